@@ -1,0 +1,130 @@
+# `make demo` and `make test` do all the set-up themselves on a fresh Debian or Ubuntu machine.
+
+VENV := .venv
+BIN := $(VENV)/bin
+PYTHON ?= python3
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+DEMO_RESULTS := demo-results
+WORKERS := 2
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+
+.PHONY: help
+help: ## list the targets
+	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/^([a-z-]+):.*## /\1|/' | awk -F'|' '{printf "  make %-8s %s\n", $$1, $$2}'
+
+# --- set-up ---------------------------------------------------------------------------------------------
+
+# Debian keeps venv in a package of its own, named after the version: python3.11-venv.
+define CREATE_VENV
+set -eu
+as_root() { if [ "$$(id -u)" = 0 ]; then "$$@"; else sudo "$$@"; fi; }
+apt_install() {
+    command -v apt-get >/dev/null || { echo "make: please install $$* and try again" >&2; exit 1; }
+    echo "Installing $$* with apt-get"
+    as_root apt-get update -qq </dev/null
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends "$$@" </dev/null >/dev/null
+}
+command -v $(PYTHON) >/dev/null || apt_install $(PYTHON) $(PYTHON)-venv
+$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
+    echo "make: posekit needs Python 3.11 or newer, $(PYTHON) is $$($(PYTHON) -c 'import platform; print(platform.python_version())'): install one and name it, as in: make PYTHON=python3.12 $(MAKECMDGOALS)" >&2
+    exit 1
+}
+$(PYTHON) -m venv --clear $(VENV) >/dev/null 2>&1 || {
+    apt_install "$$($(PYTHON) -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')"
+    $(PYTHON) -m venv --clear $(VENV)
+}
+endef
+export CREATE_VENV
+
+$(BIN)/python:
+	@bash -c "$$CREATE_VENV"
+
+# setuptools comes from constraints.txt as well, hence no build isolation.
+$(VENV)/runtime.stamp: pyproject.toml constraints.txt | $(BIN)/python
+	@echo "Installing posekit into $(VENV)"
+	@$(PIP_INSTALL) -c constraints.txt --upgrade setuptools
+	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e .
+	@touch $@
+
+$(VENV)/dev.stamp: $(VENV)/runtime.stamp
+	@echo "Installing the tools for tests and docs into $(VENV)"
+	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[dev,docs]'
+	@touch $@
+
+.PHONY: venv
+venv: $(VENV)/dev.stamp ## set up .venv with everything
+
+.PHONY: hooks
+hooks: $(VENV)/dev.stamp ## let git run the quick checks before each commit
+	$(BIN)/pre-commit install
+
+# The oldest Python that is supported: what fits it fits the later ones too.
+LOCK_PYTHON ?= python3.11
+define WRITE_LOCK
+set -euo pipefail
+fresh=$$(mktemp -d)
+trap 'rm -rf "$$fresh"' EXIT
+$(LOCK_PYTHON) -m venv "$$fresh"
+"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --upgrade setuptools
+"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[dev,docs]'
+{
+    echo '# What make installs, to the exact version. Written by `make lock` with $(LOCK_PYTHON): do not edit.'
+    "$$fresh/bin/python" -m pip freeze --disable-pip-version-check --all --exclude-editable --exclude pip
+} >constraints.txt.new
+mv constraints.txt.new constraints.txt
+endef
+export WRITE_LOCK
+
+.PHONY: lock
+lock: ## write constraints.txt anew: the newest versions that pyproject.toml allows
+	@bash -c "$$WRITE_LOCK"
+
+# --- the main job ---------------------------------------------------------------------------------------
+
+.PHONY: demo
+demo: $(VENV)/runtime.stamp ## run posekit on the built-in views, results in demo-results/
+	$(BIN)/posekit demo -o $(DEMO_RESULTS)
+
+# --- checks ---------------------------------------------------------------------------------------------
+
+.PHONY: test
+test: $(VENV)/dev.stamp ## run the tests
+	$(BIN)/python -m pytest -n $(WORKERS) tests
+
+.PHONY: format
+format: $(VENV)/dev.stamp ## rewrite the code in the project's format
+	$(BIN)/ruff check --fix-only .
+	$(BIN)/ruff format .
+
+.PHONY: lint
+lint: $(VENV)/dev.stamp ## ruff: format and rules
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+.PHONY: types
+types: $(VENV)/dev.stamp ## mypy --strict
+	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py examples/*.py)
+
+.PHONY: layers
+layers: $(VENV)/dev.stamp ## import-linter: who may import whom
+	$(BIN)/lint-imports
+
+.PHONY: docs
+docs: $(VENV)/dev.stamp ## build the documentation, warnings are errors
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	@echo "docs/_build/html/index.html"
+
+.PHONY: check
+check: lint types layers docs test ## all of the above, as CI does
+
+.PHONY: bench
+bench: $(VENV)/dev.stamp ## run every benchmark
+	@for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python "$$file" || exit 1; done
+
+.PHONY: clean
+clean: ## remove everything that make made
+	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS)
+	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find posekit validators urdf viewer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

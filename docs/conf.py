@@ -1,0 +1,30 @@
+from importlib.metadata import version as installed_version
+
+project = "posekit"
+author = "posekit developers"
+copyright = "2026, posekit developers"
+release = installed_version("posekit")
+version = ".".join(release.split(".")[:2])
+
+# No intersphinx: the documentation builds without a network.
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.mathjax",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+]
+exclude_patterns = ["_build"]
+
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 3
+
+autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": True}
+autodoc_typehints = "signature"
+autodoc_class_signature = "separated"
+napoleon_google_docstring = False
+napoleon_numpy_docstring = True
+napoleon_use_rtype = False
+
+html_theme = "furo"
+html_title = f"posekit {release}"

@@ -1,0 +1,445 @@
+"""The stick figure: one URDF, its Pinocchio model, and the way between joint positions and q."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import FigureError
+from posekit.figure.angles import Limits, ball_angles, direction_angles, limb_angles
+from posekit.figure.capsules import Capsule, read_capsules
+from posekit.figure.frames import fit_rotation, hips_frame, torso_frame, unit
+from posekit.figure.lengths import check_lengths
+from posekit.figure.stature import lengths_from_stature
+from posekit.figure.urdf import parse, read_text, rewrite
+from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, segment_name, urdf_joint_name
+
+FRAMES = {
+    "neck": "torso",
+    "pelvis": "hips",
+    **{
+        f"{side}_{joint}": f"{side}_{link}"
+        for side in SIDES
+        for joint, link in (
+            ("shoulder", "upper_arm"),
+            ("elbow", "forearm"),
+            ("hip", "thigh"),
+            ("knee", "shank"),
+        )
+    },
+}
+"""The URDF link whose origin is each point; points that are not listed have a link of their own name."""
+
+AXIS_OF_ANGLE = {"flexion": 1, "bending": 0, "abduction": 0, "rotation": 2}
+"""Flexion turns about y, bending and abduction about x, rotation about z, in this order."""
+
+
+class Configurations(NamedTuple):
+    """Configurations and how far their joints are from the postures they came from.
+
+    Attributes
+    ----------
+    q : array (N, nq)
+        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. NaN in angles of unknown joints;
+        a head that was not seen is at neutral.
+    distance : array (N,)
+        The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
+    """
+
+    q: Array
+    distance: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Figure:
+    """A stick figure, made from URDF and SRDF text by `load_figure` and changed by `scaled`.
+
+    Parameters
+    ----------
+    urdf, srdf : str
+        The texts; the model, the lengths, limits, capsules and checked pairs are read from them.
+    source : str
+        What to call it in errors.
+
+    Raises
+    ------
+    FigureError
+        Where the texts do not describe a stick figure.
+    """
+
+    urdf: str
+    srdf: str
+    source: str = "stick_figure.urdf"
+
+    def __post_init__(self) -> None:
+        parse(self.urdf, self.source)
+        names = set(self.model.names)
+        missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
+        missing += [link for link in map(_frame_name, POINTS) if not self.model.existFrame(link)]
+        if missing or self.model.nq != 7 + len(DOFS):
+            raise FigureError(
+                f"{self.source}: not a stick figure: it has {self.model.nq} configuration variables, expected "
+                f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
+            )
+        self._check_axes()
+        _ = self.capsules
+
+    @cached_property
+    def model(self) -> pin.Model:
+        """Pinocchio's model, torso on a free-flyer."""
+        try:
+            return pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
+        except (ValueError, RuntimeError) as error:
+            raise FigureError(f"{self.source}: Pinocchio cannot read it: {str(error).splitlines()[0]}") from error
+
+    @cached_property
+    def geometry(self) -> pin.GeometryModel:
+        """Pinocchio's geometry model with the SRDF's pairs."""
+        geometry = pin.buildGeomFromUrdfString(self.model, self.urdf, pin.GeometryType.COLLISION)
+        geometry.addAllCollisionPairs()
+        pin.removeCollisionPairsFromXML(self.model, geometry, self.srdf)
+        return geometry
+
+    @cached_property
+    def neutral_points(self) -> Array:
+        """The 19 points at the neutral configuration (19, 3), metres, torso frame."""
+        points = self.forward_kinematics(pin.neutral(self.model)[None])[0]
+        points.flags.writeable = False
+        return points
+
+    @cached_property
+    def lengths(self) -> Mapping[str, float]:
+        """The 17 lengths, metres, by segment name."""
+        return {
+            segment_name((a, b)): float(np.linalg.norm(self.neutral_points[a] - self.neutral_points[b]))
+            for a, b in SEGMENTS
+        }
+
+    @cached_property
+    def head_points(self) -> Array:
+        """Neck and the five head points in the paper's head frame (6, 3): x forward, y up, z right, from the neck."""
+        head = self.neutral_points[[0, *HEAD]]
+        return np.stack([head[:, 0], head[:, 2], -head[:, 1]], axis=-1)
+
+    @cached_property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """The collision bodies."""
+        return self._collision[0]
+
+    @cached_property
+    def collision_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Index pairs into `capsules` that the SRDF leaves to be checked."""
+        return self._collision[1]
+
+    @cached_property
+    def _collision(self) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
+        return read_capsules(self.model, self.geometry, self.neutral_points)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
+        index = self.angle_index
+        return Limits(
+            sign=np.array([self._axis(dof)[AXIS_OF_ANGLE[dof.split(".")[1]]] for dof in DOFS]),
+            lower=self.model.lowerPositionLimit[index],
+            upper=self.model.upperPositionLimit[index],
+        )
+
+    @cached_property
+    def angle_index(self) -> NDArray[np.intp]:
+        """Where each of `posekit.skeleton.DOFS` stands in q."""
+        return np.array([self.model.idx_qs[self.model.getJointId(urdf_joint_name(dof))] for dof in DOFS])
+
+    @cached_property
+    def configuration_names(self) -> tuple[str, ...]:
+        """A name for each entry of q: x, y, z, qx, qy, qz, qw of the torso, then the URDF's joints."""
+        names = ["x", "y", "z", "qx", "qy", "qz", "qw"] + [""] * len(DOFS)
+        for dof, index in zip(DOFS, self.angle_index, strict=True):
+            names[index] = urdf_joint_name(dof)
+        return tuple(names)
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of URDF and SRDF: what a result names to say which figure it used."""
+        return hashlib.sha256(f"{self.urdf}\0{self.srdf}".encode()).hexdigest()
+
+    def scaled(
+        self, lengths: Mapping[str, float], head_points: Mapping[str, ArrayLike] | None = None
+    ) -> Figure:
+        """Make the same figure with other lengths; capsules grow with their part.
+
+        Parameters
+        ----------
+        lengths : mapping
+            Metres, by segment name ``a-b``, a before b in tree order; others stay. Left and right are separate.
+        head_points : mapping, optional
+            Head points in the paper's head frame, metres; with ``neck`` among them, the others count from it.
+
+        Raises
+        ------
+        FigureError
+            Where a length is unknown, not positive, or no torso or hips have such lengths.
+        """
+        check_lengths(lengths)
+        head = self._head_in_link(head_points or {})
+        text = rewrite(self.urdf, self.capsules, self.neutral_points, {**self.lengths, **lengths}, head)
+        return Figure(urdf=text, srdf=self.srdf, source=self.source)
+
+    def from_stature(self, stature: float) -> Figure:
+        """Make the figure of a person of this stature (m): see `posekit.figure.stature`."""
+        lengths = lengths_from_stature(stature, dict(self.lengths))
+        ratio = lengths["neck-pelvis"] / self.lengths["neck-pelvis"]
+        head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(POINTS[len(JOINTS) :])}
+        return self.scaled(lengths, head)
+
+    def write(self, path: str | Path) -> None:
+        """Write the URDF to `path` and the SRDF beside it."""
+        path = Path(path)
+        path.write_text(self.urdf, encoding="utf-8")
+        path.with_suffix(".srdf").write_text(self.srdf, encoding="utf-8")
+
+    def forward_kinematics(self, q: Array) -> Array:
+        """Place the 19 points by Pinocchio's forward kinematics.
+
+        Parameters
+        ----------
+        q : array (N, nq)
+            Configurations with unit quaternions.
+
+        Returns
+        -------
+        array (N, 19, 3)
+            Metres; NaN where q has NaN.
+
+        Raises
+        ------
+        FigureError
+            Where q has another width or a quaternion is not of unit length: Pinocchio would place a
+            non-rotation without a word.
+        """
+        if q.ndim != 2 or q.shape[1] != self.model.nq:
+            raise FigureError(f"q has shape {q.shape}; expected (N, {self.model.nq})")
+        norm = np.linalg.norm(q[:, 3:7], axis=1)
+        if (np.abs(norm - 1) > 1e-6).any():
+            raise FigureError(
+                f"the quaternion of configuration {int(np.argmax(np.abs(norm - 1)))} has length "
+                f"{norm[np.argmax(np.abs(norm - 1))]:g}; expected 1; normalise q[3:7]"
+            )
+        model, data = self.model, self._data
+        frames = [(model.getFrameId(_frame_name(name))) for name in POINTS]
+        points = np.empty((len(q), len(POINTS), 3))
+        for k, row in enumerate(q):
+            pin.framesForwardKinematics(model, data, row)
+            oMf = data.oMf
+            points[k] = [oMf[frame].translation for frame in frames]
+        return points
+
+    def configurations(self, points: Array) -> Configurations:
+        """Turn postures into configurations, in closed form.
+
+        All branches of the decomposition are tried; the one inside the limits is taken, else the one that
+        violates them least. Where the posture has the figure's lengths, forward kinematics gives its joints
+        back; where it has not, the rigid parts are the figure's own and `distance` says how far the two are
+        apart.
+
+        Parameters
+        ----------
+        points : array (N, 14, 3) or (N, 19, 3)
+            Joints, and the head's five points where they are known, metres, any right-handed frame.
+
+        Returns
+        -------
+        Configurations
+        """
+        points = with_head(points)
+        R_torso = torso_frame(*(points[:, JOINT[j]] for j in ("neck", "right_shoulder", "left_shoulder", "pelvis")))
+        q = np.full((len(points), self.model.nq), np.nan)
+        q[:, :3] = points[:, 0]
+        q[:, 3:7] = quaternions(R_torso)
+        angles = self.angles(points, R_torso)
+        head_unknown = np.isnan(angles[:, :3])
+        angles[:, :3] = np.where(head_unknown, 0.0, angles[:, :3])
+        q[:, self.angle_index] = angles
+        placed = np.isfinite(q[:, :7]).all(axis=1)
+        distance = np.full(len(points), np.nan)
+        if placed.any():
+            joints = self.forward_kinematics(q[placed])[:, : len(JOINTS)]
+            gap = np.linalg.norm(joints - points[placed, : len(JOINTS)], axis=-1)
+            distance[placed] = np.fmax.reduce(gap, axis=1)
+        return Configurations(q, distance)
+
+    def angles(self, points: Array, R_torso: Array) -> Array:
+        """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians."""
+        joint = {name: points[:, index] for name, index in JOINT.items()}
+        R_hips = hips_frame(joint["pelvis"], joint["right_hip"], joint["left_hip"])
+        angles = np.empty((len(points), len(DOFS)))
+        angles[:, :3] = self.neck_angles(R_torso, points[:, 0], points[:, HEAD])
+        angles[:, 3:6] = self.pelvis_angles(R_torso, R_hips)
+        for k, (limb, R_parent) in enumerate(
+            ((("shoulder", "elbow", "wrist"), R_torso), (("hip", "knee", "ankle"), R_hips))
+        ):
+            for i, side in enumerate(SIDES):
+                start, middle, end = (joint[f"{side}_{name}"] for name in limb)
+                first = 6 + 8 * k + 4 * i
+                angles[:, first : first + 4] = self.limb_angles(
+                    f"{side}_{limb[0]}", R_parent, start, middle, end
+                )
+        return angles
+
+    def neck_angles(self, R_torso: Array, neck: Array, head: Array) -> Array:
+        """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
+        R_head = fit_rotation(self._head_offsets, head - neck[:, None])
+        return ball_angles(_transposed_product(R_torso, R_head), self._limits_of("neck.flexion", 3))
+
+    def pelvis_angles(self, R_torso: Array, R_hips: Array) -> Array:
+        """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
+        return ball_angles(_transposed_product(R_torso, R_hips), self._limits_of("pelvis.flexion", 3))
+
+    def limb_angles(
+        self, joint: str, R_parent: Array, start: Array, middle: Array, end: Array | None
+    ) -> Array:
+        """Find a limb's four angles (N, 4), radians; rotation and hinge NaN where its end (N, 3) is not known."""
+        limits = self._limits_of(f"{joint}.flexion", 4)
+        upper = _into(R_parent, unit(middle - start))
+        angles = np.full((len(start), 4), np.nan)
+        angles[:, :2] = direction_angles(upper, limits)
+        if end is not None:
+            known = np.isfinite(end).all(axis=1)
+            lower = _into(R_parent, unit(end - middle))
+            angles[known] = limb_angles(upper[known], lower[known], limits)
+        return angles
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self.model.createData()
+
+    @cached_property
+    def _head_offsets(self) -> Array:
+        return self.neutral_points[list(HEAD)] - self.neutral_points[0]
+
+    def _limits_of(self, first: str, count: int) -> Limits:
+        k = DOFS.index(first)
+        part = slice(k, k + count)
+        return Limits(sign=self.limits.sign[part], lower=self.limits.lower[part], upper=self.limits.upper[part])
+
+    def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
+        """Return the five head points in the head link's frame, some of them replaced."""
+        names = POINTS[len(JOINTS) :]
+        neck = np.asarray(head_points.get("neck", np.zeros(3)), dtype=np.float64)
+        head = self._head_offsets.copy()
+        for k, name in enumerate(names):
+            if name in head_points:
+                x, y, z = np.asarray(head_points[name], dtype=np.float64) - neck
+                head[k] = x, -z, y
+        if not np.isfinite(head).all() or np.linalg.norm(head.mean(axis=0)) == 0:
+            raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
+        return head
+
+    def _axis(self, dof: str) -> Array:
+        """Return a revolute's axis in its joint frame, as the URDF gives it."""
+        joint = self.model.joints[self.model.getJointId(urdf_joint_name(dof))]
+        data = joint.createData()
+        joint.calc(data, np.zeros(joint.nq))
+        return np.asarray(data.S).reshape(6)[3:]
+
+    def _check_axes(self) -> None:
+        for dof in DOFS:
+            axis = self._axis(dof)
+            expected = AXIS_OF_ANGLE[dof.split(".")[1]]
+            if abs(abs(axis[expected]) - 1) > 0:
+                raise FigureError(
+                    f"{self.source}: joint {urdf_joint_name(dof)!r} turns about {axis.tolist()}; expected plus or "
+                    f"minus the {'xyz'[expected]} axis"
+                )
+
+
+@lru_cache(maxsize=1)
+def _built_in() -> Figure:
+    folder = resources.files("posekit.urdf")
+    return Figure(
+        urdf=(folder / "stick_figure.urdf").read_text(encoding="utf-8"),
+        srdf=(folder / "stick_figure.srdf").read_text(encoding="utf-8"),
+    )
+
+
+def load_figure(path: str | Path | None = None) -> Figure:
+    """Load the built-in figure (Lee & Chen 1985, Tables A.1 and A.2), or one that `Figure.write` wrote.
+
+    Parameters
+    ----------
+    path : path, optional
+        A URDF with the stick figure's joints; an SRDF of the same name beside it, or the built-in one.
+
+    Raises
+    ------
+    FigureError
+        Where the file cannot be read or is not a stick figure.
+    """
+    if path is None:
+        return _built_in()
+    path = Path(path)
+    srdf = path.with_suffix(".srdf")
+    return Figure(
+        urdf=read_text(path),
+        srdf=read_text(srdf) if srdf.exists() else _built_in().srdf,
+        source=str(path),
+    )
+
+
+def with_head(points: Array) -> Array:
+    """Append unknown head points to postures (N, 14, 3); leave (N, 19, 3) as they are."""
+    if points.ndim != 3 or points.shape[1] not in (len(JOINTS), len(POINTS)) or points.shape[2] != 3:
+        raise FigureError(
+            f"postures have shape {points.shape}; expected (N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
+        )
+    if points.shape[1] == len(POINTS):
+        return points
+    return np.concatenate([points, np.full((len(points), len(HEAD), 3), np.nan)], axis=1)
+
+
+def quaternions(R: Array) -> Array:
+    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), order x, y, z, w, w >= 0.
+
+    The largest of the four is found first, so that no root of a small number is divided by (Shepperd 1978).
+    """
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
+    a, b, c = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
+    u, v, w = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
+    rows = np.stack(
+        [
+            np.stack([squares[:, 0], a, b, u], axis=-1),
+            np.stack([a, squares[:, 1], c, v], axis=-1),
+            np.stack([b, c, squares[:, 2], w], axis=-1),
+            np.stack([u, v, w, squares[:, 3]], axis=-1),
+        ],
+        axis=1,
+    )
+    largest = np.argmax(squares, axis=1)
+    q = np.take_along_axis(rows, largest[:, None, None], axis=1)[:, 0]
+    q = q / np.linalg.norm(q, axis=1, keepdims=True)
+    return q * np.where(q[:, 3:] < 0, -1.0, 1.0)
+
+
+def _frame_name(point: str) -> str:
+    return FRAMES.get(point, point)
+
+
+def _into(R: Array, vectors: Array) -> Array:
+    """Express camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
+    return np.einsum("nji,nj->ni", R, vectors)
+
+
+def _transposed_product(R_a: Array, R_b: Array) -> Array:
+    """Return R_a^T R_b for batches of rotations."""
+    return np.einsum("nji,njk->nik", R_a, R_b)

@@ -1,0 +1,160 @@
+"""Reading, checking and rewriting the figure's URDF text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from xml.etree import ElementTree
+
+import defusedxml
+import defusedxml.ElementTree
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.errors import FigureError
+from posekit.figure.capsules import Capsule
+from posekit.figure.lengths import hips_points, torso_points
+from posekit.skeleton import HEAD_POINTS, SIDES
+
+MAX_BYTES = 10_000_000
+MAX_LINKS = 1000
+"""Far above the figure's own 40; Pinocchio's parser overflows the stack on chains some 5000 links deep."""
+
+LIMB_SEGMENTS = (
+    ("upper_arm", "elbow_flexion", "shoulder", "elbow"),
+    ("forearm", "wrist_fixed", "elbow", "wrist"),
+    ("thigh", "knee_flexion", "hip", "knee"),
+    ("shank", "ankle_fixed", "knee", "ankle"),
+)
+"""Link, the joint at its end, and the two joints of the skeleton between which it lies."""
+
+
+def read_text(path: Path) -> str:
+    """Read a URDF or SRDF file as text, with a limit on its size."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise FigureError(f"{path}: larger than {MAX_BYTES} bytes; this is not a figure's URDF")
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise FigureError(f"{path}: cannot be read as UTF-8 text: {error}") from error
+
+
+def parse(text: str, source: str) -> ElementTree.Element:
+    """Parse XML with entities and DOCTYPE refused, every number finite, limits in order.
+
+    Raises
+    ------
+    FigureError
+        With the place that is wrong. Pinocchio would accept or silently drop most of these.
+    """
+    try:
+        robot = defusedxml.ElementTree.fromstring(text, forbid_dtd=True)
+    except ElementTree.ParseError as error:
+        raise FigureError(f"{source}: not well-formed XML: {error}") from error
+    except defusedxml.DefusedXmlException as error:
+        raise FigureError(f"{source}: DOCTYPE and entities are refused; remove them") from error
+    if robot.tag != "robot":
+        raise FigureError(f"{source}: the root element is <{robot.tag}>; expected <robot>")
+    links = len(robot.findall("link"))
+    if links > MAX_LINKS:
+        raise FigureError(f"{source}: {links} links; expected at most {MAX_LINKS}")
+    for element in robot.iter():
+        for attribute in ("xyz", "rpy", "radius", "length", "lower", "upper"):
+            if attribute in element.attrib:
+                _finite(element.attrib[attribute], f"{source}: <{element.tag} {attribute}=…>")
+    for joint in robot.findall("joint"):
+        limit = joint.find("limit")
+        if limit is not None and float(limit.get("lower", 0)) > float(limit.get("upper", 0)):
+            raise FigureError(
+                f"{source}: joint {joint.get('name')!r} has lower limit {limit.get('lower')} above its upper "
+                f"{limit.get('upper')}; swap them"
+            )
+    return robot
+
+
+def rewrite(
+    text: str, capsules: Sequence[Capsule], old: Array, lengths: Mapping[str, float], head: Array
+) -> str:
+    """Write the figure's URDF with other lengths and another head; capsules grow with their part.
+
+    A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with
+    the same ratio, the torso's with the width of the shoulders.
+
+    Parameters
+    ----------
+    text : str
+        The URDF to start from.
+    capsules : sequence of Capsule
+        Its capsules.
+    old : array (19, 3)
+        Its points at the neutral configuration, metres.
+    lengths : mapping
+        All 17 lengths, metres.
+    head : array (5, 3)
+        The head's points in the head link's frame (x forward, y left, z up, origin the neck), metres.
+
+    Returns
+    -------
+    str
+        URDF text.
+    """
+    robot = parse(text, "stick figure")
+    torso, hips = torso_points(lengths), hips_points(lengths)
+    origins = {
+        "right_shoulder_flexion": torso[1],
+        "left_shoulder_flexion": torso[2],
+        "pelvis_flexion": torso[3],
+        "right_hip_flexion": hips[1],
+        "left_hip_flexion": hips[2],
+        **{f"{name}_fixed": point for name, point in zip(HEAD_POINTS, head, strict=True)},
+    }
+    lines = {
+        "torso": (torso[0], torso[3]),
+        "hips": (hips[1], hips[2]),
+        "head": (np.zeros(3), head.mean(axis=0)),
+    }
+    for side in SIDES:
+        for part, joint, start, end in LIMB_SEGMENTS:
+            length = lengths[f"{side}_{start}-{side}_{end}"]
+            origins[f"{side}_{joint}"] = np.array([0.0, 0.0, -length])
+            lines[f"{side}_{part}"] = (np.zeros(3), origins[f"{side}_{joint}"])
+    for name, place in origins.items():
+        _find(robot, f"joint[@name='{name}']/origin").set("xyz", _numbers(place))
+    shoulders = float(np.linalg.norm(torso[1] - torso[2]) / np.linalg.norm(old[1] - old[2]))
+    for capsule in capsules:
+        start_point, end_point = lines[capsule.link]
+        line = end_point - start_point
+        length = float(np.linalg.norm(line))
+        old_start, old_end = (old[list(points)].mean(axis=0) for points in (capsule.start, capsule.end))
+        ratio = length / float(np.linalg.norm(old_end - old_start))
+        x, y, z = axis = line / length
+        collision = _find(robot, f"link[@name='{capsule.link}']/collision")
+        origin, cylinder = _find(collision, "origin"), _find(collision, "geometry/cylinder")
+        origin.set("xyz", _numbers(start_point + capsule.center * ratio * axis))
+        origin.set("rpy", _numbers(np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])))
+        cylinder.set("length", repr(2 * capsule.half_length * ratio))
+        cylinder.set("radius", repr(capsule.radius * (shoulders if capsule.link == "torso" else ratio)))
+    ElementTree.indent(robot)
+    header = "<!-- A stick figure written by posekit: metres, radians, x forward, y left, z up. -->"
+    return f'<?xml version="1.0"?>\n{header}\n{ElementTree.tostring(robot, encoding="unicode")}\n'
+
+
+def _find(element: ElementTree.Element, path: str) -> ElementTree.Element:
+    found = element.find(path)
+    if found is None:
+        raise FigureError(f"the URDF has no {path}; start from posekit's stick figure")
+    return found
+
+
+def _numbers(values: Array) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _finite(text: str, where: str) -> None:
+    try:
+        numbers = [float(word) for word in text.split()]
+    except ValueError as error:
+        raise FigureError(f"{where}: {text!r} is not a number") from error
+    if not numbers or not all(math.isfinite(number) for number in numbers):
+        raise FigureError(f"{where}: {text!r} is not finite; expected finite numbers")

@@ -1,0 +1,115 @@
+"""Write files whole or not at all: beside the target first, then renamed over it."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from posekit.errors import InputError
+from posekit.files.reading import MAX_BYTES
+from posekit.files.refusal import cut, one_line, refusal
+
+
+@contextmanager
+def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
+    """Open a file that takes the place of `path` when the block ends well, and vanishes when it does not.
+
+    Parameters
+    ----------
+    path : path
+        The target. An existing regular file is replaced and its permissions are kept; a symbolic link is
+        followed.
+    sync : bool
+        Whether to wait until the content is on the disk before the rename.
+
+    Yields
+    ------
+    binary file
+        Seekable, in the target's directory.
+
+    Raises
+    ------
+    InputError
+        Where the directory does not exist or may not be written, where the target is a directory or a
+        device, and where the disk refuses (full, for instance).
+    """
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise refusal(path, "", "a directory", "the name of a file", "add a file name")
+    if target.exists() and not target.is_file():
+        raise refusal(path, "", "a device or a pipe", "the name of a file", "choose another name")
+    if not target.parent.is_dir():
+        raise refusal(path, "", "a directory that does not exist", "an existing one", "create it first")
+    beside = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.part")
+    done = False
+    try:
+        with beside.open("xb") as file:
+            yield file
+            file.flush()
+            if sync:
+                os.fsync(file.fileno())
+        if target.exists():
+            shutil.copymode(target, beside)
+        beside.replace(target)
+        done = True
+    except OSError as error:
+        reason = cut(one_line(error.strerror or str(error)))
+        raise refusal(
+            path, "", reason, "a file that can be written", "check permissions and free space"
+        ) from None
+    finally:
+        if not done:
+            beside.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, pieces: Iterable[str]) -> None:
+    """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all.
+
+    The bound is that of `posekit.files.read_json`: what is written can be read again.
+    """
+    written = 0
+    with replacing(path) as file:
+        for piece in pieces:
+            written += file.write(piece.encode("utf-8"))
+            if written > MAX_BYTES:
+                raise too_large_to_read(path)
+
+
+def too_large_to_read(path: str | Path) -> InputError:
+    """Word why a JSON file that could not be read again is not written."""
+    return refusal(
+        path,
+        "",
+        f"more than {MAX_BYTES / 1e6:.0f} MB of JSON",
+        "a file that can be read again",
+        "name it .npz where the command writes that, or split the input",
+    )
+
+
+def json_pieces(head: dict[str, Any], name: str, items: Iterable[dict[str, Any]]) -> Iterator[str]:
+    """Spell ``{**head, name: [items]}`` as JSON, one entry and one item a line, without holding it whole.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not finite: what may be unknown is to be given as None.
+    """
+    yield "{\n"
+    for key, value in head.items():
+        yield f" {_spell(key)}: {_spell(value)},\n"
+    yield f" {_spell(name)}: ["
+    separator = "\n"
+    for item in items:
+        yield f"{separator}  {_spell(item)}"
+        separator = ",\n"
+    yield "\n ]\n}\n"
+
+
+def _spell(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)

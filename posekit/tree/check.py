@@ -1,0 +1,73 @@
+"""The protocol between the interpretation tree and whatever judges its nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Findings:
+    """What a check found in N postures at K places.
+
+    Parameters
+    ----------
+    value : array (N, K)
+        The judged quantity in the check's unit; NaN where it is undecided: not applicable, too close to
+        call, or a joint is missing.
+    lower, upper : array broadcastable to (N, K)
+        Its bounds.
+    tolerance : float
+        How far outside a bound is still not a violation (rounding, stated noise), in the same unit.
+    """
+
+    value: Array
+    lower: Array
+    upper: Array
+    tolerance: float = 0.0
+
+    @property
+    def margin(self) -> Array:
+        """Distance to the nearer bound (N, K): negative outside, NaN undecided."""
+        return np.minimum(self.value - self.lower, self.upper - self.value)
+
+    @property
+    def violated(self) -> NDArray[np.bool_]:
+        """Where the value is outside its bounds by more than the tolerance (N, K); False where undecided."""
+        return self.margin < -self.tolerance
+
+    @property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Where nothing could be judged (N, K)."""
+        return np.isnan(self.margin)
+
+
+class Check(Protocol):
+    """One kind of judgement over a fixed set of points, in batches.
+
+    Attributes
+    ----------
+    name : str
+        The validator's name, ``joint_range``.
+    where : tuple of str
+        The K places it judges: ``("right_elbow.flexion",)``.
+    unit : str
+        Unit of its values.
+    points : tuple of int
+        Indices into `posekit.skeleton.POINTS` of the points it reads. The tree applies it at the first level
+        where all of them are known.
+    """
+
+    name: str
+    where: tuple[str, ...]
+    unit: str
+    points: tuple[int, ...]
+
+    def judge(self, points: Array) -> Findings:
+        """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""
+        ...

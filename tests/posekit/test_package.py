@@ -1,0 +1,89 @@
+"""The package as it is installed: its version, its files, and an import that does nothing else."""
+
+import importlib.metadata
+import subprocess
+import sys
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LINKED = ("urdf", "validators", "viewer")
+
+# Reports every file opened for writing, socket, process and logging handler between the two marks.
+IMPORT_AND_REPORT = """
+import logging, os, sys, threading
+seen = []
+def hook(event, args):
+    if event in {"socket.__new__", "socket.connect", "socket.bind", "subprocess.Popen", "os.system", "os.mkdir"}:
+        seen.append(event)
+    if event == "open" and isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+        seen.append(f"open {args[0]}")
+sys.dont_write_bytecode = True
+modules = MODULES
+sys.addaudithook(hook)
+for module in modules:
+    __import__(module)
+seen += [f"handler {handler}" for handler in logging.getLogger().handlers]
+seen += [f"handler {handler}" for handler in logging.getLogger("posekit").handlers]
+seen += [f"thread {thread}" for thread in threading.enumerate() if thread is not threading.main_thread()]
+print("\\n".join(seen))
+"""
+
+
+def run_python(code: str) -> str:
+    finished = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False, timeout=60, cwd=ROOT
+    )
+    assert finished.returncode == 0, finished.stderr
+    assert finished.stderr == ""
+    return finished.stdout.strip()
+
+
+def test_version_is_that_of_pyproject() -> None:
+    import posekit
+
+    try:
+        importlib.metadata.version("posekit")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("posekit is imported from its folder, not installed")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert posekit.__version__ == project["version"]
+
+
+def test_import_does_nothing_else() -> None:
+    assert run_python(IMPORT_AND_REPORT.replace("MODULES", '["posekit", "posekit.skeleton", "posekit.errors"]')) == ""
+
+
+@pytest.mark.parametrize("heavy", ["pinocchio", "coal", "meshcat", "pydantic", "yourdfpy"])
+def test_cameras_and_tree_are_numpy_alone(heavy: str) -> None:
+    code = f"import sys, posekit.cameras, posekit.skeleton, posekit.tree; print({heavy!r} in sys.modules)"
+    assert run_python(code) == "False"
+
+
+def test_unknown_attribute_is_an_attribute_error() -> None:
+    import posekit
+
+    with pytest.raises(AttributeError, match="no_such_name"):
+        posekit.no_such_name  # noqa: B018 (the access is the test)
+
+
+@pytest.mark.parametrize("name", ["py.typed", "urdf/stick_figure.urdf", "urdf/stick_figure.srdf"])
+def test_data_files_are_in_the_package(name: str) -> None:
+    assert files("posekit").joinpath(name).is_file()
+
+
+def test_linked_folders_are_packages_of_posekit() -> None:
+    for name in LINKED:
+        link = ROOT / "posekit" / name
+        if link.exists():
+            assert link.is_symlink()
+            assert not link.readlink().is_absolute()
+            assert link.resolve() == ROOT / name
+
+
+def test_test_files_have_unique_names() -> None:
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert len(names) == len(set(names))
