@@ -21,7 +21,7 @@ from posekit.figure.capsules import Capsule, read_capsules
 from posekit.figure.frames import fit_rotation, hips_frame, torso_frame, unit
 from posekit.figure.lengths import check_lengths
 from posekit.figure.stature import lengths_from_stature
-from posekit.figure.urdf import parse, read_text, rewrite
+from posekit.figure.urdf import parse, read_text, replace_limits, rewrite
 from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, segment_name, urdf_joint_name
 
 FRAMES = {
@@ -202,6 +202,11 @@ class Figure:
         head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(POINTS[len(JOINTS) :])}
         return self.scaled(lengths, head)
 
+    def with_limits(self, limits: Mapping[str, tuple[float, float]]) -> Figure:
+        """Make the same figure with other joint limits (radians), by name in `posekit.skeleton.DOFS`."""
+        named = {urdf_joint_name(dof): bounds for dof, bounds in limits.items()}
+        return Figure(urdf=replace_limits(self.urdf, named), srdf=self.srdf, source=self.source)
+
     def write(self, path: str | Path) -> None:
         """Write the URDF to `path` and the SRDF beside it."""
         path = Path(path)
@@ -296,9 +301,13 @@ class Figure:
                 )
         return angles
 
+    def head_frame(self, neck: Array, head: Array) -> Array:
+        """Lay the figure's head onto seen head points (N, 5, 3): R_cam_head (N, 3, 3), NaN where they are unknown."""
+        return fit_rotation(self._head_offsets, head - neck[:, None])
+
     def neck_angles(self, R_torso: Array, neck: Array, head: Array) -> Array:
         """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
-        R_head = fit_rotation(self._head_offsets, head - neck[:, None])
+        R_head = self.head_frame(neck, head)
         return ball_angles(_transposed_product(R_torso, R_head), self._limits_of("neck.flexion", 3))
 
     def pelvis_angles(self, R_torso: Array, R_hips: Array) -> Array:

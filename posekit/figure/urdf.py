@@ -135,6 +135,20 @@ def rewrite(
         origin.set("rpy", _numbers(np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])))
         cylinder.set("length", repr(2 * capsule.half_length * ratio))
         cylinder.set("radius", repr(capsule.radius * (shoulders if capsule.link == "torso" else ratio)))
+    return _text(robot)
+
+
+def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
+    """Write the figure's URDF with other limits (radians) on some joints."""
+    robot = parse(text, "stick figure")
+    for name, (lower, upper) in limits.items():
+        limit = _find(robot, f"joint[@name='{name}']/limit")
+        limit.set("lower", repr(float(lower)))
+        limit.set("upper", repr(float(upper)))
+    return _text(robot)
+
+
+def _text(robot: ElementTree.Element) -> str:
     ElementTree.indent(robot)
     header = "<!-- A stick figure written by posekit: metres, radians, x forward, y left, z up. -->"
     return f'<?xml version="1.0"?>\n{header}\n{ElementTree.tostring(robot, encoding="unicode")}\n'

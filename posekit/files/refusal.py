@@ -67,7 +67,3 @@ def nearest(name: str, names: Iterable[str]) -> str:
         return f"did you mean {' or '.join(near)}?"
     return f"valid names are {', '.join(valid)}"
 
-
-def unknown_name(name: str, names: Iterable[str], kind: str) -> tuple[str, str]:
-    """Word what was expected and the remedy where a name of some kind is unknown."""
-    return f"the name of a {kind}", nearest(name, names)

@@ -18,7 +18,7 @@ METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units in one metre. Whole numbers, so that dividing by them gives the float nearest to the decimal."""
 
-_LENGTH = re.compile(r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-zµ]*)", re.ASCII | re.I)
+_LENGTH = re.compile(r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-z]*)", re.ASCII | re.I)
 
 
 def to_metres(values: ArrayLike, unit: str) -> NDArray[np.float64]:

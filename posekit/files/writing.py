@@ -39,16 +39,11 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
         Where the directory does not exist or may not be written, where the target is a directory or a
         device, and where the disk refuses (full, for instance).
     """
-    target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise refusal(path, "", "a directory", "the name of a file", "add a file name")
-    if target.exists() and not target.is_file():
-        raise refusal(path, "", "a device or a pipe", "the name of a file", "choose another name")
-    if not target.parent.is_dir():
-        raise refusal(path, "", "a directory that does not exist", "an existing one", "create it first")
-    beside = target.with_name(f".{target.name[:100]}.{secrets.token_hex(6)}.part")
     done = False
+    beside = None
     try:
+        target = _target(path)
+        beside = target.with_name(f".{secrets.token_hex(8)}.part")
         with beside.open("xb") as file:
             yield file
             file.flush()
@@ -64,8 +59,20 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
             path, "", reason, "a file that can be written", "check permissions and free space"
         ) from None
     finally:
-        if not done:
+        if beside is not None and not done:
             beside.unlink(missing_ok=True)
+
+
+def _target(path: str | Path) -> Path:
+    """Follow links and refuse what may not be replaced: a device that is renamed over is gone."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise refusal(path, "", "a directory", "the name of a file", "add a file name")
+    if target.exists() and not target.is_file():
+        raise refusal(path, "", "a device or a pipe", "the name of a file", "choose another name")
+    if not target.parent.is_dir():
+        raise refusal(path, "", "a directory that does not exist", "an existing one", "create it first")
+    return target
 
 
 def write_text(path: str | Path, pieces: Iterable[str]) -> None:
@@ -112,4 +119,4 @@ def json_pieces(head: dict[str, Any], name: str, items: Iterable[dict[str, Any]]
 
 
 def _spell(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+    return json.dumps(value, allow_nan=False)

@@ -24,12 +24,15 @@ class Findings:
         Its bounds.
     tolerance : float
         How far outside a bound is still not a violation (rounding, stated noise), in the same unit.
+    rejects : bool array (N, K), optional
+        The verdict itself, where another library gave it; else it follows from value and bounds.
     """
 
     value: Array
     lower: Array
     upper: Array
     tolerance: float = 0.0
+    rejects: NDArray[np.bool_] | None = None
 
     @property
     def margin(self) -> Array:
@@ -39,7 +42,7 @@ class Findings:
     @property
     def violated(self) -> NDArray[np.bool_]:
         """Where the value is outside its bounds by more than the tolerance (N, K); False where undecided."""
-        return self.margin < -self.tolerance
+        return self.margin < -self.tolerance if self.rejects is None else self.rejects
 
     @property
     def undecided(self) -> NDArray[np.bool_]:

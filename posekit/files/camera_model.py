@@ -1,0 +1,122 @@
+"""The camera that a view was taken with, as far as its file knows it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import PinholeCamera
+from posekit.errors import CameraError
+
+Array = NDArray[np.float64]
+
+ORTHONORMAL = 1e-6
+"""How far R R^T may be from the identity, entry by entry: files round R to six digits or more."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LeeChenModel:
+    """The camera of Lee & Chen 1985.
+
+    Parameters
+    ----------
+    f : float or None
+        Distance from the centre of projection to the image plane, metres; None where it is not known.
+    """
+
+    f: float | None
+
+    def __post_init__(self) -> None:
+        if self.f is not None:
+            check_positive("f", self.f)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OpenCVModel:
+    """A calibrated pinhole camera in OpenCV's convention.
+
+    Parameters
+    ----------
+    K : array (3, 3)
+        Intrinsics, pixels.
+    distortion : array (5,), optional
+        k1, k2, p1, p2, k3.
+    R : array (3, 3), optional
+        Rotation from the world to the camera: ``p_cam = R p_world + t``.
+    t : array (3,), optional
+        Translation of the same, metres.
+    size : (int, int), optional
+        Width and height of the picture, pixels.
+    """
+
+    K: Array
+    distortion: Array | None = None
+    R: Array | None = None
+    t: Array | None = None
+    size: tuple[int, int] | None = None
+
+    def __post_init__(self) -> None:
+        camera = PinholeCamera(K=self.K, distortion=self.distortion)
+        if camera.K.ndim != 2:
+            raise CameraError("K must be of shape (3, 3): one for all frames")
+        object.__setattr__(self, "K", camera.K)
+        object.__setattr__(self, "distortion", camera.distortion)
+        for name in ("R", "t"):
+            value = getattr(self, name)
+            if value is not None:
+                array = np.array(value, dtype=np.float64)
+                array.flags.writeable = False
+                object.__setattr__(self, name, array)
+        if self.R is not None:
+            check_rotation(self.R)
+        if self.t is not None and (self.t.shape != (3,) or not np.isfinite(self.t).all()):
+            raise CameraError(f"t must be three finite numbers; got {self.t.tolist()}")
+        if self.size is not None and not (len(self.size) == 2 and min(self.size) > 0):
+            raise CameraError(f"size must be a positive width and height in pixels; got {self.size}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScaledOrthographicModel:
+    """The uncalibrated camera of Taylor 2000: ``(u, v) = s (x, y)``.
+
+    Parameters
+    ----------
+    scale : float or None
+        s, pixels a metre (files give pixels a `unit`); None where it is not known.
+    """
+
+    scale: float | None
+
+    def __post_init__(self) -> None:
+        if self.scale is not None:
+            check_positive("scale", self.scale)
+
+
+CameraModel = LeeChenModel | OpenCVModel | ScaledOrthographicModel
+
+
+def check_positive(name: str, value: float) -> None:
+    """Refuse a focal length or a scale that is not positive and finite."""
+    if not (math.isfinite(value) and value > 0):
+        raise CameraError(f"{name} must be positive and finite; got {value:g}")
+
+
+def check_intrinsics(K: list[list[float]]) -> None:
+    """Refuse a K that is no camera's."""
+    PinholeCamera(K=np.array(K))
+
+
+def check_rotation(R: Array | list[list[float]]) -> None:
+    """Refuse a matrix that is not orthonormal to 1e-6 or that mirrors."""
+    matrix = np.asarray(R, dtype=np.float64)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise CameraError("R must be a finite 3x3 matrix")
+    with np.errstate(over="ignore", invalid="ignore"):
+        error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    if not error <= ORTHONORMAL:
+        raise CameraError(f"R must be a rotation; R R^T is off the identity by {error:.2g}")
+    if np.linalg.det(matrix) < 0:
+        raise CameraError("R must be a rotation; its determinant is -1, so it mirrors")

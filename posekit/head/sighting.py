@@ -1,0 +1,63 @@
+"""The image points of a batch of heads: which are seen, and which frames can be used."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import HeadError
+from posekit.head.points import DEGENERATE, HeadPoints, degeneracy
+
+
+class Sighting(NamedTuple):
+    """Image points of F heads of P points.
+
+    Attributes
+    ----------
+    image : array (F, P, 2)
+        Image points, 0 where they are not seen.
+    seen : bool array (F, P)
+        Whether a point is seen.
+    reasons : list of str
+        One a frame: why it determines no camera; empty where it may.
+    """
+
+    image: Array
+    seen: NDArray[np.bool_]
+    reasons: list[str]
+
+
+def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
+    """Check image points (P, 2) or (F, P, 2), NaN where a point is not seen.
+
+    Raises
+    ------
+    HeadError
+        Where the shape does not fit the head or a coordinate is infinite.
+    """
+    points = np.array(image, dtype=np.float64)
+    count = len(head.names)
+    if points.ndim == 2:
+        points = points[None]
+    if points.ndim != 3 or points.shape[1:] != (count, 2):
+        raise HeadError(
+            f"image points have shape {np.shape(image)}; expected ({count}, 2) or (F, {count}, 2), one row for "
+            f"each of {', '.join(head.names)}, NaN where a point is not seen"
+        )
+    if np.isinf(points).any():
+        frame, row, _ = np.argwhere(np.isinf(points))[0]
+        raise HeadError(
+            f"frame {frame}: head point {head.names[row]} is at {points[frame, row].tolist()} in the image; expected "
+            "finite numbers, or NaN where it is not seen"
+        )
+    seen = ~np.isnan(points).any(axis=-1)
+    points[~seen] = 0.0
+    patterns, which = np.unique(seen, axis=0, return_inverse=True)
+    by_pattern = [degeneracy(head.names, head.points, pattern) for pattern in patterns]
+    reasons = [by_pattern[pattern] or "" for pattern in which.reshape(-1)]
+    for frame, reason in zip(np.flatnonzero(flat(points, seen)), _flat_reasons(points, seen), strict=True):
+        reasons[frame] = reasons[frame] or reason
+    return Sighting(points, seen, reasons)

@@ -1,0 +1,183 @@
+"""The living nodes of a tree over many frames, and the record of the branches that were pruned."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.tree.bits import Codes, path_of, select
+from posekit.tree.candidates import Candidates
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pruned:
+    """P branches that one check pruned at one level, each with the finding that killed it.
+
+    Parameters
+    ----------
+    level : int
+        The tree's level; a pruned node stands for all 2^(J-1-level) leaves below it.
+    frame, code : int array (P,)
+        The frames and branch codes of the pruned nodes.
+    check : str
+        Who rejected it.
+    where : tuple of str
+        The check's places.
+    unit : str
+        Of value, lower and upper.
+    place : int array (P,)
+        Index into `where` of the first place that was violated.
+    value, lower, upper : array (P,)
+        What was found there, and the bounds.
+    """
+
+    level: int
+    frame: NDArray[np.int32]
+    code: Codes
+    check: str
+    where: tuple[str, ...]
+    unit: str
+    place: NDArray[np.int8]
+    value: Array
+    lower: Array
+    upper: Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Leaves:
+    """Living nodes at one level of the tree, sorted by frame, then by code.
+
+    Parameters
+    ----------
+    joints, parents
+        The tree's.
+    candidates : Candidates
+        Positions of all joints.
+    given : array (F, G, 3)
+        Points known beforehand.
+    level : int
+        How many joints beyond the root the codes cover.
+    frame, code : int array (N,)
+        Frame and branch code of each node.
+    pruned : tuple of Pruned
+        What was pruned so far, in order.
+    """
+
+    joints: tuple[str, ...]
+    parents: tuple[int, ...]
+    candidates: Candidates
+    given: Array
+    level: int
+    frame: NDArray[np.int32]
+    code: Codes
+    pruned: tuple[Pruned, ...]
+
+    @staticmethod
+    def start(
+        joints: tuple[str, ...],
+        parents: tuple[int, ...],
+        candidates: Candidates,
+        given: Array | None,
+        root: Array,
+    ) -> Leaves:
+        """Make the roots of F trees."""
+        return Leaves(
+            joints=joints,
+            parents=parents,
+            candidates=candidates,
+            given=np.empty((len(root), 0, 3)) if given is None else given,
+            level=0,
+            frame=np.arange(len(root), dtype=np.int32),
+            code=np.zeros(len(root), dtype=np.int32),
+            pruned=(),
+        )
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames F."""
+        return len(self.given)
+
+    def keep(
+        self,
+        alive: NDArray[np.bool_],
+        frame: NDArray[np.int32],
+        code: Codes,
+        level: int,
+        pruned: tuple[Pruned, ...],
+    ) -> Leaves:
+        """Keep the nodes that are alive."""
+        return replace(self, level=level, frame=frame[alive], code=code[alive], pruned=pruned)
+
+    def support(self, points: Sequence[int]) -> tuple[int, ...]:
+        """Return the joints on whose branches the positions of some points depend, in tree order."""
+        on_paths = {
+            joint for point in points if point < len(self.joints) for joint in path_of(point, self.parents)
+        }
+        return tuple(sorted(on_paths))
+
+    def positions(self, points: Sequence[int], nodes: NDArray[np.intp] | NDArray[np.int32]) -> Array:
+        """Place some points in some nodes: (len(nodes), len(points), 3), camera frame, metres."""
+        frame, code = self.frame[nodes], self.code[nodes]
+        placed = np.empty((len(nodes), len(points), 3))
+        for column, point in enumerate(points):
+            if point >= len(self.joints):
+                placed[:, column] = self.given[frame, point - len(self.joints)]
+            else:
+                path = select(self.level, path_of(point, self.parents))[code]
+                placed[:, column] = self.candidates.positions[point][frame, path]
+        return placed
+
+    def postures(self) -> Array:
+        """Place all joints in all nodes: (N, J, 3), camera frame, metres; NaN where a joint is unknown."""
+        return self.positions(range(len(self.joints)), np.arange(len(self.code)))
+
+    def length_residual(self) -> Array:
+        """Return how much longer than the body's the longest drawn-out segment of each node is (N,), metres.
+
+        Zero but where a segment was too short for its image and was taken as tangent to the ray.
+        """
+        worst = np.zeros(len(self.code))
+        for joint in range(1, self.level + 1):
+            path = select(self.level, path_of(joint, self.parents))[self.code]
+            worst = np.fmax(worst, self.candidates.excess[joint][self.frame, path])
+        return worst
+
+    def branches(self) -> list[str]:
+        """Write each node's code as a string of 0 (near) and 1 (far), the first joint's first."""
+        return [f"{code:0{self.level}b}" if self.level else "" for code in self.code.tolist()]
+
+    def counts(self) -> NDArray[np.int64]:
+        """Count survivors per frame and level (F, J): distinct prefixes of the living leaves (§4.1.B)."""
+        counts = np.zeros((self.n_frames, len(self.joints)), dtype=np.int64)
+        first = np.ones(len(self.code), dtype=bool)
+        first[1:] = self.frame[1:] != self.frame[:-1]
+        for level in range(self.level + 1):
+            prefix = self.code >> (self.level - level)
+            new = first.copy()
+            new[1:] |= prefix[1:] != prefix[:-1]
+            counts[:, level] = np.bincount(self.frame[new], minlength=self.n_frames)
+        return counts
+
+    def offsets(self) -> NDArray[np.int64]:
+        """Return where each frame's nodes start and the last ends (F + 1,)."""
+        return np.searchsorted(self.frame, np.arange(self.n_frames + 1)).astype(np.int64)
+
+    def rejected(self) -> list[dict[str, int]]:
+        """Count, by frame and reason, the leaves of the full tree that were lost; with the survivors, 2^(J-1)."""
+        totals: list[dict[str, int]] = [{} for _ in range(self.n_frames)]
+        depth = len(self.joints) - 1
+        for group in self.pruned:
+            weight = 1 << (depth - group.level)
+            n_places = len(group.where)
+            table = np.bincount(
+                group.frame * n_places + group.place, minlength=self.n_frames * n_places
+            ).reshape(-1, n_places)
+            for frame, place in zip(*np.nonzero(table), strict=True):
+                reason = f"{group.check}/{group.where[place]}"
+                count = int(table[frame, place]) * weight
+                totals[frame][reason] = totals[frame].get(reason, 0) + count
+        return totals

@@ -1,0 +1,12 @@
+"""What bodies can do, one kind of check a file.
+
+Each module makes checks (`posekit.tree.Check`) for a figure: small judges of a few points in batches, which
+the interpretation tree asks as soon as those points are known, and `Validator` asks about whole postures.
+"""
+
+from posekit.validators.collision import collision as collision
+from posekit.validators.joint_range import joint_range as joint_range
+from posekit.validators.ranges import Ranges as Ranges
+from posekit.validators.ranges import load_ranges as load_ranges
+from posekit.validators.rigid_parts import rigid_parts as rigid_parts
+from posekit.validators.walking import walking as walking

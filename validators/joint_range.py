@@ -1,0 +1,133 @@
+"""Joint ranges: is there a configuration inside the limits that gives the posture?
+
+Two kinds: the URDF's own angles (this file), or the paper's projected angles (`projected_angles`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.figure import Figure
+from posekit.figure.frames import hips_frame, torso_frame
+from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
+from posekit.tree import Check, Findings
+from posekit.validators.projected_angles import projected_angles
+from posekit.validators.ranges import URDF_RANGES, Ranges
+
+TOLERANCE = 1e-3
+"""Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
+
+TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
+HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
+
+
+def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES) -> list[Check]:
+    """Make the checks of the joint ranges.
+
+    With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
+    laid onto the posture, and the limbs' directions are the posture's. Shoulder and hip are judged when
+    elbow and knee are known, with the axial rotation free, and again, with it, when wrist and ankle are.
+    With ``projected`` they judge the posture itself.
+
+    Parameters
+    ----------
+    figure : Figure
+        Its limits are the ranges where `ranges` gives none.
+    ranges : Ranges
+    """
+    if ranges.kind == "projected":
+        return projected_angles(figure, ranges)
+    if ranges.limits:
+        figure = figure.with_limits({dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()})
+    checks: list[Check] = [Neck(figure=figure), Pelvis(figure=figure)]
+    for side in SIDES:
+        for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
+            joints = tuple(f"{side}_{joint}" for joint in limb)
+            checks += [Limb(figure=figure, limb=joints[:2]), Limb(figure=figure, limb=joints)]
+    return checks
+
+
+def _findings(figure: Figure, where: tuple[str, ...], angles: Array) -> Findings:
+    rows = [DOFS.index(dof) for dof in where]
+    return Findings(
+        value=np.degrees(angles),
+        lower=np.degrees(figure.limits.lower[rows]),
+        upper=np.degrees(figure.limits.upper[rows]),
+        tolerance=TOLERANCE,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Neck:
+    """Flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
+
+    figure: Figure
+    name: str = "joint_range"
+    where: tuple[str, ...] = ("neck.flexion", "neck.bending", "neck.rotation")
+    unit: str = "deg"
+    points: tuple[int, ...] = TORSO_POINTS + HEAD
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the neck's three angles; see `posekit.tree.Check`."""
+        R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
+        angles = self.figure.neck_angles(R_torso, points[:, 0], points[:, 4:])
+        return _findings(self.figure, self.where, angles)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Pelvis:
+    """Flexion, bending and rotation of the hips under the torso."""
+
+    figure: Figure
+    name: str = "joint_range"
+    where: tuple[str, ...] = ("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
+    unit: str = "deg"
+    points: tuple[int, ...] = TORSO_POINTS + HIPS_POINTS[1:]
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the pelvis's three angles; see `posekit.tree.Check`."""
+        R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
+        R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
+        return _findings(self.figure, self.where, self.figure.pelvis_angles(R_torso, R_hips))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limb:
+    """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
+
+    Parameters
+    ----------
+    limb : tuple of str
+        ``("right_shoulder", "right_elbow", "right_wrist")``, or the first two.
+    """
+
+    figure: Figure
+    limb: tuple[str, ...]
+    name: str = "joint_range"
+    unit: str = "deg"
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The angles judged."""
+        first = DOFS.index(f"{self.limb[0]}.flexion")
+        return DOFS[first : first + (2 if len(self.limb) == 2 else 4)]
+
+    @property
+    def _parent(self) -> tuple[int, ...]:
+        return TORSO_POINTS if self.limb[0].endswith("shoulder") else HIPS_POINTS
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The rigid part the limb hangs on, then the limb's joints."""
+        return self._parent + tuple(JOINT[joint] for joint in self.limb)
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the limb's angles; see `posekit.tree.Check`."""
+        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
+        R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
+        end = limb[2] if len(limb) == 3 else None
+        angles = self.figure.limb_angles(self.limb[0], R_parent, limb[0], limb[1], end)
+        return _findings(self.figure, self.where, angles[:, : len(self.where)])

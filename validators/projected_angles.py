@@ -1,0 +1,201 @@
+"""The angles of Lee & Chen 1985, §3.2.A: projections onto the planes of the torso's frame.
+
+The torso's frame has y from neck to pelvis, z from right to left shoulder and x = y x z forward. Where the
+print and the anatomy disagree (the knee's sign) or the print is silent (a projection without direction), what
+holds is said at the angle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.figure import Figure
+from posekit.figure.frames import cross, torso_frame
+from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
+from posekit.tree import Check, Findings
+from posekit.validators.ranges import Ranges
+
+TOLERANCE = 1e-3
+TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
+
+
+def projected_angles(figure: Figure, ranges: Ranges) -> list[Check]:
+    """Make the checks of Table 1; they judge the posture itself."""
+    checks: list[Check] = [HeadPlane(figure=figure, ranges=ranges), HipPlane(ranges=ranges)]
+    for side in SIDES:
+        for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
+            checks += [
+                BallJoint(ranges=ranges, side=side, limb=limb[:2]),
+                Hinge(ranges=ranges, side=side, limb=limb),
+            ]
+    return checks
+
+
+def paper_axes(points: Array) -> Array:
+    """Return the rows x, y, z of the paper's torso frame (N, 3, 3) from neck, shoulders and pelvis (N, 4, 3)."""
+    R = torso_frame(*np.moveaxis(points, 1, 0))
+    return np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
+
+
+def angle_in_plane(x: Array, y: Array, shortest: Array | float) -> Array:
+    """Return the angle (deg) from the y axis towards x, NaN where the projection (x, y) is too short."""
+    angle = np.degrees(np.arctan2(x, y))
+    return np.where(np.hypot(x, y) < shortest, np.nan, angle)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BallJoint:
+    """Shoulder or hip: flexion in the xy plane, abduction in the yz plane (§3.2.A i).
+
+    Flexion is the angle from y to the projection of the limb's upper segment, towards x; abduction the one
+    in the yz plane, away from the body. Either is undecided where its projection is shorter than
+    `Ranges.shortest_projection` of the segment: an arm held straight forward has no abduction.
+    """
+
+    ranges: Ranges
+    side: str
+    limb: tuple[str, ...]
+    name: str = "joint_range"
+    unit: str = "deg"
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Flexion and abduction."""
+        return tuple(f"{self.side}_{self.limb[0]}.{angle}" for angle in ("flexion", "abduction"))
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The torso, then the joint and the one beyond."""
+        return TORSO_POINTS + tuple(JOINT[f"{self.side}_{joint}"] for joint in self.limb)
+
+    def judge(self, points: Array) -> Findings:
+        """Judge both angles; see `posekit.tree.Check`."""
+        u = np.einsum("nij,nj->ni", paper_axes(points[:, :4]), points[:, 5] - points[:, 4])
+        shortest = self.ranges.shortest_projection * np.linalg.norm(u, axis=1)
+        outward = u[:, 2] if self.side == "left" else -u[:, 2]
+        value = np.stack(
+            [angle_in_plane(u[:, 0], u[:, 1], shortest), angle_in_plane(outward, u[:, 1], shortest)], axis=-1
+        )
+        bounds = np.array([self.ranges.limits[f"{self.limb[0]}.{a}"] for a in ("flexion", "abduction")])
+        return Findings(value=value, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=TOLERANCE)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hinge:
+    r"""Elbow or knee: the angle between the two segments, signed (§3.2.A ii); the hip's range goes with it.
+
+    With u the upper and v the lower segment, elbow flexion has :math:`(v \times u)_z \ge 0`. The paper says
+    the knee's is "similarly defined"; a shank bends backward, so its sign is the opposite. At the knee the
+    hip's flexion is judged again: its range is the wide one only where the knee is flexed (Table 1, note a).
+    """
+
+    ranges: Ranges
+    side: str
+    limb: tuple[str, ...]
+    name: str = "joint_range"
+    unit: str = "deg"
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The hinge's flexion; at the knee, the hip's too."""
+        hinge = f"{self.side}_{self.limb[1]}.flexion"
+        return (hinge,) if self.limb[1] == "elbow" else (hinge, f"{self.side}_hip.flexion")
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The torso, then the limb's three joints."""
+        return TORSO_POINTS + tuple(JOINT[f"{self.side}_{joint}"] for joint in self.limb)
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the hinge; see `posekit.tree.Check`."""
+        axes = paper_axes(points[:, :4])
+        u = np.einsum("nij,nj->ni", axes, points[:, 5] - points[:, 4])
+        v = np.einsum("nij,nj->ni", axes, points[:, 6] - points[:, 5])
+        w = cross(v, u)
+        psi = np.degrees(np.arctan2(np.linalg.norm(w, axis=1), np.einsum("ni,ni->n", u, v)))
+        forward = w[:, 2] if self.limb[1] == "elbow" else -w[:, 2]
+        flexion = np.where(forward >= 0, psi, -psi)
+        lower, upper = self.ranges.limits[f"{self.limb[1]}.flexion"]
+        if self.limb[1] == "elbow":
+            return Findings(
+                value=flexion[:, None], lower=np.array([lower]), upper=np.array([upper]), tolerance=TOLERANCE
+            )
+        hip = angle_in_plane(u[:, 0], u[:, 1], self.ranges.shortest_projection * np.linalg.norm(u, axis=1))
+        flexed = flexion > self.ranges.knee_flexed
+        wide, narrow = (self.ranges.limits[f"hip.{a}"] for a in ("flexion", "flexion_with_straight_knee"))
+        return Findings(
+            value=np.stack([flexion, hip], axis=-1),
+            lower=np.stack([np.full(len(hip), lower), np.where(flexed, wide[0], narrow[0])], axis=-1),
+            upper=np.stack([np.full(len(hip), upper), np.where(flexed, wide[1], narrow[1])], axis=-1),
+            tolerance=TOLERANCE,
+        )
+
+
+def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
+    """Return flexion, rotation and bending (N, 3), deg, of a plane against the torso's (§3.2.A iii).
+
+    Flexion is measured from x to the normal's projection on xy, positive where the normal rises (towards
+    -y); rotation to its projection on zx, positive towards z; bending from y to the projection of `along` on
+    yz, positive towards z.
+    """
+    shortest = ranges.shortest_projection
+    return np.stack(
+        [
+            angle_in_plane(-normal[:, 1], normal[:, 0], shortest),
+            angle_in_plane(normal[:, 2], normal[:, 0], shortest),
+            angle_in_plane(along[:, 2], along[:, 1], shortest * np.linalg.norm(along, axis=1)),
+        ],
+        axis=-1,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HipPlane:
+    """Pelvis: the hips' plane against the torso's (§3.2.A iii)."""
+
+    ranges: Ranges
+    name: str = "joint_range"
+    where: tuple[str, ...] = ("pelvis.flexion", "pelvis.rotation", "pelvis.bending")
+    unit: str = "deg"
+    points: tuple[int, ...] = (*TORSO_POINTS, JOINT["right_hip"], JOINT["left_hip"])
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the pelvis; see `posekit.tree.Check`."""
+        axes = paper_axes(points[:, :4])
+        pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
+        middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
+        normal = cross(middle, np.einsum("nij,nj->ni", axes, left - right))
+        normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        return _plane_findings("pelvis", plane_angles(normal, middle, self.ranges), self.ranges)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeadPlane:
+    """Neck: the head's plane against the torso's (§3.2.A iv); undecided where the head was not seen.
+
+    The head plane's normal is the facing direction; flexion lowers the chin.
+    """
+
+    figure: Figure
+    ranges: Ranges
+    name: str = "joint_range"
+    where: tuple[str, ...] = ("neck.flexion", "neck.rotation", "neck.bending")
+    unit: str = "deg"
+    points: tuple[int, ...] = TORSO_POINTS + HEAD
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the neck; see `posekit.tree.Check`."""
+        axes = paper_axes(points[:, :4])
+        R_head = self.figure.head_frame(points[:, 0], points[:, 4:])
+        normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
+        angles = plane_angles(normal, -crown, self.ranges)
+        angles[:, 0] *= -1
+        return _plane_findings("neck", angles, self.ranges)
+
+
+def _plane_findings(joint: str, angles: Array, ranges: Ranges) -> Findings:
+    bounds = np.array([ranges.limits[f"{joint}.{angle}"] for angle in ("flexion", "rotation", "bending")])
+    return Findings(value=angles, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=TOLERANCE)

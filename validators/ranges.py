@@ -1,0 +1,129 @@
+"""Named tables of joint ranges, read from TOML."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import resources
+from pathlib import Path
+from typing import Literal
+
+from posekit.errors import InputError
+from posekit.skeleton import DOFS
+
+SCHEMA = "posekit.ranges/1"
+MAX_BYTES = 1_000_000
+
+PROJECTED_ANGLES: Mapping[str, tuple[str, ...]] = {
+    "shoulder": ("flexion", "abduction"),
+    "elbow": ("flexion",),
+    "hip": ("flexion", "flexion_with_straight_knee", "abduction"),
+    "knee": ("flexion",),
+    "pelvis": ("flexion", "rotation", "bending"),
+    "neck": ("flexion", "rotation", "bending"),
+}
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranges:
+    """Joint ranges in degrees.
+
+    Parameters
+    ----------
+    name : str
+        What results call them.
+    kind : {"configuration", "projected"}
+        Ranges of the URDF's own angles, or of the projected angles of Lee & Chen 1985, §3.2.A.
+    limits : mapping
+        ``"shoulder.flexion"`` (projected; both sides) or ``"right_shoulder.flexion"`` (configuration; angles
+        that are not listed keep the URDF's limits) to (lower, upper), degrees.
+    shortest_projection : float
+        Fraction of a segment below which its projection has no direction to measure.
+    knee_flexed : float
+        Degrees of knee flexion above which the hip's wider range applies.
+    """
+
+    name: str
+    kind: Literal["configuration", "projected"]
+    limits: Mapping[str, Range] = field(default_factory=dict)
+    shortest_projection: float = 0.1
+    knee_flexed: float = 5.0
+
+
+URDF_RANGES = Ranges(name="urdf", kind="configuration")
+
+
+def load_ranges(name: str) -> Ranges:
+    """Load ranges by name (`urdf`, `table1`) or from a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where there is no such table or it is not what `posekit.ranges/1` says.
+    """
+    if name == "urdf":
+        return URDF_RANGES
+    if name == "table1":
+        text = (resources.files("posekit.urdf") / "ranges" / "table1.toml").read_text(encoding="utf-8")
+        return _parse(text, "table1")
+    path = Path(name)
+    if not path.is_file():
+        raise InputError(
+            f"--ranges {name}: no such table or file; expected urdf, table1 or the path of a TOML file"
+        )
+    if path.stat().st_size > MAX_BYTES:
+        raise InputError(f"{path}: larger than {MAX_BYTES} bytes; expected a table of joint ranges")
+    try:
+        return _parse(path.read_text(encoding="utf-8"), str(path))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: not UTF-8 text; save it as UTF-8") from error
+
+
+def _parse(text: str, source: str) -> Ranges:
+    try:
+        table = tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise InputError(f"{source}: not TOML: {error}") from error
+    if table.pop("schema", None) != SCHEMA:
+        raise InputError(f"{source}: schema: expected {SCHEMA!r} in the first line")
+    kind = table.pop("kind", None)
+    if kind not in ("configuration", "projected"):
+        raise InputError(f"{source}: kind is {kind!r}; expected 'configuration' or 'projected'")
+    shortest = _number(table.pop("shortest_projection", 0.1), f"{source}: shortest_projection")
+    flexed = _number(table.pop("knee_flexed", 5.0), f"{source}: knee_flexed")
+    if kind == "projected":
+        known = {f"{joint}.{angle}" for joint, angles in PROJECTED_ANGLES.items() for angle in angles}
+    else:
+        known = set(DOFS)
+    limits: dict[str, Range] = {}
+    for joint, angles in table.items():
+        if not isinstance(angles, dict):
+            raise InputError(f"{source}: {joint}: expected a table such as [{joint}] flexion = [0, 90]")
+        for angle, bounds in angles.items():
+            where = f"{joint}.{angle}"
+            if where not in known:
+                raise InputError(f"{source}: {where}: not an angle of kind {kind!r}; expected {', '.join(sorted(known))}")
+            limits[where] = _range(bounds, f"{source}: {where}")
+    missing = known - set(limits) if kind == "projected" else set()
+    if missing:
+        raise InputError(f"{source}: missing {', '.join(sorted(missing))}; a projected table lists every angle")
+    return Ranges(name=source, kind=kind, limits=limits, shortest_projection=shortest, knee_flexed=flexed)
+
+
+def _range(bounds: object, where: str) -> Range:
+    if not isinstance(bounds, list) or len(bounds) != 2:
+        raise InputError(f"{where}: {bounds!r}; expected [lower, upper] in degrees")
+    lower, upper = (_number(bound, where) for bound in bounds)
+    if lower > upper:
+        raise InputError(f"{where}: lower {lower:g} is above upper {upper:g}; swap them")
+    return lower, upper
+
+
+def _number(value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        raise InputError(f"{where}: {value!r}; expected a finite number")
+    return float(value)

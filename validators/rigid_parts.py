@@ -1,0 +1,87 @@
+"""Rigid parts: do torso and hips keep their shape (Lee & Chen 1985, §3.2.B)?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.figure import Figure
+from posekit.figure.frames import torso_frame
+from posekit.skeleton import JOINT, RIGID_SEGMENTS, TORSO, segment_name
+from posekit.tree import Check, Findings
+
+Mode = Literal["distances", "placement"]
+
+
+def rigid_parts(figure: Figure, *, tolerance: float, mode: Mode = "placement") -> list[Check]:
+    """Make the checks of the rigid parts.
+
+    They judge the posture itself, as it was seen.
+
+    Parameters
+    ----------
+    tolerance : float
+        Metres by which a distance, or a point of the torso, may be off.
+    mode : {"distances", "placement"}
+        ``distances`` compares the four distances inside torso and hips, as the paper does; they cannot tell
+        a torso from its mirror image. ``placement`` also lays the figure's own torso onto the posture's,
+        as the configuration q will, and compares the points.
+    """
+    checks: list[Check] = [
+        Distance(
+            where=(segment_name(segment),),
+            points=segment,
+            length=figure.lengths[segment_name(segment)],
+            tolerance=tolerance,
+        )
+        for segment in RIGID_SEGMENTS
+    ]
+    if mode == "placement":
+        checks.append(Placement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=tolerance))
+    return checks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Distance:
+    """The distance between two joints of one rigid part."""
+
+    where: tuple[str, ...]
+    points: tuple[int, ...]
+    length: float
+    tolerance: float
+    name: str = "rigid_parts"
+    unit: str = "m"
+
+    def judge(self, points: Array) -> Findings:
+        """Compare the distance with the figure's; see `posekit.tree.Check`."""
+        value = np.linalg.norm(points[:, 0] - points[:, 1], axis=-1)[:, None]
+        return Findings(
+            value=value,
+            lower=np.array([self.length - self.tolerance]),
+            upper=np.array([self.length + self.tolerance]),
+        )
+
+
+TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placement:
+    """The largest distance between the torso's joints and those of the figure's torso laid onto them."""
+
+    torso: Array
+    tolerance: float
+    name: str = "rigid_parts"
+    where: tuple[str, ...] = ("torso",)
+    unit: str = "m"
+    points: tuple[int, ...] = TORSO_POINTS
+
+    def judge(self, points: Array) -> Findings:
+        """Lay the figure's torso onto the posture's; see `posekit.tree.Check`."""
+        R = torso_frame(*np.moveaxis(points, 1, 0))
+        placed = points[:, :1] + np.einsum("nij,pj->npi", R, self.torso)
+        value = np.linalg.norm(placed - points, axis=-1).max(axis=1)[:, None]
+        return Findings(value=value, lower=np.array([-np.inf]), upper=np.array([self.tolerance]))

@@ -1,0 +1,269 @@
+"""The walking model of Lee & Chen 1985, §3.3: Rules 1-5, each on its own switch.
+
+The body plane holds the line from neck to pelvis and is normal to the head's facing direction (to the torso's
+where the head was not seen); the facing direction is the moving direction. The *swing* of a joint is its
+displacement out of that plane, less the one it has when the figure stands at neutral. A swing that is not
+clearly other than zero is no evidence: rules about it are undecided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.figure.frames import cross, torso_frame, unit
+from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
+from posekit.tree import Check, Findings
+
+RULES = (1, 2, 3, 4, 5)
+DEFAULT_RULES = (1, 2)
+LIMBS = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
+
+
+@dataclass(frozen=True, kw_only=True)
+class WalkingThresholds:
+    """When a swing is evidence, and what counts as parallel, flexed and vertical.
+
+    The paper gives no numbers; these are posekit's.
+
+    Parameters
+    ----------
+    limb_swing : float
+        Metres that elbow or knee must be out of the body plane: nearer they are "too close to the torso".
+    girdle_swing : float
+        The same for shoulder and hip.
+    out_of_plane : float
+        Rule 4: degrees that a limb's segment may leave the plane of moving direction and body axis.
+    flexed_knee : float
+        Rule 5: degrees above which a knee counts as flexed.
+    vertical : float
+        Rule 5: degrees that the other leg may lean from the body axis.
+    """
+
+    limb_swing: float = 0.03
+    girdle_swing: float = 0.01
+    out_of_plane: float = 25.0
+    flexed_knee: float = 25.0
+    vertical: float = 35.0
+
+
+def walking(
+    figure: Figure, rules: Iterable[int] = DEFAULT_RULES, thresholds: WalkingThresholds | None = None
+) -> list[Check]:
+    """Make the checks of some of the five rules; they judge the posture itself.
+
+    Raises
+    ------
+    InputError
+        Where a rule is not one of 1 to 5.
+    """
+    chosen = tuple(rules)
+    unknown = [rule for rule in chosen if rule not in RULES]
+    if unknown:
+        raise InputError(f"--rules: {unknown[0]} is not a rule; expected some of 1, 2, 3, 4, 5")
+    makers = {1: _rule_1, 2: _rule_2, 3: _rule_3, 4: _rule_4, 5: _rule_5}
+    body = thresholds or WalkingThresholds()
+    return [check for rule in RULES if rule in chosen for check in makers[rule](figure, body)]
+
+
+class Body(NamedTuple):
+    """Axes of the walking body (N, 3): where it moves, its left and its down."""
+
+    forward: Array
+    left: Array
+    down: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Rule:
+    """What the rules share: the body's axes and the swings of joints."""
+
+    figure: Figure
+    thresholds: WalkingThresholds
+    where: tuple[str, ...]
+    joints: tuple[int, ...]
+    name: str = "walking"
+    unit: str = "m"
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The torso, the head, then the rule's own joints."""
+        return (*(JOINT[name] for name in TORSO), *HEAD, *self.joints)
+
+    def body(self, points: Array) -> Body:
+        """Find the axes of the body plane."""
+        R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
+        R_head = self.figure.head_frame(points[:, 0], points[:, 4:9])
+        down = -R_torso[:, :, 2]
+        facing = np.where(np.isnan(R_head[:, :, 0]), R_torso[:, :, 0], R_head[:, :, 0])
+        forward = unit(facing - np.einsum("ni,ni->n", facing, down)[:, None] * down)
+        return Body(forward, cross(forward, down) * -1.0, down)
+
+    def joint(self, points: Array, k: int) -> Array:
+        """Return the k-th of the rule's own joints (N, 3)."""
+        return points[:, 9 + k]
+
+    def swing(self, points: Array, body: Body, k: int) -> Array:
+        """Return the swing of the k-th joint (N,), metres; NaN where it is not clearly other than zero."""
+        index = self.joints[k]
+        girdle = JOINTS[index].endswith(("shoulder", "hip"))
+        least = self.thresholds.girdle_swing if girdle else self.thresholds.limb_swing
+        displacement = np.einsum("ni,ni->n", self.joint(points, k) - points[:, 0], body.forward)
+        swing = displacement - self.figure.neutral_points[index, 0]
+        return np.where(np.abs(swing) < least, np.nan, swing)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SwingTogether(_Rule):
+    """Whether two joints swing to the same side: required (Rule 3) or forbidden (Rules 1 and 2).
+
+    The value is the smaller of the two swings, positive where they agree.
+    """
+
+    wanted: bool
+
+    def judge(self, points: Array) -> Findings:
+        """Compare the signs of the two swings; see `posekit.tree.Check`."""
+        body = self.body(points)
+        a, b = self.swing(points, body, 0), self.swing(points, body, 1)
+        value = (np.sign(a * b) * np.minimum(np.abs(a), np.abs(b)))[:, None]
+        bound = np.zeros(1)
+        infinite = np.full(1, np.inf)
+        return (
+            Findings(value=value, lower=bound, upper=infinite)
+            if self.wanted
+            else Findings(value=value, lower=-infinite, upper=bound)
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SwingPlane(_Rule):
+    """Rule 4: both segments of a limb lie parallel to the plane of moving direction and body axis."""
+
+    def judge(self, points: Array) -> Findings:
+        """Measure how far each segment leaves the plane; see `posekit.tree.Check`."""
+        body = self.body(points)
+        angles = []
+        for k in (0, 1):
+            segment = unit(self.joint(points, k + 1) - self.joint(points, k))
+            sine = np.abs(np.einsum("ni,ni->n", segment, body.left))
+            angles.append(np.degrees(np.arcsin(np.minimum(sine, 1.0))))
+        value = np.maximum(*angles)[:, None]
+        return Findings(
+            value=value, lower=np.array([-np.inf]), upper=np.array([self.thresholds.out_of_plane])
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OneKnee(_Rule):
+    """Rule 5: at most one knee is flexed, and then the other leg stands nearly vertically.
+
+    The value is the lean of the leg that is not (or less) flexed, where the other is; where both are
+    flexed, the smaller flexion.
+    """
+
+    def judge(self, points: Array) -> Findings:
+        """Measure knees and lean; see `posekit.tree.Check`."""
+        body = self.body(points)
+        flexion, lean = [], []
+        for first in (0, 3):
+            hip, knee, ankle = (self.joint(points, first + k) for k in range(3))
+            flexion.append(_angle(knee - hip, ankle - knee))
+            lean.append(_angle(ankle - hip, body.down))
+        less = np.argmin(flexion, axis=0)
+        rows = np.arange(len(points))
+        smaller, larger = np.min(flexion, axis=0), np.max(flexion, axis=0)
+        standing = np.array(lean)[less, rows]
+        limit = self.thresholds
+        standing = np.where(larger > limit.flexed_knee, standing, np.nan)
+        return Findings(
+            value=np.stack([smaller, standing], axis=-1),
+            lower=np.array([-np.inf, -np.inf]),
+            upper=np.array([limit.flexed_knee, limit.vertical]),
+        )
+
+
+def _angle(a: Array, b: Array) -> Array:
+    """Return the angle between vectors (N, 3), degrees."""
+    return np.degrees(np.arctan2(np.linalg.norm(cross(a, b), axis=1), np.einsum("ni,ni->n", a, b)))
+
+
+def _indices(*names: str) -> tuple[int, ...]:
+    return tuple(JOINT[name] for name in names)
+
+
+def _rule_1(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
+    """The two arms, or legs, are not both in front of or behind the torso."""
+    return [
+        SwingTogether(
+            figure=figure,
+            thresholds=thresholds,
+            where=(f"rule1.{limb}",),
+            joints=_indices(f"right_{middle}", f"left_{middle}"),
+            wanted=False,
+        )
+        for limb, _, middle, _ in LIMBS
+    ]
+
+
+def _rule_2(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
+    """Arm and leg of one side do not swing forward, or backward, together."""
+    return [
+        SwingTogether(
+            figure=figure,
+            thresholds=thresholds,
+            where=(f"rule2.{side}",),
+            joints=_indices(f"{side}_elbow", f"{side}_knee"),
+            wanted=False,
+        )
+        for side in SIDES
+    ]
+
+
+def _rule_3(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
+    """Shoulder and elbow, hip and knee swing the same way."""
+    return [
+        SwingTogether(
+            figure=figure,
+            thresholds=thresholds,
+            where=(f"rule3.{side}_{limb[:-1]}",),
+            joints=_indices(f"{side}_{girdle}", f"{side}_{middle}"),
+            wanted=True,
+        )
+        for limb, girdle, middle, _ in LIMBS
+        for side in SIDES
+    ]
+
+
+def _rule_4(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
+    """Limbs swing in planes parallel to the moving direction."""
+    return [
+        SwingPlane(
+            figure=figure,
+            thresholds=thresholds,
+            where=(f"rule4.{side}_{limb[:-1]}",),
+            joints=_indices(*(f"{side}_{name}" for name in joints)),
+            unit="deg",
+        )
+        for limb, *joints in LIMBS
+        for side in SIDES
+    ]
+
+
+def _rule_5(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
+    """At most one knee is flexed; then the other leg stands."""
+    return [
+        OneKnee(
+            figure=figure,
+            thresholds=thresholds,
+            where=("rule5.knees", "rule5.standing_leg"),
+            joints=_indices(*(f"{side}_{name}" for side in SIDES for name in ("hip", "knee", "ankle"))),
+            unit="deg",
+        )
+    ]
