@@ -24,6 +24,7 @@ autodoc_typehints = "signature"
 autodoc_class_signature = "separated"
 napoleon_google_docstring = False
 napoleon_numpy_docstring = True
+napoleon_use_ivar = True  # a dataclass lists its fields once, in its Attributes section
 napoleon_use_rtype = False
 
 html_theme = "furo"

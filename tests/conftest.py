@@ -5,7 +5,9 @@ import pytest
 from hypothesis import settings
 
 # The same examples in every run and on every machine; a slow machine is not a failure.
-settings.register_profile("posekit", derandomize=True, database=None, deadline=None, max_examples=50, print_blob=True)
+settings.register_profile(
+    "posekit", derandomize=True, database=None, deadline=None, max_examples=50, print_blob=True
+)
 settings.load_profile("posekit")
 
 

@@ -65,7 +65,12 @@ def read_json(path: str | Path) -> Any:
         Where the file is missing, not readable, empty, too large, not UTF-8, malformed (with line and column)
         or holds what is said above not to be there.
     """
-    text = _decode(path, read_bytes(path, limit=MAX_BYTES))
+    return parse_json(path, read_bytes(path, limit=MAX_BYTES))
+
+
+def parse_json(path: str | Path, data: bytes) -> Any:
+    """Parse JSON that came from `path`, with the checks of `read_json`."""
+    text = _decode(path, data)
     try:
         return json.loads(
             text,
@@ -77,13 +82,7 @@ def read_json(path: str | Path) -> Any:
     except _SuspiciousError:
         raise _suspicion(path, text) from None
     except json.JSONDecodeError as error:
-        raise refusal(
-            path,
-            f"line {error.lineno} column {error.colno}",
-            shown(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file",
-            f"JSON ({error.msg[0].lower()}{error.msg[1:]})",
-            "correct the file there",
-        ) from None
+        raise _malformed(path, text, error) from None
     except RecursionError:
         raise _too_deep(path, "deeper nesting than the parser takes") from None
 
@@ -130,6 +129,16 @@ def _too_large(path: str | Path, size: int, limit: int) -> InputError:
         f"{size / 1e6:,.1f} MB",
         f"at most {limit / 1e6:,.0f} MB",
         "split the file, or use .npz where the command takes it",
+    )
+
+
+def _malformed(path: str | Path, text: str, error: json.JSONDecodeError) -> InputError:
+    return refusal(
+        path,
+        f"line {error.lineno} column {error.colno}",
+        shown(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file",
+        f"JSON ({error.msg[0].lower()}{error.msg[1:]})",
+        "correct the file there",
     )
 
 
@@ -216,14 +225,8 @@ def _suspicion(path: str | Path, text: str) -> InputError:
             parse_int=lambda number: _Literal(number) if len(number) > MAX_DIGITS else int(number),
             parse_constant=_Literal,
         )
-    except (json.JSONDecodeError, RecursionError):
-        return refusal(
-            path,
-            "",
-            "a number that is not finite, or a repeated key, and malformed JSON after it",
-            "JSON with finite numbers and no repeated key",
-            "correct the file",
-        )
+    except json.JSONDecodeError as error:
+        return _malformed(path, text, error)
     field, got, expected, remedy = next(_suspicions(tree, ""))
     return refusal(path, field, got, expected, remedy)
 

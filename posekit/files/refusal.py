@@ -66,4 +66,3 @@ def nearest(name: str, names: Iterable[str]) -> str:
     if near:
         return f"did you mean {' or '.join(near)}?"
     return f"valid names are {', '.join(valid)}"
-

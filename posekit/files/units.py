@@ -18,7 +18,9 @@ METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units in one metre. Whole numbers, so that dividing by them gives the float nearest to the decimal."""
 
-_LENGTH = re.compile(r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-z]*)", re.ASCII | re.I)
+_LENGTH = re.compile(
+    r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-z]*)", re.ASCII | re.I
+)
 
 
 def to_metres(values: ArrayLike, unit: str) -> NDArray[np.float64]:
@@ -61,9 +63,7 @@ def parse_length(text: str, *, name: str = "") -> float:
     if match is None or not np.isfinite(number):
         raise refusal(name, "", shown(text), "a length with its unit", "write it as 5cm, 0.05m or 50mm")
     if not match[2]:
-        raise refusal(
-            name, "", shown(text), "a length with its unit", f"add cm, m or mm, as in {match[1]}cm"
-        )
+        raise refusal(name, "", shown(text), "a length with its unit", f"add cm, m or mm, as in {match[1]}cm")
     if match[2] not in PER_METRE:
         raise refusal(name, "", shown(text), "the unit cm, m or mm", "convert it to one of these")
     if number < 0:

@@ -72,7 +72,9 @@ def named(names: tuple[str, ...], kind: str) -> BeforeValidator:
         if isinstance(value, dict):
             for name in value:
                 if name not in valid:
-                    refuse(f"the name of a {kind}", nearest(name, names), at=cut(one_line(name)), got=shown(name))
+                    refuse(
+                        f"the name of a {kind}", nearest(name, names), at=cut(one_line(name)), got=shown(name)
+                    )
         return value
 
     return BeforeValidator(check)
@@ -150,9 +152,10 @@ def _wording(model: type[FileModel], error: ErrorDetails) -> tuple[str, str, str
     got = "nothing" if kind == "missing" else shown(error["input"])
     hints = [model.hints[str(name)] for name in reversed(error["loc"]) if name in model.hints]
     remedy = (hints or [_REMEDIES.get(kind, "correct it")])[0]
-    expected = _plain(error["msg"])
+    expected = _plain(error)
     if kind == _OWN:
-        field = ".".join(part for part in (field, context["at"]) if part)
+        inside = context["at"]
+        field += inside if inside.startswith("[") or not field or not inside else f".{inside}"
         return field, context["got"] or got, context["expected"], context["remedy"]
     if kind == "extra_forbidden":
         suggestion = nearest(str(error["loc"][-1]), sorted(set(_fields(model.model_json_schema()))))
@@ -167,7 +170,11 @@ def _wording(model: type[FileModel], error: ErrorDetails) -> tuple[str, str, str
     elif kind == "literal_error":
         expected = context["expected"]
     elif kind == "union_tag_invalid":
-        got, expected, remedy = shown(context["tag"]), f"one of {context['expected_tags']}", "write one of these"
+        got, expected, remedy = (
+            shown(context["tag"]),
+            f"one of {context['expected_tags']}",
+            "write one of these",
+        )
     if kind.startswith("union_tag"):
         field += "." + context["discriminator"].strip("'")
     return field, got, expected, remedy
@@ -184,12 +191,29 @@ def _field(location: tuple[int | str, ...], tags: frozenset[str]) -> str:
     return text
 
 
-def _plain(message: str) -> str:
-    """Turn pydantic's sentence into what was expected."""
-    for start in ("Input should be ", "Value should be "):
-        if message.startswith(start):
-            return message.removeprefix(start)
-    return message[0].lower() + message[1:]
+def _plain(error: ErrorDetails) -> str:
+    """Word what was expected, without pydantic's own terms."""
+    words = {
+        "float_type": "a number",
+        "int_type": "a whole number",
+        "finite_number": "a finite number",
+        "string_type": "a text",
+        "list_type": "a list",
+        "dict_type": "an object",
+        "model_type": "an object",
+        "model_attributes_type": "an object",
+        "bool_type": "true or false",
+    }
+    context = error.get("ctx", {})
+    if error["type"] in words:
+        return words[error["type"]]
+    if error["type"] == "greater_than":
+        return f"a number greater than {context['gt']:g}"
+    if error["type"] == "less_than_equal":
+        return f"a number of at most {context['le']:g}"
+    if error["type"] == "greater_than_equal":
+        return f"a number of at least {context['ge']:g}"
+    return error["msg"].removeprefix("Input should be ")
 
 
 def _fields(schema: object) -> Iterator[str]:

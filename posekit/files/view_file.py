@@ -97,7 +97,11 @@ def write_view(path: str | Path, view: View, unit: Unit = "m") -> None:
         if joints := _known(truth[index], JOINTS):
             frame["truth"] = joints
         frames.append(frame)
-    head_of_file: dict[str, Any] = {"schema": SCHEMA, "unit": unit, "camera": _camera_fields(view.camera, unit)}
+    head_of_file: dict[str, Any] = {
+        "schema": SCHEMA,
+        "unit": unit,
+        "camera": _camera_fields(view.camera, unit),
+    }
     if figure := _figure_fields(view, unit):
         head_of_file["figure"] = figure
     validated(ViewFile, {**head_of_file, "frames": frames}, path)

@@ -19,7 +19,10 @@ HEAD_NAMES = ("neck", *HEAD_POINTS)
 def _neck_is_seen(image: dict[str, Any]) -> dict[str, Any]:
     if "neck" not in image:
         refuse(
-            "the neck in every frame: the tree grows from it", "add it or drop the frame", at="neck", got="nothing"
+            "the neck in every frame: the tree grows from it",
+            "add it or drop the frame",
+            at="neck",
+            got="nothing",
         )
     return image
 
@@ -32,11 +35,9 @@ Point2 = Annotated[list[float], Field(min_length=2, max_length=2)]
 Point3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix3 = Annotated[list[Point3], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
-Pixels = Annotated[int, Field(gt=0)]
+Pixels = Annotated[int, Field(gt=0, le=10**6)]
 
-Image = Annotated[
-    dict[str, Point2], named(JOINTS, "joint"), AfterValidator(_neck_is_seen), _keys(JOINTS)
-]
+Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), AfterValidator(_neck_is_seen), _keys(JOINTS)]
 HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]
@@ -115,7 +116,7 @@ class ViewFile(FileModel):
         "t": "t is three numbers in the view's unit",
         "distortion": "give the five numbers k1, k2, p1, p2, k3, or leave it out",
         "size": "size is [width, height] in whole pixels",
-        "frames": "a view has at least one frame",
+        "frames": "a view has at least one frame, each of them an object with time and image",
         "time": "give it in seconds",
     }
 

@@ -99,7 +99,7 @@ def too_large_to_read(path: str | Path) -> InputError:
     )
 
 
-def json_pieces(head: dict[str, Any], name: str, items: Iterable[dict[str, Any]]) -> Iterator[str]:
+def json_pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[str]:
     """Spell ``{**head, name: [items]}`` as JSON, one entry and one item a line, without holding it whole.
 
     Raises

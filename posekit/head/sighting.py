@@ -58,6 +58,18 @@ def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     by_pattern = [degeneracy(head.names, head.points, pattern) for pattern in patterns]
     reasons = [by_pattern[pattern] or "" for pattern in which.reshape(-1)]
-    for frame, reason in zip(np.flatnonzero(flat(points, seen)), _flat_reasons(points, seen), strict=True):
-        reasons[frame] = reasons[frame] or reason
+    for frame, spread in zip(*_flat(points, seen), strict=True):
+        reasons[frame] = reasons[frame] or (
+            f"the image points lie on one line (or in one point: {spread[0]:.3g} along it, {spread[1]:.3g} across): "
+            "no view of a head does; check the image points"
+        )
     return Sighting(points, seen, reasons)
+
+
+def _flat(image: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array]:
+    """Find frames whose seen image points lie on a line, and their spread along and across it (N, 2)."""
+    weight = seen[..., None] / np.maximum(seen.sum(axis=-1), 1)[:, None, None]
+    offset = (image - (weight * image).sum(axis=1, keepdims=True)) * np.sqrt(weight)
+    spread = np.linalg.svd(offset, compute_uv=False)
+    flat = np.flatnonzero(spread[:, 1] <= DEGENERATE * spread[:, 0])
+    return flat, spread[flat]

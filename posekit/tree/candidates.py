@@ -45,6 +45,14 @@ class Candidates:
     branches: tuple[NDArray[np.int8], ...]
     excess: tuple[Array, ...]
 
+    def too_short(self, frame: int) -> tuple[int, float] | None:
+        """Return the first joint of a frame that no branch reaches, and by how much (m) its segment is too short."""
+        for joint, states in enumerate(self.branches):
+            reached = np.isfinite(self.excess[joint][frame])
+            if reached.any() and (states[frame][reached] == Branch.NO_SOLUTION).all():
+                return joint, float(self.excess[joint][frame][reached].min())
+        return None
+
 
 def lift_all(
     camera: Camera,

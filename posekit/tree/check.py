@@ -51,25 +51,30 @@ class Findings:
 
 
 class Check(Protocol):
-    """One kind of judgement over a fixed set of points, in batches.
+    """One kind of judgement over a fixed set of points, in batches."""
 
-    Attributes
-    ----------
-    name : str
-        The validator's name, ``joint_range``.
-    where : tuple of str
-        The K places it judges: ``("right_elbow.flexion",)``.
-    unit : str
-        Unit of its values.
-    points : tuple of int
-        Indices into `posekit.skeleton.POINTS` of the points it reads. The tree applies it at the first level
-        where all of them are known.
-    """
+    @property
+    def name(self) -> str:
+        """The validator's name: ``joint_range``."""
+        ...
 
-    name: str
-    where: tuple[str, ...]
-    unit: str
-    points: tuple[int, ...]
+    @property
+    def where(self) -> tuple[str, ...]:
+        """The K places it judges: ``("right_elbow.flexion",)``."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values."""
+        ...
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The points it reads, as indices into `posekit.skeleton.POINTS`.
+
+        The tree applies the check at the first level where all of them are known.
+        """
+        ...
 
     def judge(self, points: Array) -> Findings:
         """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""

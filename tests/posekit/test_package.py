@@ -16,8 +16,9 @@ LINKED = ("urdf", "validators", "viewer")
 IMPORT_AND_REPORT = """
 import logging, os, sys, threading
 seen = []
+watched = {"socket.__new__", "socket.connect", "socket.bind", "subprocess.Popen", "os.system", "os.mkdir"}
 def hook(event, args):
-    if event in {"socket.__new__", "socket.connect", "socket.bind", "subprocess.Popen", "os.system", "os.mkdir"}:
+    if event in watched:
         seen.append(event)
     if event == "open" and isinstance(args[2], int) and args[2] & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
         seen.append(f"open {args[0]}")
@@ -34,9 +35,8 @@ print("\\n".join(seen))
 
 
 def run_python(code: str) -> str:
-    finished = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False, timeout=60, cwd=ROOT
-    )
+    command = [sys.executable, "-W", "error", "-c", code]
+    finished = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60, cwd=ROOT)
     assert finished.returncode == 0, finished.stderr
     assert finished.stderr == ""
     return finished.stdout.strip()
@@ -54,7 +54,8 @@ def test_version_is_that_of_pyproject() -> None:
 
 
 def test_import_does_nothing_else() -> None:
-    assert run_python(IMPORT_AND_REPORT.replace("MODULES", '["posekit", "posekit.skeleton", "posekit.errors"]')) == ""
+    modules = ["posekit", "posekit.skeleton", "posekit.errors"]
+    assert run_python(IMPORT_AND_REPORT.replace("MODULES", repr(modules))) == ""
 
 
 @pytest.mark.parametrize("heavy", ["pinocchio", "coal", "meshcat", "pydantic", "yourdfpy"])
@@ -66,8 +67,9 @@ def test_cameras_and_tree_are_numpy_alone(heavy: str) -> None:
 def test_unknown_attribute_is_an_attribute_error() -> None:
     import posekit
 
-    with pytest.raises(AttributeError, match="no_such_name"):
-        posekit.no_such_name  # noqa: B018 (the access is the test)
+    name = "no_such_name"
+    with pytest.raises(AttributeError, match=name):
+        getattr(posekit, name)
 
 
 @pytest.mark.parametrize("name", ["py.typed", "urdf/stick_figure.urdf", "urdf/stick_figure.srdf"])

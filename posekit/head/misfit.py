@@ -1,0 +1,71 @@
+r"""Find the point that does not fit the rest.
+
+A head is fitted again without each of its points. If one point alone is wrong, the squared error falls to what
+measuring leaves. For normal errors of unknown size, and one point chosen beforehand,
+
+.. math:: F = \frac{(S - S_j)/2}{S_j / m}
+
+follows Fisher's distribution with 2 and m degrees of freedom, m being what remains without the point (twice
+its fellows, less the unknowns), and so :math:`P(F > x) = (1 + 2x/m)^{-m/2} = (S_j/S)^{m/2}` (the
+externally studentised residual of Cook & Weisberg 1982, for a pair of observations). All P points are looked
+at, hence the factor P (Bonferroni).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.head.fit import Fit, fit
+from posekit.head.perspective import Heads, Placement
+
+FALSE_ALARMS = 2e-3
+"""The chance that a head of sound points with normal errors has one of them named."""
+
+ROUNDING = 1e-10
+"""Error, as a fraction of the head's size in the image, that is taken for rounding and never looked into."""
+
+
+def misfits(heads: Heads, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
+    """Name the point that does not fit.
+
+    Parameters
+    ----------
+    heads : Heads
+    fitted : Fit
+        Of all points.
+
+    Returns
+    -------
+    point : int array (F,)
+        The row of the point, -1 where all fit.
+    cost : array (F,)
+        The squared error without it; NaN where all fit.
+    """
+    total, count = heads.seen.shape
+    floor = ROUNDING**2 * _spread(heads)
+    frames, points = np.nonzero((heads.seen > 0) & (fitted.cost > floor)[:, None])
+    without = heads.take(frames)
+    seen = without.seen.copy()
+    seen[np.arange(len(points)), points] = 0.0
+    without = without._replace(seen=seen)
+    again = fit(without, Placement(*(array[frames] for array in fitted.placement)))
+    left = np.full((total, count), np.inf)
+    left[frames, points] = np.maximum(again.cost, floor[frames])
+    point = left.argmin(axis=-1)
+    cost = left[np.arange(total), point]
+    n = heads.seen.sum(axis=-1)
+    freedom = 2 * (n - 1) - heads.unknowns
+    with np.errstate(invalid="ignore"):
+        chance = n * (cost / fitted.cost) ** (freedom / 2)
+    named = (chance < FALSE_ALARMS) & np.isfinite(cost)
+    return np.where(named, point, -1), np.where(named, cost, np.nan)
+
+
+def _spread(heads: Heads) -> Array:
+    """Sum of the squared distances of the image points from their mean, one a head."""
+    weight = heads.seen[..., None]
+    mean = (heads.image * weight).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
+    spread: Array = (((heads.image - mean) * weight) ** 2).sum(axis=(1, 2))
+    return spread

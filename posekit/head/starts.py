@@ -1,0 +1,50 @@
+"""Where the search for a placement starts: the direct linear transformation, and the scaled orthographic view."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.head.dlt import solve
+from posekit.head.perspective import Placement
+
+
+def affine_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> Placement:
+    """Fit a scaled orthographic view: the limit of a distant camera (Tomasi & Kanade 1992).
+
+    Parameters
+    ----------
+    points : array (F, P, 3)
+        Centred on the seen points; 0 where not seen.
+    image : array (F, P, 2)
+        Normalised image points, or metres where f is free.
+    seen : bool array (F, P)
+        At least four a frame, not in one plane.
+    """
+    shift = (image * seen[..., None]).sum(axis=1) / seen.sum(axis=1)[:, None]
+    offset = np.where(seen[..., None], image - shift[:, None], 0.0)
+    transposed = np.swapaxes(points, -1, -2)
+    affine = np.swapaxes(np.linalg.solve(transposed @ points, transposed @ offset), -1, -2)
+    left, values, right = np.linalg.svd(affine, full_matrices=False)
+    axes = left @ right
+    R = np.concatenate([axes, np.cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)
+    return Placement(R, shift, values.mean(axis=-1), np.zeros(len(R)))
+
+
+def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[Placement, NDArray[np.bool_]]:
+    """Take the placement from the direct linear transformation, and say whether it lies behind the camera.
+
+    NaN where the linear equations do not determine it or it has points on both sides of the camera.
+    """
+    direct = solve(points, image, seen)
+    depth = direct.t[:, 2]
+    ahead = (np.einsum("fi,fpi->fp", direct.R[:, 2], points) + depth[:, None]) * np.sign(depth)[:, None]
+    usable = direct.determined & ((ahead > 0) | ~seen).all(axis=-1)
+    behind = usable & (depth < 0)
+    side = np.where(behind, -1.0, 1.0)
+    # A head behind the camera looks as one half a turn about the optical axis further, with its depths reversed.
+    R = direct.R * np.stack([side, side, np.ones_like(side)], axis=-1)[..., None]
+    R = np.where(usable[:, None, None], R, np.nan)
+    shift = direct.f[:, None] * direct.t[:, :2] / depth[:, None]
+    return Placement(R, shift, direct.f / np.abs(depth), 1 / depth), behind

@@ -1,0 +1,9 @@
+"""Whole jobs: a view to certified postures, postures to verdicts, the papers' tables."""
+
+from posekit.pipeline.recover import recover as recover
+from posekit.pipeline.recovery import FrameRecovery as FrameRecovery
+from posekit.pipeline.recovery import Recovery as Recovery
+from posekit.pipeline.result import result_of as result_of
+from posekit.pipeline.tolerance import EXACT as EXACT
+from posekit.pipeline.tolerance import MEASURED as MEASURED
+from posekit.pipeline.tolerance import Tolerance as Tolerance

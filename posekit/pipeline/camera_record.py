@@ -1,0 +1,43 @@
+"""What a result says about the camera of each frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from posekit.cameras import lee_chen
+from posekit.files import LeeChenModel, OpenCVModel, View
+from posekit.pipeline.fit_camera import CameraFit
+
+
+def camera_records(view: View, fit: CameraFit) -> list[dict[str, Any]]:
+    """Describe the camera of each frame: f, rotation, position, residual; lengths in metres.
+
+    For a `lee-chen` camera these are the paper's (Table 2): [R] and the image plane's origin in the head's
+    frame. For an `opencv` camera with extrinsics they are the camera's in the world, without extrinsics the
+    head's R_cam_head and the optical centre in the head's frame. The residual is the root mean square
+    reprojection error of the head, in image units. None where it is not known.
+    """
+    return [_record(view, fit, k) for k in range(len(view.time))]
+
+
+def _record(view: View, fit: CameraFit, k: int) -> dict[str, Any]:
+    model, pose = view.camera, fit.pose
+    seen = pose is not None and not pose.reasons[k]
+    record: dict[str, Any] = {"f": None, "rotation": None, "position": None, "residual": None}
+    if pose is not None and seen:
+        R, t = pose.R_cam_head[k], pose.t_cam_head[k]
+        record["residual"] = float(pose.rms[k])
+        record["rotation"], record["position"] = R.tolist(), (-R.T @ t).tolist()
+        if isinstance(model, LeeChenModel):
+            f = float(pose.f[k])
+            record["f"] = f
+            record["rotation"] = lee_chen.rotation_to_paper(R).tolist()
+            record["position"] = lee_chen.camera_position(R, t, f).tolist()
+    if isinstance(model, LeeChenModel) and model.f is not None:
+        record["f"] = model.f
+    if isinstance(model, OpenCVModel) and model.R is not None and model.t is not None:
+        record["rotation"] = model.R.tolist()
+        record["position"] = (-np.asarray(model.R).T @ model.t).tolist()
+    return record

@@ -1,0 +1,253 @@
+"""What `recover` returns: every survivor of every frame, and why the rest is gone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.figure import Configurations, Figure
+from posekit.grouping import group_postures
+from posekit.pipeline.fit_camera import CameraFit
+from posekit.pipeline.tolerance import Tolerance
+from posekit.tree import Check, Leaves
+from posekit.validators import judge
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Frames whose trees were grown together.
+
+    Parameters
+    ----------
+    leaves : Leaves
+        What survived all checks.
+    physical : int array (F, 14)
+        Survivors by level before the motion model.
+    checks : sequence of Check
+        The checks that judged them, for margins.
+    figure : Figure
+    tolerance : Tolerance
+    """
+
+    leaves: Leaves
+    physical: NDArray[np.int64]
+    checks: Sequence[Check]
+    figure: Figure
+    tolerance: Tolerance
+
+    @cached_property
+    def points(self) -> Array:
+        """All survivors with their heads (N, 19, 3), camera frame, metres."""
+        leaves = self.leaves
+        return np.concatenate([leaves.postures(), leaves.given[leaves.frame]], axis=1)
+
+    @cached_property
+    def configurations(self) -> Configurations:
+        """The configurations of all survivors."""
+        return self.figure.configurations(self.points)
+
+    @cached_property
+    def margins(self) -> dict[str, Array]:
+        """The worst margin of each survivor (N,), by validator: degrees or metres."""
+        return {judgement.check: judgement.worst for judgement in judge(self.checks, self.points)}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The unit of each validator's margins."""
+        return {check.name: check.unit for check in self.checks}
+
+    @cached_property
+    def motion(self) -> NDArray[np.int64]:
+        """Survivors by level after the motion model (F, 14)."""
+        return self.leaves.counts()
+
+    @cached_property
+    def rejected(self) -> list[dict[str, int]]:
+        """Lost leaves by frame and reason."""
+        return self.leaves.rejected()
+
+    @cached_property
+    def offsets(self) -> NDArray[np.int64]:
+        """Where each frame's survivors start and the last ends (F + 1,)."""
+        return self.leaves.offsets()
+
+    @cached_property
+    def length_residual(self) -> Array:
+        """How much too short each survivor's worst segment was (N,), metres."""
+        return self.leaves.length_residual()
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrunedBranch:
+    """One pruned branch of the tree and the finding that killed it.
+
+    Parameters
+    ----------
+    branch : str
+        Its near-far choices up to the level where it was pruned; it stands for all leaves that begin so.
+    joint : str
+        The joint of that level.
+    reason : str
+        ``check/where``.
+    value, lower, upper : float
+        What was found, and its bounds, in `unit`.
+    """
+
+    branch: str
+    joint: str
+    reason: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameRecovery:
+    """One frame: its survivors and its losses.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+    batch : Batch or None
+        None where the neck could not be found: nothing was grown.
+    index : int
+        The frame's place in its batch.
+    reason : str
+        Why nothing was grown.
+    group_within : float or None
+        Metres within which survivors are grouped.
+    """
+
+    time: float
+    batch: Batch | None
+    index: int
+    reason: str = ""
+    group_within: float | None = None
+    camera: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def _rows(self) -> slice:
+        if self.batch is None:
+            return slice(0, 0)
+        return slice(int(self.batch.offsets[self.index]), int(self.batch.offsets[self.index + 1]))
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return self._rows.stop - self._rows.start
+
+    @property
+    def joints(self) -> Array:
+        """Survivors (N, 14, 3), OpenCV camera frame, metres; NaN where a joint was not seen."""
+        return self.batch.points[self._rows, :14] if self.batch else np.empty((0, 14, 3))
+
+    @property
+    def head(self) -> Array:
+        """The head's points (5, 3), camera frame, metres; NaN where it was not seen."""
+        return self.batch.leaves.given[self.index] if self.batch else np.full((5, 3), np.nan)
+
+    @property
+    def q(self) -> Array:
+        """Survivors as configurations (N, nq) in Pinocchio's order."""
+        return self.batch.configurations.q[self._rows] if self.batch else np.empty((0, 0))
+
+    @property
+    def fk_distance(self) -> Array:
+        """How far the joints of q are from the posture's (N,), metres."""
+        return self.batch.configurations.distance[self._rows] if self.batch else np.empty(0)
+
+    @property
+    def length_residual(self) -> Array:
+        """How much too short each survivor's worst segment was for its image (N,), metres."""
+        return self.batch.length_residual[self._rows] if self.batch else np.empty(0)
+
+    @property
+    def margins(self) -> dict[str, Array]:
+        """Each validator's worst margin (N,), degrees or metres; NaN where it decided nothing."""
+        if self.batch is None:
+            return {}
+        return {name: values[self._rows] for name, values in self.batch.margins.items()}
+
+    @property
+    def branches(self) -> list[str]:
+        """The branch code of each survivor: 0 near, 1 far, joints in tree order from the second."""
+        if self.batch is None:
+            return []
+        leaves = self.batch.leaves
+        return [f"{code:0{leaves.level}b}" for code in leaves.code[self._rows].tolist()]
+
+    @cached_property
+    def groups(self) -> NDArray[np.intp] | None:
+        """The group of each survivor, its first member the representative; None if none were asked for."""
+        return None if self.group_within is None else group_postures(self.joints, self.group_within)
+
+    @property
+    def levels(self) -> dict[str, NDArray[np.int64]]:
+        """Survivors by level after the ``physical`` checks and after the ``motion`` model (§4.1.B)."""
+        if self.batch is None:
+            return {name: np.zeros(14, dtype=np.int64) for name in ("physical", "motion")}
+        return {"physical": self.batch.physical[self.index], "motion": self.batch.motion[self.index]}
+
+    @property
+    def rejected(self) -> dict[str, int]:
+        """Leaves of the full tree lost to each reason; with the survivors they make 8192."""
+        return self.batch.rejected[self.index] if self.batch else {f"root/{self.reason}": 8192}
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """The tolerance that this frame was judged with."""
+        return self.batch.tolerance if self.batch else None
+
+    def too_short(self) -> tuple[str, float] | None:
+        """Return the first segment that is too short for its image in every branch, and by how much (m)."""
+        if self.batch is None:
+            return None
+        leaves = self.batch.leaves
+        found = leaves.candidates.too_short(self.index)
+        return None if found is None else (f"{leaves.joints[leaves.parents[found[0]]]}-{leaves.joints[found[0]]}", found[1])
+
+    def pruned(self) -> list[PrunedBranch]:
+        """Every pruned branch with the finding that killed it, in the order of pruning."""
+        if self.batch is None:
+            return []
+        leaves = self.batch.leaves
+        return [
+            PrunedBranch(
+                branch=f"{group.code[k]:0{group.level}b}",
+                joint=leaves.joints[group.level],
+                reason=f"{group.check}/{group.where[group.place[k]]}",
+                value=float(group.value[k]),
+                lower=float(group.lower[k]),
+                upper=float(group.upper[k]),
+                unit=group.unit,
+            )
+            for group in leaves.pruned
+            for k in np.flatnonzero(group.frame == self.index)
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovery:
+    """All frames of a view.
+
+    Parameters
+    ----------
+    figure : Figure
+        The person's figure.
+    fit : CameraFit
+    frames : list of FrameRecovery
+    settings : mapping
+        Everything that decided the result.
+    """
+
+    figure: Figure
+    fit: CameraFit
+    frames: list[FrameRecovery]
+    settings: Mapping[str, Any]

@@ -1,0 +1,62 @@
+"""From a recovery to what is written."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+
+from posekit.files import Result, ResultFrame
+from posekit.files.units import Unit
+from posekit.pipeline.recovery import FrameRecovery, Recovery
+from posekit.skeleton import JOINTS
+
+
+def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) -> Result:
+    """Gather a recovery for `posekit.write_result`.
+
+    Parameters
+    ----------
+    recovery : Recovery
+    unit : {"m", "cm", "mm"}
+        Of lengths in the file.
+    explain : bool
+        Whether to list every pruned branch with the finding that killed it.
+    """
+    margins = list(dict.fromkeys(name for frame in recovery.frames for name in frame.margins))
+    nq = recovery.figure.model.nq
+    return Result(
+        unit=unit,
+        configuration_names=recovery.figure.configuration_names,
+        settings=recovery.settings,
+        frames=[_frame(frame, margins, nq, explain) for frame in recovery.frames],
+    )
+
+
+def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> ResultFrame:
+    own = frame.margins
+    return ResultFrame(
+        time=frame.time,
+        camera=frame.camera,
+        levels={"joint": JOINTS, **{name: counts.tolist() for name, counts in frame.levels.items()}},
+        joints=frame.joints,
+        q=frame.q.reshape(-1, nq),
+        branches=frame.branches,
+        groups=frame.groups,
+        margins={
+            name: np.where(np.isinf(own[name]), np.nan, own[name]) if name in own else np.empty(0)
+            for name in margins
+        },
+        fk_distance=frame.fk_distance,
+        length_residual=frame.length_residual,
+        rejected=frame.rejected,
+        pruned=[_plain(asdict(branch)) for branch in frame.pruned()] if explain else None,
+    )
+
+
+def _plain(record: dict[str, object]) -> dict[str, object]:
+    """Write infinite and unknown numbers as None: JSON has neither."""
+    return {
+        key: None if isinstance(value, float) and not np.isfinite(value) else value
+        for key, value in record.items()
+    }

@@ -1,0 +1,43 @@
+"""How much a view may disagree with the figure."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from posekit.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerance:
+    """Allowances for lengths and image points that are not exact.
+
+    Parameters
+    ----------
+    rigid : float
+        Metres by which distances inside torso and hips may be off.
+    tangent : float
+        Metres by which a segment may be too short for its image: its end is then put at the nearest point of
+        the ray, and the posture carries what is missing as its length residual.
+    placement : bool
+        Whether the torso must also be the figure's own laid onto the posture, which tells it from its mirror
+        image. With centimetres of tolerance that question has no answer.
+    """
+
+    rigid: float
+    tangent: float
+    placement: bool
+
+    def __post_init__(self) -> None:
+        for name in ("rigid", "tangent"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(f"--{name}-tolerance: {value!r} m; expected zero or a positive length")
+
+
+EXACT: Final = Tolerance(rigid=1e-6, tangent=1e-9, placement=True)
+"""For exact image points: rounding only."""
+
+MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False)
+"""For measured image points and bodies: what real torsos give (docs, "Tolerances")."""

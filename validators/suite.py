@@ -1,0 +1,132 @@
+"""Suites of checks by name, and what they say about whole postures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.tree import Check
+from posekit.validators.collision import collision
+from posekit.validators.joint_range import joint_range
+from posekit.validators.ranges import Ranges
+from posekit.validators.rigid_parts import Mode, rigid_parts
+from posekit.validators.walking import DEFAULT_RULES, walking
+
+CHECKS = ("rigid-parts", "joint-range", "collision", "walking")
+PHYSICAL = CHECKS[:3]
+
+
+def check_names(names: Iterable[str]) -> tuple[str, ...]:
+    """Refuse names that are no checks; return them in the order in which they are applied."""
+    chosen = tuple(names)
+    unknown = [name for name in chosen if name not in CHECKS]
+    if unknown:
+        raise InputError(f"--checks: {unknown[0]!r} is not a check; expected some of {', '.join(CHECKS)}")
+    return tuple(name for name in CHECKS if name in chosen)
+
+
+def make_checks(
+    figure: Figure,
+    names: Iterable[str],
+    *,
+    ranges: Ranges,
+    rigid_tolerance: float,
+    rigid_mode: Mode = "placement",
+    rules: Iterable[int] = DEFAULT_RULES,
+    contact_margin: float = 0.0,
+    exact: bool = False,
+) -> list[Check]:
+    """Make the checks of some validators by name; `exact` asks collision for every distance."""
+    checks: list[Check] = []
+    for name in check_names(names):
+        if name == "rigid-parts":
+            checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode)
+        elif name == "joint-range":
+            checks += joint_range(figure, ranges)
+        elif name == "collision":
+            checks += collision(figure, contact_margin=contact_margin, exact=exact)
+        else:
+            checks += walking(figure, rules)
+    return checks
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """What one validator says about N postures at its K places.
+
+    Parameters
+    ----------
+    check : str
+        The validator.
+    where : tuple of str (K,)
+    unit : tuple of str (K,)
+    value, lower, upper, margin : array (N, K)
+        A negative margin is outside; NaN is undecided.
+    violated : bool array (N, K)
+    """
+
+    check: str
+    where: tuple[str, ...]
+    unit: tuple[str, ...]
+    value: Array
+    lower: Array
+    upper: Array
+    margin: Array
+    violated: NDArray[np.bool_]
+
+    @property
+    def worst(self) -> Array:
+        """The smallest margin of each posture (N,); NaN where nothing was decided."""
+        return np.fmin.reduce(self.margin, axis=1) if self.margin.shape[1] else self.margin.sum(axis=1)
+
+
+def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:
+    """Ask all checks about whole postures (N, 19, 3), and gather their findings by validator.
+
+    Where two checks judge the same place, the later one knows more joints, and holds where it is decided.
+    """
+    judgements = []
+    for name in dict.fromkeys(check.name for check in checks):
+        columns: dict[str, tuple[str, Array, Array, Array, Array, NDArray[np.bool_]]] = {}
+        for check in checks:
+            if check.name != name:
+                continue
+            findings = check.judge(points[:, list(check.points)])
+            shape = findings.value.shape
+            lower, upper = np.broadcast_to(findings.lower, shape), np.broadcast_to(findings.upper, shape)
+            for k, where in enumerate(check.where):
+                new = (
+                    findings.value[:, k],
+                    lower[:, k],
+                    upper[:, k],
+                    findings.margin[:, k],
+                    findings.violated[:, k],
+                )
+                if where in columns:
+                    undecided = np.isnan(new[3])
+                    old = columns[where][1:]
+                    new = tuple(np.where(undecided, o, n) for o, n in zip(old, new, strict=True))  # type: ignore[assignment]
+                columns[where] = (check.unit, *new)
+        table = list(columns.values())
+        value, lower, upper, margin, violated = (
+            np.stack([column[i] for column in table], axis=1) for i in range(1, 6)
+        )
+        judgements.append(
+            Judgement(
+                check=name,
+                where=tuple(columns),
+                unit=tuple(column[0] for column in table),
+                value=value,
+                lower=lower,
+                upper=upper,
+                margin=margin,
+                violated=violated.astype(bool),
+            )
+        )
+    return judgements

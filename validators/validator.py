@@ -1,0 +1,155 @@
+"""The validator of whole postures: every check at once, no tree."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure, load_figure, with_head
+from posekit.skeleton import JOINTS
+from posekit.validators.ranges import load_ranges
+from posekit.validators.suite import PHYSICAL, Judgement, check_names, judge, make_checks
+from posekit.validators.walking import DEFAULT_RULES
+
+BUILT_IN = ("human", "stick_figure")
+RIGID_TOLERANCE = 0.03
+"""Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Verdicts on N postures, with the findings behind them.
+
+    Parameters
+    ----------
+    judgements : list of Judgement
+        By validator.
+    complete : bool array (N,)
+        Whether all 14 joints are known.
+    q : array (N, nq)
+        The configuration of each posture.
+    fk_distance : array (N,)
+        Distance between the posture and its configuration, metres: the largest over the joints.
+    """
+
+    judgements: list[Judgement]
+    complete: NDArray[np.bool_]
+    q: Array
+    fk_distance: Array
+
+    @property
+    def invalid(self) -> NDArray[np.bool_]:
+        """Postures that some check rejects (N,)."""
+        invalid = np.zeros(len(self.complete), dtype=bool)
+        for judgement in self.judgements:
+            invalid |= judgement.violated.any(axis=1)
+        return invalid
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Postures with all joints that no check rejects (N,)."""
+        return self.complete & ~self.invalid
+
+    @property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Postures that nothing rejects, but with joints that are unknown (N,)."""
+        return ~self.complete & ~self.invalid
+
+    @property
+    def verdicts(self) -> list[str]:
+        """``valid``, ``invalid`` or ``undecided``, a posture each."""
+        return [
+            "invalid" if bad else "valid" if good else "undecided"
+            for bad, good in zip(self.invalid, self.valid, strict=True)
+        ]
+
+
+class Validator:
+    """Judges postures against a human figure.
+
+    Parameters
+    ----------
+    urdf : str or Figure
+        ``"human"`` (or ``"stick_figure"``), the built-in figure; the path of a figure's URDF; or a figure.
+    checks : sequence of str
+        Some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``.
+    ranges : str
+        ``urdf``, ``table1`` or the path of a TOML table.
+    rules : sequence of int
+        Rules of walking.
+    rigid_tolerance : float
+        Metres by which distances inside torso and hips may be off.
+    contact_margin : float
+        Metres that bodies must keep from each other; negative allows penetration.
+
+    Examples
+    --------
+    >>> import numpy as np, posekit
+    >>> standing = posekit.load_figure().neutral_points[:14]
+    >>> posekit.Validator("human").check(standing[None]).verdicts
+    ['valid']
+    """
+
+    def __init__(
+        self,
+        urdf: str | Figure = "human",
+        *,
+        checks: Sequence[str] = PHYSICAL,
+        ranges: str = "urdf",
+        rules: Sequence[int] = DEFAULT_RULES,
+        rigid_tolerance: float = RIGID_TOLERANCE,
+        contact_margin: float = 0.0,
+    ) -> None:
+        if isinstance(urdf, Figure):
+            self.figure = urdf
+        else:
+            self.figure = load_figure(None if urdf in BUILT_IN else urdf)
+        self.checks = check_names(checks)
+        self._suite = make_checks(
+            self.figure,
+            self.checks,
+            ranges=load_ranges(ranges),
+            rigid_tolerance=rigid_tolerance,
+            rigid_mode="distances",
+            rules=rules,
+            contact_margin=contact_margin,
+            exact=True,
+        )
+
+    def check(self, postures: ArrayLike, head: ArrayLike | None = None) -> Report:
+        """Judge postures.
+
+        Rigid parts, collision, walking and projected ranges judge the posture as it is given; the URDF's
+        ranges judge the configuration made from it, and `Report.fk_distance` says how far the two are apart.
+
+        Parameters
+        ----------
+        postures : array (N, 14, 3)
+            Joints in tree order, metres, any right-handed frame; NaN where unknown.
+        head : array (N, 5, 3), optional
+            Nose, eyes and ears; without them the neck is undecided and no arm collides with the head.
+
+        Returns
+        -------
+        Report
+        """
+        joints = np.asarray(postures, dtype=np.float64)
+        if joints.ndim != 3 or joints.shape[1:] != (len(JOINTS), 3):
+            raise InputError(f"postures have shape {joints.shape}; expected (N, {len(JOINTS)}, 3), metres")
+        if np.isinf(joints).any():
+            raise InputError("postures hold infinite coordinates; expected finite ones, NaN where unknown")
+        points = with_head(joints)
+        if head is not None:
+            points[:, len(JOINTS) :] = np.asarray(head, dtype=np.float64)
+        q, distance = self.figure.configurations(points)
+        return Report(
+            judgements=judge(self._suite, points),
+            complete=np.isfinite(joints).all(axis=(1, 2)),
+            q=q,
+            fk_distance=distance,
+        )
