@@ -60,19 +60,25 @@ venv: $(VENV)/dev.stamp ## set up .venv with everything
 hooks: $(VENV)/dev.stamp ## let git run the quick checks before each commit
 	$(BIN)/pre-commit install
 
-# The oldest Python that is supported: what fits it fits the later ones too.
+# Resolved for 3.11.0, the oldest Python that is supported: what fits it fits the later ones too (Debian 12 has
+# 3.11.2, and there are packages that want 3.11.5).
 LOCK_PYTHON ?= python3.11
 define WRITE_LOCK
 set -euo pipefail
 fresh=$$(mktemp -d)
 trap 'rm -rf "$$fresh"' EXIT
 $(LOCK_PYTHON) -m venv "$$fresh"
-"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --upgrade setuptools
-"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --no-build-isolation -e '.[dev,docs]'
-{
-    echo '# What make installs, to the exact version. Written by `make lock` with $(LOCK_PYTHON): do not edit.'
-    "$$fresh/bin/python" -m pip freeze --disable-pip-version-check --all --exclude-editable --exclude pip
-} >constraints.txt.new
+"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --upgrade pip setuptools
+"$$fresh/bin/python" -m pip install --quiet --disable-pip-version-check --dry-run --ignore-installed \
+    --python-version 3.11.0 --only-binary :all: --no-build-isolation --report "$$fresh/report.json" \
+    setuptools '.[dev,docs]'
+"$$fresh/bin/python" - "$$fresh/report.json" >constraints.txt.new <<'SCRIPT'
+import json, pathlib, sys
+found = [entry["metadata"] for entry in json.loads(pathlib.Path(sys.argv[1]).read_text())["install"]]
+pins = [(item["name"], item["version"]) for item in found if item["name"] != "posekit"]
+print("# What make installs, to the exact version. Written by `make lock`, for Python 3.11 and later: do not edit.")
+print(*(f"{name}=={version}" for name, version in sorted(pins, key=lambda pin: pin[0].lower())), sep="\n")
+SCRIPT
 mv constraints.txt.new constraints.txt
 endef
 export WRITE_LOCK

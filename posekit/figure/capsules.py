@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from posekit.cameras import Array
 from posekit.errors import FigureError
+from posekit.figure.frames import unit
 from posekit.skeleton import HEAD, JOINT
 
 AXES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
@@ -79,8 +80,7 @@ class Capsule:
         n = len(self.start)
         start = points[:, 0] if n == 1 else points[:, :n].mean(axis=1)
         end = points[:, n] if len(self.end) == 1 else points[:, n:].mean(axis=1)
-        axis = end - start
-        axis = axis / np.sqrt(np.einsum("ni,ni->n", axis, axis))[:, None]
+        axis = unit(end - start)
         return start + self.center * axis, axis
 
 

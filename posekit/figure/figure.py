@@ -22,7 +22,7 @@ from posekit.figure.frames import fit_rotation, hips_frame, torso_frame, unit
 from posekit.figure.lengths import check_lengths
 from posekit.figure.stature import lengths_from_stature
 from posekit.figure.urdf import parse, read_text, replace_limits, rewrite
-from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, segment_name, urdf_joint_name
+from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, TORSO, segment_name, urdf_joint_name
 
 FRAMES = {
     "neck": "torso",
@@ -267,14 +267,7 @@ class Figure:
         Configurations
         """
         points = with_head(points)
-        R_torso = torso_frame(*(points[:, JOINT[j]] for j in ("neck", "right_shoulder", "left_shoulder", "pelvis")))
-        q = np.full((len(points), self.model.nq), np.nan)
-        q[:, :3] = points[:, 0]
-        q[:, 3:7] = quaternions(R_torso)
-        angles = self.angles(points, R_torso)
-        head_unknown = np.isnan(angles[:, :3])
-        angles[:, :3] = np.where(head_unknown, 0.0, angles[:, :3])
-        q[:, self.angle_index] = angles
+        q = self.inverse_kinematics(points)
         placed = np.isfinite(q[:, :7]).all(axis=1)
         distance = np.full(len(points), np.nan)
         if placed.any():
@@ -282,6 +275,17 @@ class Figure:
             gap = np.linalg.norm(joints - points[placed, : len(JOINTS)], axis=-1)
             distance[placed] = np.fmax.reduce(gap, axis=1)
         return Configurations(q, distance)
+
+    def inverse_kinematics(self, points: Array) -> Array:
+        """Turn postures (N, 19, 3) into q (N, nq), in closed form: `configurations` without the distance."""
+        R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
+        q = np.full((len(points), self.model.nq), np.nan)
+        q[:, :3] = points[:, 0]
+        q[:, 3:7] = quaternions(R_torso)
+        angles = self.angles(points, R_torso)
+        angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
+        q[:, self.angle_index] = angles
+        return q
 
     def angles(self, points: Array, R_torso: Array) -> Array:
         """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians."""

@@ -62,7 +62,7 @@ class Archive:
         return tuple(name.removesuffix(".npy") for name in self.zip.namelist())
 
     def check_held(self, limit: int, *, but: tuple[str, ...] = ()) -> None:
-        """Refuse an archive whose arrays, less those whose names start with `but`, unpack to more than this."""
+        """Refuse more bytes than this, unpacked, in the arrays whose names do not start with `but`."""
         declared = sum(
             member.file_size for member in self.zip.infolist() if not member.filename.startswith(but or "\0")
         )

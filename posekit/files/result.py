@@ -28,9 +28,9 @@ class ResultFrame:
     time : float
         Seconds.
     camera : mapping
-        What was recovered of the camera, each None (or NaN) where it is not known: ``f`` (metres; Lee & Chen's camera alone, whose f
-        is a length), ``rotation`` (3, 3), ``position`` (3,) in metres, ``residual`` (in the unit of the image:
-        metres where there is an f, else pixels).
+        What was recovered of the camera, each None (or NaN) where it is not known: ``f`` (metres; Lee &
+        Chen's camera alone, whose f is a length), ``rotation`` (3, 3), ``position`` (3,) in metres,
+        ``residual`` (in the unit of the image: metres where there is an f, else pixels).
     levels : mapping
         Survivors per level of the tree: ``joint`` names, ``physical`` and ``motion`` counts, of one length.
     joints : array (N, 14, 3)

@@ -95,8 +95,11 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
 def _nullable(values: Array) -> list[Any]:
     """Turn an array into lists with None for NaN."""
     unknown = np.isnan(values)
-    listed: list[Any] = (np.where(unknown, None, values) if unknown.any() else values).tolist()
-    return listed
+    if unknown.any():
+        boxed = values.astype(object)
+        boxed[unknown] = None
+        return list(boxed.tolist())
+    return list(values.tolist())
 
 
 def _length(value: Any, unit: Unit) -> Any:

@@ -30,7 +30,7 @@ def schema(name: str) -> dict[str, Any]:
     Returns
     -------
     dict
-        With ``$schema``, ``$id`` (the versioned name) and ``title``.
+        With ``$schema``, ``$id`` (``urn:posekit:view:1``) and ``title``.
 
     Raises
     ------
@@ -41,7 +41,10 @@ def schema(name: str) -> dict[str, Any]:
     if name not in known:
         raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, SCHEMAS))
     full = known[name]
-    head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "$id": f"urn:{full.replace('/', ':')}"}
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:{full.replace('.', ':').replace('/', ':')}",
+    }
     return {**head, **_MODELS[full].model_json_schema(), "title": full}
 
 

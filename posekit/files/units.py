@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from typing import Final, Literal, get_args
+from collections.abc import Sequence
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,8 +24,8 @@ _LENGTH = re.compile(
 )
 
 
-def to_metres(values: ArrayLike, unit: str) -> NDArray[np.float64]:
-    """Turn values in a unit into metres: 35.7 cm is the float nearest to 0.357 m."""
+def to_metres(values: ArrayLike | Sequence[Any], unit: str) -> NDArray[np.float64]:
+    """Turn values in a unit into metres: 35.7 cm is the float nearest to 0.357 m; None is NaN."""
     return np.asarray(np.asarray(values, dtype=np.float64) / PER_METRE[unit])
 
 

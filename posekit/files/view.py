@@ -99,10 +99,10 @@ class View:
         return len(self.time)
 
     def _check_figure(self) -> None:
-        for name, value in self.lengths.items():
+        for name, length in self.lengths.items():
             _check_name("lengths", name, SEGMENT_NAMES)
-            _check_length(f"lengths.{name}", value)
-        object.__setattr__(self, "lengths", {name: float(value) for name, value in self.lengths.items()})
+            _check_length(f"lengths.{name}", length)
+        object.__setattr__(self, "lengths", {name: float(length) for name, length in self.lengths.items()})
         if self.stature is not None:
             _check_length("stature", self.stature)
         if self.head_points is None:

@@ -27,8 +27,9 @@ def _neck_is_seen(image: dict[str, Any]) -> dict[str, Any]:
     return image
 
 
-def _keys(names: tuple[str, ...]) -> Any:
-    return Field(json_schema_extra={"propertyNames": {"enum": list(names)}})
+def _keys(names: tuple[str, ...], **more: Any) -> Any:
+    """Say in the published schema which keys an object may have."""
+    return Field(json_schema_extra={"propertyNames": {"enum": list(names)}, **more})
 
 
 Point2 = Annotated[list[float], Field(min_length=2, max_length=2)]
@@ -37,7 +38,9 @@ Matrix3 = Annotated[list[Point3], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Annotated[int, Field(gt=0, le=10**6)]
 
-Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), AfterValidator(_neck_is_seen), _keys(JOINTS)]
+Image = Annotated[
+    dict[str, Point2], named(JOINTS, "joint"), AfterValidator(_neck_is_seen), _keys(JOINTS, required=["neck"])
+]
 HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]

@@ -114,8 +114,8 @@ def dlt(head: HeadPoints, image: ArrayLike) -> Projection:
     ):
         if not determined:
             reasons[frame] = (
-                "the linear equations have more than one solution: six points and the camera lie so that a plane "
-                "and a line through the camera hold them; use calibrate, or add a head point"
+                "the linear equations have more than one solution (as where all points but two are in a plane, "
+                "and these two in line with the camera); use calibrate, or add a head point"
             )
         elif not in_front:
             reasons[frame] = BEHIND

@@ -40,9 +40,7 @@ class Estimate(NamedTuple):
     cost_without: Array
 
 
-def estimate(
-    head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None
-) -> Estimate:
+def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None) -> Estimate:
     """Place the head in every frame.
 
     Parameters
@@ -72,27 +70,31 @@ def estimate(
     centre, size, points = _centred(head.points, seen)
     K = None if known is None else np.broadcast_to(known[0].K, (total, 3, 3))[usable]
     distortion = None if known is None else known[0].distortion
-    heads = Heads(points, sighting.image[usable], seen.astype(np.float64), K, distortion, np.ones(len(usable)))
-    plane = heads.image if known is None else known[1][usable]
+    image, ones = sighting.image[usable], np.ones(len(usable))
+    heads = Heads(points, image, seen.astype(np.float64), K, distortion, ones)
+    plane = image if known is None else known[1][usable]
     fitted, wrong = _best(heads, plane)
     f, f_deviation, undetermined = _focal_length(heads, fitted)
+    ended = np.flatnonzero(fitted.settled)
+    point, cost_without = misfits(heads.take(ended), plane[ended], fitted.take(ended))
+    result.misfit[usable[ended]], result.cost_without[usable[ended]] = point, cost_without
+    result.cost[usable[ended]] = fitted.cost[ended]
+    residual = look(heads, fitted.placement)[0].reshape(-1, 2, count)
+    result.residuals[usable[ended]] = np.hypot(residual[:, 0], residual[:, 1])[ended]
     for frame, near, far in zip(usable, wrong, undetermined, strict=True):
         reasons[frame] = near or far
+        if reasons[frame] and result.misfit[frame] >= 0:
+            name = head.names[result.misfit[frame]]
+            reasons[frame] += f"; check head point {name} first, which does not fit the others"
     good = np.array([not reasons[frame] for frame in usable], dtype=np.bool_)
-    frames, index = usable[good], np.flatnonzero(good)
-    heads, fitted = heads.take(index), Fit(fitted.placement.take(index), fitted.cost[index], fitted.settled[index])
-    placement = fitted.placement
-    lens = f[index] if K is None else np.ones(len(index))
-    z = lens * size[index] / placement.scale
+    frames = usable[good]
+    placement, f = fitted.placement.take(good), f[good]
+    lens = f if K is None else np.ones(len(f))
+    z = lens * size[good] / placement.scale
     centre_cam = np.concatenate([placement.shift * (z / lens)[:, None], z[:, None]], axis=1)
     result.R[frames] = placement.R
-    result.t[frames] = centre_cam - np.einsum("fij,fj->fi", placement.R, centre[index])
-    result.f[frames] = f[index]
-    result.f_deviation[frames] = f_deviation[index]
-    residual = look(heads, placement)[0].reshape(-1, 2, count)
-    result.residuals[frames] = np.hypot(residual[:, 0], residual[:, 1])
-    result.cost[frames] = fitted.cost
-    result.misfit[frames], result.cost_without[frames] = misfits(heads, fitted)
+    result.t[frames] = centre_cam - np.einsum("fij,fj->fi", placement.R, centre[good])
+    result.f[frames], result.f_deviation[frames] = f, f_deviation[good]
     return result
 
 
@@ -109,9 +111,9 @@ def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
     """Fit from both starts, take the better, and say where a head behind the camera fits better still."""
     seen = heads.seen > 0
     direct, behind = direct_start(heads.points, plane, seen)
-    affine = affine_start(heads.points, plane, seen)
+    affine = affine_start(heads.points, plane, seen, heads.K is not None)
     if heads.K is not None:
-        direct, affine = direct._replace(slope=direct.scale.copy()), affine._replace(slope=affine.scale.copy())
+        direct = direct._replace(slope=direct.scale.copy())
     number = np.arange(len(plane))
     both = fit(
         heads.take(np.concatenate([number, number])),
@@ -119,7 +121,7 @@ def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
     )
     second = both.cost[len(plane) :] < both.cost[: len(plane)]
     choice = np.where(second, number + len(plane), number)
-    best = Fit(both.placement.take(choice), both.cost[choice], both.settled[choice])
+    best = both.take(choice)
     reasons = [
         "" if settled else "no pose was found from either start: check the image points and the focal length"
         for settled in best.settled

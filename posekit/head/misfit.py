@@ -1,7 +1,7 @@
 r"""Find the point that does not fit the rest.
 
-A head is fitted again without each of its points. If one point alone is wrong, the squared error falls to what
-measuring leaves. For normal errors of unknown size, and one point chosen beforehand,
+A head is fitted again without each of its points. If one point alone is wrong, the squared error falls to
+what measuring leaves. For normal errors of unknown size, and one point chosen beforehand,
 
 .. math:: F = \frac{(S - S_j)/2}{S_j / m}
 
@@ -18,21 +18,27 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.head.fit import Fit, fit
-from posekit.head.perspective import Heads, Placement
+from posekit.head.perspective import Heads, Placement, look
+from posekit.head.starts import affine_start
 
-FALSE_ALARMS = 2e-3
+FALSE_ALARMS = 5e-3
 """The chance that a head of sound points with normal errors has one of them named."""
 
 ROUNDING = 1e-10
 """Error, as a fraction of the head's size in the image, that is taken for rounding and never looked into."""
 
+PRECISION = 1e-3
+"""Fraction to which the squared error without a point is found: enough to judge it."""
 
-def misfits(heads: Heads, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
+
+def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
     """Name the point that does not fit.
 
     Parameters
     ----------
     heads : Heads
+    plane : array (F, P, 2)
+        The image points, normalised where K is known.
     fitted : Fit
         Of all points.
 
@@ -50,7 +56,7 @@ def misfits(heads: Heads, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
     seen = without.seen.copy()
     seen[np.arange(len(points)), points] = 0.0
     without = without._replace(seen=seen)
-    again = fit(without, Placement(*(array[frames] for array in fitted.placement)))
+    again = fit(without, _start(without, plane[frames], fitted.placement.take(frames)), PRECISION)
     left = np.full((total, count), np.inf)
     left[frames, points] = np.maximum(again.cost, floor[frames])
     point = left.argmin(axis=-1)
@@ -61,6 +67,18 @@ def misfits(heads: Heads, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
         chance = n * (cost / fitted.cost) ** (freedom / 2)
     named = (chance < FALSE_ALARMS) & np.isfinite(cost)
     return np.where(named, point, -1), np.where(named, cost, np.nan)
+
+
+def _start(heads: Heads, plane: Array, placement: Placement) -> Placement:
+    """Start from the placement of all points, or, if that one is led far astray, from the orthographic view."""
+    start = affine_start(heads.points, plane, heads.seen > 0, heads.K is not None)
+    costs = []
+    for candidate in (placement, start):
+        residual, _, possible = look(heads, candidate)
+        costs.append(np.where(possible, np.einsum("fi,fi->f", residual, residual), np.inf))
+    better = costs[1] < costs[0]
+    placement.put(better, start.take(better))
+    return placement
 
 
 def _spread(heads: Heads) -> Array:

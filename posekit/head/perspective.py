@@ -47,7 +47,7 @@ class Heads(NamedTuple):
     distortion: Array | None
     side: Array
 
-    def take(self, index: NDArray[np.intp]) -> Heads:
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Heads:
         """Select heads."""
         K = None if self.K is None else self.K[index]
         return Heads(

@@ -57,7 +57,8 @@ class HeadPoints:
         points = np.array(self.points, dtype=np.float64)
         if points.shape != (len(names), 3):
             raise HeadError(
-                f"the head has {len(names)} names but points of shape {points.shape}; expected ({len(names)}, 3)"
+                f"the head has {len(names)} names and points of shape {points.shape}; "
+                f"expected ({len(names)}, 3)"
             )
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:
@@ -106,7 +107,7 @@ class HeadPoints:
 
 
 def degeneracy(names: tuple[str, ...], points: Array, seen: NDArray[np.bool_]) -> str:
-    """Say why those of the points (P, 3) that are `seen` (P,) cannot determine a camera; empty if they can."""
+    """Say why those points (P, 3) that are `seen` (P,) cannot determine a camera; empty if they can."""
     count = int(seen.sum())
     if count < MINIMUM:
         missing = [name for name, visible in zip(names, seen, strict=True) if not visible]
@@ -124,7 +125,7 @@ def degeneracy(names: tuple[str, ...], points: Array, seen: NDArray[np.bool_]) -
         )
     if thickness <= DEGENERATE * size:
         return (
-            f"the {count} head points lie in one plane (off it by {thickness:.3g} m, across it {size:.3g} m): "
+            f"the {count} head points lie in one plane (off it {thickness:.3g} m, along it {size:.3g} m): "
             "a plane does not determine a camera; add a point off it, the nose or the neck"
         )
     return ""

@@ -12,7 +12,7 @@ from posekit.cameras import Array, PinholeCamera
 from posekit.cameras.lee_chen import pinhole
 from posekit.errors import HeadError
 from posekit.head.dlt import require
-from posekit.head.estimate import Estimate, estimate
+from posekit.head.estimate import estimate
 from posekit.head.points import HeadPoints, head_points_cam
 from posekit.head.sighting import Sighting, sight
 
@@ -204,10 +204,10 @@ def _warn(pose: HeadPose) -> None:
         if not frames.size:
             continue
         worst = frames[pose.rms[frames].argmax()]
-        where = f" in {frames.size} of {misfit.size} frames; worst is frame {worst}" if misfit.size > 1 else ""
+        where = f" in {frames.size} of {misfit.size} frames, most in frame {worst}" if misfit.size > 1 else ""
         warnings.warn(
             f"head point {name} does not fit the others{where}: residual {pose.residuals[worst, index]:.4g}, "
-            f"rms {pose.rms[worst]:.4g} with it and {pose.rms_without[worst]:.4g} without it, in the image's unit; "
+            f"rms {pose.rms[worst]:.4g} with it and {pose.rms_without[worst]:.4g} without, in the image's unit; "
             "check its place on the head and in the image, or leave it out",
             HeadWarning,
             stacklevel=4,

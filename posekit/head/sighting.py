@@ -44,24 +44,24 @@ def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
         points = points[None]
     if points.ndim != 3 or points.shape[1:] != (count, 2):
         raise HeadError(
-            f"image points have shape {np.shape(image)}; expected ({count}, 2) or (F, {count}, 2), one row for "
-            f"each of {', '.join(head.names)}, NaN where a point is not seen"
+            f"image points have shape {np.shape(image)}; expected ({count}, 2) or (F, {count}, 2), one row "
+            f"for each of {', '.join(head.names)}, NaN where a point is not seen"
         )
     if np.isinf(points).any():
         frame, row, _ = np.argwhere(np.isinf(points))[0]
         raise HeadError(
-            f"frame {frame}: head point {head.names[row]} is at {points[frame, row].tolist()} in the image; expected "
-            "finite numbers, or NaN where it is not seen"
+            f"frame {frame}: head point {head.names[row]} is at {points[frame, row].tolist()} in the image; "
+            "expected finite numbers, or NaN where it is not seen"
         )
-    seen = ~np.isnan(points).any(axis=-1)
+    seen: NDArray[np.bool_] = np.isfinite(points).all(axis=-1)
     points[~seen] = 0.0
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     by_pattern = [degeneracy(head.names, head.points, pattern) for pattern in patterns]
     reasons = [by_pattern[pattern] or "" for pattern in which.reshape(-1)]
     for frame, spread in zip(*_flat(points, seen), strict=True):
         reasons[frame] = reasons[frame] or (
-            f"the image points lie on one line (or in one point: {spread[0]:.3g} along it, {spread[1]:.3g} across): "
-            "no view of a head does; check the image points"
+            f"the image points lie on one line or in one point ({spread[0]:.3g} along, {spread[1]:.3g} across): "
+            "a head never looks so; check the image points"
         )
     return Sighting(points, seen, reasons)
 

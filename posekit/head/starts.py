@@ -1,4 +1,4 @@
-"""Where the search for a placement starts: the direct linear transformation, and the scaled orthographic view."""
+"""Where the search for a placement starts: the linear solution, and the scaled orthographic view."""
 
 from __future__ import annotations
 
@@ -10,26 +10,32 @@ from posekit.head.dlt import solve
 from posekit.head.perspective import Placement
 
 
-def affine_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> Placement:
+def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bool) -> Placement:
     """Fit a scaled orthographic view: the limit of a distant camera (Tomasi & Kanade 1992).
 
     Parameters
     ----------
     points : array (F, P, 3)
-        Centred on the seen points; 0 where not seen.
+        As `posekit.head.perspective.Heads` has them.
     image : array (F, P, 2)
         Normalised image points, or metres where f is free.
     seen : bool array (F, P)
         At least four a frame, not in one plane.
+    known : bool
+        Whether f is: then the scale tells the depth, else the camera is infinitely far.
     """
-    shift = (image * seen[..., None]).sum(axis=1) / seen.sum(axis=1)[:, None]
-    offset = np.where(seen[..., None], image - shift[:, None], 0.0)
-    transposed = np.swapaxes(points, -1, -2)
-    affine = np.swapaxes(np.linalg.solve(transposed @ points, transposed @ offset), -1, -2)
+    weight = (seen / seen.sum(axis=-1, keepdims=True))[..., None]
+    centre, middle = (weight * points).sum(axis=1), (weight * image).sum(axis=1)
+    space = np.where(seen[..., None], points - centre[:, None], 0.0)
+    offset = np.where(seen[..., None], image - middle[:, None], 0.0)
+    transposed = np.swapaxes(space, -1, -2)
+    affine = np.swapaxes(np.linalg.solve(transposed @ space, transposed @ offset), -1, -2)
     left, values, right = np.linalg.svd(affine, full_matrices=False)
     axes = left @ right
     R = np.concatenate([axes, np.cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)
-    return Placement(R, shift, values.mean(axis=-1), np.zeros(len(R)))
+    scale = values.mean(axis=-1)
+    shift = middle - scale[:, None] * np.einsum("fij,fj->fi", axes, centre)
+    return Placement(R, shift, scale, scale.copy() if known else np.zeros(len(R)))
 
 
 def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[Placement, NDArray[np.bool_]]:
@@ -43,7 +49,7 @@ def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[
     usable = direct.determined & ((ahead > 0) | ~seen).all(axis=-1)
     behind = usable & (depth < 0)
     side = np.where(behind, -1.0, 1.0)
-    # A head behind the camera looks as one half a turn about the optical axis further, with its depths reversed.
+    # A head behind the camera looks as one turned by half a turn about the optical axis, its depths reversed.
     R = direct.R * np.stack([side, side, np.ones_like(side)], axis=-1)[..., None]
     R = np.where(usable[:, None, None], R, np.nan)
     shift = direct.f[:, None] * direct.t[:, :2] / depth[:, None]

@@ -3,6 +3,7 @@
 from posekit.tree.candidates import Branch as Branch
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
+from posekit.tree.enumeration import enumerate_leaves as enumerate_leaves
 from posekit.tree.interpretation_tree import InterpretationTree as InterpretationTree
 from posekit.tree.leaves import Leaves as Leaves
 from posekit.tree.leaves import Pruned as Pruned

@@ -1,0 +1,82 @@
+"""The `posekit` command: its commands, its errors and its exit codes."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from typing import Annotated, TextIO
+
+import click
+import typer
+
+from posekit.cli import demo, recover, reproduce, synth, validate
+from posekit.errors import PosekitError
+
+BAD_INPUT = 2
+
+app = typer.Typer(
+    name="posekit",
+    help="Every physically possible posture behind one view, each certified.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("recover")(recover.recover)
+app.command("validate")(validate.validate)
+app.add_typer(synth.app, name="synth")
+app.command("reproduce")(reproduce.reproduce)
+app.command("demo")(demo.demo)
+
+
+def _print_version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import version  # noqa: PLC0415  (only when asked for)
+
+        typer.echo(f"posekit {version('posekit')}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Every physically possible posture behind one view, each certified."""
+
+
+def main() -> None:
+    """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
+    warnings.showwarning = _warn
+    try:
+        code = app(standalone_mode=False)
+    except PosekitError as error:
+        code = _fail(str(error))
+    except click.UsageError as error:
+        hint = f"; see {error.ctx.command_path} --help" if error.ctx else ""
+        code = _fail(error.format_message().rstrip(".") + hint)
+    except click.ClickException as error:
+        code = _fail(error.format_message())
+    except (click.Abort, KeyboardInterrupt):
+        code = _fail("interrupted", 130)
+    except BrokenPipeError:
+        sys.stderr.close()
+        code = 1
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _fail(message: str, code: int = BAD_INPUT) -> int:
+    typer.echo(f"posekit: error: {' '.join(message.split())}", err=True)
+    return code
+
+
+def _warn(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    """Print a warning as one line, without the place in the code."""
+    typer.echo(f"posekit: warning: {' '.join(str(message).split())}", err=True)

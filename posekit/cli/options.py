@@ -1,0 +1,85 @@
+"""Options that several commands share, and how their texts are read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from posekit.errors import InputError
+
+PHYSICAL = "rigid-parts,joint-range,collision"
+
+Checks = Annotated[
+    str,
+    typer.Option(
+        "--checks", metavar="LIST", help="Some of rigid-parts, joint-range, collision, walking, by commas."
+    ),
+]
+RangesOption = Annotated[
+    str, typer.Option("--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, table1, or a TOML file.")
+]
+Rules = Annotated[
+    str, typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5.")
+]
+ContactMargin = Annotated[
+    str,
+    typer.Option(
+        "--contact-margin",
+        metavar="LENGTH",
+        help="Clearance that bodies must keep, as 1cm; negative allows penetration.",
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random numbers.")]
+Noise = Annotated[
+    float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")
+]
+OutputView = Annotated[Path, typer.Option("-o", "--output", metavar="VIEW", help="The view file to write.")]
+
+
+def split(text: str) -> tuple[str, ...]:
+    """Split a list by commas."""
+    return tuple(word.strip() for word in text.split(",") if word.strip())
+
+
+def rule_numbers(text: str) -> tuple[int, ...]:
+    """Read the list of rules."""
+    try:
+        return tuple(int(word) for word in split(text))
+    except ValueError as error:
+        raise InputError(f"--rules: {text!r}; expected numbers from 1 to 5 with commas, as 1,2") from error
+
+
+def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
+    """Read some finite numbers by commas."""
+    try:
+        values = tuple(float(word) for word in split(text))
+    except ValueError:
+        values = ()
+    if len(values) != count or not all(abs(value) < float("inf") for value in values):
+        raise InputError(f"{option}: {text!r}; expected {count} numbers with commas, as 400,0,0")
+    return values
+
+
+def signed_length(text: str, option: str) -> float:
+    """Read a length that may be negative, metres."""
+    from posekit.files import parse_length  # noqa: PLC0415  (pydantic is only needed when a command runs)
+
+    negative = text.startswith("-")
+    return (-1.0 if negative else 1.0) * parse_length(text.removeprefix("-"), name=option)
+
+
+@contextmanager
+def progress(label: str, total: int) -> Iterator[Any]:
+    """Show a progress bar on a terminal's stderr; yield the function to call with the number done."""
+    from rich.console import Console  # noqa: PLC0415
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+
+    console = Console(stderr=True)
+    columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda done: bar.advance(task, done)

@@ -1,0 +1,105 @@
+"""`posekit recover`: one view in, every physically possible posture out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posekit.cli.options import (
+    PHYSICAL,
+    Checks,
+    ContactMargin,
+    RangesOption,
+    Rules,
+    progress,
+    rule_numbers,
+    signed_length,
+    split,
+)
+
+if TYPE_CHECKING:
+    from posekit.pipeline import Recovery, Tolerance
+
+
+def recover(
+    view: Annotated[Path, typer.Argument(metavar="VIEW", help="A posekit.view/1 file.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="RESULT", help="The result: .json or .npz.")
+    ],
+    checks: Checks = PHYSICAL,
+    ranges: RangesOption = "urdf",
+    rules: Rules = "1,2",
+    group: Annotated[
+        str, typer.Option("--group", metavar="LENGTH", help="Group survivors nearer than this, as 5cm.")
+    ] = "",
+    rigid_tolerance: Annotated[
+        str,
+        typer.Option(
+            "--rigid-tolerance",
+            metavar="LENGTH",
+            help="How far distances inside torso and hips may be off. Default: exact where some torso fits "
+            "exactly, else 3cm.",
+        ),
+    ] = "",
+    tangent_tolerance: Annotated[
+        str,
+        typer.Option(
+            "--tangent-tolerance",
+            metavar="LENGTH",
+            help="How much too short for its image a segment may be. Default: as above, 1cm.",
+        ),
+    ] = "",
+    contact_margin: ContactMargin = "0cm",
+    explain: Annotated[
+        bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
+    ] = False,
+) -> None:
+    """Recover every posture behind a view that passes the checks, each as a configuration of the figure.
+
+    Examples:
+      posekit synth walker -o walk.json && posekit recover walk.json -o postures.json
+      posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking --rules 1,2
+      posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain
+    """
+    from posekit import files, pipeline  # noqa: PLC0415  (the libraries behind them load only when needed)
+
+    files.check_result_path(output)
+    seen = files.read_view(view)
+    with progress("recovering", len(seen.time)) as done:
+        recovery = pipeline.recover(
+            seen,
+            checks=split(checks),
+            ranges=ranges,
+            rules=rule_numbers(rules),
+            tolerance=_tolerance(rigid_tolerance, tangent_tolerance),
+            contact_margin=signed_length(contact_margin, "--contact-margin"),
+            group=files.parse_length(group, name="--group") if group else None,
+            progress=done,
+        )
+    files.write_result(output, pipeline.result_of(recovery, unit=seen.unit, explain=explain))
+    summarize(recovery)
+    typer.echo(f"written: {output}")
+
+
+def _tolerance(rigid: str, tangent: str) -> Tolerance | None:
+    from posekit.files import parse_length  # noqa: PLC0415
+    from posekit.pipeline import EXACT, MEASURED, Tolerance  # noqa: PLC0415
+
+    if not rigid and not tangent:
+        return None
+    metres = parse_length(rigid, name="--rigid-tolerance") if rigid else MEASURED.rigid
+    return Tolerance(
+        rigid=metres,
+        tangent=parse_length(tangent, name="--tangent-tolerance") if tangent else MEASURED.tangent,
+        placement=metres <= EXACT.rigid,
+    )
+
+
+def summarize(recovery: Recovery) -> None:
+    """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
+    from posekit.pipeline.summary import summary_lines  # noqa: PLC0415
+
+    for line in summary_lines(recovery):
+        typer.echo(line)

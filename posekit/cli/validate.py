@@ -1,0 +1,78 @@
+"""`posekit validate`: are these postures physically possible?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posekit.cli.options import (
+    PHYSICAL,
+    Checks,
+    ContactMargin,
+    RangesOption,
+    Rules,
+    rule_numbers,
+    signed_length,
+    split,
+)
+
+SOME_INVALID = 1
+
+
+def validate(
+    postures: Annotated[
+        Path, typer.Argument(metavar="POSTURES", help="posekit.postures/1 (JSON, NPZ), or a result.")
+    ],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="The report: .json.")],
+    urdf: Annotated[
+        str, typer.Option("--urdf", metavar="FILE|NAME", help="human (built in), or a figure's URDF.")
+    ] = "human",
+    checks: Checks = PHYSICAL,
+    ranges: RangesOption = "urdf",
+    rules: Rules = "1,2",
+    rigid_tolerance: Annotated[
+        str,
+        typer.Option(
+            "--rigid-tolerance",
+            metavar="LENGTH",
+            help="How far distances inside torso and hips may be off.",
+        ),
+    ] = "3cm",
+    contact_margin: ContactMargin = "0cm",
+    every: Annotated[
+        bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
+    ] = False,
+) -> None:
+    """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input.
+
+    Examples:
+      posekit validate postures.json -o report.json
+      posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1
+    """
+    from posekit import files, pipeline, validators  # noqa: PLC0415
+
+    given = files.read_postures(postures)
+    validator = validators.Validator(
+        urdf,
+        checks=split(checks),
+        ranges=ranges,
+        rules=rule_numbers(rules),
+        rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
+        contact_margin=signed_length(contact_margin, "--contact-margin"),
+    )
+    settings = {
+        "urdf": urdf,
+        "ranges": ranges,
+        "rules": rules,
+        "rigid_tolerance": rigid_tolerance,
+        "contact_margin": contact_margin,
+    }
+    report = pipeline.validate(validator, given, settings=settings, every=every)
+    files.write_report(output, report)
+    for line in pipeline.verdict_lines(report):
+        typer.echo(line)
+    typer.echo(f"written: {output}")
+    if report.summary["valid"] < len(report.postures):
+        raise typer.Exit(SOME_INVALID)

@@ -1,0 +1,54 @@
+"""What the command line prints of a recovery and of a report."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from posekit.files import Report
+from posekit.pipeline.recovery import FrameRecovery, Recovery
+from posekit.pipeline.tolerance import EXACT
+
+SHOWN = 4
+"""How many reasons, and how many frames at each end of a long sequence, are printed."""
+
+
+def summary_lines(recovery: Recovery) -> list[str]:
+    """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
+    frames = list(enumerate(recovery.frames))
+    lines = [f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>9}  rejected most by (of 8192)"]
+    cut = len(frames) - 2 * SHOWN
+    for k, frame in frames:
+        if cut > 1 and SHOWN <= k < len(frames) - SHOWN:
+            if k == SHOWN:
+                lines.append(f"{'…':>5} {cut} frames between")
+            continue
+        lines.append(_frame_line(k, frame))
+    counts = [len(frame) for frame in recovery.frames]
+    lines.append(
+        f"{sum(counts)} postures in {len(counts)} frames: median {np.median(counts):g}, most {max(counts)}, "
+        f"none in {counts.count(0)}"
+    )
+    return lines
+
+
+def _frame_line(k: int, frame: FrameRecovery) -> str:
+    groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
+    judged = "-" if frame.tolerance is None else "exact" if frame.tolerance == EXACT else "measured"
+    most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
+    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>9}  {most}"
+
+
+def verdict_lines(report: Report) -> list[str]:
+    """Count the verdicts of a report, and what is behind the invalid ones."""
+    reasons = Counter(
+        f"{finding.check}/{finding.where}"
+        for posture in report.postures
+        for finding in posture.findings
+        if finding.verdict == "invalid"
+    )
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in report.summary.items())
+    lines = [f"{len(report.postures)} postures: {counts}"]
+    lines += [f"{count:>8}  {reason}" for reason, count in reasons.most_common(10)]
+    return lines
