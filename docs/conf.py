@@ -27,5 +27,8 @@ napoleon_numpy_docstring = True
 napoleon_use_ivar = True  # a dataclass lists its fields once, in its Attributes section
 napoleon_use_rtype = False
 
+# Short names in docstrings (`Figure`, `q`) have more than one target: posekit.Figure is figure.figure.Figure.
+suppress_warnings = ["ref.python"]
+
 html_theme = "furo"
 html_title = f"posekit {release}"

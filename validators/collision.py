@@ -1,7 +1,7 @@
-"""Collision: do the bodies of arms, legs, torso and head penetrate (Lee & Chen 1985, §3.2.C)?
+"""Collision: arms, legs, torso and head must not penetrate each other (Lee & Chen 1985, §3.2.C).
 
-Coal is the judge, through Pinocchio: for each pair of capsules a model of two free-flyers is kept, and a batch
-of postures is one call. Only pairs whose bounding spheres meet are asked; the others are proven clear.
+Coal is the judge, through Pinocchio: for each pair of capsules a model of two free-flyers is kept, and a
+batch of postures is one call. Only pairs whose bounding spheres meet are asked; the others are proven clear.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.figure.capsules import Capsule
+from posekit.figure.frames import cross
 from posekit.tree import Check, Findings
 
 CONTACT_TOLERANCE = 1e-9
@@ -112,11 +113,11 @@ class PairCollision:
     def _pool(self) -> pin.GeometryPool:
         """A pool of models of two capsules that fly freely."""
         model, geometry = pin.Model(), pin.GeometryModel()
-        # Coal has no clearance in a pool: the radii carry it, and the tolerance, instead.
-        grow = (self.contact_margin - CONTACT_TOLERANCE) / 2
+        # Coal has no clearance in a pool: the radii carry it, and the tolerance, instead. Only their sum counts.
+        radius = max(self.a.radius + self.b.radius + self.contact_margin - CONTACT_TOLERANCE, 0.0) / 2
         for capsule in (self.a, self.b):
             joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), capsule.link)
-            shape = coal.Capsule(max(capsule.radius + grow, 0.0), 2 * capsule.half_length)
+            shape = coal.Capsule(radius, 2 * capsule.half_length)
             geometry.addGeometryObject(pin.GeometryObject(capsule.link, joint, pin.SE3.Identity(), shape))
         geometry.addCollisionPair(pin.CollisionPair(0, 1))
         return pin.GeometryPool(model, geometry, n_threads())
@@ -132,7 +133,8 @@ def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
 
     Segment a is :math:`s\,h_a`, segment b is :math:`g + t\,h_b`, with s and t in [-1, 1]. The unconstrained
     minimum is clamped in s, t follows and is clamped, and s follows that (Ericson, Real-Time Collision
-    Detection, 2005, §5.1.9).
+    Detection, 2005, §5.1.9). Where the segments are nearly parallel that minimum is ill-conditioned; the four
+    ends, each against the other segment, are tried as well.
 
     Parameters
     ----------
@@ -148,18 +150,25 @@ def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:
     aa, bb = np.einsum("ni,ni->n", half_a, half_a), np.einsum("ni,ni->n", half_b, half_b)
     ab = np.einsum("ni,ni->n", half_a, half_b)
     ag, bg = np.einsum("ni,ni->n", half_a, gap), np.einsum("ni,ni->n", half_b, gap)
-    determinant = aa * bb - ab * ab
-    parallel = determinant <= 1e-12 * aa * bb
-    s = np.where(parallel, 0.0, (ag * bb - ab * bg) / np.where(parallel, 1.0, determinant))
-    s = np.clip(s, -1.0, 1.0)
+    # Lagrange's identity: the products of cross products keep the digits that aa bb - ab^2 cancels.
+    normal = cross(half_a, half_b)
+    determinant = np.einsum("ni,ni->n", normal, normal)
+    parallel = determinant <= 1e-30 * aa * bb
+    along = np.einsum("ni,ni->n", normal, cross(gap, half_b)) / np.where(parallel, 1.0, determinant)
+    s = np.where(parallel, 0.0, np.clip(along, -1.0, 1.0))
     t = np.clip((s * ab - bg) / bb, -1.0, 1.0)
-    s = np.clip((ag + t * ab) / aa, -1.0, 1.0)
-    apart = gap + t[:, None] * half_b - s[:, None] * half_a
-    return np.asarray(np.sqrt(np.einsum("ni,ni->n", apart, apart)))
+    nearest = np.full(len(gap), np.inf)
+    for end in (t, -np.ones_like(t), np.ones_like(t)):
+        apart = gap + end[:, None] * half_b - np.clip((ag + end * ab) / aa, -1.0, 1.0)[:, None] * half_a
+        nearest = np.minimum(nearest, np.einsum("ni,ni->n", apart, apart))
+    for end in (-1.0, 1.0):
+        apart = gap + np.clip((end * ab - bg) / bb, -1.0, 1.0)[:, None] * half_b - end * half_a
+        nearest = np.minimum(nearest, np.einsum("ni,ni->n", apart, apart))
+    return np.asarray(np.sqrt(nearest))
 
 
 def _z_onto(axis: Array) -> Array:
-    """Return unit quaternions (N, 4), x y z w, that turn z onto an axis or its opposite: a capsule has no sign."""
+    """Return unit quaternions (N, 4), x y z w, that turn z onto an axis or its opposite: capsules have no sign."""
     axis = np.where(axis[:, 2:] < 0, -axis, axis)
     w = 1.0 + axis[:, 2]
     q = np.stack([-axis[:, 1], axis[:, 0], np.zeros(len(axis)), w], axis=-1)

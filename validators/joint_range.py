@@ -1,4 +1,4 @@
-"""Joint ranges: is there a configuration inside the limits that gives the posture?
+"""Joint ranges: some configuration inside the limits must give the posture.
 
 Two kinds: the URDF's own angles (this file), or the paper's projected angles (`projected_angles`).
 """
@@ -41,7 +41,9 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES) -> list[Check]:
     if ranges.kind == "projected":
         return projected_angles(figure, ranges)
     if ranges.limits:
-        figure = figure.with_limits({dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()})
+        figure = figure.with_limits(
+            {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
+        )
     checks: list[Check] = [Neck(figure=figure), Pelvis(figure=figure)]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):

@@ -13,7 +13,7 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.figure import Figure
-from posekit.figure.frames import cross, torso_frame
+from posekit.figure.frames import cross, torso_frame, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
 from posekit.validators.ranges import Ranges
@@ -35,14 +35,18 @@ def projected_angles(figure: Figure, ranges: Ranges) -> list[Check]:
 
 
 def paper_axes(points: Array) -> Array:
-    """Return the rows x, y, z of the paper's torso frame (N, 3, 3) from neck, shoulders and pelvis (N, 4, 3)."""
+    """Return the paper's torso axes x, y, z as rows (N, 3, 3), from neck, shoulders and pelvis (N, 4, 3)."""
     R = torso_frame(*np.moveaxis(points, 1, 0))
     return np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
 
 
 def angle_in_plane(x: Array, y: Array, shortest: Array | float) -> Array:
-    """Return the angle (deg) from the y axis towards x, NaN where the projection (x, y) is too short."""
+    """Return the angle (deg) from the y axis towards x, NaN where the projection (x, y) is too short.
+
+    In (-180, 180]: an arm straight up is flexed by 180, on whichever side of it rounding leaves the arm.
+    """
     angle = np.degrees(np.arctan2(x, y))
+    angle = np.where(angle < TOLERANCE - 180, angle + 360, angle)
     return np.where(np.hypot(x, y) < shortest, np.nan, angle)
 
 
@@ -115,9 +119,11 @@ class Hinge:
         u = np.einsum("nij,nj->ni", axes, points[:, 5] - points[:, 4])
         v = np.einsum("nij,nj->ni", axes, points[:, 6] - points[:, 5])
         w = cross(v, u)
-        psi = np.degrees(np.arctan2(np.linalg.norm(w, axis=1), np.einsum("ni,ni->n", u, v)))
+        size = np.linalg.norm(w, axis=1)
+        psi = np.degrees(np.arctan2(size, np.einsum("ni,ni->n", u, v)))
         forward = w[:, 2] if self.limb[1] == "elbow" else -w[:, 2]
-        flexion = np.where(forward >= 0, psi, -psi)
+        # An arm held sideways bends its elbow about y: z is zero but for rounding, and zero is flexion.
+        flexion = np.where(forward >= -np.radians(TOLERANCE) * size, psi, -psi)
         lower, upper = self.ranges.limits[f"{self.limb[1]}.flexion"]
         if self.limb[1] == "elbow":
             return Findings(
@@ -167,8 +173,7 @@ class HipPlane:
         axes = paper_axes(points[:, :4])
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
         middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
-        normal = cross(middle, np.einsum("nij,nj->ni", axes, left - right))
-        normal = normal / np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
         return _plane_findings("pelvis", plane_angles(normal, middle, self.ranges), self.ranges)
 
 

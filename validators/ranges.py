@@ -71,30 +71,35 @@ def load_ranges(name: str) -> Ranges:
         text = (resources.files("posekit.urdf") / "ranges" / "table1.toml").read_text(encoding="utf-8")
         return _parse(text, "table1")
     path = Path(name)
-    if not path.is_file():
-        raise InputError(
-            f"--ranges {name}: no such table or file; expected urdf, table1 or the path of a TOML file"
-        )
-    if path.stat().st_size > MAX_BYTES:
-        raise InputError(f"{path}: larger than {MAX_BYTES} bytes; expected a table of joint ranges")
     try:
+        if not path.is_file():
+            raise InputError(
+                f"--ranges {name}: no such table or file; expected urdf, table1 or the path of a TOML file"
+            )
+        if path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{path}: larger than {MAX_BYTES} bytes; expected a table of joint ranges")
         return _parse(path.read_text(encoding="utf-8"), str(path))
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: not UTF-8 text; save it as UTF-8") from error
+    except OSError as error:
+        raise InputError(f"--ranges {name}: cannot be read: {error.strerror}") from error
 
 
 def _parse(text: str, source: str) -> Ranges:
     try:
         table = tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of thousands of digits is a plain ValueError
         raise InputError(f"{source}: not TOML: {error}") from error
-    if table.pop("schema", None) != SCHEMA:
-        raise InputError(f"{source}: schema: expected {SCHEMA!r} in the first line")
+    schema = table.pop("schema", None)
+    if schema != SCHEMA:
+        raise InputError(f"{source}: schema is {schema!r}; expected {SCHEMA!r} in the first line")
     kind = table.pop("kind", None)
     if kind not in ("configuration", "projected"):
         raise InputError(f"{source}: kind is {kind!r}; expected 'configuration' or 'projected'")
     shortest = _number(table.pop("shortest_projection", 0.1), f"{source}: shortest_projection")
     flexed = _number(table.pop("knee_flexed", 5.0), f"{source}: knee_flexed")
+    if not 0 <= shortest < 1:
+        raise InputError(f"{source}: shortest_projection is {shortest:g}; expected a fraction from 0 to below 1")
     if kind == "projected":
         known = {f"{joint}.{angle}" for joint, angles in PROJECTED_ANGLES.items() for angle in angles}
     else:
@@ -102,15 +107,19 @@ def _parse(text: str, source: str) -> Ranges:
     limits: dict[str, Range] = {}
     for joint, angles in table.items():
         if not isinstance(angles, dict):
-            raise InputError(f"{source}: {joint}: expected a table such as [{joint}] flexion = [0, 90]")
+            raise InputError(f"{source}: {joint!r}: expected a table such as [neck] flexion = [-55, 45]")
         for angle, bounds in angles.items():
             where = f"{joint}.{angle}"
             if where not in known:
-                raise InputError(f"{source}: {where}: not an angle of kind {kind!r}; expected {', '.join(sorted(known))}")
+                raise InputError(
+                    f"{source}: {where!r} is not an angle of kind {kind!r}; expected {', '.join(sorted(known))}"
+                )
             limits[where] = _range(bounds, f"{source}: {where}")
     missing = known - set(limits) if kind == "projected" else set()
     if missing:
-        raise InputError(f"{source}: missing {', '.join(sorted(missing))}; a projected table lists every angle")
+        raise InputError(
+            f"{source}: missing {', '.join(sorted(missing))}; a projected table lists every angle"
+        )
     return Ranges(name=source, kind=kind, limits=limits, shortest_projection=shortest, knee_flexed=flexed)
 
 
@@ -124,6 +133,12 @@ def _range(bounds: object, where: str) -> Range:
 
 
 def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise InputError(f"{where}: {value!r}; expected a finite number")
-    return float(value)
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise InputError(f"{where}: {number:g}; expected a finite number")
+    return number

@@ -1,4 +1,4 @@
-"""Rigid parts: do torso and hips keep their shape (Lee & Chen 1985, §3.2.B)?"""
+"""Rigid parts: torso and hips must keep their shape (Lee & Chen 1985, §3.2.B)."""
 
 from __future__ import annotations
 

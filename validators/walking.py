@@ -103,7 +103,7 @@ class _Rule:
         down = -R_torso[:, :, 2]
         facing = np.where(np.isnan(R_head[:, :, 0]), R_torso[:, :, 0], R_head[:, :, 0])
         forward = unit(facing - np.einsum("ni,ni->n", facing, down)[:, None] * down)
-        return Body(forward, cross(forward, down) * -1.0, down)
+        return Body(forward, cross(forward, down), down)
 
     def joint(self, points: Array, k: int) -> Array:
         """Return the k-th of the rule's own joints (N, 3)."""
@@ -199,7 +199,7 @@ def _indices(*names: str) -> tuple[int, ...]:
 
 
 def _rule_1(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
-    """The two arms, or legs, are not both in front of or behind the torso."""
+    """Let not both arms, or both legs, be in front of or behind the torso."""
     return [
         SwingTogether(
             figure=figure,

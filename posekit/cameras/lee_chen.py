@@ -14,7 +14,7 @@ from posekit.cameras.camera import Array
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.errors import CameraError
 
-FLIP = np.array([1.0, -1.0, 1.0])
+FLIP: Array = np.array([1.0, -1.0, 1.0])
 
 
 def pinhole(f: float | Array) -> PinholeCamera:
@@ -34,13 +34,13 @@ def image_from_paper(image: Array) -> Array:
 
 
 def points_from_paper(points: Array, f: float | Array) -> Array:
-    """Turn points (..., 3) of the paper's camera frame into OpenCV's camera frame."""
-    return points * FLIP + _forward(f)
+    """Turn points (F, ..., 3) of the paper's camera frame into OpenCV's; f one, or one a frame (F,)."""
+    return points * FLIP + _forward(f, points.ndim)
 
 
 def points_to_paper(points: Array, f: float | Array) -> Array:
-    """Turn points (..., 3) of OpenCV's camera frame into the paper's camera frame."""
-    return (points - _forward(f)) * FLIP
+    """Turn points (F, ..., 3) of OpenCV's camera frame into the paper's; f one, or one a frame (F,)."""
+    return (points - _forward(f, points.ndim)) * FLIP
 
 
 def rotation_to_paper(R: Array) -> Array:
@@ -52,16 +52,27 @@ def rotation_to_paper(R: Array) -> Array:
 
 
 def camera_position(R: Array, t: Array, f: float | Array) -> Array:
-    """Return the paper's camera position (Table 2c): the image plane's origin in the head's coordinates."""
-    return np.einsum("...ji,...j->...i", R, _forward(f) - t)
+    """Return the paper's camera position (Table 2c): the image plane's origin in the head's coordinates.
+
+    R (..., 3, 3) and t (..., 3) take the head's frame to OpenCV's camera frame; f one, or one a frame.
+    """
+    position: Array = np.einsum("...ji,...j->...i", R, _forward(f, t.ndim) - t)
+    return position
 
 
-def transformation_matrix(R: Array, t: Array, f: float) -> Array:
-    """Return the paper's 4x3 matrix [T] of eq. (1), ``(x, y, z, 1) [T] = (X, Y, H)``, scaled as in Table 2a."""
-    rows = np.concatenate([R, t[:, None]], axis=1)
-    return np.stack([rows[0], -rows[1], rows[2] / f], axis=1)
+def transformation_matrix(R: Array, t: Array, f: float | Array) -> Array:
+    """Return the paper's matrix [T] (..., 4, 3) of eq. (1), scaled as in Table 2a.
+
+    ``(x, y, z, 1) [T] = (X, Y, H)`` takes a point of the head's frame to its image ``(X / H, Y / H)``, y up.
+    """
+    rows = np.concatenate([R, t[..., None]], axis=-1)
+    distances = np.asarray(f, dtype=np.float64)[..., None]
+    return np.stack([rows[..., 0, :], -rows[..., 1, :], rows[..., 2, :] / distances], axis=-1)
 
 
-def _forward(f: float | Array) -> Array:
+def _forward(f: float | Array, ndim: int) -> Array:
+    """Shape (0, 0, f) so that f's frames stand before the axes of an array of `ndim` axes."""
     distances = np.asarray(f, dtype=np.float64)
-    return distances[..., None] * np.array([0.0, 0.0, 1.0])
+    distances = distances.reshape(*distances.shape, *(1,) * max(ndim - distances.ndim, 1))
+    forward: Array = distances * np.array([0.0, 0.0, 1.0])
+    return forward

@@ -124,10 +124,29 @@ def distort(normalized: Array, distortion: Array) -> Array:
     )
 
 
+def fold_radius(distortion: Array) -> float:
+    r"""Return the radius in (x/z, y/z) where the radial distortion turns back; infinite where it never does.
+
+    The first zero of :math:`d/dr\,(r + k_1 r^3 + k_2 r^5 + k_3 r^7)`. Beyond it a polynomial fitted to a lens
+    says nothing about the lens.
+    """
+    k1, k2, _, _, k3 = distortion
+    squares = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
+    turning = squares.real[(np.abs(squares.imag) < 1e-9) & (squares.real > 0)]
+    return float(np.sqrt(turning.min())) if len(turning) else np.inf
+
+
 def undistort(distorted: Array, distortion: Array) -> Array:
-    """Invert `distort` by Newton's method; NaN where it does not converge (a pixel no ray reaches)."""
+    """Invert `distort` by Newton's method; NaN where no ray inside `fold_radius` reaches the pixel."""
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # where it diverges
+        normalized = _newton(distorted, distorted, distortion)
+        error = np.abs(distort(normalized, distortion) - distorted).max(axis=-1, keepdims=True)
+        radius = np.linalg.norm(normalized, axis=-1, keepdims=True)
+        return np.where((error < 1e-9) & (radius <= fold_radius(distortion)), normalized, np.nan)
+
+
+def _newton(normalized: Array, distorted: Array, distortion: Array) -> Array:
     k1, k2, p1, p2, k3 = distortion
-    normalized = distorted.copy()
     for _ in range(UNDISTORTION_STEPS):
         x, y = normalized[..., 0], normalized[..., 1]
         r2 = x * x + y * y
@@ -141,5 +160,4 @@ def undistort(distorted: Array, distortion: Array) -> Array:
         step_x = (yy * error[..., 0] - xy * error[..., 1]) / determinant
         step_y = (xx * error[..., 1] - xy * error[..., 0]) / determinant
         normalized = normalized - np.stack([step_x, step_y], axis=-1)
-    error = np.abs(distort(normalized, distortion) - distorted).max(axis=-1, keepdims=True)
-    return np.where(error < 1e-9, normalized, np.nan)
+    return normalized

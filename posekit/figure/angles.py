@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 
@@ -21,6 +22,9 @@ FREE = 1e-6
 
 Turning a free angle to its limit moves the limb's end by less than this times its length.
 """
+
+WORTH = 1e-5
+"""Radians by which turning the free first angle must bring a limb nearer its limits, else it stays as it is."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,7 +56,8 @@ class Limits:
     def violation(self, angles: Array) -> Array:
         """Return how far the worst of the angles (..., K) is outside its limits, radians; 0 inside."""
         outside = np.maximum(self.lower - angles, angles - self.upper)
-        return np.maximum(outside, 0.0).max(axis=-1)
+        worst: Array = np.maximum(outside, 0.0).max(axis=-1)
+        return worst
 
 
 def ball_angles(R: Array, limits: Limits) -> Array:
@@ -60,12 +65,14 @@ def ball_angles(R: Array, limits: Limits) -> Array:
 
     Both Euler branches are tried; the one inside the limits is taken, else the one that violates them least.
     """
-    beta = np.arctan2(-R[:, 1, 2], np.hypot(R[:, 0, 2], R[:, 2, 2]))
-    alpha = np.arctan2(R[:, 0, 2], R[:, 2, 2])
-    gamma = np.arctan2(R[:, 1, 0], R[:, 1, 1])
-    first = np.stack([alpha, beta, gamma], axis=-1)
-    second = np.stack([alpha + np.pi, np.pi - beta, gamma + np.pi], axis=-1)
-    return _least_violating(np.stack([first, second], axis=1) * limits.sign, limits)
+    branches = _direction_branches(-R[:, :, 2])
+    candidates = []
+    for k in range(2):
+        alpha, beta = branches[:, k, 0], branches[:, k, 1]
+        # From what is left after alpha and beta: where alpha is free (beta = +-90 deg), gamma makes up for it.
+        left = _into_ball(R[:, :, 0], alpha, beta)
+        candidates.append(np.stack([alpha, beta, np.arctan2(left[:, 1], left[:, 0])], axis=-1))
+    return _least_violating(np.stack(candidates, axis=1) * limits.sign, limits)
 
 
 def direction_angles(upper: Array, limits: Limits) -> Array:
@@ -74,7 +81,13 @@ def direction_angles(upper: Array, limits: Limits) -> Array:
     The axial rotation is left free: with only the upper segment known, nothing constrains it.
     """
     two = Limits(sign=limits.sign[:2], lower=limits.lower[:2], upper=limits.upper[:2])
-    return _least_violating(_direction_branches(upper, two) * two.sign, two)
+    branches = _direction_branches(upper)
+    pinned = _along_abduction_axis(upper)
+    if pinned.any():
+        turned = branches.copy()
+        turned[:, :, 0] = np.where(pinned, two.sign[0] * two.clip(0, 0.0), np.nan)[:, None]
+        branches = np.concatenate([branches, turned], axis=1)
+    return _least_violating(branches * two.sign, two, as_they_are=2)
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
@@ -96,38 +109,48 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     array (N, 4)
         Radians; NaN where a direction is NaN.
     """
-    branches = _direction_branches(upper, limits)
-    pinned = np.hypot(upper[:, 0], upper[:, 2]) < FREE
+    branches = _direction_branches(upper)
     candidates = []
     for k in range(2):
-        alpha, beta = branches[:, k, 0], branches[:, k, 1]
-        local = _into_ball(lower, alpha, beta)
-        if pinned.any():
-            alpha = np.where(pinned, _free_alpha(alpha, beta, local, limits), alpha)
-            local = _into_ball(lower, alpha, beta)
-        bend = np.arctan2(np.hypot(local[:, 0], local[:, 1]), -local[:, 2])
-        straight = np.sin(bend) < FREE
-        for side in (1.0, -1.0):
-            epsilon = side * bend
-            gamma = np.arctan2(-side * local[:, 1], -side * local[:, 0])
-            angles = limits.nearest_turn(np.stack([alpha, beta, gamma, epsilon], axis=-1) * limits.sign)
-            # A straight limb's axial rotation is noise unless it lies inside the limits as it is.
-            angles[:, 2] = np.where(straight, limits.clip(2, angles[:, 2]), angles[:, 2])
-            candidates.append(angles)
-    return _least_violating(np.stack(candidates, axis=1), limits)
+        candidates += _hinge_branches(lower, branches[:, k, 0], branches[:, k, 1], limits)
+    as_they_are = len(candidates)
+    pinned = _along_abduction_axis(upper)
+    if pinned.any():
+        for k in range(2):
+            beta = branches[:, k, 1]
+            alpha = np.where(pinned, _free_alpha(lower, beta, limits), np.nan)
+            candidates += _hinge_branches(lower, alpha, beta, limits)
+    return _least_violating(np.stack(candidates, axis=1), limits, as_they_are=as_they_are)
 
 
-def _direction_branches(upper: Array, limits: Limits) -> Array:
-    """Return both (alpha, beta) of a direction, (N, 2, 2), with alpha chosen where it is free."""
-    across = np.hypot(upper[:, 0], upper[:, 2])
+def _hinge_branches(lower: Array, alpha: Array, beta: Array, limits: Limits) -> list[Array]:
+    """Return the four angles (N, 4) of a limb for each sign of its hinge, given the first two."""
+    local = _into_ball(lower, alpha, beta)
+    bend = np.arctan2(np.hypot(local[:, 0], local[:, 1]), -local[:, 2])
+    straight = np.sin(bend) < FREE
+    branches = []
+    for side in (1.0, -1.0):
+        gamma = np.arctan2(-side * local[:, 1], -side * local[:, 0])
+        angles = limits.nearest_turn(np.stack([alpha, beta, gamma, side * bend], axis=-1) * limits.sign)
+        # A straight limb's axial rotation is noise unless it lies inside the limits as it is.
+        angles[:, 2] = np.where(straight, limits.clip(2, angles[:, 2]), angles[:, 2])
+        branches.append(angles)
+    return branches
+
+
+def _along_abduction_axis(upper: Array) -> NDArray[np.bool_]:
+    """Return where a direction (N, 3) leaves the first angle free."""
+    free: NDArray[np.bool_] = np.hypot(upper[:, 0], upper[:, 2]) < FREE
+    return free
+
+
+def _direction_branches(upper: Array) -> Array:
+    """Return both (alpha, beta) of a direction, (N, 2, 2)."""
     alpha = np.arctan2(-upper[:, 0], -upper[:, 2])
-    beta = np.arctan2(upper[:, 1], across)
-    chosen = limits.sign[0] * limits.clip(0, 0.0)
-    first = np.where(across < FREE, chosen, alpha)
-    second = np.where(across < FREE, chosen, alpha + np.pi)
-    return np.stack(
-        [np.stack([first, beta], axis=-1), np.stack([second, np.pi - beta], axis=-1)], axis=1
-    )
+    beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
+    first = np.stack([alpha, beta], axis=-1)
+    second = np.stack([alpha + np.pi, np.pi - beta], axis=-1)
+    return np.stack([first, second], axis=1)
 
 
 def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
@@ -138,11 +161,13 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
     return np.stack([ca * x - sa * z, cb * y + sb * forward, -sb * y + cb * forward], axis=-1)
 
 
-def _free_alpha(alpha: Array, beta: Array, local: Array, limits: Limits) -> Array:
-    """Use the free first angle to bring the axial rotation inside its limits.
+def _free_alpha(lower: Array, beta: Array, limits: Limits) -> Array:
+    """Use the free first angle, else zero, to bring the axial rotation inside its limits.
 
     At beta = +-90 deg, R_y(alpha) R_x(beta) R_z(gamma) depends on gamma -+ alpha alone.
     """
+    alpha = np.full(len(beta), limits.sign[0] * limits.clip(0, 0.0))
+    local = _into_ball(lower, alpha, beta)
     side = limits.sign[3] * np.sign(limits.lower[3] + limits.upper[3])
     gamma = np.arctan2(-side * local[:, 1], -side * local[:, 0])
     gamma = limits.nearest_turn(np.stack([alpha, beta, gamma, alpha], axis=-1) * limits.sign)[:, 2]
@@ -151,9 +176,14 @@ def _free_alpha(alpha: Array, beta: Array, local: Array, limits: Limits) -> Arra
     return limits.sign[0] * limits.clip(0, limits.sign[0] * moved)
 
 
-def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least; the first of equals."""
+def _least_violating(candidates: Array, limits: Limits, *, as_they_are: int | None = None) -> Array:
+    """Choose among branches (N, B, K) the one that violates the limits least; the first of equals.
+
+    Those after the first `as_they_are` have a free angle turned, and must be better by `WORTH`.
+    """
     angles = limits.nearest_turn(candidates)
     violation = limits.violation(angles)
+    if as_they_are is not None:
+        violation[:, as_they_are:] += WORTH
     best = np.argmin(np.where(np.isnan(violation), np.inf, violation), axis=1)
     return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from importlib import resources
 from pathlib import Path
@@ -20,6 +20,7 @@ from posekit.figure.angles import Limits, ball_angles, direction_angles, limb_an
 from posekit.figure.capsules import Capsule, read_capsules
 from posekit.figure.frames import fit_rotation, hips_frame, torso_frame, unit
 from posekit.figure.lengths import check_lengths
+from posekit.figure.second_reader import compare_readers
 from posekit.figure.stature import lengths_from_stature
 from posekit.figure.urdf import parse, read_text, replace_limits, rewrite
 from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, TORSO, segment_name, urdf_joint_name
@@ -77,12 +78,13 @@ class Figure:
         Where the texts do not describe a stick figure.
     """
 
-    urdf: str
-    srdf: str
+    urdf: str = field(repr=False)
+    srdf: str = field(repr=False)
     source: str = "stick_figure.urdf"
 
     def __post_init__(self) -> None:
         parse(self.urdf, self.source)
+        parse(self.srdf, f"{self.source}, SRDF")
         names = set(self.model.names)
         missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
         missing += [link for link in map(_frame_name, POINTS) if not self.model.existFrame(link)]
@@ -93,6 +95,7 @@ class Figure:
             )
         self._check_axes()
         _ = self.capsules
+        self._check_layout()
 
     @cached_property
     def model(self) -> pin.Model:
@@ -348,6 +351,13 @@ class Figure:
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
         """Return the five head points in the head link's frame, some of them replaced."""
         names = POINTS[len(JOINTS) :]
+        for name, point in head_points.items():
+            if name not in ("neck", *names):
+                raise FigureError(
+                    f"figure.head_points: {name!r} is not a head point; expected neck, {', '.join(names)}"
+                )
+            if np.shape(point) != (3,):
+                raise FigureError(f"figure.head_points: {name} has shape {np.shape(point)}; expected x, y, z")
         neck = np.asarray(head_points.get("neck", np.zeros(3)), dtype=np.float64)
         head = self._head_offsets.copy()
         for k, name in enumerate(names):
@@ -376,6 +386,20 @@ class Figure:
                 )
 
 
+    def _check_layout(self) -> None:
+        """Refuse joints that lie otherwise than the closed form of `inverse_kinematics` takes them to."""
+        q = pin.neutral(self.model)[None]
+        q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
+        points = self.forward_kinematics(q)
+        back = self.forward_kinematics(self.inverse_kinematics(points))
+        worst = np.linalg.norm(back - points, axis=-1)[0]
+        if not (worst < 1e-6).all():
+            raise FigureError(
+                f"{self.source}: the joint before {POINTS[int(np.argmin(worst < 1e-6))]!r} does not lie as the stick "
+                "figure's; expected limbs along -z, joint origins without rpy, and the stick figure's order of joints"
+            )
+
+
 @lru_cache(maxsize=1)
 def _built_in() -> Figure:
     folder = resources.files("posekit.urdf")
@@ -402,11 +426,13 @@ def load_figure(path: str | Path | None = None) -> Figure:
         return _built_in()
     path = Path(path)
     srdf = path.with_suffix(".srdf")
-    return Figure(
+    figure = Figure(
         urdf=read_text(path),
         srdf=read_text(srdf) if srdf.exists() else _built_in().srdf,
         source=str(path),
     )
+    compare_readers(figure.urdf, figure.model, figure.source)
+    return figure
 
 
 def with_head(points: Array) -> Array:

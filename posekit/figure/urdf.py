@@ -21,6 +21,9 @@ MAX_BYTES = 10_000_000
 MAX_LINKS = 1000
 """Far above the figure's own 40; Pinocchio's parser overflows the stack on chains some 5000 links deep."""
 
+NUMBERS = {"xyz": 3, "rpy": 3, "radius": 1, "length": 1, "lower": 1, "upper": 1}
+"""How many numbers each attribute holds."""
+
 LIMB_SEGMENTS = (
     ("upper_arm", "elbow_flexion", "shoulder", "elbow"),
     ("forearm", "wrist_fixed", "elbow", "wrist"),
@@ -60,9 +63,13 @@ def parse(text: str, source: str) -> ElementTree.Element:
     if links > MAX_LINKS:
         raise FigureError(f"{source}: {links} links; expected at most {MAX_LINKS}")
     for element in robot.iter():
-        for attribute in ("xyz", "rpy", "radius", "length", "lower", "upper"):
+        for attribute, count in NUMBERS.items():
             if attribute in element.attrib:
-                _finite(element.attrib[attribute], f"{source}: <{element.tag} {attribute}=…>")
+                _finite(element.attrib[attribute], count, f"{source}: <{element.tag} {attribute}=…>")
+    if robot.find(".//collision//mesh") is not None:
+        raise FigureError(f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)")
+    if robot.find("link") is not None:  # an SRDF has none
+        _check_tree(robot, source)
     for joint in robot.findall("joint"):
         limit = joint.find("limit")
         if limit is not None and float(limit.get("lower", 0)) > float(limit.get("upper", 0)):
@@ -71,6 +78,41 @@ def parse(text: str, source: str) -> ElementTree.Element:
                 f"{limit.get('upper')}; swap them"
             )
     return robot
+
+
+def _check_tree(robot: ElementTree.Element, source: str) -> None:
+    """Refuse links and joints that are not one tree: Pinocchio says so on stderr, or overflows its stack."""
+    links = [link.get("name", "") for link in robot.findall("link")]
+    parent_of: dict[str, str] = {}
+    for joint in robot.findall("joint"):
+        ends = [element.get("link", "") for tag in ("parent", "child") if (element := joint.find(tag)) is not None]
+        unknown = [link for link in ends if link not in links]
+        if len(ends) != 2 or unknown:
+            raise FigureError(
+                f"{source}: joint {joint.get('name')!r} joins {' and '.join(map(repr, ends)) or 'nothing'}; "
+                f"expected two links of this file; unknown: {', '.join(unknown) or 'none'}"
+            )
+        parent, child = ends
+        if child in parent_of:
+            raise FigureError(f"{source}: link {child!r} hangs on two joints; expected a tree")
+        parent_of[child] = parent
+    names = [joint.get("name", "") for joint in robot.findall("joint")]
+    for kind, given in (("link", links), ("joint", names)):
+        twice = sorted({name for name in given if given.count(name) > 1})
+        if twice:
+            raise FigureError(f"{source}: {kind} {twice[0]!r} is there twice; give each its own name")
+    roots = [link for link in links if link not in parent_of]
+    if len(roots) != 1:
+        raise FigureError(
+            f"{source}: {len(roots)} links hang on no joint ({', '.join(roots[:5]) or 'a cycle'}); expected one root"
+        )
+    for link in links:
+        seen = {link}
+        while link in parent_of:
+            link = parent_of[link]  # noqa: PLW2901
+            if link in seen:
+                raise FigureError(f"{source}: link {link!r} hangs on itself; remove the cycle")
+            seen.add(link)
 
 
 def rewrite(
@@ -165,10 +207,10 @@ def _numbers(values: Array) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def _finite(text: str, where: str) -> None:
+def _finite(text: str, count: int, where: str) -> None:
     try:
         numbers = [float(word) for word in text.split()]
     except ValueError as error:
         raise FigureError(f"{where}: {text!r} is not a number") from error
-    if not numbers or not all(math.isfinite(number) for number in numbers):
-        raise FigureError(f"{where}: {text!r} is not finite; expected finite numbers")
+    if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
+        raise FigureError(f"{where}: {text!r}; expected {count} finite number{'s' if count > 1 else ''}")

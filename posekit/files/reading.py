@@ -123,13 +123,8 @@ def unreadable(path: str | Path, error: Exception) -> InputError:
 
 
 def _too_large(path: str | Path, size: int, limit: int) -> InputError:
-    return refusal(
-        path,
-        "",
-        f"{size / 1e6:,.1f} MB",
-        f"at most {limit / 1e6:,.0f} MB",
-        "split the file, or use .npz where the command takes it",
-    )
+    remedy = "split it" if Path(path).suffix == ".npz" else "split it, or use .npz where the command takes it"
+    return refusal(path, "", f"{size / 1e6:,.1f} MB", f"at most {limit / 1e6:,.0f} MB", remedy)
 
 
 def _malformed(path: str | Path, text: str, error: json.JSONDecodeError) -> InputError:

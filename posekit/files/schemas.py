@@ -39,7 +39,7 @@ def schema(name: str) -> dict[str, Any]:
     """
     known = {**{full: full for full in SCHEMAS}, **{_short(full): full for full in SCHEMAS}}
     if name not in known:
-        raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, SCHEMAS))
+        raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, known))
     full = known[name]
     head = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from decimal import Decimal
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
@@ -17,15 +18,16 @@ UNITS: Final = get_args(Unit)
 METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one unit."""
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-"""Units in one metre. Whole numbers, so that dividing by them gives the float nearest to the decimal."""
+"""Units in one metre. Whole numbers: dividing by them errs by half a unit in the last place, no more."""
 
+_EXPONENTS: Final[dict[str, int]] = {"m": 0, "cm": -2, "mm": -3}
 _LENGTH = re.compile(
     r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-z]*)", re.ASCII | re.I
 )
 
 
 def to_metres(values: ArrayLike | Sequence[Any], unit: str) -> NDArray[np.float64]:
-    """Turn values in a unit into metres: 35.7 cm is the float nearest to 0.357 m; None is NaN."""
+    """Turn values in a unit into metres; None is NaN."""
     return np.asarray(np.asarray(values, dtype=np.float64) / PER_METRE[unit])
 
 
@@ -47,7 +49,7 @@ def parse_length(text: str, *, name: str = "") -> float:
     Returns
     -------
     float
-        Metres, finite and not negative.
+        Metres, the float nearest to what is written; finite and not negative.
 
     Raises
     ------
@@ -69,4 +71,4 @@ def parse_length(text: str, *, name: str = "") -> float:
         raise refusal(name, "", shown(text), "the unit cm, m or mm", "convert it to one of these")
     if number < 0:
         raise refusal(name, "", shown(text), "a length of zero or more", "remove the sign")
-    return number / PER_METRE[match[2]]
+    return float(Decimal(match[1]).scaleb(_EXPONENTS[match[2]]))

@@ -114,7 +114,7 @@ def dlt(head: HeadPoints, image: ArrayLike) -> Projection:
     ):
         if not determined:
             reasons[frame] = (
-                "the linear equations have more than one solution (as where all points but two are in a plane, "
+                "the linear equations have many solutions (as where all points but two are in a plane "
                 "and these two in line with the camera); use calibrate, or add a head point"
             )
         elif not in_front:

@@ -145,6 +145,7 @@ def _focal_length(heads: Heads, fitted: Fit) -> tuple[Array, Array, list[str]]:
         return heads.K[:, 0, 0], np.zeros(count), [""] * count
     residual, jacobian, _ = look(heads, fitted.placement)
     normal, _, unit = equations(residual, jacobian)
+    normal[~fitted.settled] = np.eye(heads.unknowns)
     values, vectors = np.linalg.eigh(normal)
     freedom = 2 * heads.seen.sum(axis=-1) - heads.unknowns
     variance = (vectors[:, -1] ** 2 / np.maximum(values, np.finfo(np.float64).tiny)).sum(axis=-1)

@@ -12,7 +12,7 @@ from posekit.head.perspective import Heads, Placement, look
 
 STEPS = 60
 DAMPING = 1e-4
-LEAST = 1e-15
+LEAST = 1e-13
 SLOWER, FASTER = 10.0, 0.03
 STUCK = 1e8
 """Damping beyond which no step improves the fit: it is at the rounding."""
@@ -97,8 +97,8 @@ def fit(heads: Heads, start: Placement, precision: float = SETTLED) -> Fit:
 
 def equations(residual: Array, jacobian: Array) -> tuple[Array, Array, Array]:
     """Return the normal equations of unknowns scaled to a unit diagonal, and the scales (F, n)."""
-    size: Array = np.sqrt(np.einsum("fpi,fpi->fi", jacobian, jacobian))
-    size[size == 0] = 1.0
+    squares = np.einsum("fpi,fpi->fi", jacobian, jacobian)
+    size = np.sqrt(np.where(squares > 0, squares, 1.0))
     scaled = jacobian / size[:, None]
     transposed = np.swapaxes(scaled, -1, -2)
     return transposed @ scaled, (transposed @ residual[..., None])[..., 0], size

@@ -70,7 +70,7 @@ def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], 
 
 
 def _start(heads: Heads, plane: Array, placement: Placement) -> Placement:
-    """Start from the placement of all points, or, if that one is led far astray, from the orthographic view."""
+    """Start from the placement of all points or, where that is led far astray, the orthographic view."""
     start = affine_start(heads.points, plane, heads.seen > 0, heads.K is not None)
     costs = []
     for candidate in (placement, start):

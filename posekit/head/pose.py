@@ -30,7 +30,8 @@ class HeadPose:
     head : HeadPoints
         The points that were placed.
     found : bool array (F,)
-        Whether a frame gives a pose; its numbers are NaN where not.
+        Whether a frame gives a pose. Where not, R, t, f and the points are NaN; residuals, rms and misfit are
+        kept of fits that were refused, and NaN or None where there was nothing to fit.
     reasons : tuple of str
         Why a frame gives none; empty where it does.
     R_cam_head : array (F, 3, 3)
@@ -207,7 +208,7 @@ def _warn(pose: HeadPose) -> None:
         where = f" in {frames.size} of {misfit.size} frames, most in frame {worst}" if misfit.size > 1 else ""
         warnings.warn(
             f"head point {name} does not fit the others{where}: residual {pose.residuals[worst, index]:.4g}, "
-            f"rms {pose.rms[worst]:.4g} with it and {pose.rms_without[worst]:.4g} without, in the image's unit; "
+            f"rms {pose.rms[worst]:.4g} with it and {pose.rms_without[worst]:.4g} without (image units); "
             "check its place on the head and in the image, or leave it out",
             HeadWarning,
             stacklevel=4,

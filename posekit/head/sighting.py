@@ -53,15 +53,15 @@ def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
             f"frame {frame}: head point {head.names[row]} is at {points[frame, row].tolist()} in the image; "
             "expected finite numbers, or NaN where it is not seen"
         )
-    seen: NDArray[np.bool_] = np.isfinite(points).all(axis=-1)
+    seen = np.asarray(np.isfinite(points).all(axis=-1), dtype=np.bool_)
     points[~seen] = 0.0
     patterns, which = np.unique(seen, axis=0, return_inverse=True)
     by_pattern = [degeneracy(head.names, head.points, pattern) for pattern in patterns]
     reasons = [by_pattern[pattern] or "" for pattern in which.reshape(-1)]
     for frame, spread in zip(*_flat(points, seen), strict=True):
         reasons[frame] = reasons[frame] or (
-            f"the image points lie on one line or in one point ({spread[0]:.3g} along, {spread[1]:.3g} across): "
-            "a head never looks so; check the image points"
+            f"the image points lie on one line or in one point (spread {spread[0]:.3g} by {spread[1]:.3g}): "
+            "a head never looks so; check them"
         )
     return Sighting(points, seen, reasons)
 

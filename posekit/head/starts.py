@@ -9,6 +9,9 @@ from posekit.cameras import Array
 from posekit.head.dlt import solve
 from posekit.head.perspective import Placement
 
+FLAT = 1e-12
+"""Added to the squared extent of points of size 1, so that the rest of a head, if flat, has a start too."""
+
 
 def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bool) -> Placement:
     """Fit a scaled orthographic view: the limit of a distant camera (Tomasi & Kanade 1992).
@@ -20,7 +23,7 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     image : array (F, P, 2)
         Normalised image points, or metres where f is free.
     seen : bool array (F, P)
-        At least four a frame, not in one plane.
+        At least four a frame.
     known : bool
         Whether f is: then the scale tells the depth, else the camera is infinitely far.
     """
@@ -29,7 +32,8 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     space = np.where(seen[..., None], points - centre[:, None], 0.0)
     offset = np.where(seen[..., None], image - middle[:, None], 0.0)
     transposed = np.swapaxes(space, -1, -2)
-    affine = np.swapaxes(np.linalg.solve(transposed @ space, transposed @ offset), -1, -2)
+    normal = transposed @ space + FLAT * np.eye(3)
+    affine = np.swapaxes(np.linalg.solve(normal, transposed @ offset), -1, -2)
     left, values, right = np.linalg.svd(affine, full_matrices=False)
     axes = left @ right
     R = np.concatenate([axes, np.cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)

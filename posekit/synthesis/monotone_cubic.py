@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -48,6 +48,7 @@ class PeriodicMonotoneCubic:
     x: ArrayLike
     y: ArrayLike
     period: float = 1.0
+    _knots: tuple[Array, Array, Array] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         x, y = np.array(self.x, dtype=np.float64), np.array(self.y, dtype=np.float64)
@@ -62,16 +63,11 @@ class PeriodicMonotoneCubic:
         y = np.concatenate([[y[-1]], y, y[:2]])
         width = np.diff(x)
         secant = np.diff(y) / width
-        slope = _harmonic_mean(width, secant)
-        for name, values in {"_x": x[1:-1], "_y": y[1:-1], "_slope": slope}.items():
-            values.flags.writeable = False
-            object.__setattr__(self, name, values)
+        object.__setattr__(self, "_knots", (x[1:-1], y[1:-1], _harmonic_mean(width, secant)))
 
     def __call__(self, at: ArrayLike) -> Array:
         """Evaluate the curve at any places, of any shape."""
-        x: Array = getattr(self, "_x")
-        y: Array = getattr(self, "_y")
-        slope: Array = getattr(self, "_slope")
+        x, y, slope = self._knots
         place = x[0] + np.mod(np.asarray(at, dtype=np.float64) - x[0], self.period)
         k = np.clip(np.searchsorted(x, place, side="right") - 1, 0, len(x) - 2)
         h = x[k + 1] - x[k]

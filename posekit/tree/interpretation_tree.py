@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array, Camera
 from posekit.tree.bits import path_of, select
@@ -68,7 +69,7 @@ class InterpretationTree:
         checks : sequence of Check
             Asked in this order at each level.
         given : array (F, G, 3), optional
-            Further points, known beforehand, that checks may read as points J, J + 1, …
+            Further points, known beforehand, that checks may read as points J, J + 1, …; unknown where absent.
         tolerance : float
             Metres by which a segment may be too short for its image and count as tangent to its ray.
 
@@ -96,7 +97,7 @@ class InterpretationTree:
 
     def _level(self, check: Check) -> int:
         """Return the first level at which all joints that a check reads are known, at least 1."""
-        return max(1, *(point for point in check.points if point < len(self.joints)))
+        return max([1, *(point for point in check.points if point < len(self.joints))])
 
     def _branch(self, leaves: Leaves, joint: int) -> Leaves:
         """Give every node its near and far successor and drop those that the lift already excludes."""
@@ -146,7 +147,7 @@ def apply(leaves: Leaves, check: Check) -> Leaves:
     nodes = representative[asked]
     findings = check.judge(leaves.positions(check.points, nodes))
     violated = findings.violated
-    rejected = violated.any(axis=1)
+    rejected: NDArray[np.bool_] = np.logical_or.reduce(violated, axis=1)
     if not rejected.any():
         return leaves
     row_of_key = representative

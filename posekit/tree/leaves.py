@@ -125,7 +125,8 @@ class Leaves:
         placed = np.empty((len(nodes), len(points), 3))
         for column, point in enumerate(points):
             if point >= len(self.joints):
-                placed[:, column] = self.given[frame, point - len(self.joints)]
+                known = point - len(self.joints) < self.given.shape[1]
+                placed[:, column] = self.given[frame, point - len(self.joints)] if known else np.nan
             else:
                 path = select(self.level, path_of(point, self.parents))[code]
                 placed[:, column] = self.candidates.positions[point][frame, path]
@@ -167,7 +168,7 @@ class Leaves:
         return np.searchsorted(self.frame, np.arange(self.n_frames + 1)).astype(np.int64)
 
     def rejected(self) -> list[dict[str, int]]:
-        """Count, by frame and reason, the leaves of the full tree that were lost; with the survivors, 2^(J-1)."""
+        """Count, by frame and reason, the full tree's leaves that were lost; with the survivors, 2^(J-1)."""
         totals: list[dict[str, int]] = [{} for _ in range(self.n_frames)]
         depth = len(self.joints) - 1
         for group in self.pruned:

@@ -51,7 +51,7 @@ def test_nesting_is_counted_as_a_walk_counts_it(document):
     assert _nesting(json.dumps(document).encode())[0] == depth_of(document)
 
 
-@given(st.binary(max_size=60) | st.text("[]{}\":,\\ 01eE+-.naNIf", max_size=60).map(str.encode))
+@given(st.binary(max_size=60) | st.text('[]{}":,\\ 01eE+-.naNIf', max_size=60).map(str.encode))
 def test_any_bytes_are_read_or_refused(data):
     try:
         parse_json("x", data)
@@ -79,7 +79,9 @@ def test_malformed_json_names_line_and_column(tmp_path, content, where):
     assert refusal_of(tmp_path, content).startswith(where)
 
 
-@pytest.mark.parametrize("literal", ["NaN", "Infinity", "-Infinity", "1e400", "-1e400", "9" * 400, "9" * 5000])
+@pytest.mark.parametrize(
+    "literal", ["NaN", "Infinity", "-Infinity", "1e400", "-1e400", "9" * 400, "9" * 5000]
+)
 def test_numbers_that_no_float_holds_name_their_field(tmp_path, literal):
     text = refusal_of(tmp_path, f'{{"a": [0, {{"b": {literal}}}]}}')
     assert text.startswith(f"a[1].b: got {literal[:40]}")
@@ -91,7 +93,9 @@ def test_repeated_keys_are_refused(tmp_path):
     assert text.startswith("frames[1].x: got the same key twice")
 
 
-@pytest.mark.parametrize("bomb", ["[" * 100_000, "[" * 100_000 + "]" * 100_000, '{"a":' * 100_000, "[" * 65 + "]" * 65])
+@pytest.mark.parametrize(
+    "bomb", ["[" * 100_000, "[" * 100_000 + "]" * 100_000, '{"a":' * 100_000, "[" * 65 + "]" * 65]
+)
 def test_nesting_bombs_are_refused_before_parsing(tmp_path, bomb):
     text = refusal_of(tmp_path, bomb)
     assert "nested levels; expected at most 64" in text
@@ -126,7 +130,7 @@ def test_many_empty_lists_are_refused(tmp_path):
 
 
 def test_an_unterminated_string_of_escaped_quotes_is_linear():
-    with pytest.raises(InputError, match="[Uu]nterminated"):
+    with pytest.raises(InputError, match="unterminated string"):
         parse_json("x", b'"' + b'\\"' * 1_000_000)
 
 

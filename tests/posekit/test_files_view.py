@@ -22,7 +22,9 @@ R = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 CAMERAS = {
     "lee-chen": LeeChenModel(f=0.05),
     "lee-chen without f": LeeChenModel(f=None),
-    "opencv": OpenCVModel(K=K, distortion=np.arange(5) / 100, R=R, t=np.array([0.1, 0.2, 4.0]), size=(640, 480)),
+    "opencv": OpenCVModel(
+        K=K, distortion=np.arange(5) / 100, R=R, t=np.array([0.1, 0.2, 4.0]), size=(640, 480)
+    ),
     "opencv with K alone": OpenCVModel(K=K),
     "orthographic": ScaledOrthographicModel(scale=123.4),
     "orthographic without scale": ScaledOrthographicModel(scale=None),
@@ -32,7 +34,11 @@ CAMERAS = {
 def a_view(rng, camera, frames=4) -> View:
     image = rng.normal(size=(frames, 14, 2))
     image[:, 1:][rng.random((frames, 13)) < 0.2] = np.nan
-    head_image, truth, root = rng.normal(size=(frames, 5, 2)), rng.normal(size=(frames, 14, 3)), rng.normal(size=(frames, 3))
+    head_image, truth, root = (
+        rng.normal(size=(frames, 5, 2)),
+        rng.normal(size=(frames, 14, 3)),
+        rng.normal(size=(frames, 3)),
+    )
     head_image[0] = truth[1] = root[2] = np.nan
     head_image[1, 2] = truth[2, 3] = np.nan
     return View(
@@ -183,15 +189,27 @@ BAD = [
     (("camera", "focal"), 5, "camera.focal: got 5; expected no field of this name"),
     (("camera",), None, "camera: got null; expected an object"),
     (("camera",), ..., "camera: got nothing; expected this field; add it"),
-    (("camera",), {"model": "scaled-orthographic", "scale": 0}, "camera.scale: got 0; expected a number greater"),
+    (
+        ("camera",),
+        {"model": "scaled-orthographic", "scale": 0},
+        "camera.scale: got 0; expected a number greater",
+    ),
     (("camera",), OPENCV | {"K": [[0, 0, 0], [0, 1, 0], [0, 0, 1]]}, "focal lengths must be positive"),
     (("camera",), OPENCV | {"K": [[1, 0, 0], [0, -1, 0], [0, 0, 1]]}, "focal lengths must be positive"),
     (("camera",), OPENCV | {"K": [[1, 0, 0], [0, 1, 0], [0, 0, 2]]}, "camera.K: got a list of 3 entries"),
-    (("camera",), OPENCV | {"K": [[1, 0, 0], [0, 1, 0], [0, 0]]}, "camera.K[2]: got [0, 0]; expected at least 3"),
+    (
+        ("camera",),
+        OPENCV | {"K": [[1, 0, 0], [0, 1, 0], [0, 0]]},
+        "camera.K[2]: got [0, 0]; expected at least 3",
+    ),
     (("camera",), OPENCV | {"R": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "its determinant is -1, so it mirrors"),
     (("camera",), OPENCV | {"R": [[1, 0, 0], [0, 1, 0], [0, 0.01, 1]]}, "R R^T is off the identity by 0.01"),
     (("camera",), OPENCV | {"R": [[1e200, 0, 0], [0, 1, 0], [0, 0, 1]]}, "R R^T is off the identity by inf"),
-    (("camera",), OPENCV | {"distortion": [0, 0, 0, 0]}, "camera.distortion: got [0, 0, 0, 0]; expected at least 5"),
+    (
+        ("camera",),
+        OPENCV | {"distortion": [0, 0, 0, 0]},
+        "camera.distortion: got [0, 0, 0, 0]; expected at least 5",
+    ),
     (("camera",), OPENCV | {"size": [0, 480]}, "camera.size[0]: got 0"),
     (("camera",), OPENCV | {"size": [640.5, 480]}, "camera.size[0]: got 640.5; expected a whole number"),
     (("unit",), "inch", "unit: got \"inch\"; expected 'm', 'cm' or 'mm'"),
@@ -208,25 +226,65 @@ BAD = [
     ((*FRAME, "time"), "now", 'frames[3].time: got "now"; expected a number'),
     ((*FRAME, "image"), ..., "frames[3].image: got nothing"),
     ((*IMAGE, "neck"), ..., "frames[3].image.neck: got nothing; expected the neck in every frame"),
-    ((*IMAGE, "lef_elbow"), [1, 2], "frames[3].image.lef_elbow: got \"lef_elbow\"; expected the name of a joint; did you mean left_elbow"),
-    ((*IMAGE, "nose"), [1, 2], "frames[3].image.nose: got \"nose\"; expected the name of a joint; valid names are neck,"),
-    ((*IMAGE, "left_elbow"), [1], "frames[3].image.left_elbow: got [1]; expected at least 2 entries; an image point is [u, v]"),
-    ((*IMAGE, "left_elbow"), [1, 2, 3], "frames[3].image.left_elbow: got [1, 2, 3]; expected at most 2 entries"),
+    (
+        (*IMAGE, "lef_elbow"),
+        [1, 2],
+        'frames[3].image.lef_elbow: got "lef_elbow"; expected the name of a joint; did you mean left_elbow',
+    ),
+    (
+        (*IMAGE, "nose"),
+        [1, 2],
+        'frames[3].image.nose: got "nose"; expected the name of a joint; valid names are neck,',
+    ),
+    (
+        (*IMAGE, "left_elbow"),
+        [1],
+        "frames[3].image.left_elbow: got [1]; expected at least 2 entries; an image point is [u, v]",
+    ),
+    (
+        (*IMAGE, "left_elbow"),
+        [1, 2, 3],
+        "frames[3].image.left_elbow: got [1, 2, 3]; expected at most 2 entries",
+    ),
     ((*IMAGE, "left_elbow"), [1, "2"], 'frames[3].image.left_elbow[1]: got "2"; expected a number'),
     ((*IMAGE, "left_elbow"), [1, None], "frames[3].image.left_elbow[1]: got null; expected a number"),
     ((*IMAGE, "left_elbow"), None, "frames[3].image.left_elbow: got null; expected a list"),
-    ((*IMAGE, "left_elbow"), [1, float("nan")], "frames[3].image.left_elbow[1]: got NaN; expected a finite number"),
-    ((*IMAGE, "left_elbow"), [float("-inf"), 1], "frames[3].image.left_elbow[0]: got -Infinity; expected a finite number"),
-    ((*FRAME, "head_image"), {"noze": [1, 2]}, "frames[3].head_image.noze: got \"noze\"; expected the name of a head point; did you mean nose?"),
+    (
+        (*IMAGE, "left_elbow"),
+        [1, float("nan")],
+        "frames[3].image.left_elbow[1]: got NaN; expected a finite number",
+    ),
+    (
+        (*IMAGE, "left_elbow"),
+        [float("-inf"), 1],
+        "frames[3].image.left_elbow[0]: got -Infinity; expected a finite number",
+    ),
+    (
+        (*FRAME, "head_image"),
+        {"noze": [1, 2]},
+        'frames[3].head_image.noze: got "noze"; expected the name of a head point; did you mean nose?',
+    ),
     ((*FRAME, "root"), [1, 2], "frames[3].root: got [1, 2]; expected at least 3 entries"),
-    ((*FRAME, "truth"), {"neck": [1, 2, 3, 4]}, "frames[3].truth.neck: got [1, 2, 3, 4]; expected at most 3 entries"),
-    ((*FRAME, "truth"), {"head": [1, 2, 3]}, "frames[3].truth.head: got \"head\"; expected the name of a joint"),
-    (("figure", "lengths", "neck-pelvis"), 0, "figure.lengths.neck-pelvis: got 0; expected a number greater than 0"),
+    (
+        (*FRAME, "truth"),
+        {"neck": [1, 2, 3, 4]},
+        "frames[3].truth.neck: got [1, 2, 3, 4]; expected at most 3 entries",
+    ),
+    (
+        (*FRAME, "truth"),
+        {"head": [1, 2, 3]},
+        'frames[3].truth.head: got "head"; expected the name of a joint',
+    ),
+    (
+        ("figure", "lengths", "neck-pelvis"),
+        0,
+        "figure.lengths.neck-pelvis: got 0; expected a number greater than 0",
+    ),
     (("figure", "lengths", "neck-pelvis"), -50.2, "figure.lengths.neck-pelvis: got -50.2"),
     (("figure", "lengths", "pelvis-neck"), 5, "expected the name of a segment; did you mean neck-pelvis?"),
     (("figure", "lengths", "right_hip-knee"), 5, "did you mean right_hip-right_knee"),
     (("figure", "stature"), 0, "figure.stature: got 0; expected a number greater than 0"),
-    (("figure", "head_points"), {"chin": [1, 2, 3]}, "figure.head_points.chin: got \"chin\""),
+    (("figure", "head_points"), {"chin": [1, 2, 3]}, 'figure.head_points.chin: got "chin"'),
     (("figure", "head_points"), {"nose": [1, 2]}, "figure.head_points.nose: got [1, 2]"),
     (("figure", "height"), 5, "figure.height: got 5; expected no field of this name"),
 ]
@@ -295,12 +353,15 @@ half_known[1, 3, 0] = 1.0
         ({"image": np.zeros((3, 14, 2))}, r"image: got shape \(3, 14, 2\); expected \(2, 14, 2\)"),
         ({"image": np.full((2, 14, 2), np.nan)}, r"image\[0, 0\]: got NaN; expected the neck"),
         ({"root": np.full((2, 3), np.inf)}, r"root\[0, 0\]: got Infinity"),
-        ({"truth": half_known}, r"truth\[1, 3, 0\]: got 1.0; expected finite points, or NaN in all of a point"),
+        (
+            {"truth": half_known},
+            r"truth\[1, 3, 1\]: got NaN; expected finite points, or NaN in all of a point",
+        ),
         ({"lengths": {"neck-pelvi": 1.0}}, "did you mean neck-pelvis"),
         ({"lengths": {"neck-pelvis": 0.0}}, "lengths.neck-pelvis: got 0.0; expected a positive length"),
         ({"lengths": {"neck-pelvis": np.nan}}, "lengths.neck-pelvis: got NaN"),
         ({"stature": -1.0}, "stature: got -1.0"),
-        ({"head_points": {"chin": np.zeros(3)}}, "head_points: got \"chin\""),
+        ({"head_points": {"chin": np.zeros(3)}}, 'head_points: got "chin"'),
         ({"head_points": {"nose": np.zeros(2)}}, "head_points.nose: got"),
     ],
 )

@@ -1,0 +1,128 @@
+"""`posekit synth`: synthetic views, with their truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posekit.cli.options import Noise, OutputView, Seed, numbers
+
+if TYPE_CHECKING:
+    from posekit.synthesis import Scene
+
+app = typer.Typer(
+    help="Make synthetic views with truth: a walker, random legal postures, or motion capture.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+
+Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")]
+Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
+
+
+@app.command()
+def walker(
+    output: OutputView,
+    camera: Annotated[
+        str,
+        typer.Option(
+            "--camera", metavar="X,Y,Z", help="Camera position in the head's frame, cm: x ahead, y up, z right."
+        ),
+    ] = "400,0,0",
+    frames: Frames = 5,
+    dt: Dt = 0.2,
+    velocity: Annotated[
+        float, typer.Option("--velocity", help="Relative velocity, leg lengths a second, 0.5 to 1.3.")
+    ] = 1.0,
+    phase: Annotated[float, typer.Option("--phase", help="Phase of the first frame, in cycles.")] = 0.0,
+    noise: Annotated[
+        float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, cm on the image plane.")
+    ] = 0.0,
+    seed: Seed = 0,
+) -> None:
+    """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1.
+
+    Examples:
+      posekit synth walker -o seq1.json --camera 400,0,0
+      posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2
+    """
+    from posekit import synthesis  # noqa: PLC0415
+
+    x, y, z = numbers(camera, 3, "--camera")
+    scene = synthesis.walker_scene(
+        position=(x / 100, y / 100, z / 100), frames=frames, dt=dt, velocity=velocity, phase0=phase
+    )
+    _write(output, scene, noise / 100, seed, "cm")
+
+
+@app.command()
+def random(
+    output: OutputView,
+    frames: Frames = 1,
+    distance: Annotated[
+        str, typer.Option("--distance", metavar="MIN,MAX", help="Distances of the cameras, metres.")
+    ] = "2.5,6",
+    noise: Noise = 0.0,
+    seed: Seed = 0,
+) -> None:
+    """Draw random legal postures, each seen from anywhere on a sphere around the person.
+
+    Example:
+      posekit synth random -o random.json --frames 100 --noise 1 --seed 7
+    """
+    import numpy as np  # noqa: PLC0415
+
+    from posekit import synthesis  # noqa: PLC0415
+    from posekit.figure import load_figure  # noqa: PLC0415
+
+    near, far = numbers(distance, 2, "--distance")
+    scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), distance=(near, far))
+    _write(output, scene, noise, seed, "m")
+
+
+@app.command()
+def mocap(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")],
+    output: OutputView,
+    frames: Frames = 5,
+    clip: Annotated[str, typer.Option("--clip", help="One clip by name; default: frames of all clips.")] = "",
+    camera: Annotated[
+        str, typer.Option("--camera", metavar="X,Y,Z", help="Camera position from the person, metres, world axes.")
+    ] = "",
+    dt: Dt = 0.2,
+    noise: Noise = 0.0,
+    seed: Seed = 0,
+) -> None:
+    """See a motion-capture clip through a virtual camera, with the segment lengths of the clip.
+
+    Examples:
+      posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1
+      posekit synth mocap clips.npz -o views.json --frames 100 --seed 3
+    """
+    import numpy as np  # noqa: PLC0415
+
+    from posekit import synthesis  # noqa: PLC0415
+
+    rng = np.random.default_rng(seed)
+    capture = synthesis.read_capture(file)
+    if clip or camera:
+        scene = synthesis.clip_scene(
+            capture, clip or None, frames=frames, dt=dt, rng=rng, position=numbers(camera, 3, "--camera") if camera else None
+        )
+    else:
+        scene = synthesis.mocap_scenes(capture, frames, rng)
+    _write(output, scene, noise, seed, "m")
+
+
+def _write(output: Path, scene: Scene, noise: float, seed: int, unit: str) -> None:
+    """Add noise, write the view, say so."""
+    import numpy as np  # noqa: PLC0415
+
+    from posekit import files, pipeline  # noqa: PLC0415
+
+    if noise > 0:
+        scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
+    files.write_view(output, pipeline.view_of(scene), unit)  # type: ignore[arg-type]
+    typer.echo(f"written: {output} ({len(scene)} frames)")

@@ -1,0 +1,63 @@
+"""From synthetic scenes to views, and the built-in ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from posekit.errors import InputError
+from posekit.figure import Figure, load_figure
+from posekit.files import CameraModel, LeeChenModel, OpenCVModel, View
+from posekit.head import TABLE_A2
+from posekit.skeleton import HEAD_POINTS
+from posekit.synthesis import Scene, seq1, seq2
+
+BUILT_IN: dict[str, Callable[[], Scene]] = {"seq1": seq1, "seq2": seq2}
+"""The two sequences of Lee & Chen 1985, §4, walked by posekit's own walker."""
+
+
+def view_of(scene: Scene) -> View:
+    """Make the view of a scene, with the truth.
+
+    The 1985 camera's f is left open and the head's points are Table A.2's, in the frame in which the paper
+    gives the camera's position; another camera's intrinsics are known.
+    """
+    model: CameraModel
+    head = TABLE_A2.points if scene.lee_chen_f is not None else None
+    if scene.lee_chen_f is not None:
+        model = LeeChenModel(f=None)
+    else:
+        model = OpenCVModel(K=scene.camera.K, distortion=scene.camera.distortion, size=scene.size)
+    return View(
+        camera=model,
+        time=scene.time,
+        image=scene.image,
+        head_image=scene.head_image,
+        root=scene.root,
+        truth=scene.joints_cam,
+        lengths=_differences(scene.figure),
+        head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
+    )
+
+
+def builtin_view(name: str) -> View:
+    """Return a built-in view: ``seq1`` (camera ahead of the walker) or ``seq2`` (ahead and to the right).
+
+    Raises
+    ------
+    InputError
+        Where there is no view of that name.
+    """
+    if name not in BUILT_IN:
+        raise InputError(f"{name!r} is not a built-in view; expected one of {', '.join(BUILT_IN)}")
+    return view_of(BUILT_IN[name]())
+
+
+def _differences(figure: Figure) -> dict[str, float]:
+    """Return the lengths that are not the built-in figure's."""
+
+    standard = load_figure().lengths
+    return {
+        name: length for name, length in figure.lengths.items() if not np.isclose(length, standard[name], rtol=0, atol=1e-12)
+    }

@@ -1,0 +1,63 @@
+"""Take a figure's points from their own world into a camera's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posekit.cameras import Array, PinholeCamera
+from posekit.figure import Figure
+from posekit.figure.figure import quaternions
+from posekit.figure.frames import torso_frame
+from posekit.skeleton import JOINTS, TORSO
+from posekit.synthesis.scene import Scene
+from posekit.synthesis.viewpoints import to_camera
+
+
+def observe(
+    figure: Figure,
+    camera: PinholeCamera,
+    points: Array,
+    R_cam_world: Array,
+    position: Array,
+    *,
+    q: Array | None = None,
+    time: Array | None = None,
+    lee_chen_f: float | None = None,
+    size: tuple[int, int] | None = None,
+    labels: tuple[str, ...] = (),
+) -> Scene:
+    """Make the scene of points that cameras see in F frames.
+
+    Parameters
+    ----------
+    points : array (F, 19, 3)
+        World frame, metres; NaN where absent.
+    R_cam_world : array (F, 3, 3)
+    position : array (F, 3)
+        Optical centres, world frame, metres.
+    q : array (F, nq), optional
+        Configurations in the world frame: only the torso's pose changes with the frame.
+
+    Returns
+    -------
+    Scene
+    """
+    points_cam = to_camera(points, R_cam_world, position)
+    if q is None:
+        q_cam = np.full((len(points), figure.model.nq), np.nan)
+    else:
+        torso = np.moveaxis(points_cam[:, : len(TORSO)], 1, 0)
+        q_cam = np.concatenate([torso[0], quaternions(torso_frame(*torso)), q[:, 7:]], axis=1)
+    return Scene(
+        figure=figure,
+        camera=camera,
+        joints_cam=points_cam[:, : len(JOINTS)],
+        head_cam=points_cam[:, len(JOINTS) :],
+        time=np.arange(len(points), dtype=np.float64) if time is None else time,
+        q=q_cam,
+        R_cam_world=R_cam_world,
+        t_cam_world=-np.einsum("fij,fj->fi", R_cam_world, position),
+        lee_chen_f=lee_chen_f,
+        size=size,
+        labels=labels,
+    )

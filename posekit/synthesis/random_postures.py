@@ -1,0 +1,109 @@
+"""Random legal postures, and views of them from everywhere."""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.synthesis.camera_sphere import CameraSphere
+from posekit.synthesis.observe import observe
+from posekit.synthesis.scene import Scene
+
+UP = np.array([0.0, 0.0, 1.0])
+"""Up in the torso's frame at which the postures stand."""
+
+LEAST_ACCEPTED = 1e-3
+"""Fraction of draws free of collision below which it is said that the limits leave nothing to draw."""
+
+
+def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
+    """Draw configurations uniform inside all limits of the figure, rejected until free of collision.
+
+    Parameters
+    ----------
+    figure : Figure
+        `Figure.with_limits` narrows the ranges.
+    n : int
+    rng : Generator
+        The same seed gives the same postures.
+
+    Returns
+    -------
+    array (n, nq)
+        The torso at the origin, upright, facing +x.
+
+    Raises
+    ------
+    InputError
+        Where n is not positive, or hardly any posture inside the limits is free of collision.
+    """
+    if n < 1:
+        raise InputError(f"{n} postures were asked for; ask for one or more")
+    lower, upper = figure.limits.lower, figure.limits.upper
+    kept: list[Array] = []
+    found = drawn = 0
+    while found < n:
+        missing = n - found
+        rate = max(found / drawn, 0.1) if drawn else 1.0
+        count = int(missing / rate * 1.1) + 16
+        q = np.tile(pin.neutral(figure.model), (count, 1))
+        q[:, figure.angle_index] = rng.uniform(lower, upper, (count, len(lower)))
+        kept.append(q[~collides(figure, q)])
+        found += len(kept[-1])
+        drawn += count
+        if found < LEAST_ACCEPTED * drawn and drawn > 10 / LEAST_ACCEPTED:
+            raise InputError(
+                f"{found} of {drawn} random postures inside the limits are free of collision; expected more "
+                f"than {LEAST_ACCEPTED:g} of them; widen the limits or thin the capsules"
+            )
+    return np.concatenate(kept)[:n]
+
+
+def random_views(
+    figure: Figure, n: int, rng: np.random.Generator, sphere: CameraSphere | None = None
+) -> Scene:
+    """Draw random legal postures, each seen by its own camera.
+
+    Parameters
+    ----------
+    figure : Figure
+    n : int
+    rng : Generator
+        The same seed gives the same views.
+    sphere : CameraSphere, optional
+        Where cameras may stand, and what they are.
+
+    Returns
+    -------
+    Scene
+        n independent frames, all points in front of their camera and inside the picture.
+
+    Raises
+    ------
+    InputError
+        See `random_postures` and `CameraSphere.place`.
+    """
+    sphere = sphere or CameraSphere()
+    q = random_postures(figure, n, rng)
+    points = figure.forward_kinematics(q)
+    placement = sphere.place(points, UP, rng)
+    return observe(
+        figure, sphere.camera, points, placement.R_cam_world, placement.position, q=q, size=sphere.size
+    )
+
+
+def collides(figure: Figure, q: Array) -> NDArray[np.bool_]:
+    """Ask coal which configurations (N, nq) penetrate in a pair that the figure's SRDF leaves to be checked."""
+    if not np.isfinite(q).all():
+        # Pinocchio would call them free.
+        raise InputError("a configuration is not finite; whether it collides cannot be said")
+    threads = min(2, len(os.sched_getaffinity(0)))
+    pool = pin.GeometryPool(figure.model, figure.geometry, threads)
+    verdicts = pin.computeCollisionsInParallel(threads, pool, np.asfortranarray(q.T), True)
+    return np.asarray(verdicts).astype(bool)

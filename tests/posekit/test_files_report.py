@@ -1,0 +1,138 @@
+"""Reports: each verdict with the findings that it rests on."""
+
+import json
+
+import numpy as np
+import pytest
+
+from posekit.errors import InputError
+from posekit.files import Finding, Judged, PostureReport, Report, make_report, read_report, write_report
+from posekit.tree.check import Findings
+
+VALUE = np.array([[0.5, 2.0, -1.0], [0.5, 0.4, 0.9], [np.nan, np.nan, np.nan]])
+
+
+def judged(name="joint_range") -> Judged:
+    findings = Findings(value=VALUE, lower=np.zeros(3), upper=np.array([1.0, 1.0, np.inf]))
+    return Judged(check=name, unit="rad", where=("a", "b", "c"), findings=findings)
+
+
+def a_report(**options) -> Report:
+    return make_report(
+        settings={"checks": ["joint_range"]},
+        verdicts=["invalid", "valid", "undecided"],
+        fk_distance=np.array([1e-12, 0.0, np.nan]),
+        judged=[judged()],
+        **options,
+    )
+
+
+def test_violated_and_worst_findings_are_listed():
+    report = a_report()
+    listed = [[(f.where, f.verdict) for f in posture.findings] for posture in report.postures]
+    assert listed == [[("b", "invalid"), ("c", "invalid")], [("b", "valid")], [("a", "undecided")]]
+    first = report.postures[0].findings[0]
+    assert first == Finding(
+        check="joint_range",
+        where="b",
+        value=2.0,
+        lower=0.0,
+        upper=1.0,
+        margin=-1.0,
+        unit="rad",
+        verdict="invalid",
+    )
+    assert report.postures[0].findings[1].upper is None
+    assert report.postures[2].findings[0].value is None
+    assert report.postures[2].fk_distance is None
+    assert report.summary == {"valid": 1, "invalid": 1, "undecided": 1}
+
+
+def test_all_findings_are_listed_on_request():
+    assert [len(posture.findings) for posture in a_report(all_findings=True).postures] == [3, 3, 3]
+
+
+@pytest.mark.parametrize("everything", [False, True])
+def test_a_report_is_read_back(tmp_path, everything):
+    report = a_report(all_findings=everything)
+    write_report(tmp_path / "r.json", report)
+    assert read_report(tmp_path / "r.json") == report
+    document = json.loads((tmp_path / "r.json").read_text())
+    assert list(document) == ["schema", "settings", "summary", "postures"]
+
+
+def test_numbers_that_json_has_not_become_null(tmp_path):
+    finding = Finding(
+        check="c",
+        where="w",
+        value=np.nan,
+        lower=-np.inf,
+        upper=np.inf,
+        margin=np.nan,
+        unit="m",
+        verdict="undecided",
+    )
+    posture = PostureReport(verdict="undecided", fk_distance=np.nan, findings=[finding])
+    write_report(tmp_path / "r.json", Report(settings={}, postures=[posture]))
+    back = read_report(tmp_path / "r.json").postures[0]
+    assert (back.fk_distance, back.findings[0].value, back.findings[0].lower) == (None, None, None)
+
+
+def test_no_posture_and_no_place_are_reports(tmp_path):
+    empty = make_report(settings={}, verdicts=[], fk_distance=np.zeros(0), judged=[])
+    write_report(tmp_path / "r.json", empty)
+    assert read_report(tmp_path / "r.json").summary == {"valid": 0, "invalid": 0, "undecided": 0}
+    nowhere = Findings(value=np.zeros((1, 0)), lower=np.zeros(0), upper=np.zeros(0))
+    check = Judged(check="c", unit="m", where=(), findings=nowhere)
+    report = make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[check])
+    assert report.postures[0].findings == ()
+
+
+def test_thousands_of_postures_are_reported_in_seconds(tmp_path, rng):
+    findings = Findings(value=rng.normal(size=(10_000, 22)), lower=np.full(22, -2.0), upper=np.full(22, 2.0))
+    check = Judged(check="c", unit="rad", where=[str(i) for i in range(22)], findings=findings)
+    verdicts = np.where(findings.violated.any(axis=1), "invalid", "valid").tolist()
+    report = make_report(settings={}, verdicts=verdicts, fk_distance=np.zeros(10_000), judged=[check])
+    write_report(tmp_path / "r.json", report)
+    assert read_report(tmp_path / "r.json").summary["invalid"] == verdicts.count("invalid")
+
+
+def test_what_does_not_fit_is_refused(tmp_path):
+    with pytest.raises(InputError, match="report: joint_range: got 3 postures; expected 1"):
+        make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[judged()])
+    with pytest.raises(InputError, match='verdicts: got "true"; expected valid or invalid or undecided'):
+        make_report(settings={}, verdicts=["true"], fk_distance=np.zeros(1), judged=[])
+    with pytest.raises(InputError, match=r'the suffix "\.npz"; expected \.json'):
+        write_report(tmp_path / "r.npz", a_report())
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "text"),
+    [
+        (
+            ("postures", 1, "verdict"),
+            "ok",
+            "postures[1].verdict: got \"ok\"; expected 'valid', 'invalid' or 'undecided'",
+        ),
+        (
+            ("postures", 1, "findings", 0, "value"),
+            "2",
+            'postures[1].findings[0].value: got "2"; expected a number',
+        ),
+        (("summary", "valid"), -1, "summary.valid: got -1; expected a number of at least 0"),
+        (("schema",), "posekit.report/9", "the file is of another version"),
+    ],
+)
+def test_a_file_that_breaks_the_schema_is_one_clear_line(tmp_path, place, value, text):
+    write_report(tmp_path / "r.json", a_report())
+    document = json.loads((tmp_path / "r.json").read_text())
+    *parents, last = place
+    node = document
+    for part in parents:
+        node = node[part]
+    node[last] = value
+    (tmp_path / "r.json").write_text(json.dumps(document))
+    with pytest.raises(InputError) as caught:
+        read_report(tmp_path / "r.json")
+    assert text in str(caught.value)

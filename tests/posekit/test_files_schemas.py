@@ -1,0 +1,114 @@
+"""The published schemas say what the readers accept."""
+
+import json
+
+import numpy as np
+import pytest
+
+from posekit.errors import InputError
+from posekit.files import (
+    SCHEMAS,
+    LeeChenModel,
+    OpenCVModel,
+    Report,
+    Result,
+    ResultFrame,
+    ScaledOrthographicModel,
+    View,
+    schema,
+    schema_text,
+    write_postures,
+    write_report,
+    write_result,
+    write_view,
+)
+from posekit.skeleton import JOINTS, SEGMENT_NAMES
+
+
+def write_all(folder, rng) -> dict[str, list]:
+    """Write a file or more of each schema and return what they hold."""
+    cameras = [
+        LeeChenModel(f=0.05),
+        OpenCVModel(K=np.eye(3), R=np.eye(3)),
+        ScaledOrthographicModel(scale=None),
+    ]
+    for index, camera in enumerate(cameras):
+        view = View(
+            camera=camera, time=np.zeros(2), image=rng.normal(size=(2, 14, 2)), lengths={"neck-pelvis": 0.5}
+        )
+        write_view(folder / f"view{index}.json", view, "cm")
+    frame = ResultFrame(
+        time=0.0,
+        camera={"f": 1.0},
+        levels={"joint": JOINTS, "physical": [1] * 14, "motion": [1] * 14},
+        joints=rng.normal(size=(2, 14, 3)),
+        q=rng.normal(size=(2, 3)),
+        branches=["01", "10"],
+        margins={"collision": np.array([np.nan, 1.0])},
+        fk_distance=np.zeros(2),
+        length_residual=np.zeros(2),
+        rejected={"collision": 3},
+    )
+    write_result(
+        folder / "result.json",
+        Result(unit="m", configuration_names=["a", "b", "c"], settings={}, frames=[frame]),
+    )
+    joints = rng.normal(size=(2, 14, 3))
+    joints[0, 1] = np.nan
+    write_postures(folder / "postures.json", joints)
+    write_report(folder / "report.json", Report(settings={}, postures=[]))
+    documents: dict[str, list] = {name: [] for name in SCHEMAS}
+    for path in folder.iterdir():
+        document = json.loads(path.read_text())
+        documents[document["schema"]].append(document)
+    return documents
+
+
+def test_each_is_versioned_and_closed():
+    assert SCHEMAS == ("posekit.view/1", "posekit.result/1", "posekit.postures/1", "posekit.report/1")
+    for name in SCHEMAS:
+        found = schema(name)
+        assert found["title"] == name
+        assert found["$id"] == "urn:" + name.replace(".", ":").replace("/", ":")
+        assert found["properties"]["schema"]["const"] == name
+        assert found["additionalProperties"] is False
+        assert {"schema", "unit"} & set(found["required"])
+        assert json.loads(schema_text(name)) == found
+        assert schema(name.removeprefix("posekit.").removesuffix("/1")) == found
+
+
+def test_the_names_of_joints_and_segments_are_published():
+    definitions = schema("view")["$defs"]
+    assert definitions["FrameFields"]["properties"]["image"]["propertyNames"]["enum"] == list(JOINTS)
+    assert definitions["FrameFields"]["properties"]["image"]["required"] == ["neck"]
+    lengths = definitions["FigureFields"]["properties"]["lengths"]["anyOf"][0]
+    assert lengths["propertyNames"]["enum"] == list(SEGMENT_NAMES)
+
+
+def test_what_is_written_is_valid_for_another_validator(tmp_path, rng):
+    jsonschema = pytest.importorskip("jsonschema")
+    for name, documents in write_all(tmp_path, rng).items():
+        jsonschema.Draft202012Validator.check_schema(schema(name))
+        validator = jsonschema.Draft202012Validator(schema(name))
+        assert documents
+        for document in documents:
+            validator.validate(document)
+            assert not validator.is_valid(document | {"more": 1})
+
+
+def test_what_is_refused_is_invalid_for_another_validator(tmp_path, rng):
+    jsonschema = pytest.importorskip("jsonschema")
+    documents = write_all(tmp_path, rng)["posekit.view/1"]
+    document = next(found for found in documents if found["camera"]["model"] == "lee-chen")
+    validator = jsonschema.Draft202012Validator(schema("view"))
+    assert not validator.is_valid(document | {"camera": {"model": "lee-chen", "f": 0}})
+    assert not validator.is_valid(document | {"frames": []})
+    assert not validator.is_valid(document | {"frames": [{"time": 0, "image": {"pelvis": [1, 2]}}]})
+    assert not validator.is_valid(
+        document | {"frames": [{"time": 0, "image": {"neck": [1, 2], "x": [1, 2]}}]}
+    )
+
+
+def test_an_unknown_schema_is_refused():
+    with pytest.raises(InputError, match=r'schema: got "views"; .*did you mean view'):
+        schema("views")
