@@ -46,11 +46,11 @@ class WalkingThresholds:
         Rule 5: degrees that the other leg may lean from the body axis.
     """
 
-    limb_swing: float = 0.03
+    limb_swing: float = 0.02
     girdle_swing: float = 0.01
-    out_of_plane: float = 25.0
-    flexed_knee: float = 25.0
-    vertical: float = 35.0
+    out_of_plane: float = 10.0
+    flexed_knee: float = 15.0
+    vertical: float = 30.0
 
 
 def walking(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-COINCIDENT = 2e-7
+COINCIDENT = 1e-7
 """Half the distance (m) between the two candidates below which they count as one.
 
 The candidates are at the foot of the perpendicular on the ray, plus and minus ``sqrt(l^2 - h^2)``. Rounding

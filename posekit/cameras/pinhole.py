@@ -131,9 +131,10 @@ def fold_radius(distortion: Array) -> float:
     says nothing about the lens.
     """
     k1, k2, _, _, k3 = distortion
-    squares = np.roots([7 * k3, 5 * k2, 3 * k1, 1.0])
-    turning = squares.real[(np.abs(squares.imag) < 1e-9) & (squares.real > 0)]
-    return float(np.sqrt(turning.min())) if len(turning) else np.inf
+    # In 1 / r^2: the leading coefficient is one, however small the lens's own are.
+    roots = np.roots([1.0, 3 * k1, 5 * k2, 7 * k3])
+    turning = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)]
+    return float(1 / np.sqrt(turning.max())) if len(turning) else np.inf
 
 
 def undistort(distorted: Array, distortion: Array) -> Array:

@@ -52,9 +52,13 @@ def walker(
 
     x, y, z = numbers(camera, 3, "--camera")
     scene = synthesis.walker_scene(
-        position=(x / 100, y / 100, z / 100), frames=frames, dt=dt, velocity=velocity, phase0=phase
+        synthesis.Walker(velocity=velocity),
+        camera=(x / 100, y / 100, z / 100),
+        frames=frames,
+        dt=dt,
+        phase0=phase,
     )
-    _write(output, scene, noise / 100, seed, "cm")
+    _write(output, scene, noise / 100, seed)
 
 
 @app.command()
@@ -78,8 +82,9 @@ def random(
     from posekit.figure import load_figure  # noqa: PLC0415
 
     near, far = numbers(distance, 2, "--distance")
-    scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), distance=(near, far))
-    _write(output, scene, noise, seed, "m")
+    sphere = synthesis.CameraSphere(distance=(near, far))
+    scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), sphere)
+    _write(output, scene, noise, seed)
 
 
 @app.command()
@@ -87,9 +92,14 @@ def mocap(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")],
     output: OutputView,
     frames: Frames = 5,
-    clip: Annotated[str, typer.Option("--clip", help="One clip by name; default: frames of all clips.")] = "",
+    clip: Annotated[str, typer.Option("--clip", help="The clip, by name. Default: the first.")] = "",
     camera: Annotated[
-        str, typer.Option("--camera", metavar="X,Y,Z", help="Camera position from the person, metres, world axes.")
+        str,
+        typer.Option(
+            "--camera",
+            metavar="X,Y,Z",
+            help="Camera position in the file's world, metres. Default: drawn on a sphere around the person.",
+        ),
     ] = "",
     dt: Dt = 0.2,
     noise: Noise = 0.0,
@@ -97,26 +107,26 @@ def mocap(
 ) -> None:
     """See a motion-capture clip through a virtual camera, with the segment lengths of the clip.
 
-    Examples:
+    Example:
       posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1
-      posekit synth mocap clips.npz -o views.json --frames 100 --seed 3
     """
     import numpy as np  # noqa: PLC0415
 
     from posekit import synthesis  # noqa: PLC0415
 
-    rng = np.random.default_rng(seed)
     capture = synthesis.read_capture(file)
-    if clip or camera:
-        scene = synthesis.clip_scene(
-            capture, clip or None, frames=frames, dt=dt, rng=rng, position=numbers(camera, 3, "--camera") if camera else None
-        )
-    else:
-        scene = synthesis.mocap_scenes(capture, frames, rng)
-    _write(output, scene, noise, seed, "m")
+    scene = synthesis.mocap_scene(
+        capture,
+        clip or capture.names[0],
+        np.random.default_rng(seed),
+        frames=frames,
+        dt=dt,
+        position=numbers(camera, 3, "--camera") if camera else None,
+    )
+    _write(output, scene, noise, seed)
 
 
-def _write(output: Path, scene: Scene, noise: float, seed: int, unit: str) -> None:
+def _write(output: Path, scene: Scene, noise: float, seed: int) -> None:
     """Add noise, write the view, say so."""
     import numpy as np  # noqa: PLC0415
 
@@ -124,5 +134,5 @@ def _write(output: Path, scene: Scene, noise: float, seed: int, unit: str) -> No
 
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
-    files.write_view(output, pipeline.view_of(scene), unit)  # type: ignore[arg-type]
+    files.write_view(output, pipeline.view_of(scene))
     typer.echo(f"written: {output} ({len(scene)} frames)")

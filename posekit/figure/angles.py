@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.figure.frames import cross
 
 FREE = 1e-6
 """Sine below which an angle is free: the limb is straight, or points along the abduction axis.
@@ -23,8 +24,11 @@ FREE = 1e-6
 Turning a free angle to its limit moves the limb's end by less than this times its length.
 """
 
+STRAIGHT = 1e-10
+"""Sine below which a limb's bend is rounding, and its axial rotation is none."""
+
 WORTH = 1e-5
-"""Radians by which turning the free first angle must bring a limb nearer its limits, else it stays as it is."""
+"""Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,21 +85,17 @@ def direction_angles(upper: Array, limits: Limits) -> Array:
     The axial rotation is left free: with only the upper segment known, nothing constrains it.
     """
     two = Limits(sign=limits.sign[:2], lower=limits.lower[:2], upper=limits.upper[:2])
-    branches = _direction_branches(upper)
-    pinned = _along_abduction_axis(upper)
-    if pinned.any():
-        turned = branches.copy()
-        turned[:, :, 0] = np.where(pinned, two.sign[0] * two.clip(0, 0.0), np.nan)[:, None]
-        branches = np.concatenate([branches, turned], axis=1)
-    return _least_violating(branches * two.sign, two, as_they_are=2)
+    angles = _least_violating(_direction_branches(upper) * two.sign, two)
+    angles[:, 0] = np.where(_along_abduction_axis(upper), two.clip(0, angles[:, 0]), angles[:, 0])
+    return angles
 
 
 def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     r"""Find the four angles of a ball joint and the hinge below it.
 
     Two Euler branches times two signs of the hinge are tried. Where the limb is straight the axial rotation
-    is free, and taken nearest to zero inside its limits; where the upper segment lies along the abduction
-    axis the first angle is free, and is used to bring the axial rotation inside.
+    is free, and where the upper segment lies along the abduction axis the first angle is: where none of the
+    four is inside the limits, the free angles are used to bring one inside.
 
     Parameters
     ----------
@@ -112,36 +112,57 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
     branches = _direction_branches(upper)
     candidates = []
     for k in range(2):
-        candidates += _hinge_branches(lower, branches[:, k, 0], branches[:, k, 1], limits)
-    as_they_are = len(candidates)
-    pinned = _along_abduction_axis(upper)
-    if pinned.any():
-        for k in range(2):
-            beta = branches[:, k, 1]
-            alpha = np.where(pinned, _free_alpha(lower, beta, limits), np.nan)
-            candidates += _hinge_branches(lower, alpha, beta, limits)
-    return _least_violating(np.stack(candidates, axis=1), limits, as_they_are=as_they_are)
+        alpha, beta = branches[:, k, 0], branches[:, k, 1]
+        local = _into_ball(lower, alpha, beta)
+        candidates += [_hinge_branch(local, alpha, beta, side, limits) for side in (1.0, -1.0)]
+    angles = _least_violating(np.stack(candidates, axis=1), limits)
+    free = _along_abduction_axis(upper) | _along(upper, lower)
+    free &= limits.violation(angles) > WORTH
+    if free.any():
+        angles[free] = _turn_free_angles(upper[free], lower[free], angles[free], limits)
+    return angles
 
 
-def _hinge_branches(lower: Array, alpha: Array, beta: Array, limits: Limits) -> list[Array]:
-    """Return the four angles (N, 4) of a limb for each sign of its hinge, given the first two."""
-    local = _into_ball(lower, alpha, beta)
-    bend = np.arctan2(np.hypot(local[:, 0], local[:, 1]), -local[:, 2])
-    straight = np.sin(bend) < FREE
-    branches = []
-    for side in (1.0, -1.0):
-        gamma = np.arctan2(-side * local[:, 1], -side * local[:, 0])
-        angles = limits.nearest_turn(np.stack([alpha, beta, gamma, side * bend], axis=-1) * limits.sign)
-        # A straight limb's axial rotation is noise unless it lies inside the limits as it is.
-        angles[:, 2] = np.where(straight, limits.clip(2, angles[:, 2]), angles[:, 2])
-        branches.append(angles)
-    return branches
+def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
+    """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment after two turns."""
+    across = np.hypot(local[:, 0], local[:, 1])
+    gamma = np.where(across < STRAIGHT, 0.0, np.arctan2(-side * local[:, 1], -side * local[:, 0]))
+    epsilon = side * np.arctan2(across, -local[:, 2])
+    return limits.nearest_turn(np.stack([alpha, beta, gamma, epsilon], axis=-1) * limits.sign)
+
+
+def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits) -> Array:
+    r"""Bring limbs (N) inside their limits by their free angles, where that helps.
+
+    A straight limb's axial rotation is put into its limits. At beta = +-90 deg,
+    :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
+    their limits, then also with one of the two at a limit, or with alpha at zero.
+    """
+    branches, pinned, straight = _direction_branches(upper), _along_abduction_axis(upper), _along(upper, lower)
+    sign, low, high = limits.sign, limits.lower, limits.upper
+    candidates = [angles]
+    for k in range(2):
+        beta = branches[:, k, 1]
+        at_zero = _into_ball(lower, np.zeros(len(beta)), beta)
+        for side in (1.0, -1.0):
+            gamma = np.arctan2(-side * at_zero[:, 1], -side * at_zero[:, 0])
+            turned = [sign[0] * limits.clip(0, 0.0), sign[0] * low[0], sign[0] * high[0]]
+            turned += [np.sign(np.sin(beta)) * (sign[2] * bound - gamma) for bound in (low[2], high[2])]
+            for alpha in (branches[:, k, 0], *(np.where(pinned, alpha, np.nan) for alpha in turned)):
+                branch = _hinge_branch(_into_ball(lower, alpha, beta), alpha, beta, side, limits)
+                branch[:, 2] = np.where(straight, limits.clip(2, branch[:, 2]), branch[:, 2])
+                candidates.append(branch)
+    return _least_violating(np.stack(candidates, axis=1), limits)
+
+
+def _along(upper: Array, lower: Array) -> NDArray[np.bool_]:
+    """Return where two directions (N, 3) lie on one line: a straight or folded limb."""
+    return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE)
 
 
 def _along_abduction_axis(upper: Array) -> NDArray[np.bool_]:
     """Return where a direction (N, 3) leaves the first angle free."""
-    free: NDArray[np.bool_] = np.hypot(upper[:, 0], upper[:, 2]) < FREE
-    return free
+    return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE)
 
 
 def _direction_branches(upper: Array) -> Array:
@@ -161,29 +182,9 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
     return np.stack([ca * x - sa * z, cb * y + sb * forward, -sb * y + cb * forward], axis=-1)
 
 
-def _free_alpha(lower: Array, beta: Array, limits: Limits) -> Array:
-    """Use the free first angle, else zero, to bring the axial rotation inside its limits.
-
-    At beta = +-90 deg, R_y(alpha) R_x(beta) R_z(gamma) depends on gamma -+ alpha alone.
-    """
-    alpha = np.full(len(beta), limits.sign[0] * limits.clip(0, 0.0))
-    local = _into_ball(lower, alpha, beta)
-    side = limits.sign[3] * np.sign(limits.lower[3] + limits.upper[3])
-    gamma = np.arctan2(-side * local[:, 1], -side * local[:, 0])
-    gamma = limits.nearest_turn(np.stack([alpha, beta, gamma, alpha], axis=-1) * limits.sign)[:, 2]
-    correction = (limits.clip(2, gamma) - gamma) * limits.sign[2]
-    moved = alpha + np.sign(np.sin(beta)) * correction
-    return limits.sign[0] * limits.clip(0, limits.sign[0] * moved)
-
-
-def _least_violating(candidates: Array, limits: Limits, *, as_they_are: int | None = None) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least; the first of equals.
-
-    Those after the first `as_they_are` have a free angle turned, and must be better by `WORTH`.
-    """
+def _least_violating(candidates: Array, limits: Limits) -> Array:
+    """Choose among branches (N, B, K) the one that violates the limits least; the first of equals."""
     angles = limits.nearest_turn(candidates)
     violation = limits.violation(angles)
-    if as_they_are is not None:
-        violation[:, as_they_are:] += WORTH
     best = np.argmin(np.where(np.isnan(violation), np.inf, violation), axis=1)
     return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]

@@ -18,7 +18,7 @@ def unit(vectors: Array) -> Array:
 
 
 def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis: Array) -> Array:
-    """Return R_cam_torso (..., 3, 3): down is neck to pelvis, left the shoulders' line square to it (§3.1)."""
+    """Return R_cam_torso (..., 3, 3), §3.1: down is neck to pelvis, left the shoulders' line square to it."""
     down = unit(pelvis - neck)
     across = left_shoulder - right_shoulder
     left = unit(across - np.einsum("...i,...i->...", across, down)[..., None] * down)

@@ -57,8 +57,8 @@ def torso_points(lengths: Mapping[str, float]) -> Array:
     across_squared = width**2 - (right[0] - left[0]) ** 2
     if across_squared <= 0:
         raise FigureError(
-            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but the shoulders' heights differ by "
-            f"{abs(right[0] - left[0]):g} m; lengthen it or make the two sides more alike"
+            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but the shoulders' heights differ "
+            f"by {abs(right[0] - left[0]):g} m; lengthen it or make the two sides more alike"
         )
     across = math.sqrt(across_squared)
     middle = (left[1] ** 2 - right[1] ** 2) / across
@@ -67,8 +67,8 @@ def torso_points(lengths: Mapping[str, float]) -> Array:
     if forward_squared < -FLAT:
         reach = right[1] + left[1]
         raise FigureError(
-            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths it "
-            f"must lie between {math.hypot(right[1] - left[1], right[0] - left[0]):g} and "
+            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "
+            f"it must lie between {math.hypot(right[1] - left[1], right[0] - left[0]):g} and "
             f"{math.hypot(reach, right[0] - left[0]):g} m; correct one of the torso's six lengths"
         )
     forward = math.sqrt(max(forward_squared, 0.0))
@@ -92,6 +92,11 @@ def hips_points(lengths: Mapping[str, float]) -> Array:
     """
     base = lengths["right_hip-left_hip"]
     offset, height = _apex("right_hip", "pelvis", "left_hip", lengths)
+    if height**2 <= FLAT:
+        raise FigureError(
+            f"figure.lengths: with right_hip-left_hip {base:g} m the pelvis lies on the line between the "
+            "hips, which have no plane then; lengthen pelvis-right_hip or pelvis-left_hip"
+        )
     return np.array([[0.0, 0.0, 0.0], [0.0, -offset, -height], [0.0, base - offset, -height]])
 
 

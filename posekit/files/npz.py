@@ -7,6 +7,7 @@ Here the declared sizes are compared with the archive's directory and with a lim
 from __future__ import annotations
 
 import math
+import struct
 import sys
 import zipfile
 import zlib
@@ -23,7 +24,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.files.reading import check_file, unreadable
-from posekit.files.refusal import cut, nearest, one_line, refusal, shown
+from posekit.files.refusal import cut, nearest, refusal, shown
 
 MAX_ARRAYS: Final = 1_000_000_000
 """Bytes of memory that the arrays of one archive may take."""
@@ -173,12 +174,24 @@ def open_npz(path: str | Path, *, limit: int = MAX_ARRAYS) -> Iterator[Archive]:
     """
     check_file(path, limit=limit)
     try:
-        with zipfile.ZipFile(path) as archive:
+        archive = zipfile.ZipFile(path)
+    except (zipfile.BadZipFile, ValueError, OverflowError, NotImplementedError, struct.error) as error:
+        raise _damaged(path, error) from None
+    except OSError as error:
+        raise unreadable(path, error) from None
+    try:
+        with archive:
             _check_directory(path, archive, limit)
             yield Archive(path=path, zip=archive)
-    except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        reason = cut(one_line(str(error)))
-        raise refusal(path, "", reason, "an undamaged .npz archive", "write it again") from None
+    except (
+        zipfile.BadZipFile,
+        zlib.error,
+        EOFError,
+        NotImplementedError,
+        RuntimeError,
+        struct.error,
+    ) as error:
+        raise _damaged(path, error) from None
     except OSError as error:
         raise unreadable(path, error) from None
 
@@ -215,6 +228,9 @@ def _check_directory(path: str | Path, archive: zipfile.ZipFile, limit: int) -> 
     if len(members) > MAX_MEMBERS:
         raise refusal(path, "", f"{len(members):,} members", f"at most {MAX_MEMBERS:,}", "split it")
     for member in members:
+        if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            method = f"compression method {member.compress_type}"
+            raise refusal(path, "", method, "none, or deflate", "save it with numpy.savez_compressed")
         if not member.filename.endswith(".npy"):
             raise refusal(
                 path,
@@ -230,6 +246,10 @@ def _check_directory(path: str | Path, archive: zipfile.ZipFile, limit: int) -> 
         raise _too_large(path, declared, limit)
 
 
+def _damaged(path: str | Path, error: Exception) -> InputError:
+    return refusal(path, "", cut(str(error)), "an undamaged .npz archive", "write it again")
+
+
 def _too_large(path: str | Path, declared: int, limit: int) -> InputError:
     got = f"{declared / 1e6:,.0f} MB of arrays when unpacked"
     return refusal(path, "", got, f"at most {limit / 1e6:,.0f} MB", "split it")
@@ -243,7 +263,7 @@ def _header(path: str | Path, name: str, file: IO[bytes]) -> tuple[tuple[int, ..
         if version == (2, 0):
             return npy.read_array_header_2_0(file)
     except (ValueError, TypeError, SyntaxError, KeyError, MemoryError, RecursionError, TokenError) as error:
-        reason = cut(one_line(str(error)))
+        reason = cut(str(error))
         raise refusal(
             path, name, reason, "an array as numpy.save writes it", "write the file again"
         ) from None
@@ -278,7 +298,7 @@ def suffix(path: str | Path, *accepted: str) -> str:
     found = Path(path).suffix.lower()
     if found not in accepted:
         remedy = nearest(found, accepted) if found else f"add {' or '.join(accepted)} to the name"
-        raise refusal(path, "", f'the suffix "{cut(one_line(found))}"', " or ".join(accepted), remedy)
+        raise refusal(path, "", f'the suffix "{cut(found)}"', " or ".join(accepted), remedy)
     return found
 
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.files.refusal import cut, one_line, refusal, shown
+from posekit.files.refusal import cut, refusal, shown
 
 MAX_BYTES: Final = 100_000_000
 """The largest file that is read as JSON; also the largest that is written as JSON."""
@@ -119,7 +119,7 @@ def check_file(path: str | Path, *, limit: int) -> None:
 def unreadable(path: str | Path, error: Exception) -> InputError:
     """Word the operating system's refusal to give a file."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return refusal(path, "", cut(one_line(reason)), "a readable file", "check the name and the permissions")
+    return refusal(path, "", cut(reason), "a readable file", "check the name and the permissions")
 
 
 def _too_large(path: str | Path, size: int, limit: int) -> InputError:
@@ -231,7 +231,7 @@ def _suspicions(node: Any, field: str) -> Iterator[tuple[str, str, str, str]]:
     if isinstance(node, _Literal):
         yield (
             field,
-            cut(one_line(node)),
+            cut(node),
             "a finite number",
             "leave out or write null for what is not known, where the schema allows it",
         )

@@ -26,13 +26,13 @@ def refusal(source: str | PathLike[str], field: str, got: str, expected: str, re
     got, expected, remedy : str
         The value (see `shown`), what would be accepted, and what to do about it.
     """
-    places = [one_line(str(place)) for place in (source, field) if str(place)]
-    return InputError(": ".join([*places, f"got {got}; expected {expected}; {remedy}"]))
+    places = [str(place) for place in (source, field) if str(place)]
+    return InputError(_one_line(": ".join([*places, f"got {got}; expected {expected}; {remedy}"])))
 
 
-def one_line(text: str) -> str:
-    """Return the text itself where it prints on one line, else its escaped form."""
-    return text if text.isprintable() else ascii(text)
+def _one_line(text: str) -> str:
+    """Escape what does not print: names in a damaged file may hold anything, line ends included."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 def shown(value: object) -> str:
@@ -50,7 +50,7 @@ def shown(value: object) -> str:
         return json.dumps(value)
     if isinstance(value, float) and not math.isfinite(value):
         return json.dumps(value)
-    return cut(one_line(str(value)))
+    return cut(str(value))
 
 
 def cut(text: str) -> str:

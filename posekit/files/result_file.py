@@ -34,6 +34,11 @@ def read_result(path: str | Path) -> Result:
     return read_result_json(path) if suffix(path, ".json", ".npz") == ".json" else read_result_npz(path)
 
 
+def check_result_path(path: str | Path) -> None:
+    """Refuse a result's name before the work that it is for is done."""
+    suffix(path, ".json", ".npz")
+
+
 def write_result(path: str | Path, result: Result) -> None:
     """Write a result, whole or not at all.
 

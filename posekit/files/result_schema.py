@@ -39,8 +39,14 @@ class ResultCamera(FileModel):
     """What was recovered of the camera; null where it is not known."""
 
     f: Maybe = Field(description="Lens to image plane, in `unit` (Lee & Chen's camera alone).")
-    rotation: Matrix | None = Field(description="R of p_cam = R p_head + t, OpenCV's frame.")
-    position: Row | None = Field(description="Position of the camera, in `unit`.")
+    rotation: Matrix | None = Field(
+        description="lee-chen: the matrix [R] of the paper's Table 2. opencv: R of p_cam = R p + t, where p "
+        "is in the world if the view gives extrinsics, else in the head's frame."
+    )
+    position: Row | None = Field(
+        description="In `unit`, in the frame of p. lee-chen: the image plane's origin. opencv: the optical "
+        "centre."
+    )
     residual: Maybe = Field(description="Of the reprojection: in `unit` where there is an f, else in pixels.")
 
 

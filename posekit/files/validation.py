@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Val
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from posekit.errors import InputError, PosekitError
-from posekit.files.refusal import cut, nearest, one_line, refusal, shown
+from posekit.files.refusal import cut, nearest, refusal, shown
 
 Model = TypeVar("Model", bound="FileModel")
 
@@ -72,9 +72,7 @@ def named(names: tuple[str, ...], kind: str) -> BeforeValidator:
         if isinstance(value, dict):
             for name in value:
                 if name not in valid:
-                    refuse(
-                        f"the name of a {kind}", nearest(name, names), at=cut(one_line(name)), got=shown(name)
-                    )
+                    refuse(f"the name of a {kind}", nearest(name, names), at=cut(name), got=shown(name))
         return value
 
     return BeforeValidator(check)
@@ -187,7 +185,7 @@ def _field(location: tuple[int | str, ...], tags: frozenset[str]) -> str:
         if isinstance(part, int):
             text += f"[{part}]"
         elif part not in tags and part != "[key]":
-            text += f".{cut(one_line(part))}" if text else cut(one_line(part))
+            text += f".{cut(part)}" if text else cut(part)
     return text
 
 

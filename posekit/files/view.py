@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.files.camera_model import CameraModel
 from posekit.files.refusal import nearest, refusal, shown
+from posekit.files.units import Unit
 from posekit.files.view_schema import HEAD_NAMES
 from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
 
@@ -45,6 +46,8 @@ class View:
         Height of the person, metres.
     head_points : mapping of str to array (3,), optional
         The rigid head's points in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them.
+    unit : {"m", "cm", "mm"}
+        The unit of its file; in memory all is metres.
 
     Raises
     ------
@@ -66,6 +69,7 @@ class View:
     lengths: Mapping[str, float] = field(default_factory=dict)
     stature: float | None = None
     head_points: Mapping[str, Array] | None = None
+    unit: Unit = "m"
 
     def __post_init__(self) -> None:
         frames = len(self.time)

@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras.lee_chen import image_from_paper
+from posekit.errors import CameraError
 from posekit.files.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
 from posekit.files.reading import read_json
+from posekit.files.refusal import refusal
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.view import View
-from posekit.files.view_schema import SCHEMA, LeeChenCamera, OpenCVCamera, ViewFile
+from posekit.files.view_schema import SCHEMA, LeeChenCamera, OpenCVCamera, ScaledOrthographicCamera, ViewFile
 from posekit.files.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -48,7 +50,7 @@ def read_view(path: str | Path) -> View:
         head_image = image_from_paper(to_metres(head_image, unit))
     roots = [frame.root or [np.nan] * 3 for frame in frames]
     return View(
-        camera=_camera(file),
+        camera=_camera(file, path),
         time=np.array([frame.time for frame in frames], dtype=np.float64),
         image=image,
         head_image=head_image,
@@ -62,10 +64,11 @@ def read_view(path: str | Path) -> View:
         head_points={name: to_metres(point, unit) for name, point in figure.head_points.items()}
         if figure and figure.head_points is not None
         else None,
+        unit=unit,
     )
 
 
-def write_view(path: str | Path, view: View, unit: Unit = "m") -> None:
+def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
     """Write a view, whole or not at all.
 
     Parameters
@@ -74,14 +77,15 @@ def write_view(path: str | Path, view: View, unit: Unit = "m") -> None:
         Where to.
     view : View
         What to write.
-    unit : "m", "cm" or "mm"
-        The file's unit of length. What is written in metres is read back to the last bit.
+    unit : "m", "cm" or "mm", optional
+        The file's unit of length; the view's own if not given. What is written in metres is read back to the last bit.
 
     Raises
     ------
     InputError
         Where the file cannot be written, or would be larger than can be read again.
     """
+    unit = unit or view.unit
     plane = isinstance(view.camera, LeeChenModel)
     image = from_metres(image_from_paper(view.image), unit) if plane else view.image
     head_image = from_metres(image_from_paper(view.head_image), unit) if plane else view.head_image
@@ -121,8 +125,15 @@ def _known(points: Array, names: tuple[str, ...]) -> dict[str, list[float]]:
     return {name: row for name, row in zip(names, rows, strict=True) if row[0] == row[0]}
 
 
-def _camera(file: ViewFile) -> CameraModel:
-    camera, unit = file.camera, file.unit
+def _camera(file: ViewFile, path: str | Path) -> CameraModel:
+    """Make the camera; what is finite in the file's unit may still overflow in metres."""
+    try:
+        return _in_metres(file.camera, file.unit)
+    except CameraError as error:
+        raise refusal(path, "camera", str(error), "a camera that can be", "correct it") from None
+
+
+def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera, unit: Unit) -> CameraModel:
     if isinstance(camera, LeeChenCamera):
         return LeeChenModel(f=None if camera.f is None else float(to_metres(camera.f, unit)))
     if isinstance(camera, OpenCVCamera):

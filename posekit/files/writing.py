@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 from posekit.errors import InputError
 from posekit.files.reading import MAX_BYTES
-from posekit.files.refusal import cut, one_line, refusal
+from posekit.files.refusal import cut, refusal
 
 
 @contextmanager
@@ -54,7 +54,7 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
         beside.replace(target)
         done = True
     except OSError as error:
-        reason = cut(one_line(error.strerror or str(error)))
+        reason = cut(error.strerror or str(error))
         raise refusal(
             path, "", reason, "a file that can be written", "check permissions and free space"
         ) from None
@@ -86,6 +86,30 @@ def write_text(path: str | Path, pieces: Iterable[str]) -> None:
             written += file.write(piece.encode("utf-8"))
             if written > MAX_BYTES:
                 raise too_large_to_read(path)
+
+
+def write_lines(path: str | Path, lines: Iterable[str]) -> None:
+    """Write lines of text."""
+    write_text(path, (f"{line}\n" for line in lines))
+
+
+def write_json(path: str | Path, document: object) -> None:
+    """Write a small document of plain values as JSON, indented."""
+    write_text(path, [json.dumps(document, indent=1, allow_nan=False), "\n"])
+
+
+def make_folder(path: str | Path) -> None:
+    """Make a folder for results, and those above it.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be made.
+    """
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refusal(path, "", error.strerror or str(error), "a folder for results", "choose another name") from None
 
 
 def too_large_to_read(path: str | Path) -> InputError:

@@ -108,7 +108,9 @@ def dlt(head: HeadPoints, image: ArrayLike) -> Projection:
     """
     image_points, seen, reasons = sight(head, image)
     usable = np.array([not reason for reason in reasons], dtype=np.bool_)
-    direct = solve(np.broadcast_to(head.points, (*seen.shape, 3))[usable], image_points[usable], seen[usable])
+    points = np.broadcast_to(head.points, (*seen.shape, 3))
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # absurd image points: not determined
+        direct = solve(points[usable], image_points[usable], seen[usable])
     for frame, determined, in_front in zip(
         np.flatnonzero(usable), direct.determined, direct.in_front, strict=True
     ):
@@ -147,8 +149,7 @@ def solve(points: Array, image: Array, seen: NDArray[np.bool_]) -> Direct:
     _, values, vectors = np.linalg.svd(rows, full_matrices=False)
     determined = values[:, 10] > RANK * values[:, 0]
     P = np.linalg.inv(to_plane) @ vectors[:, -1].reshape(-1, 3, 4) @ to_space
-    with np.errstate(divide="ignore", invalid="ignore"):
-        P /= np.linalg.norm(P[:, 2:, :3], axis=-1, keepdims=True)
+    P /= np.linalg.norm(P[:, 2:, :3], axis=-1, keepdims=True)
     P *= np.where(np.linalg.det(P[:, :, :3]) < 0, -1.0, 1.0)[:, None, None]
     depth = np.einsum("fi,fpi->fp", P[:, 2, :3], points) + P[:, 2, 3:]
     in_front = ((depth > 0) | ~seen).all(axis=-1)

@@ -10,17 +10,24 @@ from numpy.typing import NDArray
 from posekit.cameras import Array, PinholeCamera
 from posekit.head.dlt import BEHIND
 from posekit.head.fit import Fit, equations, fit
-from posekit.head.misfit import misfits
+from posekit.head.misfit import misfits, spread
 from posekit.head.perspective import Heads, Placement, look
 from posekit.head.points import HeadPoints
 from posekit.head.sighting import Sighting
-from posekit.head.starts import affine_start, direct_start
+from posekit.head.starts import affine_start, direct_start, reversed_start
 
 CLEARLY = 5.0
 """Standard deviations by which the perspective must be reversed to be called so, not merely unseen."""
 
 BETTER_BEHIND = 1e-4
 """Chance below which a head behind the camera fits better for a reason."""
+
+COARSE = 0.2
+"""Error, as a fraction of the head's size in the image, from which the reversed head is tried.
+
+Of 2,000 heads of 20 to 150 pixels each, the two starts missed the best minimum known in none at 1 pixel of
+noise, in one at 2 and in 13 at 5, all with an error above this; with the third start in none, none and 2.
+"""
 
 DETERMINED = 1e-12
 """Smallest eigenvalue of the normal equations, scaled to a unit diagonal, that determines all unknowns."""
@@ -38,6 +45,7 @@ class Estimate(NamedTuple):
     cost: Array
     misfit: NDArray[np.intp]
     cost_without: Array
+    chance: Array
 
 
 def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None) -> Estimate:
@@ -62,6 +70,7 @@ def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, A
         cost=np.full(total, np.nan),
         misfit=np.full(total, -1),
         cost_without=np.full(total, np.nan),
+        chance=np.ones(total),
     )
     usable = np.flatnonzero([not reason for reason in reasons])
     if not usable.size:
@@ -76,8 +85,9 @@ def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, A
     fitted, wrong = _best(heads, plane)
     f, f_deviation, undetermined = _focal_length(heads, fitted)
     ended = np.flatnonzero(fitted.settled)
-    point, cost_without = misfits(heads.take(ended), plane[ended], fitted.take(ended))
-    result.misfit[usable[ended]], result.cost_without[usable[ended]] = point, cost_without
+    accused = misfits(heads.take(ended), plane[ended], fitted.take(ended))
+    for target, values in zip((result.misfit, result.cost_without, result.chance), accused, strict=True):
+        target[usable[ended]] = values
     result.cost[usable[ended]] = fitted.cost[ended]
     residual = look(heads, fitted.placement)[0].reshape(-1, 2, count)
     result.residuals[usable[ended]] = np.hypot(residual[:, 0], residual[:, 1])[ended]
@@ -108,7 +118,10 @@ def _centred(points: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array, Arra
 
 
 def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
-    """Fit from both starts, take the better, and say where a head behind the camera fits better still."""
+    """Fit from both starts, take the better, and say where a head behind the camera fits better still.
+
+    Coarse image points have a second minimum, the head with its depths reversed: there it is tried as well.
+    """
     seen = heads.seen > 0
     direct, behind = direct_start(heads.points, plane, seen)
     affine = affine_start(heads.points, plane, seen, heads.K is not None)
@@ -122,18 +135,25 @@ def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
     second = both.cost[len(plane) :] < both.cost[: len(plane)]
     choice = np.where(second, number + len(plane), number)
     best = both.take(choice)
+    coarse = np.flatnonzero(np.isfinite(best.cost) & (best.cost > COARSE**2 * spread(heads)))
+    if coarse.size:
+        some = heads.take(coarse)
+        turned = fit(some, reversed_start(some.points, best.placement.take(coarse)))
+        better = turned.cost < best.cost[coarse]
+        best.placement.put(coarse[better], turned.placement.take(better))
+        best.cost[coarse[better]] = turned.cost[better]
+        best.settled[coarse[better]] = turned.settled[better]
     reasons = [
         "" if settled else "no pose was found from either start: check the image points and the focal length"
         for settled in best.settled
     ]
     if heads.K is not None and behind.any():
-        turned = np.flatnonzero(behind)
-        back = heads.take(turned)._replace(side=-np.ones(len(turned)))
-        mirrored = fit(back, direct.take(turned)._replace(slope=-direct.scale[turned]))
+        frames = np.flatnonzero(behind)
+        back = heads.take(frames)._replace(side=-np.ones(len(frames)))
+        mirrored = fit(back, direct.take(frames)._replace(slope=-direct.scale[frames]))
         freedom = 2 * back.seen.sum(axis=-1) - back.unknowns
-        with np.errstate(invalid="ignore", divide="ignore"):
-            chance = (mirrored.cost / best.cost[turned]) ** (freedom / 2)
-        for frame in turned[chance < BETTER_BEHIND]:
+        chance = (mirrored.cost / best.cost[frames]) ** (freedom / 2)
+        for frame in frames[chance < BETTER_BEHIND]:
             reasons[frame] = BEHIND
     return best, reasons
 
@@ -163,6 +183,5 @@ def _focal_length(heads: Heads, fitted: Fit) -> tuple[Array, Array, list[str]]:
             reasons.append("the perspective is too weak to determine f (the head is far away); give f")
         else:
             reasons.append("")
-    with np.errstate(divide="ignore"):
-        f = fitted.placement.scale / slope
-        return f, np.abs(f / slope) * deviation, reasons
+    f = fitted.placement.scale / slope
+    return f, np.abs(f / slope) * deviation, reasons

@@ -106,5 +106,5 @@ def equations(residual: Array, jacobian: Array) -> tuple[Array, Array, Array]:
 
 def _solve(normal: Array, gradient: Array, damping: Array) -> Array:
     damped = normal + damping[:, None, None] * np.eye(normal.shape[-1])
-    solution: Array = np.linalg.solve(damped, gradient[..., None])[..., 0]
+    solution: Array = np.asarray(np.linalg.solve(damped, gradient[..., None]), dtype=np.float64)[..., 0]
     return solution

@@ -7,7 +7,7 @@ what measuring leaves. For normal errors of unknown size, and one point chosen b
 
 follows Fisher's distribution with 2 and m degrees of freedom, m being what remains without the point (twice
 its fellows, less the unknowns), and so :math:`P(F > x) = (1 + 2x/m)^{-m/2} = (S_j/S)^{m/2}` (the
-externally studentised residual of Cook & Weisberg 1982, for a pair of observations). All P points are looked
+mean-shift outlier test of Cook & Weisberg 1982, for a pair of observations). All P points are looked
 at, hence the factor P (Bonferroni).
 """
 
@@ -31,7 +31,7 @@ PRECISION = 1e-3
 """Fraction to which the squared error without a point is found: enough to judge it."""
 
 
-def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], Array]:
+def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], Array, Array]:
     """Name the point that does not fit.
 
     Parameters
@@ -48,9 +48,11 @@ def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], 
         The row of the point, -1 where all fit.
     cost : array (F,)
         The squared error without it; NaN where all fit.
+    chance : array (F,)
+        The chance of so good a fit without one point, were all sound; 1 at most.
     """
     total, count = heads.seen.shape
-    floor = ROUNDING**2 * _spread(heads)
+    floor = ROUNDING**2 * spread(heads)
     frames, points = np.nonzero((heads.seen > 0) & (fitted.cost > floor)[:, None])
     without = heads.take(frames)
     seen = without.seen.copy()
@@ -63,10 +65,25 @@ def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], 
     cost = left[np.arange(total), point]
     n = heads.seen.sum(axis=-1)
     freedom = 2 * (n - 1) - heads.unknowns
-    with np.errstate(invalid="ignore"):
-        chance = n * (cost / fitted.cost) ** (freedom / 2)
-    named = (chance < FALSE_ALARMS) & np.isfinite(cost)
-    return np.where(named, point, -1), np.where(named, cost, np.nan)
+    chance = np.minimum(n * (cost / fitted.cost) ** (freedom / 2), 1.0)
+    chance = np.where(np.isfinite(cost), chance, 1.0)
+    named = chance <= FALSE_ALARMS
+    return np.where(named, point, -1), np.where(named, cost, np.nan), chance
+
+
+def beyond_chance(chance: Array) -> NDArray[np.bool_]:
+    """Say which of many heads have a misfit that is more than the accident of looking at many.
+
+    Of the chances (F,), the k smallest where the k-th is at most k / F of `FALSE_ALARMS`, for the largest
+    such k (Benjamini & Hochberg 1995): one head is judged as by `misfits`, among thousands an accident is
+    not, and an error that all heads share is.
+    """
+    order = np.argsort(chance)
+    allowed = FALSE_ALARMS * np.arange(1, len(chance) + 1) / max(len(chance), 1)
+    below = np.flatnonzero(chance[order] <= allowed)
+    beyond = np.zeros(len(chance), dtype=np.bool_)
+    beyond[order[: below[-1] + 1 if below.size else 0]] = True
+    return beyond
 
 
 def _start(heads: Heads, plane: Array, placement: Placement) -> Placement:
@@ -81,9 +98,9 @@ def _start(heads: Heads, plane: Array, placement: Placement) -> Placement:
     return placement
 
 
-def _spread(heads: Heads) -> Array:
+def spread(heads: Heads) -> Array:
     """Sum of the squared distances of the image points from their mean, one a head."""
     weight = heads.seen[..., None]
     mean = (heads.image * weight).sum(axis=1, keepdims=True) / weight.sum(axis=1, keepdims=True)
-    spread: Array = (((heads.image - mean) * weight) ** 2).sum(axis=(1, 2))
-    return spread
+    squares: Array = (((heads.image - mean) * weight) ** 2).sum(axis=(1, 2))
+    return squares

@@ -13,12 +13,13 @@ from posekit.cameras.lee_chen import pinhole
 from posekit.errors import HeadError
 from posekit.head.dlt import require
 from posekit.head.estimate import estimate
+from posekit.head.misfit import beyond_chance
 from posekit.head.points import HeadPoints, head_points_cam
 from posekit.head.sighting import Sighting, sight
 
 
 class HeadWarning(UserWarning):
-    """A head point does not fit the others."""
+    """A head point does not fit the others, in one frame or in more frames than accident explains."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +51,8 @@ class HeadPose:
     rms : array (F,)
         Root of the mean squared residual of the points seen.
     misfit : tuple of str or None
-        The point that does not fit the others, None where all do.
+        The point that does not fit the others, None where all do. Of sound heads with normal errors one in
+        two hundred has one by accident; a warning is given only of more than that.
     rms_without : array (F,)
         `rms` when the head is fitted without the misfit; NaN where there is none.
     """
@@ -160,7 +162,9 @@ def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None) -> 
     if camera is not None:
         sighting, normalized = _normalize(head, sighting, camera)
         known = (camera, normalized)
-    estimated = estimate(head, sighting, known)
+    # Exact image points divide 0 by 0 where chances are compared; absurd ones overflow, and have no fit.
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        estimated = estimate(head, sighting, known)
     seen = sighting.seen.sum(axis=-1)
     pose = HeadPose(
         head=head,
@@ -178,7 +182,7 @@ def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None) -> 
     )
     if np.ndim(image) == 2:
         pose.require()
-    _warn(pose)
+    _warn(pose, beyond_chance(estimated.chance))
     return pose
 
 
@@ -197,9 +201,10 @@ def _normalize(head: HeadPoints, sighting: Sighting, camera: PinholeCamera) -> t
     return sighting, np.where(reached[..., None], normalized, 0.0)
 
 
-def _warn(pose: HeadPose) -> None:
-    """Name every point that does not fit, once, with its worst frame."""
-    misfit = np.array([name or "" for name in pose.misfit])
+def _warn(pose: HeadPose, beyond: NDArray[np.bool_]) -> None:
+    """Name every point that does not fit in frames that are `beyond` chance, once, with its worst frame."""
+    misfit = np.array([name or "" for name in pose.misfit], dtype=np.str_)
+    misfit[~beyond] = ""
     for index, name in enumerate(pose.head.names):
         frames = np.flatnonzero(misfit == name)
         if not frames.size:

@@ -11,6 +11,9 @@ from posekit.cameras import Array
 from posekit.errors import HeadError
 from posekit.head.points import DEGENERATE, HeadPoints, degeneracy
 
+VANISHING = 1e-100
+"""Spread of image points below which their squares underflow."""
+
 
 class Sighting(NamedTuple):
     """Image points of F heads of P points.
@@ -71,5 +74,5 @@ def _flat(image: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Arra
     weight = seen[..., None] / np.maximum(seen.sum(axis=-1), 1)[:, None, None]
     offset = (image - (weight * image).sum(axis=1, keepdims=True)) * np.sqrt(weight)
     spread = np.linalg.svd(offset, compute_uv=False)
-    flat = np.flatnonzero(spread[:, 1] <= DEGENERATE * spread[:, 0])
+    flat = np.flatnonzero(spread[:, 1] <= np.maximum(DEGENERATE * spread[:, 0], VANISHING))
     return flat, spread[flat]

@@ -14,7 +14,7 @@ FLAT = 1e-12
 
 
 def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bool) -> Placement:
-    """Fit a scaled orthographic view: the limit of a distant camera (Tomasi & Kanade 1992).
+    """Fit a scaled orthographic view: the limit of a distant camera (DeMenthon & Davis 1995).
 
     Parameters
     ----------
@@ -40,6 +40,17 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     scale = values.mean(axis=-1)
     shift = middle - scale[:, None] * np.einsum("fij,fj->fi", axes, centre)
     return Placement(R, shift, scale, scale.copy() if known else np.zeros(len(R)))
+
+
+def reversed_start(points: Array, placement: Placement) -> Placement:
+    """Turn heads (F, P, 3) so that they look nearly the same with their depths reversed (Necker 1832).
+
+    The head is mirrored in the plane across its thinnest direction, then along the optical axis: together a
+    rotation. A flat head would look exactly the same from afar.
+    """
+    thinnest = np.linalg.svd(points, full_matrices=False)[2][:, 2]
+    mirror = np.eye(3) - 2 * thinnest[:, :, None] * thinnest[:, None, :]
+    return placement._replace(R=np.diag([1.0, 1.0, -1.0]) @ placement.R @ mirror)
 
 
 def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[Placement, NDArray[np.bool_]]:

@@ -3,6 +3,7 @@
 from posekit.pipeline.recover import recover as recover
 from posekit.pipeline.recovery import FrameRecovery as FrameRecovery
 from posekit.pipeline.recovery import Recovery as Recovery
+from posekit.pipeline.reproduce import reproduce_lee_chen as reproduce_lee_chen
 from posekit.pipeline.result import result_of as result_of
 from posekit.pipeline.summary import summary_lines as summary_lines
 from posekit.pipeline.summary import verdict_lines as verdict_lines
@@ -10,3 +11,6 @@ from posekit.pipeline.tolerance import EXACT as EXACT
 from posekit.pipeline.tolerance import MEASURED as MEASURED
 from posekit.pipeline.tolerance import Tolerance as Tolerance
 from posekit.pipeline.validate import validate as validate
+from posekit.pipeline.views import builtin_view as builtin_view
+from posekit.pipeline.views import view_of as view_of
+from posekit.pipeline.demo import demo as demo

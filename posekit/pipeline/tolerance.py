@@ -36,7 +36,7 @@ class Tolerance:
                 raise InputError(f"--{name}-tolerance: {value!r} m; expected zero or a positive length")
 
 
-EXACT: Final = Tolerance(rigid=1e-6, tangent=1e-9, placement=True)
+EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9, placement=True)
 """For exact image points: rounding only."""
 
 MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False)

@@ -38,6 +38,7 @@ def view_of(scene: Scene) -> View:
         truth=scene.joints_cam,
         lengths=_differences(scene.figure),
         head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
+        unit="m" if head is None else "cm",
     )
 
 

@@ -56,7 +56,7 @@ class CameraSphere:
     def __post_init__(self) -> None:
         near, far = self.distance
         if not 0 < near <= far < np.inf:
-            raise InputError(f"camera distances are {near:g} to {far:g} m; expected positive, the nearer first")
+            raise InputError(f"camera distances are {near:g} to {far:g} m; expected positive, nearer first")
         if not 0 < self.f < np.inf:
             raise InputError(f"the focal length is {self.f:g} pixels; expected positive and finite")
         if min(self.size) <= 0:
@@ -100,11 +100,11 @@ class CameraSphere:
                 return Placement(R, position)
         raise InputError(
             f"body {rows[0]} does not fit into {self.size[0]} x {self.size[1]} pixels at f = {self.f:g} from "
-            f"{self.distance[0]:g} to {self.distance[1]:g} m, tried {ROUNDS} times; raise the distance or lower f"
+            f"{self.distance[0]:g} to {self.distance[1]:g} m, in {ROUNDS} tries; move away or lower f"
         )
 
     def fits(self, points_cam: Array) -> NDArray[np.bool_]:
-        """Tell which bodies (N, P, 3), camera frame, are in front of the camera and inside the picture (N,)."""
+        """Tell which bodies (N, P, 3), camera frame, are in front of the camera and in the picture (N,)."""
         known = ~np.isnan(points_cam[..., 2])
         pixels = self.camera.project(points_cam)
         inside = ((pixels >= 0) & (pixels <= np.array(self.size))).all(axis=-1)

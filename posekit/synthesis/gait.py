@@ -29,7 +29,8 @@ class GaitAngles(NamedTuple):
     Attributes
     ----------
     vertical, lateral, fore_aft : array (...)
-        Translation of the root (the pelvis): up from the height of the leg, to the left, forward; leg lengths.
+        Translation of the root (the pelvis): up from the height of the leg, to the left, and forward, in leg
+        lengths.
     lean : array (...)
         How far the back flexes forward against the hips, radians: the model's pelvis tilt, its sign turned.
     torsion : array (...)
@@ -78,8 +79,8 @@ class Gait:
     def __post_init__(self) -> None:
         if not SLOWEST <= self.velocity <= FASTEST:
             raise InputError(
-                f"the walker's velocity is {self.velocity:g} leg lengths/s; expected {SLOWEST:g} to {FASTEST:g}: "
-                "slower and faster gaits follow other curves"
+                f"the walker's velocity is {self.velocity:g} leg lengths/s; expected {SLOWEST:g} to "
+                f"{FASTEST:g}: slower and faster gaits follow other curves"
             )
 
     @property

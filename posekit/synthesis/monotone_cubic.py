@@ -16,14 +16,14 @@ class PeriodicMonotoneCubic:
     r"""The periodic piecewise cubic that is monotone wherever its points are.
 
     Between two points it is the cubic Hermite curve of their values and slopes. With the secants
-    :math:`\Delta_k` and widths :math:`h_k`, the slope at a point is 0 where the secants on its sides differ in
-    sign, else their weighted harmonic mean
+    :math:`\Delta_k` and widths :math:`h_k`, the slope at a point is 0 where the secants on its sides differ
+    in sign, else their weighted harmonic mean
 
     .. math:: \frac{w_1 + w_2}{w_1/\Delta_{k-1} + w_2/\Delta_k}, \quad
               w_1 = 2h_k + h_{k-1},\; w_2 = h_k + 2h_{k-1},
 
-    which lies inside the region of monotonicity of Fritsch & Carlson 1980 (*SIAM J. Numer. Anal.* 17:238-246);
-    the mean is Fritsch & Butland's (1984, *SIAM J. Sci. Stat. Comput.* 5:300-304).
+    which lies inside the region of monotonicity of Fritsch & Carlson 1980 (*SIAM J. Numer. Anal.*
+    17:238-246); the mean is Fritsch & Butland's (1984, *SIAM J. Sci. Stat. Comput.* 5:300-304).
 
     Parameters
     ----------
@@ -53,7 +53,9 @@ class PeriodicMonotoneCubic:
     def __post_init__(self) -> None:
         x, y = np.array(self.x, dtype=np.float64), np.array(self.y, dtype=np.float64)
         if x.ndim != 1 or x.shape != y.shape or len(x) < 2 or not np.isfinite([x, y]).all():
-            raise InputError(f"a curve needs two or more finite points x, y; got shapes {x.shape} and {y.shape}")
+            raise InputError(
+                f"a curve needs two or more finite points x, y; got shapes {x.shape} and {y.shape}"
+            )
         if (np.diff(x) <= 0).any() or not x[-1] - x[0] < self.period:
             raise InputError(
                 f"a curve's x must increase and span less than the period {self.period:g}; got {x.tolist()}"

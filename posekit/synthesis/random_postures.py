@@ -99,7 +99,7 @@ def random_views(
 
 
 def collides(figure: Figure, q: Array) -> NDArray[np.bool_]:
-    """Ask coal which configurations (N, nq) penetrate in a pair that the figure's SRDF leaves to be checked."""
+    """Ask coal which configurations (N, nq) penetrate in a pair that the figure's SRDF leaves to check."""
     if not np.isfinite(q).all():
         # Pinocchio would call them free.
         raise InputError("a configuration is not finite; whether it collides cannot be said")

@@ -88,7 +88,8 @@ class Scene:
         given = {name: np.array(getattr(self, name), dtype=np.float64) for name in shapes}
         left_out = {name for name, values in given.items() if values.shape == (0,)}
         arrays = {
-            name: np.full(shapes[name], np.nan) if name in left_out else values for name, values in given.items()
+            name: np.full(shapes[name], np.nan) if name in left_out else values
+            for name, values in given.items()
         }
         for name, values in arrays.items():
             if values.shape != shapes[name]:
@@ -113,7 +114,7 @@ class Scene:
 
         A head that is seen gives the neck; one that is not leaves it to be told.
         """
-        headless = np.isnan(self.head_image).any(axis=(1, 2))
+        headless = np.asarray(np.isnan(self.head_image).any(axis=(1, 2)))
         return np.where(headless[:, None], self.joints_cam[:, 0], np.nan)
 
     def select(self, frames: ArrayLike) -> Scene:
@@ -141,7 +142,7 @@ class Scene:
             Where sigma is negative or not finite.
         """
         if not 0 <= sigma < np.inf:
-            raise InputError(f"noise is {sigma:g}; expected a standard deviation of 0 or more, in image units")
+            raise InputError(f"noise is {sigma:g}; expected a standard deviation >= 0 in image units")
         noise = sigma * rng.standard_normal((len(self), len(POINTS), 2))
         split = len(JOINTS)
         return replace(
@@ -153,9 +154,9 @@ _PER_FRAME = ("joints_cam", "head_cam", "time", "q", "image", "head_image", "R_c
 
 
 def _check_in_front(points: Array) -> None:
-    behind = points[..., 2] <= 0
+    behind = np.asarray(points[..., 2] <= 0)
     if behind.any():
-        frame, k = (int(index) for index in np.argwhere(behind)[0])
+        frame, k = (int(index[0]) for index in np.nonzero(behind))
         names = JOINTS if points.shape[1] == len(JOINTS) else HEAD_POINTS
         raise InputError(
             f"{names[k]} of frame {frame} is at depth {points[frame, k, 2]:.3g} m; expected in front of the "

@@ -51,4 +51,5 @@ def uniform_directions(n: int, rng: np.random.Generator) -> Array:
 
 def to_camera(points: Array, R_cam_world: Array, position: Array) -> Array:
     """Express world points (..., P, 3) in the camera frame: ``R (p - position)``."""
-    return np.einsum("...ij,...pj->...pi", R_cam_world, points - position[..., None, :])
+    points_cam: Array = np.einsum("...ij,...pj->...pi", R_cam_world, points - position[..., None, :])
+    return points_cam

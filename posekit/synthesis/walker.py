@@ -32,7 +32,7 @@ NECK = TABLE_A2.points[0]
 """The neck in the head-centred frame, metres (Table A.2a)."""
 
 R_HEAD_REP103 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-"""Turns the URDF's axes (x forward, y left, z up) into the head-centred frame's (x forward, y up, z right)."""
+"""From the URDF's axes (x forward, y left, z up) to the head-centred frame's (x forward, y up, z right)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -73,7 +73,9 @@ class Walker:
     def leg_length(self) -> float:
         """Hip to ankle, the mean of both sides, metres: the figure has no feet."""
         lengths = self.figure.lengths
-        return sum(lengths[f"{side}_hip-{side}_knee"] + lengths[f"{side}_knee-{side}_ankle"] for side in SIDES) / 2
+        thighs = sum(lengths[f"{side}_hip-{side}_knee"] for side in SIDES)
+        shanks = sum(lengths[f"{side}_knee-{side}_ankle"] for side in SIDES)
+        return (thighs + shanks) / 2
 
     def phase(self, time: ArrayLike, phase0: float = 0.0) -> Array:
         """Return the phases at times (s) of a walk that is at `phase0` at time 0."""
@@ -123,9 +125,10 @@ class Walker:
         """
         times = np.concatenate([[0.0], np.asarray(time, dtype=np.float64)])
         gait = self.gait.angles(self.phase(times, phase0))
-        back = _turned(-COUNTER_TORSION * gait.torsion, gait.lean)[:, :, 2] * self.figure.lengths["neck-pelvis"]
-        place = (self._root(times, gait) + back) @ R_HEAD_REP103.T
-        return place[1:] - place[0]
+        up = _turned(-COUNTER_TORSION * gait.torsion, gait.lean)[:, :, 2]
+        back = up * self.figure.lengths["neck-pelvis"]
+        place: Array = (self._root(times, gait) + back) @ R_HEAD_REP103.T
+        return np.asarray(place[1:] - place[0])
 
     def _root(self, time: Array, gait: GaitAngles) -> Array:
         """Return the root's path (N, 3) in REP-103 axes, metres."""

@@ -25,10 +25,11 @@ SEQ1_CAMERA = (4.0, 0.0, 0.0)
 SEQ2_CAMERA = (3.0, 0.0, 3.0)
 """The paper's camera positions, metres: image-plane origins in the head-centred frame."""
 
-SEQ_VELOCITY = 1.0
-SEQ1_PHASE0 = 0.0
-SEQ2_PHASE0 = 0.0
-"""What the paper does not tell: the velocity (leg lengths/s) and the phase of frame 1."""
+SEQ_VELOCITY = 0.7
+SEQ1_PHASE0 = 0.11
+SEQ2_PHASE0 = 0.68
+"""What the paper does not tell: the velocity (leg lengths/s), and the phase of frame 1 at which the survivors come
+closest to its Tables 3 and 4 (found by `posekit reproduce lee-chen`)."""
 
 UP = np.array([0.0, 1.0, 0.0])
 
@@ -84,12 +85,12 @@ def walker_scene(
     position, aim = np.asarray(camera, dtype=np.float64), np.asarray(target, dtype=np.float64)
     if position.shape != (3,) or aim.shape != (3,) or not np.isfinite([position, aim]).all():
         raise InputError(
-            f"the camera is at {position.tolist()} and looks at {aim.tolist()}; expected three finite numbers "
-            "x, y, z each, metres"
+            f"the camera is at {position.tolist()} and looks at {aim.tolist()}; expected three finite "
+            "numbers x, y, z each, metres"
         )
     pinhole = lee_chen.pinhole(f)
     R = look_at(position, aim, UP)
-    time = dt * np.arange(frames)
+    time = dt * np.arange(frames, dtype=np.float64)
     q = walker.configurations(walker.phase(time, phase0))
     if not carried:
         q[:, :3] += walker.travel(time, phase0)

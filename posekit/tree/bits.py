@@ -1,7 +1,8 @@
 """Branch codes: which near-far choices a node stands for, and how to pick some of them out.
 
-A node at level j is an integer of j bits; the bit of joint 1 is the highest, 0 is near and 1 is far. A joint's
-position depends only on the bits of the path that leads to it, a check only on those of the joints it reads.
+A node at level j is an integer of j bits; the bit of joint 1 is the highest, 0 is near and 1 is far. A
+joint's position depends only on the bits of the path that leads to it, a check only on those of the joints it
+reads.
 """
 
 from __future__ import annotations

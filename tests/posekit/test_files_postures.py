@@ -272,6 +272,14 @@ def test_archives_that_are_none_are_refused(tmp_path):
     path.write_bytes(buffer.getvalue())
     with pytest.raises(InputError, match=r'a member "readme\.txt"; expected arrays'):
         read_postures(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_BZIP2) as archive:
+        archive.writestr("a.npy", "x")
+    with pytest.raises(InputError, match="compression method 12"):
+        read_postures(path)
+    path.write_bytes(whole.replace(b"joints", b"j\n\x1bnts"))
+    with pytest.raises(InputError, match="joints: got nothing") as caught:
+        read_postures(path)
+    assert str(caught.value).isprintable()
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("a.npy", "x")
         with pytest.warns(UserWarning, match="Duplicate"):

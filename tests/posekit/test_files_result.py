@@ -3,6 +3,7 @@
 import io
 import json
 import zipfile
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,7 +61,7 @@ def assert_same(one: Result, other: Result, rtol: float = 0.0) -> None:
         for name in ("joints", "q", "fk_distance", "length_residual"):
             np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=rtol, err_msg=name)
         assert (a.groups is None) == (b.groups is None)
-        if a.groups is not None:
+        if a.groups is not None and b.groups is not None:
             assert np.array_equal(a.groups, b.groups)
         assert set(a.margins) == set(b.margins)
         for name in a.margins:
@@ -76,14 +77,14 @@ def assert_same(one: Result, other: Result, rtol: float = 0.0) -> None:
 @pytest.mark.parametrize("unit", ["m", "cm", "mm"])
 @pytest.mark.parametrize("kind", ["all", "no groups", "no camera", "pruned", "few levels"])
 def test_a_result_is_read_back(tmp_path, rng, suffix, unit, kind):
-    frame = {
+    kinds: dict[str, dict[str, Any]] = {
         "all": {},
         "no groups": {"groups": False},
         "no camera": {"camera": NO_CAMERA},
         "pruned": {"pruned": [{"branch": "01", "by": "collision", "value": -0.01, "at": None}]},
         "few levels": {"levels": 3},
-    }[kind]
-    result = a_result(rng, unit=unit, **frame)
+    }
+    result = a_result(rng, unit=unit, **kinds[kind])
     path = tmp_path / f"result.{suffix}"
     write_result(path, result)
     assert_same(result, read_result(path), rtol=0.0 if unit == "m" else 3e-16)
@@ -204,14 +205,20 @@ def test_a_frame_that_cannot_be_is_refused(rng, changes, text):
 
 def test_a_result_that_cannot_be_is_refused(rng):
     frame = a_frame(rng, 2)
-    fields = {"unit": "m", "configuration_names": ["x"] * NQ, "settings": {}, "frames": [frame]}
-    for changes, text in [
+    fields: dict[str, Any] = {
+        "unit": "m",
+        "configuration_names": ["x"] * NQ,
+        "settings": {},
+        "frames": [frame],
+    }
+    cases: list[tuple[dict[str, Any], str]] = [
         ({"frames": []}, "frames: got no frame"),
         ({"configuration_names": ["x"]}, r"frames\[0\].q: got 29 columns; expected 1"),
         ({"joint_names": JOINTS[::-1]}, "expected the 14 joints in tree order"),
         ({"frames": [frame, changed(frame, margins={})]}, r"frames\[1\].margins: got none"),
         ({"frames": [frame, changed(frame, groups=None)]}, r"frames\[1\].groups"),
-    ]:
+    ]
+    for changes, text in cases:
         with pytest.raises(InputError, match=text):
             Result(**(fields | changes))
 
@@ -271,7 +278,7 @@ def rewritten(path, changes):
     np.savez_compressed(path, **{name: value for name, value in content.items() if value is not None})
 
 
-BAD_NPZ = [
+BAD_NPZ: list[tuple[dict[str, Any], str]] = [
     ({"schema": np.array("posekit.view/1")}, 'schema: got "posekit.view/1"'),
     ({"schema": np.array(["posekit.result/1"])}, r"schema: got shape \(1,\); expected shape \(\)"),
     ({"unit": np.array("inch")}, 'unit: got "inch"; expected m or cm or mm'),

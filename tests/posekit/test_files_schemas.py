@@ -1,6 +1,7 @@
 """The published schemas say what the readers accept."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from posekit.skeleton import JOINTS, SEGMENT_NAMES
 
 def write_all(folder, rng) -> dict[str, list]:
     """Write a file or more of each schema and return what they hold."""
-    cameras = [
+    cameras: list[Any] = [
         LeeChenModel(f=0.05),
         OpenCVModel(K=np.eye(3), R=np.eye(3)),
         ScaledOrthographicModel(scale=None),

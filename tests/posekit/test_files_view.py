@@ -5,6 +5,7 @@ import json
 import pickle
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -157,7 +158,7 @@ def test_the_boundary_needs_no_pinocchio():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
-GOOD = {
+GOOD: dict[str, Any] = {
     "schema": "posekit.view/1",
     "unit": "cm",
     "camera": {"model": "lee-chen", "f": 5.0},
@@ -212,6 +213,11 @@ BAD = [
     ),
     (("camera",), OPENCV | {"size": [0, 480]}, "camera.size[0]: got 0"),
     (("camera",), OPENCV | {"size": [640.5, 480]}, "camera.size[0]: got 640.5; expected a whole number"),
+    (
+        ("camera",),
+        {"model": "scaled-orthographic", "scale": 1e308},
+        "camera: got scale must be positive and finite",
+    ),
     (("unit",), "inch", "unit: got \"inch\"; expected 'm', 'cm' or 'mm'"),
     (("unit",), ..., "unit: got nothing"),
     (("schema",), ..., 'schema: got nothing; expected "posekit.view/1"; add "schema"'),
@@ -336,7 +342,11 @@ def test_a_flood_of_errors_costs_little(tmp_path):
 
 
 def view_with(**changes) -> View:
-    fields = {"camera": LeeChenModel(f=0.05), "time": np.zeros(2), "image": np.zeros((2, 14, 2))}
+    fields: dict[str, Any] = {
+        "camera": LeeChenModel(f=0.05),
+        "time": np.zeros(2),
+        "image": np.zeros((2, 14, 2)),
+    }
     return View(**(fields | changes))
 
 

@@ -1,0 +1,23 @@
+"""`posekit demo`: all of it on the built-in views."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def demo(
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")],
+) -> None:
+    """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables.
+
+    Example:
+      posekit demo -o demo-results
+    """
+    from posekit import files, pipeline  # noqa: PLC0415
+
+    files.make_folder(output)
+    for line in pipeline.demo(output):
+        typer.echo(line)

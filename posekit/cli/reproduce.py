@@ -1,0 +1,31 @@
+"""`posekit reproduce`: the papers' tables, beside the print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posekit.errors import InputError
+
+PAPERS = ("lee-chen",)
+
+
+def reproduce(
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the tables.")],
+) -> None:
+    """Write a paper's tables, reproduced, beside what it prints.
+
+    Example:
+      posekit reproduce lee-chen -o tables
+    """
+    from posekit import files, pipeline  # noqa: PLC0415
+
+    if paper not in PAPERS:
+        raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")
+    files.make_folder(output)
+    for line in pipeline.reproduce_lee_chen(output):
+        typer.echo(line)
+    typer.echo(f"written: {output / 'lee-chen.md'}, {output / 'lee-chen.json'}")
