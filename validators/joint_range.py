@@ -24,7 +24,9 @@ TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
-def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES) -> list[Check]:
+def joint_range(
+    figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE
+) -> list[Check]:
     """Make the checks of the joint ranges.
 
     With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
@@ -37,28 +39,35 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES) -> list[Check]:
     figure : Figure
         Its limits are the ranges where `ranges` gives none.
     ranges : Ranges
+    tolerance : float
+        Degrees by which the direction of a segment may be off; see `Limb` for what follows for axial rotations.
     """
     if ranges.kind == "projected":
-        return projected_angles(figure, ranges)
+        return projected_angles(figure, ranges, tolerance=tolerance)
     if ranges.limits:
         figure = figure.with_limits(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
         )
-    checks: list[Check] = [Neck(figure=figure), Pelvis(figure=figure)]
+    checks: list[Check] = [
+        Neck(figure=figure, tolerance=tolerance),
+        Pelvis(figure=figure, tolerance=tolerance),
+    ]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             joints = tuple(f"{side}_{joint}" for joint in limb)
-            checks += [Limb(figure=figure, limb=joints[:2]), Limb(figure=figure, limb=joints)]
+            checks += [Limb(figure=figure, limb=part, tolerance=tolerance) for part in (joints[:2], joints)]
     return checks
 
 
-def _findings(figure: Figure, where: tuple[str, ...], angles: Array) -> Findings:
+def _findings(
+    figure: Figure, where: tuple[str, ...], angles: Array, tolerance: float | Array
+) -> Findings:
     rows = [DOFS.index(dof) for dof in where]
     return Findings(
         value=np.degrees(angles),
         lower=np.degrees(figure.limits.lower[rows]),
         upper=np.degrees(figure.limits.upper[rows]),
-        tolerance=TOLERANCE,
+        tolerance=tolerance,
     )
 
 
@@ -67,6 +76,7 @@ class Neck:
     """Flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
 
     figure: Figure
+    tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("neck.flexion", "neck.bending", "neck.rotation")
     unit: str = "deg"
@@ -76,7 +86,7 @@ class Neck:
         """Judge the neck's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         angles = self.figure.neck_angles(R_torso, points[:, 0], points[:, 4:])
-        return _findings(self.figure, self.where, angles)
+        return _findings(self.figure, self.where, angles, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,6 +94,7 @@ class Pelvis:
     """Flexion, bending and rotation of the hips under the torso."""
 
     figure: Figure
+    tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
     unit: str = "deg"
@@ -93,12 +104,16 @@ class Pelvis:
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
-        return _findings(self.figure, self.where, self.figure.pelvis_angles(R_torso, R_hips))
+        angles = self.figure.pelvis_angles(R_torso, R_hips)
+        return _findings(self.figure, self.where, angles, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Limb:
     """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
+
+    A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
+    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be off.
 
     Parameters
     ----------
@@ -108,6 +123,7 @@ class Limb:
 
     figure: Figure
     limb: tuple[str, ...]
+    tolerance: float
     name: str = "joint_range"
     unit: str = "deg"
 
@@ -132,4 +148,8 @@ class Limb:
         R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = self.figure.limb_angles(self.limb[0], R_parent, limb[0], limb[1], end)
-        return _findings(self.figure, self.where, angles[:, : len(self.where)])
+        tolerance = np.full((len(angles), len(self.where)), self.tolerance)
+        if end is not None:
+            bend = np.abs(np.sin(angles[:, 3]))
+            tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), np.radians(self.tolerance) / np.pi)
+        return _findings(self.figure, self.where, angles[:, : len(self.where)], tolerance)

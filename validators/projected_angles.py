@@ -18,18 +18,23 @@ from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
 from posekit.validators.ranges import Ranges
 
-TOLERANCE = 1e-3
+ROUNDING = 1e-3
+"""Degrees within which -180 is taken for 180."""
+
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 
 
-def projected_angles(figure: Figure, ranges: Ranges) -> list[Check]:
+def projected_angles(figure: Figure, ranges: Ranges, *, tolerance: float) -> list[Check]:
     """Make the checks of Table 1; they judge the posture itself."""
-    checks: list[Check] = [HeadPlane(figure=figure, ranges=ranges), HipPlane(ranges=ranges)]
+    checks: list[Check] = [
+        HeadPlane(figure=figure, ranges=ranges, tolerance=tolerance),
+        HipPlane(ranges=ranges, tolerance=tolerance),
+    ]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             checks += [
-                BallJoint(ranges=ranges, side=side, limb=limb[:2]),
-                Hinge(ranges=ranges, side=side, limb=limb),
+                BallJoint(ranges=ranges, tolerance=tolerance, side=side, limb=limb[:2]),
+                Hinge(ranges=ranges, tolerance=tolerance, side=side, limb=limb),
             ]
     return checks
 
@@ -46,7 +51,7 @@ def angle_in_plane(x: Array, y: Array, shortest: Array | float) -> Array:
     In (-180, 180]: an arm straight up is flexed by 180, on whichever side of it rounding leaves the arm.
     """
     angle = np.degrees(np.arctan2(x, y))
-    angle = np.where(angle < TOLERANCE - 180, angle + 360, angle)
+    angle = np.where(angle < ROUNDING - 180, angle + 360, angle)
     return np.where(np.hypot(x, y) < shortest, np.nan, angle)
 
 
@@ -60,6 +65,7 @@ class BallJoint:
     """
 
     ranges: Ranges
+    tolerance: float
     side: str
     limb: tuple[str, ...]
     name: str = "joint_range"
@@ -84,7 +90,7 @@ class BallJoint:
             [angle_in_plane(u[:, 0], u[:, 1], shortest), angle_in_plane(outward, u[:, 1], shortest)], axis=-1
         )
         bounds = np.array([self.ranges.limits[f"{self.limb[0]}.{a}"] for a in ("flexion", "abduction")])
-        return Findings(value=value, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=TOLERANCE)
+        return Findings(value=value, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,6 +103,7 @@ class Hinge:
     """
 
     ranges: Ranges
+    tolerance: float
     side: str
     limb: tuple[str, ...]
     name: str = "joint_range"
@@ -123,11 +130,11 @@ class Hinge:
         psi = np.degrees(np.arctan2(size, np.einsum("ni,ni->n", u, v)))
         forward = w[:, 2] if self.limb[1] == "elbow" else -w[:, 2]
         # An arm held sideways bends its elbow about y: z is zero but for rounding, and zero is flexion.
-        flexion = np.where(forward >= -np.radians(TOLERANCE) * size, psi, -psi)
+        flexion = np.where(forward >= -np.radians(self.tolerance) * size, psi, -psi)
         lower, upper = self.ranges.limits[f"{self.limb[1]}.flexion"]
         if self.limb[1] == "elbow":
             return Findings(
-                value=flexion[:, None], lower=np.array([lower]), upper=np.array([upper]), tolerance=TOLERANCE
+                value=flexion[:, None], lower=np.array([lower]), upper=np.array([upper]), tolerance=self.tolerance
             )
         hip = angle_in_plane(u[:, 0], u[:, 1], self.ranges.shortest_projection * np.linalg.norm(u, axis=1))
         flexed = flexion > self.ranges.knee_flexed
@@ -136,7 +143,7 @@ class Hinge:
             value=np.stack([flexion, hip], axis=-1),
             lower=np.stack([np.full(len(hip), lower), np.where(flexed, wide[0], narrow[0])], axis=-1),
             upper=np.stack([np.full(len(hip), upper), np.where(flexed, wide[1], narrow[1])], axis=-1),
-            tolerance=TOLERANCE,
+            tolerance=self.tolerance,
         )
 
 
@@ -163,6 +170,7 @@ class HipPlane:
     """Pelvis: the hips' plane against the torso's (§3.2.A iii)."""
 
     ranges: Ranges
+    tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("pelvis.flexion", "pelvis.rotation", "pelvis.bending")
     unit: str = "deg"
@@ -174,7 +182,7 @@ class HipPlane:
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
         middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
         normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
-        return _plane_findings("pelvis", plane_angles(normal, middle, self.ranges), self.ranges)
+        return _plane_findings("pelvis", plane_angles(normal, middle, self.ranges), self.ranges, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -186,6 +194,7 @@ class HeadPlane:
 
     figure: Figure
     ranges: Ranges
+    tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("neck.flexion", "neck.rotation", "neck.bending")
     unit: str = "deg"
@@ -198,9 +207,9 @@ class HeadPlane:
         normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
         angles = plane_angles(normal, -crown, self.ranges)
         angles[:, 0] *= -1
-        return _plane_findings("neck", angles, self.ranges)
+        return _plane_findings("neck", angles, self.ranges, self.tolerance)
 
 
-def _plane_findings(joint: str, angles: Array, ranges: Ranges) -> Findings:
+def _plane_findings(joint: str, angles: Array, ranges: Ranges, tolerance: float) -> Findings:
     bounds = np.array([ranges.limits[f"{joint}.{angle}"] for angle in ("flexion", "rotation", "bending")])
-    return Findings(value=angles, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=TOLERANCE)
+    return Findings(value=angles, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=tolerance)

@@ -13,7 +13,7 @@ from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.tree import Check
 from posekit.validators.collision import collision
-from posekit.validators.joint_range import joint_range
+from posekit.validators.joint_range import TOLERANCE, joint_range
 from posekit.validators.ranges import Ranges
 from posekit.validators.rigid_parts import Mode, rigid_parts
 from posekit.validators.walking import DEFAULT_RULES, walking
@@ -38,6 +38,7 @@ def make_checks(
     ranges: Ranges,
     rigid_tolerance: float,
     rigid_mode: Mode = "placement",
+    angle_tolerance: float = TOLERANCE,
     rules: Iterable[int] = DEFAULT_RULES,
     contact_margin: float = 0.0,
     exact: bool = False,
@@ -48,7 +49,7 @@ def make_checks(
         if name == "rigid-parts":
             checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode)
         elif name == "joint-range":
-            checks += joint_range(figure, ranges)
+            checks += joint_range(figure, ranges, tolerance=angle_tolerance)
         elif name == "collision":
             checks += collision(figure, contact_margin=contact_margin, exact=exact)
         else:

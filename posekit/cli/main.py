@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Annotated, TextIO
+from typing import Annotated, Any, TextIO
 
-import click
 import typer
 
 from posekit.cli import demo, recover, reproduce, synth, validate
@@ -14,10 +13,13 @@ from posekit.errors import PosekitError
 
 BAD_INPUT = 2
 
+# Typer brings click along in its own name space, or takes the installed one, version by version.
+UsageError: Any = typer.BadParameter.__bases__[0]
+ClickError: Any = UsageError.__bases__[0]
+
 app = typer.Typer(
     name="posekit",
     help="Every physically possible posture behind one view, each certified.",
-    no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -49,15 +51,15 @@ def main() -> None:
     """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
     try:
-        code = app(standalone_mode=False)
+        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except PosekitError as error:
         code = _fail(str(error))
-    except click.UsageError as error:
+    except UsageError as error:
         hint = f"; see {error.ctx.command_path} --help" if error.ctx else ""
         code = _fail(error.format_message().rstrip(".") + hint)
-    except click.ClickException as error:
+    except ClickError as error:
         code = _fail(error.format_message())
-    except (click.Abort, KeyboardInterrupt):
+    except (typer.Abort, KeyboardInterrupt):
         code = _fail("interrupted", 130)
     except BrokenPipeError:
         sys.stderr.close()

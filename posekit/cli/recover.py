@@ -94,6 +94,7 @@ def _tolerance(rigid: str, tangent: str) -> Tolerance | None:
         rigid=metres,
         tangent=parse_length(tangent, name="--tangent-tolerance") if tangent else MEASURED.tangent,
         placement=metres <= EXACT.rigid,
+        angle=EXACT.angle if metres <= EXACT.rigid else MEASURED.angle,
     )
 
 

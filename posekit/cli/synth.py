@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     help="Make synthetic views with truth: a walker, random legal postures, or motion capture.",
-    no_args_is_help=True,
     rich_markup_mode=None,
 )
 

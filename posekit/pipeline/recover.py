@@ -167,6 +167,7 @@ class _Grower:
             ranges=self.ranges,
             rigid_tolerance=tolerance.rigid,
             rigid_mode="placement" if tolerance.placement else "distances",
+            angle_tolerance=tolerance.angle,
             rules=self.rules,
             contact_margin=self.contact_margin,
             exact=exact,

@@ -23,13 +23,18 @@ class Tolerance:
     placement : bool
         Whether the torso must also be the figure's own laid onto the posture, which tells it from its mirror
         image. With centimetres of tolerance that question has no answer.
+    angle : float
+        Degrees by which the direction of a segment may be off, for joint ranges.
     """
 
     rigid: float
     tangent: float
     placement: bool
+    angle: float = 1e-3
 
     def __post_init__(self) -> None:
+        if not (math.isfinite(self.angle) and self.angle >= 0):
+            raise InputError(f"the angle tolerance is {self.angle!r} degrees; expected zero or a positive number")
         for name in ("rigid", "tangent"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
@@ -39,5 +44,5 @@ class Tolerance:
 EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9, placement=True)
 """For exact image points: rounding only."""
 
-MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False)
+MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False, angle=2.0)
 """For measured image points and bodies: what real torsos give (docs, "Tolerances")."""

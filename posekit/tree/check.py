@@ -22,7 +22,7 @@ class Findings:
         call, or a joint is missing.
     lower, upper : array broadcastable to (N, K)
         Its bounds.
-    tolerance : float
+    tolerance : float or array broadcastable to (N, K)
         How far outside a bound is still not a violation (rounding, stated noise), in the same unit.
     rejects : bool array (N, K), optional
         The verdict itself, where another library gave it; else it follows from value and bounds.
@@ -31,7 +31,7 @@ class Findings:
     value: Array
     lower: Array
     upper: Array
-    tolerance: float = 0.0
+    tolerance: float | Array = 0.0
     rejects: NDArray[np.bool_] | None = None
 
     @property

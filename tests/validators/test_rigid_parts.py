@@ -1,0 +1,119 @@
+"""Rigid parts: just passes, just fails, and the mirror image that distances cannot tell."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from posekit.figure import load_figure
+from posekit.skeleton import JOINT, RIGID_SEGMENTS, TORSO, segment_name
+from posekit.tree import Findings
+from posekit.validators import rigid_parts
+from posekit.validators.rigid_parts import Mode
+
+FIGURE = load_figure()
+NAMES = tuple(segment_name(segment) for segment in RIGID_SEGMENTS)
+
+
+def postures(n: int, seed: int = 3) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    q = np.tile(pin.neutral(FIGURE.model), (n, 1))
+    q[:, :3] = rng.normal(size=(n, 3)) * 0.3 + [0, 0, 4]
+    turn = rng.normal(size=(n, 4))
+    q[:, 3:7] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    limits = FIGURE.limits
+    q[:, FIGURE.angle_index] = limits.lower + rng.random((n, 22)) * (limits.upper - limits.lower)
+    return FIGURE.forward_kinematics(q)
+
+
+def judge(points: np.ndarray, *, tolerance: float, mode: Mode = "placement") -> dict[str, Findings]:
+    return {
+        check.where[0]: check.judge(points[:, check.points])
+        for check in rigid_parts(FIGURE, tolerance=tolerance, mode=mode)
+    }
+
+
+def violated(points: np.ndarray, *, tolerance: float, mode: Mode = "placement") -> list[str]:
+    return [
+        name for name, findings in judge(points, tolerance=tolerance, mode=mode).items() if findings.violated.any()
+    ]
+
+
+@pytest.mark.parametrize("mode", ["distances", "placement"])
+def test_the_figures_own_postures_pass(mode: Mode) -> None:
+    assert violated(postures(200), tolerance=1e-12, mode=mode) == []
+
+
+def test_distances_are_judged_in_four_places_and_the_torso_in_one_more() -> None:
+    assert tuple(judge(postures(1), tolerance=0.01, mode="distances")) == NAMES
+    assert tuple(judge(postures(1), tolerance=0.01)) == (*NAMES, "torso")
+
+
+@pytest.mark.parametrize("segment", RIGID_SEGMENTS)
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("off", "passes"), [(0.00999, True), (0.01001, False)])
+def test_a_distance_just_passes_and_just_fails(
+    segment: tuple[int, int], sign: int, off: float, passes: bool
+) -> None:
+    points = postures(20)
+    a, b = segment
+    along = points[:, b] - points[:, a]
+    points[:, b] += sign * off * along / np.linalg.norm(along, axis=1, keepdims=True)
+    findings = judge(points, tolerance=0.01, mode="distances")[segment_name(segment)]
+    assert (findings.violated == (not passes)).all()
+    np.testing.assert_allclose(findings.value[:, 0] - FIGURE.lengths[segment_name(segment)], sign * off, atol=1e-12)
+    np.testing.assert_allclose(findings.margin[:, 0], 0.01 - off, rtol=0, atol=1e-12)
+
+
+def test_the_mirror_image_is_told_apart_by_placement_alone() -> None:
+    mirrored = postures(50) * [-1, 1, 1]
+    assert violated(mirrored, tolerance=1e-12, mode="distances") == []
+    torso = judge(mirrored, tolerance=0.05)["torso"]
+    assert torso.violated.all()
+    # The shoulders lie 3.742 cm behind the spine instead of in front of it.
+    np.testing.assert_allclose(torso.value, 2 * 0.037420243, rtol=0, atol=1e-8)
+
+
+def test_a_flat_torso_is_its_own_mirror_image() -> None:
+    flat = FIGURE.scaled({"right_shoulder-left_shoulder": 2 * np.sqrt(0.205**2 - 0.004740820734341**2)})
+    check = rigid_parts(flat, tolerance=1e-4)[-1]
+    points = flat.neutral_points[None] * [-1, 1, 1]
+    assert not check.judge(points[:, check.points]).violated.any()
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
+@pytest.mark.parametrize(("factor", "passes"), [(0.999, True), (1.001, False)])
+def test_a_torso_point_just_passes_and_just_fails(tolerance: float, factor: float, passes: bool) -> None:
+    # The pelvis moved along the spine leaves the frame as it is: it alone is off, by as much.
+    points = postures(20)
+    neck, pelvis = points[:, JOINT["neck"]], points[:, JOINT["pelvis"]]
+    down = (pelvis - neck) / np.linalg.norm(pelvis - neck, axis=1, keepdims=True)
+    points[:, JOINT["pelvis"]] += factor * tolerance * down
+    torso = judge(points, tolerance=tolerance)["torso"]
+    np.testing.assert_allclose(torso.value, factor * tolerance, rtol=0, atol=1e-12)
+    assert (torso.violated == (not passes)).all()
+
+
+def test_a_looser_tolerance_never_rejects_more(rng: np.random.Generator) -> None:
+    points = postures(200) + rng.normal(size=(200, 19, 3)) * 0.01
+    rejected = []
+    for tolerance in (0.0, 0.005, 0.01, 0.02, 0.05, 0.2):
+        findings = judge(points, tolerance=tolerance).values()
+        rejected.append(np.any([f.violated[:, 0] for f in findings], axis=0))
+    for strict, loose in zip(rejected, rejected[1:], strict=False):
+        assert (strict | ~loose).all()
+    assert rejected[0].all()
+    assert not rejected[-1].any()
+
+
+@pytest.mark.parametrize("missing", TORSO)
+def test_a_missing_joint_leaves_its_places_undecided(missing: str) -> None:
+    points = postures(5)
+    points[:, JOINT[missing]] = np.nan
+    for name, findings in judge(points, tolerance=1e-9).items():
+        reads = name == "torso" or missing in name.split("-")
+        assert (findings.undecided == reads).all()
+        assert not findings.violated.any()
+
+
+def test_a_collapsed_torso_is_rejected_without_a_warning() -> None:
+    assert set(NAMES) <= set(violated(np.zeros((1, 19, 3)), tolerance=0.1))
