@@ -91,10 +91,13 @@ def evaluate(scenes: tuple[Scene, ...], ranges: str, tolerance: Tolerance, check
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("capture", type=Path)
+    parser.add_argument("capture", type=Path, nargs="?")
     parser.add_argument("--frames", type=int, default=500)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    if given.capture is None:
+        print("no capture given: python benchmarks/real_motion.py CAPTURE.npz")
+        return
     scenes = mocap_scenes(read_capture(given.capture), given.frames, np.random.default_rng(given.seed))
     head = ["truth among survivors", "survivors, median", "95 %", "median joint error of the truth, mm"]
 

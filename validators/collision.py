@@ -43,9 +43,7 @@ def collision(figure: Figure, *, contact_margin: float = 0.0, exact: bool = Fals
         The verdicts are the same.
     """
     return [
-        PairCollision(
-            a=figure.capsules[i], b=figure.capsules[j], contact_margin=contact_margin, exact=exact
-        )
+        PairCollision(a=figure.capsules[i], b=figure.capsules[j], contact_margin=contact_margin, exact=exact)
         for i, j in figure.collision_pairs
     ]
 

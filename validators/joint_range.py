@@ -24,9 +24,7 @@ TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
-def joint_range(
-    figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE
-) -> list[Check]:
+def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE) -> list[Check]:
     """Make the checks of the joint ranges.
 
     With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
@@ -59,9 +57,7 @@ def joint_range(
     return checks
 
 
-def _findings(
-    figure: Figure, where: tuple[str, ...], angles: Array, tolerance: float | Array
-) -> Findings:
+def _findings(figure: Figure, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
     rows = [DOFS.index(dof) for dof in where]
     return Findings(
         value=np.degrees(angles),
@@ -151,5 +147,7 @@ class Limb:
         tolerance = np.full((len(angles), len(self.where)), self.tolerance)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))
-            tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), np.radians(self.tolerance) / np.pi)
+            tolerance[:, 2] /= np.maximum(
+                np.where(np.isnan(bend), 1.0, bend), np.radians(self.tolerance) / np.pi
+            )
         return _findings(self.figure, self.where, angles[:, : len(self.where)], tolerance)

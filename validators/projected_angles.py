@@ -134,7 +134,10 @@ class Hinge:
         lower, upper = self.ranges.limits[f"{self.limb[1]}.flexion"]
         if self.limb[1] == "elbow":
             return Findings(
-                value=flexion[:, None], lower=np.array([lower]), upper=np.array([upper]), tolerance=self.tolerance
+                value=flexion[:, None],
+                lower=np.array([lower]),
+                upper=np.array([upper]),
+                tolerance=self.tolerance,
             )
         hip = angle_in_plane(u[:, 0], u[:, 1], self.ranges.shortest_projection * np.linalg.norm(u, axis=1))
         flexed = flexion > self.ranges.knee_flexed
@@ -182,7 +185,9 @@ class HipPlane:
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
         middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
         normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
-        return _plane_findings("pelvis", plane_angles(normal, middle, self.ranges), self.ranges, self.tolerance)
+        return _plane_findings(
+            "pelvis", plane_angles(normal, middle, self.ranges), self.ranges, self.tolerance
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -99,7 +99,9 @@ def _parse(text: str, source: str) -> Ranges:
     shortest = _number(table.pop("shortest_projection", 0.1), f"{source}: shortest_projection")
     flexed = _number(table.pop("knee_flexed", 5.0), f"{source}: knee_flexed")
     if not 0 <= shortest < 1:
-        raise InputError(f"{source}: shortest_projection is {shortest:g}; expected a fraction from 0 to below 1")
+        raise InputError(
+            f"{source}: shortest_projection is {shortest:g}; expected a fraction from 0 to below 1"
+        )
     if kind == "projected":
         known = {f"{joint}.{angle}" for joint, angles in PROJECTED_ANGLES.items() for angle in angles}
     else:

@@ -84,7 +84,7 @@ class Judgement:
     @property
     def worst(self) -> Array:
         """The smallest margin of each posture (N,); NaN where nothing was decided."""
-        return np.fmin.reduce(self.margin, axis=1) if self.margin.shape[1] else self.margin.sum(axis=1)
+        return np.asarray(np.fmin.reduce(self.margin, axis=1))
 
 
 def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:

@@ -149,7 +149,7 @@ class Validator:
         q, distance = self.figure.configurations(points)
         return Report(
             judgements=judge(self._suite, points),
-            complete=np.isfinite(joints).all(axis=(1, 2)),
+            complete=np.asarray(np.isfinite(joints).all(axis=(1, 2))),
             q=q,
             fk_distance=distance,
         )

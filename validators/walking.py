@@ -191,7 +191,8 @@ class OneKnee(_Rule):
 
 def _angle(a: Array, b: Array) -> Array:
     """Return the angle between vectors (N, 3), degrees."""
-    return np.degrees(np.arctan2(np.linalg.norm(cross(a, b), axis=1), np.einsum("ni,ni->n", a, b)))
+    sine, cosine = np.linalg.norm(cross(a, b), axis=1), np.einsum("ni,ni->n", a, b)
+    return np.asarray(np.degrees(np.arctan2(sine, cosine)))
 
 
 def _indices(*names: str) -> tuple[int, ...]:

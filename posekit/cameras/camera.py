@@ -48,9 +48,7 @@ class Camera(Protocol):
         ...
 
 
-def meet_sphere(
-    origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float
-) -> Lift:
+def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *, tolerance: float) -> Lift:
     r"""Meet the ray of a pixel with the sphere of a segment's ends.
 
     With the foot of the perpendicular from the start :math:`s` on the ray at parameter :math:`t_0`, and

@@ -9,14 +9,16 @@ import typer
 
 
 def demo(
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")],
+    output: Annotated[
+        Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")
+    ],
 ) -> None:
     """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables.
 
     Example:
       posekit demo -o demo-results
     """
-    from posekit import files, pipeline  # noqa: PLC0415
+    from posekit import files, pipeline
 
     files.make_folder(output)
     for line in pipeline.demo(output):

@@ -32,7 +32,7 @@ app.command("demo")(demo.demo)
 
 def _print_version(asked: bool) -> None:
     if asked:
-        from importlib.metadata import version  # noqa: PLC0415  (only when asked for)
+        from importlib.metadata import version
 
         typer.echo(f"posekit {version('posekit')}")
         raise typer.Exit

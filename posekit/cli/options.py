@@ -23,7 +23,8 @@ RangesOption = Annotated[
     str, typer.Option("--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, table1, or a TOML file.")
 ]
 Rules = Annotated[
-    str, typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5.")
+    str,
+    typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5."),
 ]
 ContactMargin = Annotated[
     str,
@@ -66,7 +67,7 @@ def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
 
 def signed_length(text: str, option: str) -> float:
     """Read a length that may be negative, metres."""
-    from posekit.files import parse_length  # noqa: PLC0415  (pydantic is only needed when a command runs)
+    from posekit.files import parse_length
 
     negative = text.startswith("-")
     return (-1.0 if negative else 1.0) * parse_length(text.removeprefix("-"), name=option)
@@ -75,8 +76,8 @@ def signed_length(text: str, option: str) -> float:
 @contextmanager
 def progress(label: str, total: int) -> Iterator[Any]:
     """Show a progress bar on a terminal's stderr; yield the function to call with the number done."""
-    from rich.console import Console  # noqa: PLC0415
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn  # noqa: PLC0415
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())

@@ -58,12 +58,13 @@ def recover(
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure.
 
-    Examples:
+    Examples
+    --------
       posekit synth walker -o walk.json && posekit recover walk.json -o postures.json
       posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking --rules 1,2
       posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain
     """
-    from posekit import files, pipeline  # noqa: PLC0415  (the libraries behind them load only when needed)
+    from posekit import files, pipeline
 
     files.check_result_path(output)
     seen = files.read_view(view)
@@ -84,8 +85,8 @@ def recover(
 
 
 def _tolerance(rigid: str, tangent: str) -> Tolerance | None:
-    from posekit.files import parse_length  # noqa: PLC0415
-    from posekit.pipeline import EXACT, MEASURED, Tolerance  # noqa: PLC0415
+    from posekit.files import parse_length
+    from posekit.pipeline import EXACT, MEASURED, Tolerance
 
     if not rigid and not tangent:
         return None
@@ -100,7 +101,7 @@ def _tolerance(rigid: str, tangent: str) -> Tolerance | None:
 
 def summarize(recovery: Recovery) -> None:
     """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
-    from posekit.pipeline.summary import summary_lines  # noqa: PLC0415
+    from posekit.pipeline.summary import summary_lines
 
     for line in summary_lines(recovery):
         typer.echo(line)

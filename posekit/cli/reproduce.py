@@ -21,7 +21,7 @@ def reproduce(
     Example:
       posekit reproduce lee-chen -o tables
     """
-    from posekit import files, pipeline  # noqa: PLC0415
+    from posekit import files, pipeline
 
     if paper not in PAPERS:
         raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")

@@ -27,7 +27,9 @@ def walker(
     camera: Annotated[
         str,
         typer.Option(
-            "--camera", metavar="X,Y,Z", help="Camera position in the head's frame, cm: x ahead, y up, z right."
+            "--camera",
+            metavar="X,Y,Z",
+            help="Camera position in the head's frame, cm: x ahead, y up, z right.",
         ),
     ] = "400,0,0",
     frames: Frames = 5,
@@ -37,17 +39,21 @@ def walker(
     ] = 1.0,
     phase: Annotated[float, typer.Option("--phase", help="Phase of the first frame, in cycles.")] = 0.0,
     noise: Annotated[
-        float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, cm on the image plane.")
+        float,
+        typer.Option(
+            "--noise", min=0.0, help="Standard deviation of the image points' noise, cm on the image plane."
+        ),
     ] = 0.0,
     seed: Seed = 0,
 ) -> None:
     """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1.
 
-    Examples:
+    Examples
+    --------
       posekit synth walker -o seq1.json --camera 400,0,0
       posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2
     """
-    from posekit import synthesis  # noqa: PLC0415
+    from posekit import synthesis
 
     x, y, z = numbers(camera, 3, "--camera")
     scene = synthesis.walker_scene(
@@ -75,10 +81,10 @@ def random(
     Example:
       posekit synth random -o random.json --frames 100 --noise 1 --seed 7
     """
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from posekit import synthesis  # noqa: PLC0415
-    from posekit.figure import load_figure  # noqa: PLC0415
+    from posekit import synthesis
+    from posekit.figure import load_figure
 
     near, far = numbers(distance, 2, "--distance")
     sphere = synthesis.CameraSphere(distance=(near, far))
@@ -88,7 +94,9 @@ def random(
 
 @app.command()
 def mocap(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")
+    ],
     output: OutputView,
     frames: Frames = 5,
     clip: Annotated[str, typer.Option("--clip", help="The clip, by name. Default: the first.")] = "",
@@ -109,9 +117,9 @@ def mocap(
     Example:
       posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1
     """
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from posekit import synthesis  # noqa: PLC0415
+    from posekit import synthesis
 
     capture = synthesis.read_capture(file)
     scene = synthesis.mocap_scene(
@@ -127,9 +135,9 @@ def mocap(
 
 def _write(output: Path, scene: Scene, noise: float, seed: int) -> None:
     """Add noise, write the view, say so."""
-    import numpy as np  # noqa: PLC0415
+    import numpy as np
 
-    from posekit import files, pipeline  # noqa: PLC0415
+    from posekit import files, pipeline
 
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))

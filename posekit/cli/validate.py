@@ -1,4 +1,4 @@
-"""`posekit validate`: are these postures physically possible?"""
+"""`posekit validate`: whether postures are physically possible."""
 
 from __future__ import annotations
 
@@ -47,11 +47,12 @@ def validate(
 ) -> None:
     """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input.
 
-    Examples:
+    Examples
+    --------
       posekit validate postures.json -o report.json
       posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1
     """
-    from posekit import files, pipeline, validators  # noqa: PLC0415
+    from posekit import files, pipeline, validators
 
     given = files.read_postures(postures)
     validator = validators.Validator(

@@ -138,7 +138,11 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
     :math:`R_y(\alpha) R_x(\beta) R_z(\gamma)` depends on :math:`\gamma \mp \alpha` alone: if both can be inside
     their limits, then also with one of the two at a limit, or with alpha at zero.
     """
-    branches, pinned, straight = _direction_branches(upper), _along_abduction_axis(upper), _along(upper, lower)
+    branches, pinned, straight = (
+        _direction_branches(upper),
+        _along_abduction_axis(upper),
+        _along(upper, lower),
+    )
     sign, low, high = limits.sign, limits.lower, limits.upper
     candidates = [angles]
     for k in range(2):

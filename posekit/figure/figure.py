@@ -23,7 +23,18 @@ from posekit.figure.lengths import check_lengths
 from posekit.figure.second_reader import compare_readers
 from posekit.figure.stature import lengths_from_stature
 from posekit.figure.urdf import parse, read_text, replace_limits, rewrite
-from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SEGMENTS, SIDES, TORSO, segment_name, urdf_joint_name
+from posekit.skeleton import (
+    DOFS,
+    HEAD,
+    JOINT,
+    JOINTS,
+    POINTS,
+    SEGMENTS,
+    SIDES,
+    TORSO,
+    segment_name,
+    urdf_joint_name,
+)
 
 FRAMES = {
     "neck": "torso",
@@ -103,7 +114,9 @@ class Figure:
         try:
             return pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
         except (ValueError, RuntimeError) as error:
-            raise FigureError(f"{self.source}: Pinocchio cannot read it: {str(error).splitlines()[0]}") from error
+            raise FigureError(
+                f"{self.source}: Pinocchio cannot read it: {str(error).splitlines()[0]}"
+            ) from error
 
     @cached_property
     def geometry(self) -> pin.GeometryModel:
@@ -116,7 +129,7 @@ class Figure:
     @cached_property
     def neutral_points(self) -> Array:
         """The 19 points at the neutral configuration (19, 3), metres, torso frame."""
-        points = self.forward_kinematics(pin.neutral(self.model)[None])[0]
+        points: Array = self.forward_kinematics(pin.neutral(self.model)[None])[0]
         points.flags.writeable = False
         return points
 
@@ -341,12 +354,14 @@ class Figure:
 
     @cached_property
     def _head_offsets(self) -> Array:
-        return self.neutral_points[list(HEAD)] - self.neutral_points[0]
+        return np.asarray(self.neutral_points[list(HEAD)] - self.neutral_points[0])
 
     def _limits_of(self, first: str, count: int) -> Limits:
         k = DOFS.index(first)
         part = slice(k, k + count)
-        return Limits(sign=self.limits.sign[part], lower=self.limits.lower[part], upper=self.limits.upper[part])
+        return Limits(
+            sign=self.limits.sign[part], lower=self.limits.lower[part], upper=self.limits.upper[part]
+        )
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
         """Return the five head points in the head link's frame, some of them replaced."""
@@ -384,7 +399,6 @@ class Figure:
                     f"{self.source}: joint {urdf_joint_name(dof)!r} turns about {axis.tolist()}; expected plus or "
                     f"minus the {'xyz'[expected]} axis"
                 )
-
 
     def _check_layout(self) -> None:
         """Refuse joints that lie otherwise than the closed form of `inverse_kinematics` takes them to."""
@@ -467,7 +481,7 @@ def quaternions(R: Array) -> Array:
     largest = np.argmax(squares, axis=1)
     q = np.take_along_axis(rows, largest[:, None, None], axis=1)[:, 0]
     q = q / np.linalg.norm(q, axis=1, keepdims=True)
-    return q * np.where(q[:, 3:] < 0, -1.0, 1.0)
+    return np.asarray(q * np.where(q[:, 3:] < 0, -1.0, 1.0))
 
 
 def _frame_name(point: str) -> str:
@@ -476,9 +490,9 @@ def _frame_name(point: str) -> str:
 
 def _into(R: Array, vectors: Array) -> Array:
     """Express camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
-    return np.einsum("nji,nj->ni", R, vectors)
+    return np.asarray(np.einsum("nji,nj->ni", R, vectors))
 
 
 def _transposed_product(R_a: Array, R_b: Array) -> Array:
     """Return R_a^T R_b for batches of rotations."""
-    return np.einsum("nji,njk->nik", R_a, R_b)
+    return np.asarray(np.einsum("nji,njk->nik", R_a, R_b))

@@ -25,17 +25,21 @@ def compare_readers(urdf: str, model: pin.Model, source: str) -> None:
     FigureError
         Naming the first link on which they differ.
     """
-    import yourdfpy  # noqa: PLC0415  (it takes a second to load, and only files from outside need it)
+    import yourdfpy
 
     try:
         other = yourdfpy.URDF.load(io.BytesIO(urdf.encode()), load_meshes=False, build_scene_graph=True)
     except Exception as error:  # yourdfpy lets through whatever its parsers raise
-        raise FigureError(f"{source}: a second reader cannot read it: {str(error).splitlines()[0]}") from error
+        raise FigureError(
+            f"{source}: a second reader cannot read it: {str(error).splitlines()[0]}"
+        ) from error
     q = pin.neutral(model)
     angles = {}
     for name in other.actuated_joint_names:
         if not model.existJointName(name):
-            raise FigureError(f"{source}: joint {name!r} is read by one reader and not by another; check its XML")
+            raise FigureError(
+                f"{source}: joint {name!r} is read by one reader and not by another; check its XML"
+            )
         index = model.idx_qs[model.getJointId(name)]
         lower, upper = model.lowerPositionLimit[index], model.upperPositionLimit[index]
         q[index] = angles[name] = lower + 0.6 * (upper - lower) if math.isfinite(upper - lower) else 0.3

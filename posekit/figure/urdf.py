@@ -67,7 +67,9 @@ def parse(text: str, source: str) -> ElementTree.Element:
             if attribute in element.attrib:
                 _finite(element.attrib[attribute], count, f"{source}: <{element.tag} {attribute}=…>")
     if robot.find(".//collision//mesh") is not None:
-        raise FigureError(f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)")
+        raise FigureError(
+            f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)"
+        )
     if robot.find("link") is not None:  # an SRDF has none
         _check_tree(robot, source)
     for joint in robot.findall("joint"):
@@ -85,7 +87,9 @@ def _check_tree(robot: ElementTree.Element, source: str) -> None:
     links = [link.get("name", "") for link in robot.findall("link")]
     parent_of: dict[str, str] = {}
     for joint in robot.findall("joint"):
-        ends = [element.get("link", "") for tag in ("parent", "child") if (element := joint.find(tag)) is not None]
+        ends = [
+            element.get("link", "") for tag in ("parent", "child") if (element := joint.find(tag)) is not None
+        ]
         unknown = [link for link in ends if link not in links]
         if len(ends) != 2 or unknown:
             raise FigureError(

@@ -17,6 +17,7 @@ from posekit.files.report import read_report as read_report
 from posekit.files.report import write_report as write_report
 from posekit.files.result import Result as Result
 from posekit.files.result import ResultFrame as ResultFrame
+from posekit.files.result_file import check_result_path as check_result_path
 from posekit.files.result_file import read_result as read_result
 from posekit.files.result_file import write_result as write_result
 from posekit.files.schemas import SCHEMAS as SCHEMAS
@@ -27,7 +28,6 @@ from posekit.files.units import parse_length as parse_length
 from posekit.files.view import View as View
 from posekit.files.view_file import read_view as read_view
 from posekit.files.view_file import write_view as write_view
-from posekit.files.result_file import check_result_path as check_result_path
 from posekit.files.writing import make_folder as make_folder
 from posekit.files.writing import write_json as write_json
 from posekit.files.writing import write_lines as write_lines

@@ -109,7 +109,9 @@ def make_folder(path: str | Path) -> None:
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise refusal(path, "", error.strerror or str(error), "a folder for results", "choose another name") from None
+        raise refusal(
+            path, "", error.strerror or str(error), "a folder for results", "choose another name"
+        ) from None
 
 
 def too_large_to_read(path: str | Path) -> InputError:

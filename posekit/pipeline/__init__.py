@@ -1,5 +1,6 @@
 """Whole jobs: a view to certified postures, postures to verdicts, the papers' tables."""
 
+from posekit.pipeline.demo import demo as demo
 from posekit.pipeline.recover import recover as recover
 from posekit.pipeline.recovery import FrameRecovery as FrameRecovery
 from posekit.pipeline.recovery import Recovery as Recovery
@@ -13,4 +14,3 @@ from posekit.pipeline.tolerance import Tolerance as Tolerance
 from posekit.pipeline.validate import validate as validate
 from posekit.pipeline.views import builtin_view as builtin_view
 from posekit.pipeline.views import view_of as view_of
-from posekit.pipeline.demo import demo as demo

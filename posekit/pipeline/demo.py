@@ -7,14 +7,23 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.files import Postures, View, read_postures, write_lines, write_postures, write_report, write_result, write_view
+from posekit.figure import load_figure
+from posekit.files import (
+    Postures,
+    View,
+    read_postures,
+    write_lines,
+    write_postures,
+    write_report,
+    write_result,
+    write_view,
+)
 from posekit.pipeline.recover import recover
 from posekit.pipeline.recovery import Recovery
 from posekit.pipeline.reproduce import reproduce_lee_chen, table_lines
 from posekit.pipeline.result import result_of
 from posekit.pipeline.validate import validate
 from posekit.pipeline.views import builtin_view, view_of
-from posekit.figure import load_figure
 from posekit.synthesis import random_views
 from posekit.validators import PHYSICAL, Validator
 
@@ -44,13 +53,24 @@ def demo(folder: Path) -> Iterator[str]:
         write_result(folder / f"{name}.result.json", result_of(recovery, unit=view.unit, explain=True))
         rows.append((name, *_row(view, recovery)))
         yield f"{name}: {rows[-1][3]} postures in {rows[-1][1]} frames"
-    head = ("view", "frames", "leaves", "postures", "most in a frame", "input among them", "furthest FK joint, m")
+    head = (
+        "view",
+        "frames",
+        "leaves",
+        "postures",
+        "most in a frame",
+        "input among them",
+        "furthest FK joint, m",
+    )
     table = ["# posekit demo", "", *table_lines(head, rows)]
     given = read_postures(folder / "seq1.result.json")
     report = validate(Validator("human"), given)
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
-    table += [f"Validated again from the file: {report.summary['valid']} of {len(report.postures)} postures valid.", ""]
+    table += [
+        f"Validated again from the file: {report.summary['valid']} of {len(report.postures)} postures valid.",
+        "",
+    ]
     write_lines(folder / "demo.md", table)
     yield from table[2:]
     reproduce_lee_chen(folder)
@@ -64,4 +84,11 @@ def _row(view: View, recovery: Recovery) -> tuple[int, int, int, int, str, str]:
         error = np.linalg.norm(frame.joints - truth, axis=-1).max(axis=1)
         found += bool((error < 1e-6).any())
     distance = max((float(frame.fk_distance.max(initial=0.0)) for frame in recovery.frames), default=0.0)
-    return len(counts), 8192 * len(counts), sum(counts), max(counts), f"{found} of {len(counts)}", f"{distance:.1e}"
+    return (
+        len(counts),
+        8192 * len(counts),
+        sum(counts),
+        max(counts),
+        f"{found} of {len(counts)}",
+        f"{distance:.1e}",
+    )

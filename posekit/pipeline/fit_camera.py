@@ -82,17 +82,21 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         root[unknown] = neck[unknown]
         head = pose.points_cam[:, 1 : 1 + len(HEAD)] - neck[:, None] + root[:, None]
     for k in np.flatnonzero(np.isnan(root).any(axis=1)):
-        why = pose.reasons[k] if pose is not None and pose.reasons[k] else "its root is not given and its head is not seen"
+        why = (
+            pose.reasons[k]
+            if pose is not None and pose.reasons[k]
+            else "its root is not given and its head is not seen"
+        )
         reasons[k] = f"frames[{k}]: {why}"
     if n and all(reasons):
-        raise HeadError(
-            f"{reasons[0]}; give six head points in head_image (with the neck in image), or root"
-        )
+        raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or root")
     return CameraFit(camera=camera, root=root, head=head, pose=pose, reasons=reasons)
 
 
 def _recovered_f(pose: HeadPose | None) -> Array:
     """Return f of each frame; 1 m, which nothing will use, where the head gave none."""
     if pose is None:
-        raise HeadError("view: camera.f is null and no head is seen; give f, or six head points in head_image")
+        raise HeadError(
+            "view: camera.f is null and no head is seen; give f, or six head points in head_image"
+        )
     return np.where(pose.found, pose.f, 1.0)

@@ -209,7 +209,7 @@ def _fits_nowhere(batch: Batch) -> NDArray[np.bool_]:
     for group in batch.leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
             judged[group.frame] = True
-    return ~judged & (batch.physical[:, -1] == 0)
+    return np.asarray(~judged & (batch.physical[:, -1] == 0))
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

@@ -141,7 +141,7 @@ class FrameRecovery:
 
     def __len__(self) -> int:
         """Count the survivors."""
-        return self._rows.stop - self._rows.start
+        return int(self._rows.stop - self._rows.start)
 
     @property
     def joints(self) -> Array:
@@ -211,7 +211,11 @@ class FrameRecovery:
             return None
         leaves = self.batch.leaves
         found = leaves.candidates.too_short(self.index)
-        return None if found is None else (f"{leaves.joints[leaves.parents[found[0]]]}-{leaves.joints[found[0]]}", found[1])
+        return (
+            None
+            if found is None
+            else (f"{leaves.joints[leaves.parents[found[0]]]}-{leaves.joints[found[0]]}", found[1])
+        )
 
     def pruned(self) -> list[PrunedBranch]:
         """Every pruned branch with the finding that killed it, in the order of pruning."""

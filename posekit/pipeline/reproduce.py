@@ -78,7 +78,10 @@ def table_lines(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[s
     """Lay out a Markdown table, columns aligned."""
     cells = [[str(cell) for cell in row] for row in rows]
     widths = [max(len(row[k]) for row in [list(head), *cells]) for k in range(len(head))]
-    layout = [f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |" for row in cells]
+    layout = [
+        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
+        for row in cells
+    ]
     top = f"| {' | '.join(cell.ljust(width) for cell, width in zip(head, widths, strict=True))} |"
     return [top, f"|{'|'.join('-' * (width + 2) for width in widths)}|", *layout, ""]
 
@@ -149,7 +152,13 @@ def _frame1_lines(found: Sequence[Sequence1985]) -> list[str]:
                 "yes" if sequence.truth_survives else "no",
             )
         )
-    head = ("", "Rules 1-2: print / here", "groups: print / here", "Rules 3-5, groups: print / here", "input among them")
+    head = (
+        "",
+        "Rules 1-2: print / here",
+        "groups: print / here",
+        "Rules 3-5, groups: print / here",
+        "input among them",
+    )
     return [
         "## Frame 1 after grouping and Rules 3-5 (§4.2)",
         "",

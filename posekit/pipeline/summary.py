@@ -17,7 +17,9 @@ SHOWN = 4
 def summary_lines(recovery: Recovery) -> list[str]:
     """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
     frames = list(enumerate(recovery.frames))
-    lines = [f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>9}  rejected most by (of 8192)"]
+    lines = [
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>9}  rejected most by (of 8192)"
+    ]
     cut = len(frames) - 2 * SHOWN
     for k, frame in frames:
         if cut > 1 and SHOWN <= k < len(frames) - SHOWN:

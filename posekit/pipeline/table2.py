@@ -42,7 +42,7 @@ def exact_image(head: HeadPoints = TABLE_A2) -> Array:
     """Project Table A.2(a) exactly into the camera at (400, 0, 0): (6, 2), metres, y down."""
     R = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
     points = head.points @ R.T + [0.0, 0.0, 4.0 + F]
-    return lee_chen.pinhole(F).project(points[None])[0]
+    return np.asarray(lee_chen.pinhole(F).project(points[None])[0])
 
 
 def camera_estimates() -> list[CameraEstimate]:

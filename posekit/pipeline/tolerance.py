@@ -34,7 +34,9 @@ class Tolerance:
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.angle) and self.angle >= 0):
-            raise InputError(f"the angle tolerance is {self.angle!r} degrees; expected zero or a positive number")
+            raise InputError(
+                f"the angle tolerance is {self.angle!r} degrees; expected zero or a positive number"
+            )
         for name in ("rigid", "tangent"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):

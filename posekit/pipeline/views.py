@@ -57,8 +57,9 @@ def builtin_view(name: str) -> View:
 
 def _differences(figure: Figure) -> dict[str, float]:
     """Return the lengths that are not the built-in figure's."""
-
     standard = load_figure().lengths
     return {
-        name: length for name, length in figure.lengths.items() if not np.isclose(length, standard[name], rtol=0, atol=1e-12)
+        name: length
+        for name, length in figure.lengths.items()
+        if not np.isclose(length, standard[name], rtol=0, atol=1e-12)
     }

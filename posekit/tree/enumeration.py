@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array, Camera
 
@@ -17,7 +18,7 @@ def enumerate_leaves(
     parents: tuple[int, ...],
     lengths: Array,
     tolerance: float = 0.0,
-) -> tuple[Array, Array]:
+) -> tuple[Array, NDArray[np.intp]]:
     """Lift all joints for every string of branches, each on its own: 2^(J-1) leaves, nothing shared or pruned.
 
     Parameters

@@ -170,4 +170,3 @@ def apply(leaves: Leaves, check: Check) -> Leaves:
         upper=np.broadcast_to(findings.upper, shape)[dead_rows, place],
     )
     return leaves.keep(~dead, leaves.frame, leaves.code, leaves.level, (*leaves.pruned, pruned))
-
