@@ -10,13 +10,15 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.figure.frames import torso_frame
-from posekit.skeleton import JOINT, RIGID_SEGMENTS, TORSO, segment_name
+from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Check, Findings
 
 Mode = Literal["distances", "placement"]
 
 
-def rigid_parts(figure: Figure, *, tolerance: float, mode: Mode = "placement") -> list[Check]:
+def rigid_parts(
+    figure: Figure, *, tolerance: float, mode: Mode = "placement", limbs: bool = False
+) -> list[Check]:
     """Make the checks of the rigid parts.
 
     They judge the posture itself, as it was seen.
@@ -29,6 +31,8 @@ def rigid_parts(figure: Figure, *, tolerance: float, mode: Mode = "placement") -
         ``distances`` compares the four distances inside torso and hips, as the paper does; they cannot tell
         a torso from its mirror image. ``placement`` also lays the figure's own torso onto the posture's,
         as the configuration q will, and compares the points.
+    limbs : bool
+        Judge the thirteen lifted segments too, which a tree's postures have right by construction and others need not.
     """
     checks: list[Check] = [
         Distance(
@@ -37,7 +41,7 @@ def rigid_parts(figure: Figure, *, tolerance: float, mode: Mode = "placement") -
             length=figure.lengths[segment_name(segment)],
             tolerance=tolerance,
         )
-        for segment in RIGID_SEGMENTS
+        for segment in (SEGMENTS if limbs else RIGID_SEGMENTS)
     ]
     if mode == "placement":
         checks.append(Placement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=tolerance))

@@ -38,16 +38,17 @@ def make_checks(
     ranges: Ranges,
     rigid_tolerance: float,
     rigid_mode: Mode = "placement",
+    limbs: bool = False,
     angle_tolerance: float = TOLERANCE,
     rules: Iterable[int] = DEFAULT_RULES,
     contact_margin: float = 0.0,
     exact: bool = False,
 ) -> list[Check]:
-    """Make the checks of some validators by name; `exact` asks collision for every distance."""
+    """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance."""
     checks: list[Check] = []
     for name in check_names(names):
         if name == "rigid-parts":
-            checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode)
+            checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode, limbs=limbs)
         elif name == "joint-range":
             checks += joint_range(figure, ranges, tolerance=angle_tolerance)
         elif name == "collision":

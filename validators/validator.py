@@ -83,7 +83,7 @@ class Validator:
     rules : sequence of int
         Rules of walking.
     rigid_tolerance : float
-        Metres by which distances inside torso and hips may be off.
+        Metres by which distances inside torso and hips, and the lengths of the limbs, may be off.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration.
 
@@ -116,6 +116,7 @@ class Validator:
             ranges=load_ranges(ranges),
             rigid_tolerance=rigid_tolerance,
             rigid_mode="distances",
+            limbs=True,
             rules=rules,
             contact_margin=contact_margin,
             exact=True,

@@ -175,7 +175,7 @@ def _differences_lines(found: Sequence[Sequence1985]) -> list[str]:
         "- The joints of SEQ1 and SEQ2 are not printed. The walker here is Boulic, Thalmann & Thalmann's (1990) on the "
         "body of Table A.1, not Cutting's (1978), whose constants the paper does not give; velocity and phase are not "
         "given either. So the counts can be compared in size, not digit for digit.",
-        "- The torso of Table A.1 is not flat, and here its shoulders are in front of the line from neck to pelvis; the "
+        "- The torso of Table A.1 is not flat, and its shoulders are put in front of the line from neck to pelvis; the "
         "pelvis is therefore not always square to its ray, as it seems to have been in the paper.",
         f"- The paper gives no tolerance for its distances; here it is {TOLERANCE.rigid * 100:g} cm. It gives no "
         "thresholds for its rules and no size for its groups: see `WalkingThresholds` and `--group`.",
