@@ -147,7 +147,6 @@ class Limb:
         tolerance = np.full((len(angles), len(self.where)), self.tolerance)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))
-            tolerance[:, 2] /= np.maximum(
-                np.where(np.isnan(bend), 1.0, bend), np.radians(self.tolerance) / np.pi
-            )
+            least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
+            tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
         return _findings(self.figure, self.where, angles[:, : len(self.where)], tolerance)

@@ -45,13 +45,14 @@ def paper_axes(points: Array) -> Array:
     return np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
 
 
-def angle_in_plane(x: Array, y: Array, shortest: Array | float) -> Array:
+def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING) -> Array:
     """Return the angle (deg) from the y axis towards x, NaN where the projection (x, y) is too short.
 
-    In (-180, 180]: an arm straight up is flexed by 180, on whichever side of it rounding leaves the arm.
+    In (-180, 180], and up to the tolerance (deg) beyond: an arm straight up is flexed by 180, on whichever side
+    of it rounding or noise leaves the arm.
     """
     angle = np.degrees(np.arctan2(x, y))
-    angle = np.where(angle < ROUNDING - 180, angle + 360, angle)
+    angle = np.where(angle < max(tolerance, ROUNDING) - 180, angle + 360, angle)
     return np.where(np.hypot(x, y) < shortest, np.nan, angle)
 
 
@@ -87,7 +88,8 @@ class BallJoint:
         shortest = self.ranges.shortest_projection * np.linalg.norm(u, axis=1)
         outward = u[:, 2] if self.side == "left" else -u[:, 2]
         value = np.stack(
-            [angle_in_plane(u[:, 0], u[:, 1], shortest), angle_in_plane(outward, u[:, 1], shortest)], axis=-1
+            [angle_in_plane(across, u[:, 1], shortest, self.tolerance) for across in (u[:, 0], outward)],
+            axis=-1,
         )
         bounds = np.array([self.ranges.limits[f"{self.limb[0]}.{a}"] for a in ("flexion", "abduction")])
         return Findings(value=value, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=self.tolerance)
@@ -139,7 +141,9 @@ class Hinge:
                 upper=np.array([upper]),
                 tolerance=self.tolerance,
             )
-        hip = angle_in_plane(u[:, 0], u[:, 1], self.ranges.shortest_projection * np.linalg.norm(u, axis=1))
+        shortest = self.ranges.shortest_projection * np.linalg.norm(u, axis=1)
+        hip = angle_in_plane(u[:, 0], u[:, 1], shortest, self.tolerance)
+        hip = np.where(np.isnan(flexion), np.nan, hip)  # without the knee its range is not known
         flexed = flexion > self.ranges.knee_flexed
         wide, narrow = (self.ranges.limits[f"hip.{a}"] for a in ("flexion", "flexion_with_straight_knee"))
         return Findings(

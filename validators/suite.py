@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -44,7 +45,20 @@ def make_checks(
     contact_margin: float = 0.0,
     exact: bool = False,
 ) -> list[Check]:
-    """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance."""
+    """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance.
+
+    Raises
+    ------
+    InputError
+        Where a check or a rule is unknown, or a tolerance or margin is not finite: nothing compares with NaN, and
+        every posture would pass.
+    """
+    for what, value in (("rigid tolerance", rigid_tolerance), ("angle tolerance", angle_tolerance)):
+        if not (math.isfinite(value) and value >= 0):
+            raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
+    if not math.isfinite(contact_margin):
+        raise InputError(f"the contact margin is {contact_margin!r} m; expected a finite length")
+    motion = walking(figure, rules)  # made even where it is not wanted: it refuses unknown rules
     checks: list[Check] = []
     for name in check_names(names):
         if name == "rigid-parts":
@@ -54,7 +68,7 @@ def make_checks(
         elif name == "collision":
             checks += collision(figure, contact_margin=contact_margin, exact=exact)
         else:
-            checks += walking(figure, rules)
+            checks += motion
     return checks
 
 

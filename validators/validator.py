@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure, with_head
-from posekit.skeleton import JOINTS
+from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.validators.ranges import load_ranges
 from posekit.validators.suite import PHYSICAL, Judgement, check_names, judge, make_checks
 from posekit.validators.walking import DEFAULT_RULES
@@ -19,6 +19,9 @@ from posekit.validators.walking import DEFAULT_RULES
 BUILT_IN = ("human", "stick_figure")
 RIGID_TOLERANCE = 0.03
 """Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
+
+FARTHEST = 1e9
+"""Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -110,6 +113,8 @@ class Validator:
         else:
             self.figure = load_figure(None if urdf in BUILT_IN else urdf)
         self.checks = check_names(checks)
+        if not self.checks:
+            raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
         self._suite = make_checks(
             self.figure,
             self.checks,
@@ -138,15 +143,16 @@ class Validator:
         Returns
         -------
         Report
+
+        Raises
+        ------
+        InputError
+            Where a shape is wrong or a coordinate is no number, infinite or absurd.
         """
-        joints = np.asarray(postures, dtype=np.float64)
-        if joints.ndim != 3 or joints.shape[1:] != (len(JOINTS), 3):
-            raise InputError(f"postures have shape {joints.shape}; expected (N, {len(JOINTS)}, 3), metres")
-        if np.isinf(joints).any():
-            raise InputError("postures hold infinite coordinates; expected finite ones, NaN where unknown")
+        joints = _points("postures", postures, len(JOINTS))
         points = with_head(joints)
         if head is not None:
-            points[:, len(JOINTS) :] = np.asarray(head, dtype=np.float64)
+            points[:, len(JOINTS) :] = _points("head", head, len(HEAD_POINTS), len(joints))
         q, distance = self.figure.configurations(points)
         return Report(
             judgements=judge(self._suite, points),
@@ -154,3 +160,21 @@ class Validator:
             q=q,
             fk_distance=distance,
         )
+
+
+def _points(name: str, given: ArrayLike, count: int, postures: int | None = None) -> Array:
+    """Make an array (N, count, 3) of what was given, or refuse it."""
+    expected = f"({'N' if postures is None else postures}, {count}, 3)"
+    try:
+        points = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: not an array of numbers; expected {expected}, metres") from error
+    if points.ndim != 3 or points.shape[1:] != (count, 3) or postures not in (None, len(points)):
+        raise InputError(f"{name}: the shape is {points.shape}; expected {expected}, metres")
+    far = np.abs(points) > FARTHEST
+    if far.any():
+        raise InputError(
+            f"{name}: a coordinate is {points[far][0]:g} m; expected finite ones within {FARTHEST:g} m, "
+            "NaN where unknown"
+        )
+    return points

@@ -81,6 +81,8 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         unknown = np.isnan(root).any(axis=1)
         root[unknown] = neck[unknown]
         head = pose.points_cam[:, 1 : 1 + len(HEAD)] - neck[:, None] + root[:, None]
+    if isinstance(model, LeeChenModel) and model.f is None and pose is not None:
+        root[~pose.found] = np.nan  # a given root is of no use where f, which the head would tell, is not known
     for k in np.flatnonzero(np.isnan(root).any(axis=1)):
         why = (
             pose.reasons[k]
@@ -94,7 +96,7 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
 
 
 def _recovered_f(pose: HeadPose | None) -> Array:
-    """Return f of each frame; 1 m, which nothing will use, where the head gave none."""
+    """Return f of each frame; 1 m, in frames that are not grown, where the head gave none."""
     if pose is None:
         raise HeadError(
             "view: camera.f is null and no head is seen; give f, or six head points in head_image"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
@@ -78,6 +79,8 @@ def recover(
     5
     """
     names = check_names(checks)
+    if group is not None and not (math.isfinite(group) and group >= 0):
+        raise InputError(f"--group: {group!r} m; expected zero or a positive length")
     table = load_ranges(ranges) if isinstance(ranges, str) else ranges
     person = person_of(view, figure or load_figure())
     fit = fit_camera(view, person)

@@ -39,7 +39,7 @@ def turn(axis: int, angle: np.ndarray) -> np.ndarray:
 def ball(angles: np.ndarray, sign: np.ndarray) -> np.ndarray:
     """Return R_y(alpha) R_x(beta) R_z(gamma) of joint angles (N, 3)."""
     alpha, beta, gamma = (angles[:, :3] * sign[:3]).T
-    return turn(1, alpha) @ turn(0, beta) @ turn(2, gamma)
+    return np.asarray(turn(1, alpha) @ turn(0, beta) @ turn(2, gamma))
 
 
 def limb(angles: np.ndarray, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -133,7 +133,9 @@ def test_noise_on_an_arm_held_sideways_does_not_put_it_outside(rng: np.random.Ge
     noisy = upper + rng.uniform(-3e-7, 3e-7, upper.shape)
     noisy /= np.linalg.norm(noisy, axis=1, keepdims=True)
     assert limits.violation(limb_angles(noisy, lower, limits)).max() < np.radians(1e-3)
-    assert limits.violation(np.pad(direction_angles(noisy, limits), ((0, 0), (0, 2)))).max() < np.radians(1e-3)
+    assert limits.violation(np.pad(direction_angles(noisy, limits), ((0, 0), (0, 2)))).max() < np.radians(
+        1e-3
+    )
 
 
 @pytest.mark.parametrize("joint", LIMBS)
@@ -169,10 +171,11 @@ def test_outside_the_limits_the_least_violating_branch_is_taken(rng: np.random.G
     upper, lower = limb(angles, limits.sign)
     found = limits.violation(limb_angles(upper, lower, limits))
     # Every way to write the same limb: Euler branch times sign of the hinge.
-    same = [angles, angles + [0, 0, np.pi, 0]]
-    same[1][:, 3] *= -1
-    same += [np.stack([a + np.pi, np.pi * b - b_, g + np.pi, e], axis=-1) for (a, b_, g, e), b in
-             ((branch.T, limits.sign[1]) for branch in same)]
+    same = [angles, (angles + np.array([0, 0, np.pi, 0])) * [1, 1, 1, -1]]
+    same += [
+        np.stack([a + np.pi, np.pi * b - b_, g + np.pi, e], axis=-1)
+        for (a, b_, g, e), b in ((branch.T, limits.sign[1]) for branch in same)
+    ]
     for other in same:
         for one, two in zip(limb(other, limits.sign), (upper, lower), strict=True):
             np.testing.assert_allclose(one, two, rtol=0, atol=1e-12)
@@ -181,7 +184,9 @@ def test_outside_the_limits_the_least_violating_branch_is_taken(rng: np.random.G
 
 
 @pytest.mark.parametrize("joint", LIMBS)
-def test_the_upper_segment_alone_is_never_worse_than_with_the_lower(rng: np.random.Generator, joint: str) -> None:
+def test_the_upper_segment_alone_is_never_worse_than_with_the_lower(
+    rng: np.random.Generator, joint: str
+) -> None:
     limits = limits_of(joint)
     angles = rng.uniform(-np.pi, np.pi, (3000, 4))
     angles[:500, 1] = np.pi / 2
@@ -220,8 +225,12 @@ def test_a_mirrored_figure_has_mirrored_angles(rng: np.random.Generator) -> None
     rows = [DOFS.index(name) for name in swap]
     sign = np.array([-1.0 if name in MIDDLE_TURNS else 1.0 for name in DOFS])
     limits = FIGURE.limits
-    np.testing.assert_allclose(limits.lower[rows], np.where(sign > 0, limits.lower, -limits.upper), atol=1e-15)
-    np.testing.assert_allclose(limits.upper[rows], np.where(sign > 0, limits.upper, -limits.lower), atol=1e-15)
+    np.testing.assert_allclose(
+        limits.lower[rows], np.where(sign > 0, limits.lower, -limits.upper), atol=1e-15
+    )
+    np.testing.assert_allclose(
+        limits.upper[rows], np.where(sign > 0, limits.upper, -limits.lower), atol=1e-15
+    )
     q = np.zeros((200, FIGURE.model.nq))
     q[:, 6] = 1
     q[:, FIGURE.angle_index] = limits.lower + rng.random((200, 22)) * (limits.upper - limits.lower)

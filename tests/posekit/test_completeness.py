@@ -5,7 +5,6 @@ something else than posekit's own checks is asked there: projection and lengths 
 and collisions are Pinocchio's on the whole body.
 """
 
-import os
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -94,11 +93,14 @@ def some(chunk: Chunk, count: int) -> np.ndarray:
 
 
 def test_the_truth_is_among_the_survivors_every_time(chunk: Chunk) -> None:
-    assert (distance_to_truth(chunk) < FOUND).all()
+    apart = distance_to_truth(chunk)
+    assert apart.shape == (VIEWS // CHUNKS,)
+    assert (apart < FOUND).all()
 
 
 def test_exact_views_are_judged_as_exact(chunk: Chunk) -> None:
-    assert (~chunk.exact).sum() < FALLBACKS / CHUNKS
+    exact = chunk.exact
+    assert (~exact).sum() < FALLBACKS / CHUNKS
 
 
 def test_every_survivor_reprojects(chunk: Chunk) -> None:
@@ -169,29 +171,34 @@ def test_pinocchios_whole_body_is_free_of_collision(chunk: Chunk) -> None:
     assert not any(pin.computeCollisions(model, data, geometry, geometry_data, row, True) for row in q)
 
 
+@lru_cache(maxsize=1)
+def pool() -> pin.GeometryPool:
+    return pin.GeometryPool(FIGURE.model, FIGURE.geometry, 1)
+
+
 def hit(q: np.ndarray) -> np.ndarray:
     """Ask Pinocchio's pool about whole bodies (N, nq)."""
-    threads = min(2, len(os.sched_getaffinity(0)))
-    pool = pin.GeometryPool(FIGURE.model, FIGURE.geometry, threads)
-    return np.asarray(pin.computeCollisionsInParallel(threads, pool, np.asfortranarray(q.T), True)).astype(bool)
+    return np.asarray(pin.computeCollisionsInParallel(1, pool(), np.asfortranarray(q.T), True)).astype(bool)
 
 
-@pytest.mark.parametrize("index", range(BRUTE_CHUNKS))
-def test_survivors_are_those_of_brute_force(index: int) -> None:
+@pytest.mark.parametrize(
+    ("ranges", "index", "count"),
+    [*(("urdf", index, BRUTE_VIEWS // BRUTE_CHUNKS) for index in range(BRUTE_CHUNKS)), ("table1", 9, 10)],
+)
+def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int) -> None:
     """All 8192 leaves, each lifted and judged on its own; collision once more by Pinocchio, on q."""
-    scene = random_views(FIGURE, BRUTE_VIEWS // BRUTE_CHUNKS, np.random.default_rng([2000, index]))
-    _, view, recovery = recovered(scene)
+    scene = random_views(FIGURE, count, np.random.default_rng([2000, index]))
+    view = view_of(scene)
+    recovery = recover(view, ranges=ranges, tolerance=EXACT)
     lengths = np.array([0.0, *(FIGURE.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)])
     checks = make_checks(
         FIGURE,
         ("rigid-parts", "joint-range", "collision"),
-        ranges=load_ranges("urdf"),
+        ranges=load_ranges(ranges),
         rigid_tolerance=EXACT.rigid,
         angle_tolerance=EXACT.angle,
-        exact=True,
     )
     for k, frame in enumerate(recovery.frames):
-        assert frame.tolerance == EXACT
         leaves, codes = enumerate_leaves(
             scene.camera,
             recovery.fit.root[k],
@@ -206,7 +213,7 @@ def test_survivors_are_those_of_brute_force(index: int) -> None:
         possible = ~violated["rigid_parts"] & ~violated["joint_range"]
         survivors = [int(code, 2) for code in frame.branches]
         assert codes[possible & ~violated["collision"]].tolist() == survivors
-        possible[possible] = ~hit(FIGURE.inverse_kinematics(points[possible]))
+        possible[np.flatnonzero(possible)] = ~hit(FIGURE.inverse_kinematics(points[possible]))
         assert codes[possible].tolist() == survivors
 
 
@@ -245,8 +252,9 @@ def test_limits_met_exactly_and_straight_limbs_are_no_exception() -> None:
     position = target + 4.0 * direction
     scene = observe(FIGURE, CameraSphere().camera, points, look_at(position, target, UP), position, q=q)
     chunk = recovered(scene)
-    assert (distance_to_truth(chunk) < FOUND).all()
-    assert chunk.exact.mean() > 0.999
+    apart, exact = distance_to_truth(chunk), chunk.exact
+    assert (apart < FOUND).all()
+    assert exact.mean() > 0.999
     assert worst_length(chunk) < 1e-9
 
 
@@ -269,17 +277,21 @@ def square_on(off: float, count: int = 200) -> Chunk:
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-6, 1e-5])
 def test_a_segment_square_to_its_ray_keeps_the_truth(off: float) -> None:
     chunk = square_on(off)
-    assert (distance_to_truth(chunk) < FOUND).all()
-    assert chunk.exact.mean() > 0.98
-    if off == 0.0:
-        assert chunk.exact.all()
-        assert all("coincident/" in " ".join(frame.rejected) for frame in chunk.recovery.frames)
+    apart, exact = distance_to_truth(chunk), chunk.exact
+    assert (apart < FOUND).all()
+    assert exact.all()
+    met = ["coincident/" in " ".join(frame.rejected) for frame in chunk.recovery.frames]
+    assert sum(met) > 0.95 * len(met) or off > 1e-7
 
 
 @pytest.mark.parametrize("off", [3e-8, 1e-7])
-def test_where_rounding_hides_two_ends_the_frame_says_measured_and_keeps_the_truth(off: float) -> None:
-    """A root of rounding error is 1e-8 m: in a band some 1e-7 m wide no float64 can tell the two ends apart."""
+def test_two_ends_too_near_to_tell_apart_become_one_and_keep_the_truth(off: float) -> None:
+    """Ends less than 1e-7 m from their middle count as one: no more exact, but the truth is not lost.
+
+    Where the next segment is almost square to its ray as well, the 1e-7 m grow to some 1e-5 at its end.
+    """
     chunk = square_on(off)
-    assert (distance_to_truth(chunk) < 1e-5).all()
-    assert (distance_to_truth(chunk)[chunk.exact] < FOUND).all()
-    assert 0 < chunk.exact.sum() < len(chunk.exact)
+    apart, exact = distance_to_truth(chunk), chunk.exact
+    assert (apart < 1e-4).all()
+    assert np.median(apart) < 2e-7
+    assert 0.5 < exact.mean() < 1

@@ -55,7 +55,7 @@ def configuration(**angles: float) -> np.ndarray:
     q[0, 3:7] = np.array([0.3, -0.5, 0.7, 0.2]) / np.linalg.norm([0.3, -0.5, 0.7, 0.2])
     for name, angle in angles.items():
         q[0, FIGURE.model.idx_qs[FIGURE.model.getJointId(name)]] = np.radians(angle)
-    return q
+    return np.asarray(q)
 
 
 def random_configurations(rng: np.random.Generator, n: int, fraction: np.ndarray | None = None) -> np.ndarray:
@@ -67,7 +67,7 @@ def random_configurations(rng: np.random.Generator, n: int, fraction: np.ndarray
     limits = FIGURE.limits
     at = rng.random((n, 22)) if fraction is None else fraction
     q[:, FIGURE.angle_index] = limits.lower + at * (limits.upper - limits.lower)
-    return q
+    return np.asarray(q)
 
 
 def assert_there_and_back(q: np.ndarray, *, inside: bool = True, figure: Figure = FIGURE) -> None:
@@ -291,7 +291,9 @@ class TestForwardKinematics:
 
 
 class TestQuaternions:
-    @given(st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 4).filter(lambda q: np.linalg.norm(q) > 1e-3))
+    @given(
+        st.tuples(*[st.floats(-1, 1, allow_subnormal=False)] * 4).filter(lambda q: np.linalg.norm(q) > 1e-3)
+    )
     def test_a_rotation_is_recovered(self, components: tuple[float, ...]) -> None:
         q = np.array(components) / np.linalg.norm(components)
         R = pin.Quaternion(q).toRotationMatrix()
@@ -320,7 +322,8 @@ class TestLengths:
         assert middle[2] * 100 == pytest.approx(-0.474, abs=5e-4)
         assert middle[0] * 100 == pytest.approx(3.742, abs=5e-4)
         assert middle[1] == pytest.approx(0, abs=1e-12)
-        np.testing.assert_allclose([neck, pelvis], [[0, 0, 0], [0, 0, -0.463]], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(neck, np.zeros(3), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(pelvis, np.array([0, 0, -0.463]), rtol=0, atol=1e-12)
         np.testing.assert_allclose(FIGURE.neutral_points[:4], [neck, right, left, pelvis], rtol=0, atol=1e-12)
 
     def test_of_the_hips_put_the_pelvis_above_them(self) -> None:
@@ -331,7 +334,7 @@ class TestLengths:
 
     def test_of_the_head_are_those_of_table_a2(self) -> None:
         expected = [[0, 0, 0], [5, 9.5, 0], [3, 13, 5.5], [3, 13, -5.5], [-1, 8, 8.5], [-1, 8, -8.5]]
-        np.testing.assert_allclose(FIGURE.head_points * 100, expected, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(FIGURE.head_points * 100, np.array(expected), rtol=0, atol=1e-12)
 
     @given(factors=st.lists(st.floats(0.995, 1.005), min_size=9, max_size=9))
     def test_any_torso_and_hips_have_the_lengths_they_were_made_from(self, factors: list[float]) -> None:
@@ -385,6 +388,20 @@ class TestScaling:
             assert ours.radius == pytest.approx(factor * theirs.radius, abs=1e-12)
             assert ours.half_length == pytest.approx(factor * theirs.half_length, abs=1e-12)
 
+    def test_the_torsos_capsule_grows_with_the_shoulders_and_the_spine(self) -> None:
+        names = ("neck-pelvis", "right_shoulder-pelvis", "left_shoulder-pelvis")
+        longer = FIGURE.scaled(dict(zip(names, (0.5, 0.536, 0.536), strict=True)))
+        narrower = FIGURE.scaled({"right_shoulder-left_shoulder": 0.9 * 0.403})
+        ours, tall, narrow = (figure.capsules[self.torso(figure)] for figure in (FIGURE, longer, narrower))
+        assert tall.radius == pytest.approx(ours.radius, abs=1e-12)
+        assert tall.half_length == pytest.approx(ours.half_length * 0.5 / 0.463, abs=1e-12)
+        assert narrow.radius == pytest.approx(0.9 * ours.radius, abs=1e-12)
+        assert narrow.half_length == pytest.approx(ours.half_length, abs=1e-12)
+
+    @staticmethod
+    def torso(figure: Figure) -> int:
+        return [capsule.link for capsule in figure.capsules].index("torso")
+
     def test_takes_other_head_points(self) -> None:
         figure = FIGURE.scaled({}, {"neck": [1, 2, 3], "nose": [1.06, 2.1, 3.0]})
         np.testing.assert_allclose(figure.head_points[1], [0.06, 0.1, 0], rtol=0, atol=1e-12)
@@ -431,7 +448,10 @@ class TestFiles:
         assert load_figure(str(path)).collision_pairs == FIGURE.collision_pairs
 
     def test_the_hash_tells_figures_apart(self) -> None:
-        assert len({FIGURE.hash, FIGURE.scaled(OTHER).hash, FIGURE.with_limits({"neck.flexion": (0, 1)}).hash}) == 3
+        assert (
+            len({FIGURE.hash, FIGURE.scaled(OTHER).hash, FIGURE.with_limits({"neck.flexion": (0, 1)}).hash})
+            == 3
+        )
 
     def test_a_figure_can_be_pickled(self) -> None:
         again = pickle.loads(pickle.dumps(FIGURE))
@@ -454,7 +474,8 @@ class TestNames:
         def moved(point: str, **angles: float) -> np.ndarray:
             q = configuration(**angles)
             q[:, :7] = pin.neutral(FIGURE.model)[:7]
-            return FIGURE.forward_kinematics(q)[0, POINTS.index(point)] - FIGURE.neutral_points[POINTS.index(point)]
+            k = POINTS.index(point)
+            return np.asarray(FIGURE.forward_kinematics(q)[0, k] - FIGURE.neutral_points[k])
 
         x, y = 0, 1
         assert moved("right_elbow", right_shoulder_flexion=30)[x] > 0.1
@@ -485,7 +506,10 @@ def without_the_head_capsule(text: str) -> str:
 
 ENTITY = '<!DOCTYPE robot [<!ENTITY a "b">]>'
 BREAKS: dict[str, tuple[Callable[[str], str], str]] = {
-    "doctype": (lambda t: t.replace("<robot ", "<!DOCTYPE robot><robot ", 1), "DOCTYPE and entities are refused"),
+    "doctype": (
+        lambda t: t.replace("<robot ", "<!DOCTYPE robot><robot ", 1),
+        "DOCTYPE and entities are refused",
+    ),
     "entity": (lambda t: t.replace("<robot ", f"{ENTITY}<robot ", 1), "DOCTYPE and entities are refused"),
     "truncated": (lambda t: t[:2000], "not well-formed"),
     "empty": (lambda t: "", "not well-formed"),
@@ -507,18 +531,29 @@ BREAKS: dict[str, tuple[Callable[[str], str], str]] = {
         "'torso': its collision body is a Cylinder; expected a capsule",
     ),
     "a mesh": (
-        lambda t: t.replace('<cylinder radius="0.1" length="0.28"/>', '<mesh filename="file:///etc/hostname"/>'),
+        lambda t: t.replace(
+            '<cylinder radius="0.1" length="0.28"/>', '<mesh filename="file:///etc/hostname"/>'
+        ),
         "a collision body is a mesh",
     ),
-    "a capsule off its line": (lambda t: t.replace('xyz="0 0 -0.26"', 'xyz="0 0.01 -0.26"'), "beside the line"),
+    "a capsule off its line": (
+        lambda t: t.replace('xyz="0 0 -0.26"', 'xyz="0 0.01 -0.26"'),
+        "beside the line",
+    ),
     "an axis of another kind": (
         lambda t: t.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 0 1"/>', 1),
         "'neck_flexion' turns about",
     ),
     "a slanted axis": (lambda t: t.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 1 0.1"/>', 1), "turns about"),
     "a sliding joint": (lambda t: t.replace('type="revolute"', 'type="prismatic"', 1), "turns about"),
-    "an endless joint": (lambda t: t.replace('type="revolute"', 'type="continuous"', 1), "not a stick figure"),
-    "another name": (lambda t: t.replace('"right_wrist_fixed"', '"x"').replace('"right_wrist"', '"y"'), "right_wrist"),
+    "an endless joint": (
+        lambda t: t.replace('type="revolute"', 'type="continuous"', 1),
+        "not a stick figure",
+    ),
+    "another name": (
+        lambda t: t.replace('"right_wrist_fixed"', '"x"').replace('"right_wrist"', '"y"'),
+        "right_wrist",
+    ),
     "a turned joint": (
         lambda t: t.replace('<origin xyz="0 0 -0.38"/>', '<origin xyz="0 0 -0.38" rpy="0 0.3 0"/>', 1),
         "'right_ankle' does not lie as the stick figure's",
@@ -564,7 +599,10 @@ class TestRefusals:
     @pytest.mark.parametrize(
         ("lengths", "match"),
         [
-            ({"right_hip-right_knee": 0.0}, "right_hip-right_knee is 0 m; expected a positive, finite length"),
+            (
+                {"right_hip-right_knee": 0.0},
+                "right_hip-right_knee is 0 m; expected a positive, finite length",
+            ),
             ({"right_hip-right_knee": -0.4}, "is -0.4 m"),
             ({"right_hip-right_knee": float("nan")}, "is nan m"),
             ({"right_hip-right_knee": float("inf")}, "is inf m"),
@@ -573,9 +611,16 @@ class TestRefusals:
             ({"neck-pelvis": 0.9}, "the triangle neck, right_shoulder, pelvis does not close with 0.9"),
             ({"right_shoulder-pelvis": 0.1}, "the triangle neck, right_shoulder, pelvis does not close"),
             ({"neck-left_shoulder": 1.0}, "the triangle neck, left_shoulder, pelvis does not close"),
-            ({"right_shoulder-left_shoulder": 0.6}, "right_shoulder-left_shoulder is 0.6 m, but with the other"),
             (
-                {"neck-right_shoulder": 0.1, "right_shoulder-pelvis": 0.4, "right_shoulder-left_shoulder": 0.01},
+                {"right_shoulder-left_shoulder": 0.6},
+                "right_shoulder-left_shoulder is 0.6 m, but with the other",
+            ),
+            (
+                {
+                    "neck-right_shoulder": 0.1,
+                    "right_shoulder-pelvis": 0.4,
+                    "right_shoulder-left_shoulder": 0.01,
+                },
                 "the shoulders' heights differ",
             ),
             ({"pelvis-right_hip": 0.6}, "the triangle right_hip, pelvis, left_hip does not close"),

@@ -24,7 +24,7 @@ def quadratic(start: np.ndarray, ray: np.ndarray, length: float) -> list[float]:
 
 
 def random_segments(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    start = rng.uniform(-1, 1, (n, 3)) + [0, 0, 4]
+    start = rng.uniform(-1, 1, (n, 3)) + np.array([0, 0, 4])
     length = rng.uniform(0.1, 0.6, n)
     direction = rng.normal(size=(n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
@@ -109,7 +109,9 @@ def test_an_end_behind_the_camera_is_no_solution() -> None:
     np.testing.assert_array_equal(lifted.valid, [[False, True]])
     np.testing.assert_allclose(lifted.points[0, 1], [0, 0, 0.7], rtol=0, atol=1e-15)
     assert not lift([0.0, 0.0, -2.0], [960, 540], 0.5).valid.any()
-    tangent_behind = meet_sphere(np.zeros(3), AHEAD, np.array([[0.5, 0, -2]]), np.array([0.5]), tolerance=1e-3)
+    tangent_behind = meet_sphere(
+        np.zeros(3), AHEAD, np.array([[0.5, 0, -2]]), np.array([0.5]), tolerance=1e-3
+    )
     assert not tangent_behind.valid.any()
 
 
@@ -135,7 +137,7 @@ def test_a_negative_tolerance_is_none() -> None:
 )
 def test_a_looser_tolerance_never_loses_solutions(seed: int, tolerances: list[float]) -> None:
     rng = np.random.default_rng(seed)
-    start = rng.uniform(-1, 1, (50, 3)) + [0, 0, 1]
+    start = rng.uniform(-1, 1, (50, 3)) + np.array([0, 0, 1])
     pixel = rng.uniform([0, 0], [1920, 1080], (50, 2))
     length = rng.uniform(0.01, 2, 50)
     strict, loose = (CAMERA.lift(start, pixel, length, tolerance=tolerance) for tolerance in tolerances)
@@ -147,20 +149,24 @@ def test_a_looser_tolerance_never_loses_solutions(seed: int, tolerances: list[fl
 @given(seed=st.integers(0, 2**31), tolerance=st.floats(0, 0.1))
 def test_the_number_of_solutions_follows_from_the_excess(seed: int, tolerance: float) -> None:
     rng = np.random.default_rng(seed)
-    start = rng.uniform(-1, 1, (50, 3)) + [0, 0, 6]
+    start = rng.uniform(-1, 1, (50, 3)) + np.array([0, 0, 6])
     length = rng.uniform(0.01, 2, 50)
     lifted = CAMERA.lift(start, rng.uniform([0, 0], [1920, 1080], (50, 2)), length, tolerance=tolerance)
     count = lifted.valid.sum(axis=1)
     clear = np.abs(lifted.excess) > 1e-9
     np.testing.assert_array_equal(count == 2, (lifted.excess < 0) & clear)
-    np.testing.assert_array_equal((count == 1)[clear], ((lifted.excess > 0) & (lifted.excess <= tolerance))[clear])
+    np.testing.assert_array_equal(
+        (count == 1)[clear], ((lifted.excess > 0) & (lifted.excess <= tolerance))[clear]
+    )
     np.testing.assert_array_equal(count == 0, lifted.excess > tolerance)
 
 
 @pytest.mark.parametrize("unknown", ["start", "pixel"])
 def test_what_is_unknown_has_no_solution(unknown: str) -> None:
     nan = float("nan")
-    lifted = lift([nan, 0, 4] if unknown == "start" else [0, 0, 4], [960, nan if unknown == "pixel" else 540], 0.3)
+    lifted = lift(
+        [nan, 0, 4] if unknown == "start" else [0, 0, 4], [960, nan if unknown == "pixel" else 540], 0.3
+    )
     assert not lifted.valid.any()
     assert np.isnan(lifted.points).any(axis=-1).all()
     assert np.isnan(lifted.excess).all()
@@ -178,6 +184,8 @@ def test_a_batch_is_its_elements(rng: np.random.Generator) -> None:
         start.reshape(4, 6, 3), CAMERA.project(end).reshape(4, 6, 2), length.reshape(4, 6), tolerance=0.0
     )
     for k in range(24):
-        alone = CAMERA.lift(start[k : k + 1], CAMERA.project(end[k : k + 1]), length[k : k + 1], tolerance=0.0)
+        alone = CAMERA.lift(
+            start[k : k + 1], CAMERA.project(end[k : k + 1]), length[k : k + 1], tolerance=0.0
+        )
         np.testing.assert_array_equal(shaped.points.reshape(24, 2, 3)[k], alone.points[0])
         np.testing.assert_array_equal(shaped.valid.reshape(24, 2)[k], alone.valid[0])

@@ -1,6 +1,7 @@
 """The interpretation tree: its laws, and brute force over all leaves by a recursion that shares nothing with it."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -33,7 +34,7 @@ def legal_postures(seed: int, n: int) -> np.ndarray:
     q[:, FIGURE.angle_index] = limits.lower + rng.random((4 * n, 22)) * (limits.upper - limits.lower)
     points = FIGURE.forward_kinematics(q)
     hit = np.any([c.judge(points[:, c.points]).violated[:, 0] for c in collision(FIGURE)], axis=0)
-    return points[~hit][:n]
+    return np.asarray(points[~hit][:n])
 
 
 POSTURES = legal_postures(7, 12)
@@ -111,9 +112,7 @@ def test_every_leaf_reprojects_and_keeps_every_length() -> None:
     leaves = grow(POSTURES[:3], [])
     joints = leaves.postures()
     image = CAMERA.project(POSTURES)[:, :N]
-    np.testing.assert_allclose(
-        (CAMERA.project(joints) - image[leaves.frame]) / 1500, 0, rtol=0, atol=1e-12
-    )
+    np.testing.assert_allclose((CAMERA.project(joints) - image[leaves.frame]) / 1500, 0, rtol=0, atol=1e-12)
     lengths = np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
     np.testing.assert_allclose(lengths, np.broadcast_to(LENGTHS[1:], lengths.shape), rtol=0, atol=1e-12)
     assert (leaves.length_residual() <= 1e-12).all()
@@ -254,8 +253,13 @@ def test_a_root_that_is_unknown_leaves_one_unknown_posture() -> None:
 
 
 def test_the_mirror_image_has_the_mirrored_survivors() -> None:
-    swap = [JOINT[name.replace("right", "LEFT").replace("left", "right").replace("LEFT", "left")] for name in JOINTS]
-    swap += [N + HEAD_POINTS.index(name) for name in ("nose", "left_eye", "right_eye", "left_ear", "right_ear")]
+    swap = [
+        JOINT[name.replace("right", "LEFT").replace("left", "right").replace("LEFT", "left")]
+        for name in JOINTS
+    ]
+    swap += [
+        N + HEAD_POINTS.index(name) for name in ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
+    ]
     points = POSTURES[:6]
     leaves, mirrored = grow(points), grow((points * [-1, 1, 1])[:, swap])
     np.testing.assert_array_equal(np.diff(leaves.offsets()), np.diff(mirrored.offsets()))
@@ -277,9 +281,20 @@ def test_a_looser_tolerance_never_loses_a_leaf(rng: np.random.Generator) -> None
         sets.append(members(leaves))
         residuals.append(leaves.length_residual().max(initial=0.0))
         assert residuals[-1] <= tolerance
-    for strict, loose in zip(sets, sets[1:], strict=False):
+    for strict, loose in pairwise(sets):
         assert strict <= loose
     assert len(sets[0]) < len(sets[-1])
+
+
+def test_a_leaf_carries_the_length_that_its_tangents_lack(rng: np.random.Generator) -> None:
+    points = POSTURES[:3]
+    image = CAMERA.project(points)[:, :N] + rng.normal(size=(3, N, 2)) * 8
+    leaves = TREE.grow(CAMERA, points[:, 0], image, [], given=points[:, N:], tolerance=0.1)
+    joints = leaves.postures()
+    lengths = np.linalg.norm(joints[:, 1:] - joints[:, list(PARENTS[1:])], axis=-1)
+    longer = np.maximum(lengths - LENGTHS[1:], 0).max(axis=1)
+    np.testing.assert_allclose(leaves.length_residual(), longer, rtol=0, atol=1e-12)
+    assert longer.max() > 1e-3
 
 
 def test_a_segment_too_short_says_which_and_by_how_much() -> None:
@@ -333,9 +348,7 @@ class Seen:
 
     def judge(self, points: np.ndarray) -> Findings:
         self.asked.append(points)
-        return Findings(
-            value=points[:, -1, 2:], lower=np.array([-np.inf]), upper=np.array([self.limit])
-        )
+        return Findings(value=points[:, -1, 2:], lower=np.array([-np.inf]), upper=np.array([self.limit]))
 
 
 def test_a_check_is_asked_once_for_each_choice_of_its_own_branches() -> None:

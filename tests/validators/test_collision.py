@@ -2,6 +2,7 @@
 
 import math
 from fractions import Fraction
+from itertools import pairwise
 
 import coal
 import numpy as np
@@ -148,7 +149,7 @@ def test_the_distance_of_segments_by_hand(gap: list[float], half_b: list[float],
 @given(numbers=st.lists(st.floats(-0.5, 0.5, allow_subnormal=False), min_size=9, max_size=9))
 def test_no_two_points_of_the_segments_are_nearer(numbers: list[float]) -> None:
     gap, half_a, half_b = np.array(numbers).reshape(3, 3)
-    half_a, half_b = half_a + [0.6, 0, 0], half_b + [0, 0.6, 0]
+    half_a, half_b = half_a + np.array([0.6, 0, 0]), half_b + np.array([0, 0.6, 0])
     found = segment_distance(gap[None], half_a[None], half_b[None])[0]
     s, t = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 41))
     grid = np.linalg.norm(gap + t[..., None] * half_b - s[..., None] * half_a, axis=-1)
@@ -192,7 +193,7 @@ def test_a_verdict_is_a_distance_below_the_margin(contact_margin: float) -> None
 def test_a_larger_margin_never_rejects_less() -> None:
     points = FIGURE.forward_kinematics(configurations(1000, wild=True))
     rejected = [verdicts(points, contact_margin=m) for m in (-0.2, -0.1, -0.05, -0.01, 0.0, 0.01, 0.05, 0.2)]
-    for smaller, larger in zip(rejected, rejected[1:], strict=False):
+    for smaller, larger in pairwise(rejected):
         assert (larger | ~smaller).all()
         assert larger.sum() > smaller.sum()
 
@@ -211,7 +212,9 @@ def test_the_exact_flag_changes_no_verdict_and_never_lowers_a_value(contact_marg
     np.testing.assert_array_equal(quick[rejected], exact[rejected])
 
 
-@pytest.mark.parametrize(("depth", "rejected"), [(-1e-6, False), (-2e-9, False), (0.0, False), (2e-9, True), (1e-6, True)])
+@pytest.mark.parametrize(
+    ("depth", "rejected"), [(-1e-6, False), (-2e-9, False), (0.0, False), (2e-9, True), (1e-6, True)]
+)
 @pytest.mark.parametrize("contact_margin", [-0.02, 0.0, 0.05])
 def test_two_capsules_just_pass_and_just_fail(depth: float, rejected: bool, contact_margin: float) -> None:
     a = Capsule(link="a", start=(0,), end=(1,), center=0.2, half_length=0.15, radius=0.05)
@@ -244,8 +247,12 @@ def test_what_is_checked_is_what_the_figure_says() -> None:
     legs = [f"{side}_{part}" for side in ("right", "left") for part in ("thigh", "shank")]
     wanted = {(arm, other) for arm in arms for other in ("torso", "head", *legs)}
     wanted |= {(f"{side}_forearm", "hips") for side in ("right", "left")}
-    wanted |= {(f"right_{a}", f"left_{b}") for group in (("upper_arm", "forearm"), ("thigh", "shank"))
-               for a in group for b in group}
+    wanted |= {
+        (f"right_{a}", f"left_{b}")
+        for group in (("upper_arm", "forearm"), ("thigh", "shank"))
+        for a in group
+        for b in group
+    }
     checked = {frozenset(pair.split("-")) for pair in PAIRS}
     assert checked == {frozenset(pair) for pair in wanted}
 
@@ -264,7 +271,9 @@ def test_the_mirror_image_has_the_mirrored_verdicts() -> None:
     other = [name.replace("right", "L").replace("left", "right").replace("L", "left") for name in POINTS]
     mirrored = (points * [-1, 1, 1])[:, [POINTS.index(name) for name in other]]
     np.testing.assert_array_equal(verdicts(points).any(axis=1), verdicts(mirrored).any(axis=1))
-    np.testing.assert_allclose(distances(points).min(axis=1), distances(mirrored).min(axis=1), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(
+        distances(points).min(axis=1), distances(mirrored).min(axis=1), rtol=0, atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("exact", [False, True])

@@ -59,7 +59,8 @@ def test_a_file_names_some_of_the_figures_angles(tmp_path: Path) -> None:
 
 def test_a_file_may_name_all_of_them_or_none(tmp_path: Path) -> None:
     everything = "".join(
-        f"[{joint}]\n" + "".join(f"{dof.split('.')[1]} = [-1, 1]\n" for dof in DOFS if dof.split(".")[0] == joint)
+        f"[{joint}]\n"
+        + "".join(f"{dof.split('.')[1]} = [-1, 1]\n" for dof in DOFS if dof.split(".")[0] == joint)
         for joint in dict.fromkeys(dof.split(".")[0] for dof in DOFS)
     )
     assert set(load(tmp_path, HEAD + everything).limits) == set(DOFS)
@@ -82,7 +83,10 @@ def test_equal_bounds_are_a_range(tmp_path: Path) -> None:
 
 WRONG = {
     "no schema": ("", "schema is None; expected 'posekit.ranges/1'"),
-    "another schema": ('schema = "posekit.ranges/9"', "schema is 'posekit.ranges/9'; expected 'posekit.ranges/1'"),
+    "another schema": (
+        'schema = "posekit.ranges/9"',
+        "schema is 'posekit.ranges/9'; expected 'posekit.ranges/1'",
+    ),
     "no kind": (f'schema = "{SCHEMA}"', "kind is None; expected 'configuration' or 'projected'"),
     "another kind": (f'schema = "{SCHEMA}"\nkind = "euler"', "kind is 'euler'"),
     "no TOML": (HEAD + "[neck\n", "not TOML"),
@@ -90,22 +94,34 @@ WRONG = {
     "a control character": (HEAD + "a = \0", "not TOML"),
     "deep nesting": (HEAD + "a = " + "[" * 50_000, "not TOML"),
     "a number of 5000 digits": (HEAD + f"[neck]\nflexion = [0, 1{'0' * 5000}]\n", "not TOML"),
-    "a number of 400 digits": (HEAD + f"[neck]\nflexion = [0, 1{'0' * 400}]\n", "neck.flexion: inf; expected a finite"),
+    "a number of 400 digits": (
+        HEAD + f"[neck]\nflexion = [0, 1{'0' * 400}]\n",
+        "neck.flexion: inf; expected a finite",
+    ),
     "NaN": (HEAD + "[neck]\nflexion = [nan, 1]\n", "neck.flexion: nan; expected a finite number"),
     "infinity": (HEAD + "[neck]\nflexion = [0, inf]\n", "neck.flexion: inf; expected a finite number"),
     "a string": (HEAD + '[neck]\nflexion = ["0", 1]\n', "neck.flexion: '0'; expected a finite number"),
     "a truth value": (HEAD + "[neck]\nflexion = [true, 1]\n", "neck.flexion: True; expected a finite number"),
     "one number": (HEAD + "[neck]\nflexion = 3\n", "neck.flexion: 3; expected [lower, upper] in degrees"),
     "three numbers": (HEAD + "[neck]\nflexion = [1, 2, 3]\n", "expected [lower, upper] in degrees"),
-    "swapped bounds": (HEAD + "[neck]\nflexion = [10, -10]\n", "neck.flexion: lower 10 is above upper -10; swap them"),
+    "swapped bounds": (
+        HEAD + "[neck]\nflexion = [10, -10]\n",
+        "neck.flexion: lower 10 is above upper -10; swap them",
+    ),
     "an unknown joint": (HEAD + "[tail]\nflexion = [0, 1]\n", "'tail.flexion' is not an angle of kind"),
     "an unknown angle": (HEAD + "[neck]\nabduction = [0, 1]\n", "'neck.abduction' is not an angle of kind"),
-    "a joint of the other kind": (HEAD + "[shoulder]\nflexion = [0, 1]\n", "'shoulder.flexion' is not an angle"),
+    "a joint of the other kind": (
+        HEAD + "[shoulder]\nflexion = [0, 1]\n",
+        "'shoulder.flexion' is not an angle",
+    ),
     "no table": (HEAD + "neck = 3\n", "'neck': expected a table"),
     "a line break in a name": (HEAD + '["a\\nb"]\nflexion = [0, 1]\n', "is not an angle of kind"),
     "a line break in a key": (HEAD + '"a\\nb" = 3\n', "expected a table"),
     "missing angles": (PROJECTED + "[neck]\nflexion = [0, 1]\n", "missing elbow.flexion, hip.abduction"),
-    "a threshold that is none": (HEAD + 'knee_flexed = "bent"\n', "knee_flexed: 'bent'; expected a finite number"),
+    "a threshold that is none": (
+        HEAD + 'knee_flexed = "bent"\n',
+        "knee_flexed: 'bent'; expected a finite number",
+    ),
     "a negative threshold": (HEAD + "shortest_projection = -0.1\n", "expected a fraction from 0 to below 1"),
     "a threshold of one": (HEAD + "shortest_projection = 1\n", "expected a fraction from 0 to below 1"),
 }

@@ -1,5 +1,7 @@
 """Rigid parts: just passes, just fails, and the mirror image that distances cannot tell."""
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -34,7 +36,9 @@ def judge(points: np.ndarray, *, tolerance: float, mode: Mode = "placement") -> 
 
 def violated(points: np.ndarray, *, tolerance: float, mode: Mode = "placement") -> list[str]:
     return [
-        name for name, findings in judge(points, tolerance=tolerance, mode=mode).items() if findings.violated.any()
+        name
+        for name, findings in judge(points, tolerance=tolerance, mode=mode).items()
+        if findings.violated.any()
     ]
 
 
@@ -60,7 +64,9 @@ def test_a_distance_just_passes_and_just_fails(
     points[:, b] += sign * off * along / np.linalg.norm(along, axis=1, keepdims=True)
     findings = judge(points, tolerance=0.01, mode="distances")[segment_name(segment)]
     assert (findings.violated == (not passes)).all()
-    np.testing.assert_allclose(findings.value[:, 0] - FIGURE.lengths[segment_name(segment)], sign * off, atol=1e-12)
+    np.testing.assert_allclose(
+        findings.value[:, 0] - FIGURE.lengths[segment_name(segment)], sign * off, atol=1e-12
+    )
     np.testing.assert_allclose(findings.margin[:, 0], 0.01 - off, rtol=0, atol=1e-12)
 
 
@@ -99,7 +105,7 @@ def test_a_looser_tolerance_never_rejects_more(rng: np.random.Generator) -> None
     for tolerance in (0.0, 0.005, 0.01, 0.02, 0.05, 0.2):
         findings = judge(points, tolerance=tolerance).values()
         rejected.append(np.any([f.violated[:, 0] for f in findings], axis=0))
-    for strict, loose in zip(rejected, rejected[1:], strict=False):
+    for strict, loose in pairwise(rejected):
         assert (strict | ~loose).all()
     assert rejected[0].all()
     assert not rejected[-1].any()
