@@ -81,7 +81,7 @@ class Neck:
     def judge(self, points: Array) -> Findings:
         """Judge the neck's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        angles = self.figure.neck_angles(R_torso, points[:, 0], points[:, 4:])
+        angles = self.figure.ik.neck(R_torso, points[:, 0], points[:, 4:])
         return _findings(self.figure, self.where, angles, self.tolerance)
 
 
@@ -100,7 +100,7 @@ class Pelvis:
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
-        angles = self.figure.pelvis_angles(R_torso, R_hips)
+        angles = self.figure.ik.pelvis(R_torso, R_hips)
         return _findings(self.figure, self.where, angles, self.tolerance)
 
 
@@ -143,7 +143,7 @@ class Limb:
         rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
         R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
-        angles = self.figure.limb_angles(self.limb[0], R_parent, limb[0], limb[1], end)
+        angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
         tolerance = np.full((len(angles), len(self.where)), self.tolerance)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))

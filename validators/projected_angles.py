@@ -212,7 +212,7 @@ class HeadPlane:
     def judge(self, points: Array) -> Findings:
         """Judge the neck; see `posekit.tree.Check`."""
         axes = paper_axes(points[:, :4])
-        R_head = self.figure.head_frame(points[:, 0], points[:, 4:])
+        R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:])
         normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
         angles = plane_angles(normal, -crown, self.ranges)
         angles[:, 0] *= -1

@@ -99,7 +99,7 @@ class _Rule:
     def body(self, points: Array) -> Body:
         """Find the axes of the body plane."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        R_head = self.figure.head_frame(points[:, 0], points[:, 4:9])
+        R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:9])
         down = -R_torso[:, :, 2]
         facing = np.where(np.isnan(R_head[:, :, 0]), R_torso[:, :, 0], R_head[:, :, 0])
         forward = unit(facing - np.einsum("ni,ni->n", facing, down)[:, None] * down)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
-from importlib import resources
+from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -16,13 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.cameras import Array
 from posekit.errors import FigureError
-from posekit.figure.angles import Limits, ball_angles, direction_angles, limb_angles
+from posekit.figure.angles import Limits
 from posekit.figure.capsules import Capsule, read_capsules
-from posekit.figure.frames import fit_rotation, hips_frame, torso_frame, unit
+from posekit.figure.closed_form import ClosedForm, with_head
+from posekit.figure.frames import quaternions, torso_frame
+from posekit.figure.layout import axis_signs, check_layout
 from posekit.figure.lengths import check_lengths
-from posekit.figure.second_reader import compare_readers
 from posekit.figure.stature import lengths_from_stature
-from posekit.figure.urdf import parse, read_text, replace_limits, rewrite
+from posekit.figure.urdf import parse, replace_limits, rewrite, write_texts
 from posekit.skeleton import (
     DOFS,
     HEAD,
@@ -51,9 +52,6 @@ FRAMES = {
     },
 }
 """The URDF link whose origin is each point; points that are not listed have a link of their own name."""
-
-AXIS_OF_ANGLE = {"flexion": 1, "bending": 0, "abduction": 0, "rotation": 2}
-"""Flexion turns about y, bending and abduction about x, rotation about z, in this order."""
 
 
 class Configurations(NamedTuple):
@@ -104,9 +102,8 @@ class Figure:
                 f"{self.source}: not a stick figure: it has {self.model.nq} configuration variables, expected "
                 f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
             )
-        self._check_axes()
-        _ = self.capsules
-        self._check_layout()
+        _ = self.limits, self.capsules
+        check_layout(self)
 
     @cached_property
     def model(self) -> pin.Model:
@@ -136,10 +133,9 @@ class Figure:
     @cached_property
     def lengths(self) -> Mapping[str, float]:
         """The 17 lengths, metres, by segment name."""
-        return {
-            segment_name((a, b)): float(np.linalg.norm(self.neutral_points[a] - self.neutral_points[b]))
-            for a, b in SEGMENTS
-        }
+        points = self.neutral_points
+        lengths = {segment_name((a, b)): float(np.linalg.norm(points[a] - points[b])) for a, b in SEGMENTS}
+        return MappingProxyType(lengths)
 
     @cached_property
     def head_points(self) -> Array:
@@ -166,10 +162,15 @@ class Figure:
         """Signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
         index = self.angle_index
         return Limits(
-            sign=np.array([self._axis(dof)[AXIS_OF_ANGLE[dof.split(".")[1]]] for dof in DOFS]),
+            sign=axis_signs(self.model, self.source),
             lower=self.model.lowerPositionLimit[index],
             upper=self.model.upperPositionLimit[index],
         )
+
+    @cached_property
+    def ik(self) -> ClosedForm:
+        """The closed form from points to angles."""
+        return ClosedForm(limits=self.limits, head_offsets=self._head_offsets)
 
     @cached_property
     def angle_index(self) -> NDArray[np.intp]:
@@ -224,10 +225,14 @@ class Figure:
         return Figure(urdf=replace_limits(self.urdf, named), srdf=self.srdf, source=self.source)
 
     def write(self, path: str | Path) -> None:
-        """Write the URDF to `path` and the SRDF beside it."""
-        path = Path(path)
-        path.write_text(self.urdf, encoding="utf-8")
-        path.with_suffix(".srdf").write_text(self.srdf, encoding="utf-8")
+        """Write the URDF to `path` and the SRDF beside it; `posekit.load_figure` reads them again.
+
+        Raises
+        ------
+        FigureError
+            Where they cannot be written.
+        """
+        write_texts(Path(path), self.urdf, self.srdf)
 
     def forward_kinematics(self, q: Array) -> Array:
         """Place the 19 points by Pinocchio's forward kinematics.
@@ -298,55 +303,10 @@ class Figure:
         q = np.full((len(points), self.model.nq), np.nan)
         q[:, :3] = points[:, 0]
         q[:, 3:7] = quaternions(R_torso)
-        angles = self.angles(points, R_torso)
+        angles = self.ik.angles(points, R_torso)
         angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
         q[:, self.angle_index] = angles
         return q
-
-    def angles(self, points: Array, R_torso: Array) -> Array:
-        """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians."""
-        joint = {name: points[:, index] for name, index in JOINT.items()}
-        R_hips = hips_frame(joint["pelvis"], joint["right_hip"], joint["left_hip"])
-        angles = np.empty((len(points), len(DOFS)))
-        angles[:, :3] = self.neck_angles(R_torso, points[:, 0], points[:, HEAD])
-        angles[:, 3:6] = self.pelvis_angles(R_torso, R_hips)
-        for k, (limb, R_parent) in enumerate(
-            ((("shoulder", "elbow", "wrist"), R_torso), (("hip", "knee", "ankle"), R_hips))
-        ):
-            for i, side in enumerate(SIDES):
-                start, middle, end = (joint[f"{side}_{name}"] for name in limb)
-                first = 6 + 8 * k + 4 * i
-                angles[:, first : first + 4] = self.limb_angles(
-                    f"{side}_{limb[0]}", R_parent, start, middle, end
-                )
-        return angles
-
-    def head_frame(self, neck: Array, head: Array) -> Array:
-        """Lay the figure's head onto seen head points (N, 5, 3): R_cam_head (N, 3, 3), NaN where they are unknown."""
-        return fit_rotation(self._head_offsets, head - neck[:, None])
-
-    def neck_angles(self, R_torso: Array, neck: Array, head: Array) -> Array:
-        """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
-        R_head = self.head_frame(neck, head)
-        return ball_angles(_transposed_product(R_torso, R_head), self._limits_of("neck.flexion", 3))
-
-    def pelvis_angles(self, R_torso: Array, R_hips: Array) -> Array:
-        """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
-        return ball_angles(_transposed_product(R_torso, R_hips), self._limits_of("pelvis.flexion", 3))
-
-    def limb_angles(
-        self, joint: str, R_parent: Array, start: Array, middle: Array, end: Array | None
-    ) -> Array:
-        """Find a limb's four angles (N, 4), radians; rotation and hinge NaN where its end (N, 3) is not known."""
-        limits = self._limits_of(f"{joint}.flexion", 4)
-        upper = _into(R_parent, unit(middle - start))
-        angles = np.full((len(start), 4), np.nan)
-        angles[:, :2] = direction_angles(upper, limits)
-        if end is not None:
-            known = np.isfinite(end).all(axis=1)
-            lower = _into(R_parent, unit(end - middle))
-            angles[known] = limb_angles(upper[known], lower[known], limits)
-        return angles
 
     @cached_property
     def _data(self) -> pin.Data:
@@ -355,13 +315,6 @@ class Figure:
     @cached_property
     def _head_offsets(self) -> Array:
         return np.asarray(self.neutral_points[list(HEAD)] - self.neutral_points[0])
-
-    def _limits_of(self, first: str, count: int) -> Limits:
-        k = DOFS.index(first)
-        part = slice(k, k + count)
-        return Limits(
-            sign=self.limits.sign[part], lower=self.limits.lower[part], upper=self.limits.upper[part]
-        )
 
     def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
         """Return the five head points in the head link's frame, some of them replaced."""
@@ -383,116 +336,6 @@ class Figure:
             raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
         return head
 
-    def _axis(self, dof: str) -> Array:
-        """Return a revolute's axis in its joint frame, as the URDF gives it."""
-        joint = self.model.joints[self.model.getJointId(urdf_joint_name(dof))]
-        data = joint.createData()
-        joint.calc(data, np.zeros(joint.nq))
-        return np.asarray(data.S).reshape(6)[3:]
-
-    def _check_axes(self) -> None:
-        for dof in DOFS:
-            axis = self._axis(dof)
-            expected = AXIS_OF_ANGLE[dof.split(".")[1]]
-            if abs(abs(axis[expected]) - 1) > 0:
-                raise FigureError(
-                    f"{self.source}: joint {urdf_joint_name(dof)!r} turns about {axis.tolist()}; expected plus or "
-                    f"minus the {'xyz'[expected]} axis"
-                )
-
-    def _check_layout(self) -> None:
-        """Refuse joints that lie otherwise than the closed form of `inverse_kinematics` takes them to."""
-        q = pin.neutral(self.model)[None]
-        q[:, self.angle_index] = self.limits.lower + 0.4 * (self.limits.upper - self.limits.lower)
-        points = self.forward_kinematics(q)
-        back = self.forward_kinematics(self.inverse_kinematics(points))
-        worst = np.linalg.norm(back - points, axis=-1)[0]
-        if not (worst < 1e-6).all():
-            raise FigureError(
-                f"{self.source}: the joint before {POINTS[int(np.argmin(worst < 1e-6))]!r} does not lie as the stick "
-                "figure's; expected limbs along -z, joint origins without rpy, and the stick figure's order of joints"
-            )
-
-
-@lru_cache(maxsize=1)
-def _built_in() -> Figure:
-    folder = resources.files("posekit.urdf")
-    return Figure(
-        urdf=(folder / "stick_figure.urdf").read_text(encoding="utf-8"),
-        srdf=(folder / "stick_figure.srdf").read_text(encoding="utf-8"),
-    )
-
-
-def load_figure(path: str | Path | None = None) -> Figure:
-    """Load the built-in figure (Lee & Chen 1985, Tables A.1 and A.2), or one that `Figure.write` wrote.
-
-    Parameters
-    ----------
-    path : path, optional
-        A URDF with the stick figure's joints; an SRDF of the same name beside it, or the built-in one.
-
-    Raises
-    ------
-    FigureError
-        Where the file cannot be read or is not a stick figure.
-    """
-    if path is None:
-        return _built_in()
-    path = Path(path)
-    srdf = path.with_suffix(".srdf")
-    figure = Figure(
-        urdf=read_text(path),
-        srdf=read_text(srdf) if srdf.exists() else _built_in().srdf,
-        source=str(path),
-    )
-    compare_readers(figure.urdf, figure.model, figure.source)
-    return figure
-
-
-def with_head(points: Array) -> Array:
-    """Append unknown head points to postures (N, 14, 3); leave (N, 19, 3) as they are."""
-    if points.ndim != 3 or points.shape[1] not in (len(JOINTS), len(POINTS)) or points.shape[2] != 3:
-        raise FigureError(
-            f"postures have shape {points.shape}; expected (N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
-        )
-    if points.shape[1] == len(POINTS):
-        return points
-    return np.concatenate([points, np.full((len(points), len(HEAD), 3), np.nan)], axis=1)
-
-
-def quaternions(R: Array) -> Array:
-    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), order x, y, z, w, w >= 0.
-
-    The largest of the four is found first, so that no root of a small number is divided by (Shepperd 1978).
-    """
-    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
-    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
-    a, b, c = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
-    u, v, w = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
-    rows = np.stack(
-        [
-            np.stack([squares[:, 0], a, b, u], axis=-1),
-            np.stack([a, squares[:, 1], c, v], axis=-1),
-            np.stack([b, c, squares[:, 2], w], axis=-1),
-            np.stack([u, v, w, squares[:, 3]], axis=-1),
-        ],
-        axis=1,
-    )
-    largest = np.argmax(squares, axis=1)
-    q = np.take_along_axis(rows, largest[:, None, None], axis=1)[:, 0]
-    q = q / np.linalg.norm(q, axis=1, keepdims=True)
-    return np.asarray(q * np.where(q[:, 3:] < 0, -1.0, 1.0))
-
 
 def _frame_name(point: str) -> str:
     return FRAMES.get(point, point)
-
-
-def _into(R: Array, vectors: Array) -> Array:
-    """Express camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
-    return np.asarray(np.einsum("nji,nj->ni", R, vectors))
-
-
-def _transposed_product(R_a: Array, R_b: Array) -> Array:
-    """Return R_a^T R_b for batches of rotations."""
-    return np.asarray(np.einsum("nji,njk->nik", R_a, R_b))

@@ -71,3 +71,37 @@ def cross(a: Array, b: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def quaternions(R: Array) -> Array:
+    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), order x, y, z, w, w >= 0.
+
+    The largest of the four is found first, so that no root of a small number is divided by (Shepperd 1978).
+    """
+    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
+    squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
+    a, b, c = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
+    u, v, w = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
+    rows = np.stack(
+        [
+            np.stack([squares[:, 0], a, b, u], axis=-1),
+            np.stack([a, squares[:, 1], c, v], axis=-1),
+            np.stack([b, c, squares[:, 2], w], axis=-1),
+            np.stack([u, v, w, squares[:, 3]], axis=-1),
+        ],
+        axis=1,
+    )
+    largest = np.argmax(squares, axis=1)
+    q = np.take_along_axis(rows, largest[:, None, None], axis=1)[:, 0]
+    q = q / np.linalg.norm(q, axis=1, keepdims=True)
+    return np.asarray(q * np.where(q[:, 3:] < 0, -1.0, 1.0))
+
+
+def into(R: Array, vectors: Array) -> Array:
+    """Express camera-frame vectors (N, 3) in the frames R_cam_part (N, 3, 3)."""
+    return np.asarray(np.einsum("nji,nj->ni", R, vectors))
+
+
+def transposed_product(R_a: Array, R_b: Array) -> Array:
+    """Return R_a^T R_b for batches of rotations."""
+    return np.asarray(np.einsum("nji,njk->nik", R_a, R_b))

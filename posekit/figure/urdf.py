@@ -43,6 +43,20 @@ def read_text(path: Path) -> str:
         raise FigureError(f"{path}: cannot be read as UTF-8 text: {error}") from error
 
 
+def write_texts(path: Path, urdf: str, srdf: str) -> None:
+    """Write a URDF, and its SRDF beside it: each whole or not at all."""
+    for target, text in ((path.with_suffix(".srdf"), srdf), (path, urdf)):
+        beside = target.with_name(f".{target.name}.part")
+        try:
+            beside.write_text(text, encoding="utf-8")
+            beside.replace(target)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise FigureError(
+                f"{target}: cannot be written: {error.strerror}; choose another name"
+            ) from error
+
+
 def parse(text: str, source: str) -> ElementTree.Element:
     """Parse XML with entities and DOCTYPE refused, every number finite, limits in order.
 

@@ -82,7 +82,9 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         root[unknown] = neck[unknown]
         head = pose.points_cam[:, 1 : 1 + len(HEAD)] - neck[:, None] + root[:, None]
     if isinstance(model, LeeChenModel) and model.f is None and pose is not None:
-        root[~pose.found] = np.nan  # a given root is of no use where f, which the head would tell, is not known
+        root[~pose.found] = (
+            np.nan
+        )  # a given root is of no use where f, which the head would tell, is not known
     for k in np.flatnonzero(np.isnan(root).any(axis=1)):
         why = (
             pose.reasons[k]

@@ -6,8 +6,7 @@ import numpy as np
 
 from posekit.cameras import Array, PinholeCamera
 from posekit.figure import Figure
-from posekit.figure.figure import quaternions
-from posekit.figure.frames import torso_frame
+from posekit.figure.frames import quaternions, torso_frame
 from posekit.skeleton import JOINTS, TORSO
 from posekit.synthesis.scene import Scene
 from posekit.synthesis.viewpoints import to_camera

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure
-from posekit.figure.figure import quaternions
+from posekit.figure.frames import quaternions
 from posekit.head.points import TABLE_A2
 from posekit.skeleton import DOFS, SIDES
 from posekit.synthesis.gait import Gait, GaitAngles
@@ -98,8 +98,8 @@ class Walker:
         neck = np.broadcast_to(NECK, (len(phases), 3))
         head = neck[:, None] + self.figure.head_points[1:]
         angles = np.zeros((len(phases), len(DOFS)))
-        angles[:, :3] = self.figure.neck_angles(R_torso, neck, head)
-        angles[:, 3:6] = self.figure.pelvis_angles(R_torso, R_hips)
+        angles[:, :3] = self.figure.ik.neck(R_torso, neck, head)
+        angles[:, 3:6] = self.figure.ik.pelvis(R_torso, R_hips)
         for k, side in enumerate(SIDES):
             for joint in ("shoulder", "elbow", "hip", "knee"):
                 angles[:, DOFS.index(f"{side}_{joint}.flexion")] = getattr(gait, joint)[:, k]
