@@ -23,3 +23,7 @@ class HeadError(PosekitError):
 
 class CameraError(PosekitError):
     """A camera's parameters are impossible."""
+
+
+class ViewerError(PosekitError):
+    """A picture, a plot or a page cannot be made."""

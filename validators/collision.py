@@ -6,7 +6,6 @@ batch of postures is one call. Only pairs whose bounding spheres meet are asked;
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,13 +18,11 @@ from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.figure.capsules import Capsule
 from posekit.figure.frames import cross
+from posekit.figure.pool import collides, make_pool
 from posekit.tree import Check, Findings
 
 CONTACT_TOLERANCE = 1e-9
 """Metres of penetration below which the verdict would be rounding noise: not a collision."""
-
-SMALL_BATCH = 2000
-"""Pairs below which a second thread costs more than it brings."""
 
 
 def collision(figure: Figure, *, contact_margin: float = 0.0, exact: bool = False) -> list[Check]:
@@ -104,8 +101,7 @@ class PairCollision:
         q = np.empty((14, len(middle_a)))
         q[0:3], q[3:7] = middle_a.T, _z_onto(axis_a).T
         q[7:10], q[10:14] = middle_b.T, _z_onto(axis_b).T
-        threads = 1 if len(middle_a) < SMALL_BATCH else n_threads()
-        return np.asarray(pin.computeCollisionsInParallel(threads, self._pool, q, True)).astype(bool)
+        return collides(self._pool, q)
 
     @cached_property
     def _pool(self) -> pin.GeometryPool:
@@ -118,12 +114,7 @@ class PairCollision:
             shape = coal.Capsule(radius, 2 * capsule.half_length)
             geometry.addGeometryObject(pin.GeometryObject(capsule.link, joint, pin.SE3.Identity(), shape))
         geometry.addCollisionPair(pin.CollisionPair(0, 1))
-        return pin.GeometryPool(model, geometry, n_threads())
-
-
-def n_threads() -> int:
-    """Return how many threads the collision pool may use: the cores this process has, at most two."""
-    return min(2, len(os.sched_getaffinity(0)))
+        return make_pool(model, geometry)
 
 
 def segment_distance(gap: Array, half_a: Array, half_b: Array) -> Array:

@@ -144,7 +144,7 @@ class Limb:
         R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
-        tolerance = np.full((len(angles), len(self.where)), self.tolerance)
+        tolerance = np.full((len(angles), len(self.where)), self.tolerance, dtype=np.float64)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)

@@ -174,7 +174,10 @@ def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HipPlane:
-    """Pelvis: the hips' plane against the torso's (§3.2.A iii)."""
+    """Pelvis: the hips' plane against the torso's (§3.2.A iii).
+
+    Signs are the URDF's: what is above the pelvis bends and turns to the left.
+    """
 
     ranges: Ranges
     tolerance: float
@@ -189,16 +192,15 @@ class HipPlane:
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
         middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
         normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
-        return _plane_findings(
-            "pelvis", plane_angles(normal, middle, self.ranges), self.ranges, self.tolerance
-        )
+        angles = plane_angles(normal, middle, self.ranges) * [1.0, -1.0, 1.0]
+        return _plane_findings("pelvis", angles, self.ranges, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HeadPlane:
     """Neck: the head's plane against the torso's (§3.2.A iv); undecided where the head was not seen.
 
-    The head plane's normal is the facing direction; flexion lowers the chin.
+    The head plane's normal is the facing direction; flexion lowers the chin; the head bends and turns to the left.
     """
 
     figure: Figure
@@ -214,8 +216,7 @@ class HeadPlane:
         axes = paper_axes(points[:, :4])
         R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:])
         normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
-        angles = plane_angles(normal, -crown, self.ranges)
-        angles[:, 0] *= -1
+        angles = plane_angles(normal, -crown, self.ranges) * [-1.0, 1.0, -1.0]
         return _plane_findings("neck", angles, self.ranges, self.tolerance)
 
 

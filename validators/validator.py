@@ -55,13 +55,20 @@ class Report:
 
     @property
     def valid(self) -> NDArray[np.bool_]:
-        """Postures with all joints that no check rejects (N,)."""
-        return self.complete & ~self.invalid
+        """Postures with all joints that no check rejects, and on which every check decided something (N,)."""
+        return self._decided & ~self.invalid
 
     @property
     def undecided(self) -> NDArray[np.bool_]:
-        """Postures that nothing rejects, but with joints that are unknown (N,)."""
-        return ~self.complete & ~self.invalid
+        """Postures that nothing rejects, but with unknown joints, or that some check could not judge at all (N,)."""
+        return ~self._decided & ~self.invalid
+
+    @property
+    def _decided(self) -> NDArray[np.bool_]:
+        decided = self.complete.copy()
+        for judgement in self.judgements:
+            decided &= ~np.isnan(judgement.worst)
+        return decided
 
     @property
     def verdicts(self) -> list[str]:

@@ -7,17 +7,17 @@ from typing import Annotated
 
 import typer
 
+from posekit.cli.options import examples
+
+EXAMPLES = examples("posekit demo -o demo-results")
+
 
 def demo(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")
     ],
 ) -> None:
-    """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables.
-
-    Example:
-      posekit demo -o demo-results
-    """
+    """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables."""
     from posekit import files, pipeline
 
     files.make_folder(output)

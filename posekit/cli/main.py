@@ -9,6 +9,7 @@ from typing import Annotated, Any, TextIO
 import typer
 
 from posekit.cli import demo, recover, reproduce, synth, validate
+from posekit.cli.options import examples
 from posekit.errors import PosekitError
 
 BAD_INPUT = 2
@@ -20,14 +21,19 @@ ClickError: Any = UsageError.__bases__[0]
 app = typer.Typer(
     name="posekit",
     help="Every physically possible posture behind one view, each certified.",
+    epilog=examples(
+        "posekit demo -o demo-results",
+        "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
+        "posekit recover --help",
+    ),
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command("recover")(recover.recover)
-app.command("validate")(validate.validate)
+app.command("recover", epilog=recover.EXAMPLES)(recover.recover)
+app.command("validate", epilog=validate.EXAMPLES)(validate.validate)
 app.add_typer(synth.app, name="synth")
-app.command("reproduce")(reproduce.reproduce)
-app.command("demo")(demo.demo)
+app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
+app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
 
 
 def _print_version(asked: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from posekit.errors import InputError
+from posekit.errors import InputError, PosekitError
 
 PHYSICAL = "rigid-parts,joint-range,collision"
 
@@ -39,6 +39,22 @@ Noise = Annotated[
     float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")
 ]
 OutputView = Annotated[Path, typer.Option("-o", "--output", metavar="VIEW", help="The view file to write.")]
+
+
+def examples(*lines: str) -> str:
+    """Lay out a command's examples for the end of its help; the first character keeps the lines as they are."""
+    return "\n".join(["\b", "Examples:" if len(lines) > 1 else "Example:", *(f"  {line}" for line in lines)])
+
+
+@contextmanager
+def about(file: Path) -> Iterator[None]:
+    """Name the file in errors about what it holds; those about an option name the option."""
+    try:
+        yield
+    except PosekitError as error:
+        if str(error).startswith("--"):
+            raise
+        raise type(error)(f"{file}: {error}") from error
 
 
 def split(text: str) -> tuple[str, ...]:

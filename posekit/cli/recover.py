@@ -13,6 +13,8 @@ from posekit.cli.options import (
     ContactMargin,
     RangesOption,
     Rules,
+    about,
+    examples,
     progress,
     rule_numbers,
     signed_length,
@@ -21,6 +23,12 @@ from posekit.cli.options import (
 
 if TYPE_CHECKING:
     from posekit.pipeline import Recovery, Tolerance
+
+EXAMPLES = examples(
+    "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
+    "posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking",
+    "posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain",
+)
 
 
 def recover(
@@ -56,23 +64,17 @@ def recover(
         bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
     ] = False,
 ) -> None:
-    """Recover every posture behind a view that passes the checks, each as a configuration of the figure.
-
-    Examples
-    --------
-      posekit synth walker -o walk.json && posekit recover walk.json -o postures.json
-      posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking --rules 1,2
-      posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain
-    """
-    from posekit import files, pipeline
+    """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
+    from posekit import files, pipeline, validators
 
     files.check_result_path(output)
     seen = files.read_view(view)
-    with progress("recovering", len(seen.time)) as done:
+    table = validators.load_ranges(ranges)
+    with progress("recovering", len(seen.time)) as done, about(view):
         recovery = pipeline.recover(
             seen,
             checks=split(checks),
-            ranges=ranges,
+            ranges=table,
             rules=rule_numbers(rules),
             tolerance=_tolerance(rigid_tolerance, tangent_tolerance),
             contact_margin=signed_length(contact_margin, "--contact-margin"),

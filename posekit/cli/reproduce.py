@@ -7,20 +7,18 @@ from typing import Annotated
 
 import typer
 
+from posekit.cli.options import examples
 from posekit.errors import InputError
 
 PAPERS = ("lee-chen",)
+EXAMPLES = examples("posekit reproduce lee-chen -o tables")
 
 
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen.")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the tables.")],
 ) -> None:
-    """Write a paper's tables, reproduced, beside what it prints.
-
-    Example:
-      posekit reproduce lee-chen -o tables
-    """
+    """Write a paper's tables, reproduced, beside what it prints."""
     from posekit import files, pipeline
 
     if paper not in PAPERS:

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.options import Noise, OutputView, Seed, numbers
+from posekit.cli.options import Noise, OutputView, Seed, examples, numbers
 
 if TYPE_CHECKING:
     from posekit.synthesis import Scene
 
 app = typer.Typer(
     help="Make synthetic views with truth: a walker, random legal postures, or motion capture.",
+    epilog=examples("posekit synth walker -o walk.json", "posekit synth random -o random.json --frames 100"),
     rich_markup_mode=None,
 )
 
@@ -21,7 +22,12 @@ Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")
 Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "posekit synth walker -o seq1.json --camera 400,0,0",
+        "posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2",
+    )
+)
 def walker(
     output: OutputView,
     camera: Annotated[
@@ -46,13 +52,7 @@ def walker(
     ] = 0.0,
     seed: Seed = 0,
 ) -> None:
-    """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1.
-
-    Examples
-    --------
-      posekit synth walker -o seq1.json --camera 400,0,0
-      posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2
-    """
+    """Walk past a camera of 1985: the gait of Boulic, Thalmann & Thalmann 1990, the body of Table A.1."""
     from posekit import synthesis
 
     x, y, z = numbers(camera, 3, "--camera")
@@ -66,7 +66,7 @@ def walker(
     _write(output, scene, noise / 100, seed)
 
 
-@app.command()
+@app.command(epilog=examples("posekit synth random -o random.json --frames 100 --noise 1 --seed 7"))
 def random(
     output: OutputView,
     frames: Frames = 1,
@@ -76,11 +76,7 @@ def random(
     noise: Noise = 0.0,
     seed: Seed = 0,
 ) -> None:
-    """Draw random legal postures, each seen from anywhere on a sphere around the person.
-
-    Example:
-      posekit synth random -o random.json --frames 100 --noise 1 --seed 7
-    """
+    """Draw random legal postures, each seen from anywhere on a sphere around the person."""
     import numpy as np
 
     from posekit import synthesis
@@ -92,7 +88,9 @@ def random(
     _write(output, scene, noise, seed)
 
 
-@app.command()
+@app.command(
+    epilog=examples("posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1")
+)
 def mocap(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="An NPZ with joints (T, J, 3) and joint_names.")
@@ -112,11 +110,7 @@ def mocap(
     noise: Noise = 0.0,
     seed: Seed = 0,
 ) -> None:
-    """See a motion-capture clip through a virtual camera, with the segment lengths of the clip.
-
-    Example:
-      posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1
-    """
+    """See a motion-capture clip through a virtual camera, with the segment lengths of the clip."""
     import numpy as np
 
     from posekit import synthesis

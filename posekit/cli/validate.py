@@ -13,12 +13,18 @@ from posekit.cli.options import (
     ContactMargin,
     RangesOption,
     Rules,
+    about,
+    examples,
     rule_numbers,
     signed_length,
     split,
 )
 
 SOME_INVALID = 1
+EXAMPLES = examples(
+    "posekit validate postures.json -o report.json",
+    "posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1",
+)
 
 
 def validate(
@@ -45,13 +51,7 @@ def validate(
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
     ] = False,
 ) -> None:
-    """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input.
-
-    Examples
-    --------
-      posekit validate postures.json -o report.json
-      posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1
-    """
+    """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input."""
     from posekit import files, pipeline, validators
 
     given = files.read_postures(postures)
@@ -70,7 +70,8 @@ def validate(
         "rigid_tolerance": rigid_tolerance,
         "contact_margin": contact_margin,
     }
-    report = pipeline.validate(validator, given, settings=settings, every=every)
+    with about(postures):
+        report = pipeline.validate(validator, given, settings=settings, every=every)
     files.write_report(output, report)
     for line in pipeline.verdict_lines(report):
         typer.echo(line)

@@ -27,6 +27,9 @@ Turning a free angle to its limit moves the limb's end by less than this times i
 STRAIGHT = 1e-10
 """Sine below which a limb's bend is rounding, and its axial rotation is none."""
 
+LIMB = 4
+"""Angles of a whole limb: three of its ball joint and one of its hinge."""
+
 WORTH = 1e-5
 """Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
 
@@ -56,6 +59,17 @@ class Limits:
         middle = (self.lower + self.upper) / 2
         turn = 2 * np.pi
         return middle + np.mod(angles - middle + np.pi, turn) - np.pi
+
+    def cost(self, angles: Array) -> Array:
+        """Return how far outside the limits branches (..., K) are, radians, to choose among them.
+
+        Of a whole limb (K = 4) the axial rotation counts by how far it turns the lower segment: little, where
+        the limb is almost straight.
+        """
+        outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
+        if len(self.sign) == LIMB:
+            outside[..., 2] *= np.abs(np.sin(angles[..., 3]))
+        return np.asarray(outside.max(axis=-1))
 
     def violation(self, angles: Array) -> Array:
         """Return how far the worst of the angles (..., K) is outside its limits, radians; 0 inside."""
@@ -189,6 +203,6 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 def _least_violating(candidates: Array, limits: Limits) -> Array:
     """Choose among branches (N, B, K) the one that violates the limits least; the first of equals."""
     angles = limits.nearest_turn(candidates)
-    violation = limits.violation(angles)
+    violation = limits.cost(angles)
     best = np.argmin(np.where(np.isnan(violation), np.inf, violation), axis=1)
     return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]

@@ -22,6 +22,7 @@ from posekit.figure.closed_form import ClosedForm, with_head
 from posekit.figure.frames import quaternions, torso_frame
 from posekit.figure.layout import axis_signs, check_layout
 from posekit.figure.lengths import check_lengths
+from posekit.figure.pool import collides, make_pool
 from posekit.figure.stature import lengths_from_stature
 from posekit.figure.urdf import parse, replace_limits, rewrite, write_texts
 from posekit.skeleton import (
@@ -90,6 +91,10 @@ class Figure:
     urdf: str = field(repr=False)
     srdf: str = field(repr=False)
     source: str = "stick_figure.urdf"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the texts alone: they are small, and a model is built from them in milliseconds."""
+        return _figure, (self.urdf, self.srdf, self.source)
 
     def __post_init__(self) -> None:
         parse(self.urdf, self.source)
@@ -270,6 +275,10 @@ class Figure:
             points[k] = [oMf[frame].translation for frame in frames]
         return points
 
+    def collides(self, q: Array) -> NDArray[np.bool_]:
+        """Ask coal which configurations (N, nq) penetrate in a pair that the SRDF leaves to be checked (N,)."""
+        return collides(self._pool, q.T)
+
     def configurations(self, points: Array) -> Configurations:
         """Turn postures into configurations, in closed form.
 
@@ -309,6 +318,10 @@ class Figure:
         return q
 
     @cached_property
+    def _pool(self) -> pin.GeometryPool:
+        return make_pool(self.model, self.geometry)
+
+    @cached_property
     def _data(self) -> pin.Data:
         return self.model.createData()
 
@@ -335,6 +348,10 @@ class Figure:
         if not np.isfinite(head).all() or np.linalg.norm(head.mean(axis=0)) == 0:
             raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
         return head
+
+
+def _figure(urdf: str, srdf: str, source: str) -> Figure:
+    return Figure(urdf=urdf, srdf=srdf, source=source)
 
 
 def _frame_name(point: str) -> str:

@@ -71,7 +71,7 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         pose = solve_pose(head_points, image, camera) if seen.any() else None
     else:
         raise InputError(
-            "view: camera.model is scaled-orthographic; recover takes lee-chen and opencv cameras; give K"
+            "camera.model is scaled-orthographic; recover takes lee-chen and opencv cameras; give K"
         )
     root = view.root.copy()
     head = np.full((n, len(HEAD), 3), np.nan)
@@ -100,7 +100,5 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
 def _recovered_f(pose: HeadPose | None) -> Array:
     """Return f of each frame; 1 m, in frames that are not grown, where the head gave none."""
     if pose is None:
-        raise HeadError(
-            "view: camera.f is null and no head is seen; give f, or six head points in head_image"
-        )
+        raise HeadError("camera.f is null and no head is seen; give f, or six head points in head_image")
     return np.where(pose.found, pose.f, 1.0)

@@ -184,14 +184,15 @@ class _Grower:
         """Grow the trees of some frames: physical checks on the way, the motion model on the leaves."""
         suite = self._suites.setdefault(tolerance, self.suite(tolerance))
         camera = self.fit.frames(frames)
-        leaves = self.tree.grow(
-            camera,
-            self.fit.root[frames],
-            self.view.image[frames],
-            [check for check in suite if check.name != "walking"],
-            given=self.fit.head[frames],
-            tolerance=tolerance.tangent,
-        )
+        with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
+            leaves = self.tree.grow(
+                camera,
+                self.fit.root[frames],
+                self.view.image[frames],
+                [check for check in suite if check.name != "walking"],
+                given=self.fit.head[frames],
+                tolerance=tolerance.tangent,
+            )
         physical = leaves.counts()
         leaves = self.tree.prune(leaves, [check for check in suite if check.name == "walking"])
         return Batch(

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.errors import InputError
@@ -54,7 +51,7 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
         count = int(missing / rate * 1.1) + 16
         q = np.tile(pin.neutral(figure.model), (count, 1))
         q[:, figure.angle_index] = rng.uniform(lower, upper, (count, len(lower)))
-        kept.append(q[~collides(figure, q)])
+        kept.append(q[~figure.collides(q)])
         found += len(kept[-1])
         drawn += count
         if found < LEAST_ACCEPTED * drawn and drawn > 10 / LEAST_ACCEPTED:
@@ -96,14 +93,3 @@ def random_views(
     return observe(
         figure, sphere.camera, points, placement.R_cam_world, placement.position, q=q, size=sphere.size
     )
-
-
-def collides(figure: Figure, q: Array) -> NDArray[np.bool_]:
-    """Ask coal which configurations (N, nq) penetrate in a pair that the figure's SRDF leaves to check."""
-    if not np.isfinite(q).all():
-        # Pinocchio would call them free.
-        raise InputError("a configuration is not finite; whether it collides cannot be said")
-    threads = min(2, len(os.sched_getaffinity(0)))
-    pool = pin.GeometryPool(figure.model, figure.geometry, threads)
-    verdicts = pin.computeCollisionsInParallel(threads, pool, np.asfortranarray(q.T), True)
-    return np.asarray(verdicts).astype(bool)

@@ -169,7 +169,7 @@ def test_outside_the_limits_the_least_violating_branch_is_taken(rng: np.random.G
     angles = rng.uniform(-np.pi, np.pi, (3000, 4))
     angles[:, 3] = rng.uniform(0.1, 3.0, 3000) * rng.choice([-1, 1], 3000)
     upper, lower = limb(angles, limits.sign)
-    found = limits.violation(limb_angles(upper, lower, limits))
+    found = limits.cost(limb_angles(upper, lower, limits))
     # Every way to write the same limb: Euler branch times sign of the hinge.
     same = [angles, (angles + np.array([0, 0, np.pi, 0])) * [1, 1, 1, -1]]
     same += [
@@ -179,7 +179,7 @@ def test_outside_the_limits_the_least_violating_branch_is_taken(rng: np.random.G
     for other in same:
         for one, two in zip(limb(other, limits.sign), (upper, lower), strict=True):
             np.testing.assert_allclose(one, two, rtol=0, atol=1e-12)
-    best = np.min([limits.violation(limits.nearest_turn(other)) for other in same], axis=0)
+    best = np.min([limits.cost(limits.nearest_turn(other)) for other in same], axis=0)
     np.testing.assert_allclose(found, best, rtol=0, atol=1e-9)
 
 

@@ -6,11 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posekit.errors import InputError
+from posekit.errors import FigureError, InputError
 from posekit.figure import load_figure
 from posekit.skeleton import DOFS, SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, random_postures, random_views
-from posekit.synthesis.random_postures import collides
 from posekit.synthesis.viewpoints import look_at, to_camera, uniform_directions
 
 FIGURE = load_figure()
@@ -47,7 +46,7 @@ def test_batch_verdicts_are_those_of_single_calls():
         pin.computeCollisions(FIGURE.model, data, FIGURE.geometry, geometry_data, row, True) for row in q
     ]
     assert 0 < sum(single) < 300
-    np.testing.assert_array_equal(collides(FIGURE, q), single)
+    np.testing.assert_array_equal(FIGURE.collides(q), single)
 
 
 def test_narrower_limits_are_kept():
@@ -148,8 +147,8 @@ def test_a_person_that_cannot_fit_is_said_to_be():
 def test_impossible_numbers_are_refused():
     with pytest.raises(InputError, match="one or more"):
         random_postures(FIGURE, 0, np.random.default_rng(0))
-    with pytest.raises(InputError, match="not finite"):
-        collides(FIGURE, np.full((1, FIGURE.model.nq), np.nan))
+    with pytest.raises(FigureError, match="not finite"):
+        FIGURE.collides(np.full((1, FIGURE.model.nq), np.nan))
 
 
 def test_limits_that_leave_nothing_are_said_to():

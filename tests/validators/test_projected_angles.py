@@ -124,17 +124,17 @@ def test_the_sign_of_a_limbs_angle(joints: dict[str, np.ndarray], where: str, ex
         ({"neck.flexion": 30}, "neck.flexion", 30),
         ({"neck.flexion": -30}, "neck.flexion", -30),
         ({"neck.rotation": 30}, "neck.rotation", 30),
-        ({"neck.bending": 30}, "neck.bending", -30),
+        ({"neck.bending": 30}, "neck.bending", 30),
         ({"pelvis.flexion": 30}, "pelvis.flexion", 30),
         ({"pelvis.flexion": -20}, "pelvis.flexion", -20),
-        ({"pelvis.rotation": 20}, "pelvis.rotation", -20),
+        ({"pelvis.rotation": 20}, "pelvis.rotation", 20),
         ({"pelvis.bending": 20}, "pelvis.bending", 20),
     ],
 )
 def test_the_sign_of_the_necks_and_the_pelvis_angles(
     angles: dict[str, float], where: str, expected: float
 ) -> None:
-    # Bending and rotation are the head's in the torso's frame, and the hips' in the torso's frame.
+    # What is above the joint bends and turns to the left, as in the URDF.
     found = values(turned(angles))
     assert found.pop(where) == pytest.approx(expected, abs=1e-9)
     joint = where.partition(".")[0]
@@ -180,11 +180,11 @@ RANGES = [
     ("right_knee.flexion", "right_knee.flexion", 1, 0.0, 130.0),
     ("left_knee.flexion", "left_knee.flexion", 1, 0.0, 130.0),
     ("pelvis.flexion", "pelvis.flexion", 1, -30.0, 75.0),
-    ("pelvis.rotation", "pelvis.rotation", -1, -30.0, 30.0),
+    ("pelvis.rotation", "pelvis.rotation", 1, -30.0, 30.0),
     ("pelvis.bending", "pelvis.bending", 1, -35.0, 35.0),
     ("neck.flexion", "neck.flexion", 1, -55.0, 45.0),
     ("neck.rotation", "neck.rotation", 1, -70.0, 70.0),
-    ("neck.bending", "neck.bending", -1, -40.0, 40.0),
+    ("neck.bending", "neck.bending", 1, -40.0, 40.0),
 ]
 
 

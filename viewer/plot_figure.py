@@ -1,0 +1,91 @@
+"""Start and save a matplotlib figure, without a screen and without matplotlib's global state."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+from posekit.errors import ViewerError
+from posekit.files.npz import suffix
+from posekit.files.writing import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FORMATS: Final = (".png", ".svg", ".pdf")
+DPI: Final = 160
+
+RIGHT: Final = "#D55E00"
+"""Right limbs: vermilion of Okabe & Ito's palette, told from `LEFT` by colour-blind eyes too."""
+LEFT: Final = "#0072B2"
+"""Left limbs: blue of the same palette."""
+TRUNK: Final = "#333333"
+MUTED: Final = "#767676"
+"""What is only there to compare with: printed numbers, what was pruned, hints."""
+FAINT: Final = "#DDDDDD"
+
+STYLE: Final[dict[str, Any]] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlepad": 6.0,
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.color": TRUNK,
+    "ytick.color": TRUNK,
+    "grid.color": "#E8E8E8",
+    "grid.linewidth": 0.6,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "svg.hashsalt": "posekit",  # the same drawing gives the same file
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def drawing() -> Iterator[type[Figure]]:
+    """Yield matplotlib's `Figure` class, with the style set as long as the block lasts.
+
+    Raises
+    ------
+    ViewerError
+        Where matplotlib is not installed.
+    """
+    try:
+        import matplotlib as mpl
+        from matplotlib.figure import Figure
+    except ImportError as error:
+        raise ViewerError(
+            "plots need matplotlib, which is not installed; run: pip install 'posekit[pictures]'"
+        ) from error
+    with mpl.rc_context(STYLE):
+        yield Figure
+
+
+def save(figure: Figure, path: str | Path) -> None:
+    """Write a figure as ``.png``, ``.svg`` or ``.pdf``, whole or not at all.
+
+    Parameters
+    ----------
+    figure : matplotlib.figure.Figure
+        What a function of `posekit.viewer.plots` returned, or any other.
+    path : path
+        Its suffix decides the format. The same figure gives the same bytes: no date is written.
+
+    Raises
+    ------
+    InputError
+        Where the suffix is another, or the file cannot be written.
+    """
+    kind = suffix(path, *FORMATS)
+    date: dict[str, Any] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[kind]
+    with drawing(), replacing(path) as file:
+        figure.savefig(file, format=kind[1:], dpi=DPI, metadata=date, facecolor="white")
