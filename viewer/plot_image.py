@@ -44,7 +44,7 @@ def plot_image(view: View, frames: Sequence[int] | None = None) -> Figure:
     image = scale * view.image[chosen]
     head = scale * view.head_image[chosen]
     with drawing() as kind:
-        figure, axes = panels(kind, len(chosen), columns=6, size=(1.9, 2.9), what="frames", sharey=True)
+        figure, axes = panels(kind, len(chosen), columns=6, size=(1.5, 2.9), what="frames", sharey=True)
         extent = same_scale(axes, np.concatenate([image, head], axis=1))
         for panel, frame, points, face in zip(axes, chosen, image, head, strict=True):
             panel.invert_yaxis()

@@ -70,7 +70,7 @@ def plot_levels(
             _scale(panel, largest)
         figure.supxlabel("surviving branches", fontsize=9)
         handles, labels = axes[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+        figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 3))
     return figure
 
 
@@ -101,14 +101,13 @@ def _draw(panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, 
     for stage, counts in print_rows.items():
         label, colour, marker = STAGES[stage]
         panel.plot(
-            counts, np.arange(len(counts)), linestyle="dotted", linewidth=1.0, color=MUTED, marker=marker,
-            markersize=8, markerfacecolor="none", markeredgecolor=colour, markeredgewidth=0.7,
+            counts, np.arange(len(counts)), linestyle="none", marker=marker, markersize=8, markerfacecolor="none", markeredgecolor=colour, markeredgewidth=0.7,
             label=f"printed: {label}", gid=f"printed {stage}",
         )  # fmt: skip
     depth = len(next(iter(rows.values())))
     panel.plot(
         2.0 ** np.arange(depth), np.arange(depth), color=MUTED, linestyle=(0, (1, 2)), linewidth=0.9,
-        label="nothing pruned", gid="full tree",
+        label="if nothing were pruned", gid="full tree",
     )  # fmt: skip
 
 

@@ -106,8 +106,8 @@ def plot_projections(
         alpha = max(0.25, len(joints) ** -0.5) if superposed else 1.0
         for panel, posture in zip(axes, points, strict=True):
             draw_stick(panel, posture, extent=extent, alpha=alpha)
-        figure.supxlabel("depth z_c from the optical centre (m); the camera is to the left", fontsize=9)
-        figure.supylabel("height y_c (m)", fontsize=9)
+        figure.supxlabel("depth $z_c$ from the optical centre (m); the camera is to the left", fontsize=9)
+        figure.supylabel("height $y_c$ (m)", fontsize=9)
         add_key(figure)
     return figure
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.skeleton import JOINTS, SEGMENTS, SIDES, TORSO, HIPS, segment_name
+from posekit.skeleton import HIPS, JOINTS, SEGMENTS, SIDES, TORSO, segment_name
 from posekit.viewer.plot_figure import LEFT, RIGHT, TRUNK
 
 if TYPE_CHECKING:
@@ -92,7 +92,7 @@ def wave(ends: Array, amplitude: float) -> Array:
 
 
 def add_key(figure: Figure) -> None:
-    """Say below the drawing which line is which side's."""
+    """Say above the drawing which line is which side's."""
     from matplotlib.lines import Line2D
 
     # matplotlib's own sketch filter stands in for the wave: a legend's line has two points only.
@@ -104,7 +104,7 @@ def add_key(figure: Figure) -> None:
             Line2D([], [], color=LEFT, linewidth=1.5, linestyle=DASHES, label="left arm and leg (dashed)"),
             Line2D([], [], color=TRUNK, linewidth=1.5, label="torso and hips"),
         ],
-        loc="outside lower center",
-        ncols=3,
+        loc="outside upper center",
+        ncols=3 if figure.get_figwidth() > 6 else 1,
         handlelength=3.2,
     )

@@ -56,7 +56,7 @@ def plot_tree(frame: ResultFrame, levels: int | None = None) -> Figure:
         lost[reason] += 2 ** (depth - len(branch))
     colours = dict(zip((reason for reason, _ in lost.most_common()), COLOURS, strict=False))
     with drawing() as kind:
-        width = min(max(6.5, 0.1 * len(ends) + 3.5), 22.0)
+        width = min(max(8.5, 0.1 * len(ends) + 4.0), 22.0)
         figure = kind(figsize=(width, 1.6 + 0.42 * (shown + 1)), layout="constrained")
         axes = figure.subplots()
         _draw(axes, ends, shown, colours)
@@ -69,8 +69,8 @@ def plot_tree(frame: ResultFrame, levels: int | None = None) -> Figure:
         axes.grid(axis="y")
         deeper = "" if shown == depth else f"; {depth - shown} levels below are not drawn"
         axes.set_title(
-            f"{frame.time:.3g} s: {2**depth} leaves, {len(frame.branches)} survive"
-            f" (left: nearer to the camera, right: farther){deeper}",
+            f"{frame.time:.3g} s: {2**depth} leaves, {len(frame.branches)} survive\n"
+            f"left: nearer to the camera, right: farther{deeper}",
             loc="left",
         )
         _legend(figure, lost, colours)

@@ -89,7 +89,7 @@ class Archive:
     def ragged(
         self, name: str, kinds: str, counts: NDArray[np.int64], tail: tuple[int | None, ...]
     ) -> list[Any]:
-        """Read the first ``counts[i]`` entries of each row of a padded array (F, Nmax, *tail).
+        """Read the first ``counts[i]`` entries of each row of a padded array ``(F, Nmax, *tail)``.
 
         The padding is passed over in pieces and never held.
         """

@@ -58,7 +58,7 @@ class Sequence1985:
 
     @property
     def distance(self) -> float:
-        """How far the counts are from the print: the sum of |log2| of their ratios over all cells."""
+        """How far the counts are from the print: the sum over all cells of how many octaves they are apart."""
         ours = np.maximum(np.stack([self.physical, self.motion]), 0.5)
         print_ = np.array([printed.PHYSICAL[self.name], printed.MOTION[self.name]], dtype=np.float64)
         return float(np.abs(np.log2(ours / print_)).sum())

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure
 from posekit.files import CameraModel, LeeChenModel, OpenCVModel, View
@@ -20,11 +21,12 @@ BUILT_IN: dict[str, Callable[[], Scene]] = {"seq1": seq1, "seq2": seq2}
 def view_of(scene: Scene) -> View:
     """Make the view of a scene, with the truth.
 
-    The 1985 camera's f is left open and the head's points are Table A.2's, in the frame in which the paper
-    gives the camera's position; another camera's intrinsics are known.
+    The 1985 camera's f is left open and the head's points are in Table A.2's frame, in which the paper gives
+    the camera's position; another camera's intrinsics are known. Of the figure, the view says what is not the
+    built-in one's.
     """
     model: CameraModel
-    head = TABLE_A2.points if scene.lee_chen_f is not None else None
+    head = _head(scene)
     if scene.lee_chen_f is not None:
         model = LeeChenModel(f=None)
     else:
@@ -38,7 +40,7 @@ def view_of(scene: Scene) -> View:
         truth=scene.joints_cam,
         lengths=_differences(scene.figure),
         head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
-        unit="m" if head is None else "cm",
+        unit="m" if scene.lee_chen_f is None else "cm",
     )
 
 
@@ -53,6 +55,15 @@ def builtin_view(name: str) -> View:
     if name not in BUILT_IN:
         raise InputError(f"{name!r} is not a built-in view; expected one of {', '.join(BUILT_IN)}")
     return view_of(BUILT_IN[name]())
+
+
+def _head(scene: Scene) -> Array | None:
+    """Return neck and head points (6, 3), metres, where the view has to tell them."""
+    own, standard = scene.figure.head_points, load_figure().head_points
+    built_in = np.allclose(own, standard, rtol=0, atol=1e-12)
+    if scene.lee_chen_f is not None:
+        return TABLE_A2.points if built_in else own + TABLE_A2.points[0]
+    return None if built_in else own
 
 
 def _differences(figure: Figure) -> dict[str, float]:

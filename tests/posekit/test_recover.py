@@ -1,0 +1,663 @@
+"""From a view to certified postures: cameras, heads, missing joints, tolerances, rules, groups, reasons."""
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posekit.cameras import PinholeCamera
+from posekit.errors import FigureError, HeadError, InputError
+from posekit.figure import Figure, load_figure
+from posekit.files import LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
+from posekit.head import HeadWarning
+from posekit.pipeline import (
+    EXACT,
+    MEASURED,
+    FrameRecovery,
+    Recovery,
+    Tolerance,
+    builtin_view,
+    recover,
+    result_of,
+    summary_lines,
+    view_of,
+)
+from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS
+from posekit.synthesis import (
+    CameraSphere,
+    Scene,
+    Walker,
+    random_postures,
+    random_views,
+    seq1,
+    seq2,
+    walker_scene,
+)
+from posekit.synthesis.observe import observe
+from posekit.synthesis.viewpoints import look_at
+from posekit.validators import load_ranges
+
+FIGURE = load_figure()
+SEQ1 = builtin_view("seq1")
+ALL = ("rigid-parts", "joint-range", "collision", "walking")
+SCENES = {"seq1": seq1, "seq2": seq2}
+FOUND = 1e-6
+LEAVES = 8192
+
+
+def change(view: View, **fields: Any) -> View:
+    return dataclasses.replace(view, **fields)
+
+
+def without(view: View, joint: str) -> View:
+    image = view.image.copy()
+    image[:, JOINT[joint]] = np.nan
+    return change(view, image=image)
+
+
+def truth_at(recovery: Recovery, truth: np.ndarray) -> list[float]:
+    """Return how far the nearest survivor of each frame is from the truth, over the joints it knows."""
+    nearest = []
+    for frame, joints in zip(recovery.frames, truth, strict=True):
+        apart = np.linalg.norm(frame.joints - joints, axis=-1)
+        nearest.append(float(np.fmax.reduce(apart, axis=1).min()) if len(frame) else np.inf)
+    return nearest
+
+
+def counts(recovery: Recovery) -> list[int]:
+    return [len(frame) for frame in recovery.frames]
+
+
+def codes(recovery: Recovery) -> list[list[str]]:
+    return [frame.branches for frame in recovery.frames]
+
+
+def total(frame: FrameRecovery) -> int:
+    return len(frame) + sum(frame.rejected.values())
+
+
+def assert_same(one: Recovery, other: Recovery) -> None:
+    assert codes(one) == codes(other)
+    for a, b in zip(one.frames, other.frames, strict=True):
+        assert np.array_equal(a.joints, b.joints, equal_nan=True)
+        assert np.array_equal(a.q, b.q, equal_nan=True)
+        assert np.array_equal(a.fk_distance, b.fk_distance, equal_nan=True)
+        assert a.rejected == b.rejected
+        assert a.pruned() == b.pruned()
+        assert set(a.margins) == set(b.margins)
+        for name, values in a.margins.items():
+            assert np.array_equal(values, b.margins[name], equal_nan=True)
+        for column, level in a.levels.items():
+            assert level.tolist() == b.levels[column].tolist()
+
+
+# --- the built-in views ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("name", "position"), [("seq1", [400, 0, 0]), ("seq2", [300, 0, 300])])
+def test_the_camera_of_1985_is_recovered_from_the_head(name: str, position: list[float]) -> None:
+    view = builtin_view(name)
+    assert view.camera.f is None  # type: ignore[union-attr]
+    for frame in recover(view).frames:
+        assert frame.camera["f"] * 100 == pytest.approx(5.0, abs=1e-6)
+        np.testing.assert_allclose(np.array(frame.camera["position"]) * 100, position, rtol=0, atol=1e-6)
+        assert np.linalg.det(frame.camera["rotation"]) == pytest.approx(1.0)
+        assert frame.camera["residual"] < 1e-15
+
+
+@pytest.mark.parametrize("name", ["seq1", "seq2"])
+def test_the_input_is_among_the_survivors_of_the_built_in_views(name: str) -> None:
+    recovery = recover(builtin_view(name))
+    assert max(truth_at(recovery, SCENES[name]().joints_cam)) < FOUND
+    assert {total(frame) for frame in recovery.frames} == {LEAVES}
+    assert max(frame.fk_distance.max() for frame in recovery.frames) < 1e-9
+    assert all(frame.tolerance == EXACT for frame in recovery.frames)
+    assert max(frame.length_residual.max() for frame in recovery.frames) == 0
+
+
+def test_another_name_is_refused_with_those_that_exist() -> None:
+    with pytest.raises(InputError, match=r"'seq3' is not a built-in view; expected one of seq1, seq2"):
+        builtin_view("seq3")
+
+
+@pytest.mark.parametrize("name", ["seq1", "seq2"])
+def test_the_same_view_gives_the_same_bits(name: str) -> None:
+    assert_same(recover(builtin_view(name)), recover(builtin_view(name)))
+
+
+def test_a_batch_is_its_frames_one_at_a_time() -> None:
+    scene = random_views(FIGURE, 40, np.random.default_rng(1))
+    together = recover(view_of(scene))
+    for k, frame in enumerate(together.frames):
+        alone = recover(view_of(scene.select([k]))).frames[0]
+        assert alone.branches == frame.branches
+        assert alone.rejected == frame.rejected
+        np.testing.assert_allclose(alone.joints, frame.joints, rtol=0, atol=1e-9)
+
+
+def test_more_frames_than_are_grown_together_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    view = view_of(random_views(FIGURE, 25, np.random.default_rng(4)))
+    at_once, seen = recover(view), []
+    monkeypatch.setattr("posekit.pipeline.recover.FRAMES_AT_ONCE", 10)
+    in_parts = recover(view, progress=seen.append)
+    assert seen == [10, 10, 5]
+    assert codes(in_parts) == codes(at_once)
+    assert [frame.rejected for frame in in_parts.frames] == [frame.rejected for frame in at_once.frames]
+
+
+def test_the_settings_say_what_decided_the_result() -> None:
+    settings = recover(
+        SEQ1, checks=ALL, rules=(1, 3), ranges="table1", contact_margin=-0.01, group=0.05
+    ).settings
+    assert settings["checks"] == list(ALL)
+    assert settings["rules"] == [1, 3]
+    assert settings["ranges"] == "table1"
+    assert settings["range_limits"]["elbow.flexion"] == [0.0, 160.0]
+    assert settings["contact_margin"] == -0.01
+    assert settings["group"] == 0.05
+    assert settings["figure"] == FIGURE.scaled({}, SEQ1.head_points).hash
+    assert set(settings["versions"]) == {"posekit", "pin", "coal", "numpy"}
+    assert recover(SEQ1).settings["rules"] == []
+
+
+# --- the camera and the root ----------------------------------------------------------------------------
+
+
+def test_f_given_and_f_recovered_lead_to_the_same_postures() -> None:
+    recovered, given = recover(SEQ1), recover(change(SEQ1, camera=LeeChenModel(f=0.05)))
+    assert codes(given) == codes(recovered)
+    for a, b in zip(given.frames, recovered.frames, strict=True):
+        np.testing.assert_allclose(a.joints, b.joints, rtol=0, atol=1e-9)
+        assert a.camera["f"] == 0.05
+        np.testing.assert_allclose(a.camera["position"], [4, 0, 0], rtol=0, atol=1e-8)
+
+
+def test_a_root_serves_where_no_head_is_seen() -> None:
+    camera = LeeChenModel(f=0.05)
+    headless = change(
+        SEQ1, camera=camera, head_image=np.full((5, 5, 2), np.nan), root=SEQ1.truth[:, 0], head_points=None
+    )
+    recovery = recover(headless)
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+    for frame, with_head in zip(recovery.frames, recover(SEQ1).frames, strict=True):
+        assert set(with_head.branches) <= set(frame.branches)
+        assert np.isnan(frame.head).all()
+        assert frame.camera == {"f": 0.05, "rotation": None, "position": None, "residual": None}
+        assert not any("neck" in reason for reason in frame.rejected)
+        neck = [
+            frame.q[:, recovery.figure.configuration_names.index(f"neck_{angle}")] for angle in ("flexion",)
+        ]
+        assert (np.array(neck) == 0).all()
+
+
+def test_a_root_comes_before_the_heads_neck() -> None:
+    moved = SEQ1.truth[:, 0] * 1.01
+    recovery = recover(change(SEQ1, root=moved), tolerance=MEASURED)
+    for frame, root in zip(recovery.frames, moved, strict=True):
+        if len(frame):
+            assert np.array_equal(frame.joints[0, 0], root)
+        np.testing.assert_allclose(recovery.fit.root, moved, rtol=0, atol=0)
+    head = recovery.fit.head - moved[:, None]
+    np.testing.assert_allclose(head, recover(SEQ1).fit.head - SEQ1.truth[:, :1], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("camera", "give_root"), [("f", False), ("no f", False), ("no f", True)])
+def test_a_frame_without_head_and_root_is_skipped_with_its_reason(camera: str, give_root: bool) -> None:
+    """Without f a root is not enough: only the head would tell f."""
+    head_image, root = SEQ1.head_image.copy(), np.full((5, 3), np.nan)
+    head_image[2, HEAD_POINTS.index("nose")] = np.nan
+    if give_root:
+        root[2] = SEQ1.truth[2, 0]
+    view = change(
+        SEQ1, head_image=head_image, root=root, camera=LeeChenModel(f=0.05 if camera == "f" else None)
+    )
+    recovery = recover(view, group=0.05)
+    frame = recovery.frames[2]
+    assert frame.reason.startswith("frames[2]: 5 of 6 head points are known")
+    assert frame.reason.endswith("missing: nose")
+    assert (len(frame), frame.joints.shape, frame.branches, frame.pruned()) == (0, (0, 14, 3), [], [])
+    assert frame.rejected == {f"root/{frame.reason}": LEAVES}
+    assert frame.tolerance is None
+    assert frame.levels["physical"].tolist() == [0] * 14
+    whole = recover(SEQ1).frames
+    for k in (0, 1, 3, 4):
+        assert recovery.frames[k].branches == whole[k].branches
+    assert len(result_of(recovery).frames) == 5
+    assert "frames[2]" in "\n".join(summary_lines(recovery))
+
+
+def test_a_root_and_f_together_need_no_head() -> None:
+    head_image, root = SEQ1.head_image.copy(), np.full((5, 3), np.nan)
+    head_image[2], root[2] = np.nan, SEQ1.truth[2, 0]
+    recovery = recover(change(SEQ1, head_image=head_image, root=root, camera=LeeChenModel(f=0.05)))
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+
+
+@pytest.mark.parametrize(
+    ("f", "text"),
+    [
+        (0.05, "frames[0]: its root is not given and its head is not seen; give six head points"),
+        (None, "frames[0]: 1 of 6 head points are known"),
+    ],
+)
+def test_a_view_without_any_neck_is_refused(f: float | None, text: str) -> None:
+    view = change(SEQ1, camera=LeeChenModel(f=f), head_image=np.full((5, 5, 2), np.nan))
+    with pytest.raises(HeadError) as caught:
+        recover(view)
+    assert str(caught.value).startswith(text)
+    assert "or root" in str(caught.value)
+
+
+def test_a_scaled_orthographic_view_is_refused_with_what_is_taken() -> None:
+    with pytest.raises(InputError, match=r"scaled-orthographic; recover takes lee-chen and opencv cameras"):
+        recover(change(SEQ1, camera=ScaledOrthographicModel(scale=100.0)))
+
+
+def test_a_head_point_that_does_not_fit_is_named() -> None:
+    assert SEQ1.head_points is not None
+    eye = SEQ1.head_points["right_eye"] * [0, 1, 1] + [-0.32168, 0, 0]
+    with pytest.warns(HeadWarning, match="head point right_eye does not fit the others in 5 of 5 frames"):
+        recover(change(SEQ1, head_points={**SEQ1.head_points, "right_eye": eye}), checks=())
+
+
+def distorted_scene(count: int = 10) -> Scene:
+    """See random postures through a lens with strong distortion."""
+    rng = np.random.default_rng(9)
+    points = FIGURE.forward_kinematics(random_postures(FIGURE, count, rng))
+    direction = rng.normal(size=(count, 3))
+    middle = points.mean(axis=1)
+    position = middle + 4.0 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    camera = PinholeCamera(
+        K=np.array([[900.0, 0.5, 640.0], [0, 910.0, 360.0], [0, 0, 1]]),
+        distortion=np.array([-0.3, 0.1, 1e-3, -2e-3, 0.0]),
+    )
+    return observe(FIGURE, camera, points, look_at(position, middle, np.array([0.0, 0.0, 1.0])), position)
+
+
+def test_a_distorted_opencv_view_is_recovered() -> None:
+    scene = distorted_scene()
+    recovery = recover(view_of(scene))
+    assert max(truth_at(recovery, scene.joints_cam)) < FOUND
+    assert all(frame.tolerance == EXACT for frame in recovery.frames)
+    for frame, image in zip(recovery.frames, scene.image, strict=True):
+        seen = scene.camera.project(frame.joints)
+        np.testing.assert_allclose(seen, np.broadcast_to(image, seen.shape), rtol=0, atol=1e-9)
+        assert frame.camera["f"] is None
+        assert frame.camera["residual"] < 1e-9
+
+
+def test_an_opencv_cameras_place_in_the_world_is_reported() -> None:
+    scene = random_views(FIGURE, 1, np.random.default_rng(2))
+    R, t = scene.R_cam_world[0], scene.t_cam_world[0]
+    model = OpenCVModel(K=scene.camera.K, R=R, t=t)
+    record = recover(change(view_of(scene), camera=model)).frames[0].camera
+    np.testing.assert_allclose(record["rotation"], R)
+    np.testing.assert_allclose(record["position"], -R.T @ t)
+
+
+# --- the person -----------------------------------------------------------------------------------------
+
+
+def scaled_person() -> Figure:
+    return FIGURE.scaled({"right_hip-right_knee": 0.40, "neck-pelvis": 0.51})
+
+
+@pytest.mark.parametrize(
+    "make", [scaled_person, lambda: FIGURE.from_stature(1.95)], ids=["lengths", "stature"]
+)
+def test_a_view_of_another_person_tells_that_persons_body(make: Any) -> None:
+    person = make()
+    scene = random_views(person, 20, np.random.default_rng(3))
+    recovery = recover(view_of(scene))
+    assert max(truth_at(recovery, scene.joints_cam)) < FOUND
+    assert dict(recovery.figure.lengths) == pytest.approx(dict(person.lengths), abs=1e-12)
+    with_figure = recover(change(view_of(scene), lengths={}, head_points=None), figure=person)
+    assert codes(with_figure) == codes(recovery)
+
+
+def test_stature_and_lengths_of_a_view_scale_the_figure() -> None:
+    tall = FIGURE.from_stature(1.9)
+    scene = random_views(tall, 5, np.random.default_rng(3))
+    view = change(view_of(scene), lengths={}, head_points=None, stature=1.9)
+    recovery = recover(view)
+    assert max(truth_at(recovery, scene.joints_cam)) < FOUND
+    assert recovery.figure.hash == tall.hash
+    longer = recover(change(view, lengths={"right_knee-right_ankle": 0.60}))
+    assert longer.figure.lengths["right_knee-right_ankle"] == pytest.approx(0.60)
+    assert longer.figure.lengths["left_knee-left_ankle"] == pytest.approx(
+        tall.lengths["left_knee-left_ankle"]
+    )
+
+
+def test_a_walker_of_another_stature_keeps_the_camera_of_1985() -> None:
+    person = FIGURE.from_stature(1.6)
+    scene = walker_scene(Walker(velocity=0.7, figure=person), frames=2)
+    recovery = recover(view_of(scene), checks=("rigid-parts", "joint-range"))
+    assert max(truth_at(recovery, scene.joints_cam)) < FOUND
+    np.testing.assert_allclose(recovery.frames[0].camera["position"], [4, 0, 0], rtol=0, atol=1e-8)
+
+
+def test_a_torso_that_cannot_close_is_refused() -> None:
+    with pytest.raises(FigureError, match=r"the triangle neck, right_shoulder, pelvis does not close"):
+        recover(change(SEQ1, lengths={"neck-pelvis": 2.0}))
+
+
+def test_a_segment_too_short_for_its_image_is_named_with_by_how_much() -> None:
+    with pytest.raises(InputError) as caught:
+        recover(change(SEQ1, lengths={"right_elbow-right_wrist": 0.05}))
+    text = str(caught.value)
+    assert text.startswith("frames[0]: the segment right_elbow-right_wrist is at least ")
+    assert " cm too short for its image" in text
+    missing = float(text.split("at least ")[1].split(" cm")[0]) / 100
+    # With what is missing, and no more, the frame has a solution again for that segment.
+    enough = recover(change(SEQ1, lengths={"right_elbow-right_wrist": 0.05 + missing * 1.01}), checks=())
+    assert enough.frames[0].too_short() is None
+
+
+def test_an_image_point_beyond_all_reach_costs_its_frame_alone() -> None:
+    image = SEQ1.image.copy()
+    image[1, JOINT["left_elbow"], 0] = 1e298
+    recovery = recover(change(SEQ1, image=image))
+    assert [n > 0 for n in counts(recovery)] == [True, False, True, True, True]
+    assert recovery.frames[1].too_short() is not None
+    assert total(recovery.frames[1]) == LEAVES
+
+
+# --- missing joints -------------------------------------------------------------------------------------
+
+
+def beyond(joint: str) -> set[str]:
+    """Return a joint and all that hang on it."""
+    found = {JOINT[joint]}
+    for child, parent in enumerate(PARENTS):
+        if parent in found:
+            found.add(child)
+    return {JOINTS[k] for k in found}
+
+
+@pytest.mark.parametrize("joint", ["right_wrist", "left_knee", "right_shoulder", "left_hip", "pelvis"])
+def test_a_missing_joint_leaves_the_postures_of_the_others(joint: str) -> None:
+    recovery = recover(without(SEQ1, joint))
+    lost = sorted(JOINT[name] for name in beyond(joint))
+    kept = sorted(set(range(14)) - set(lost))
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+    for frame, whole in zip(recovery.frames, recover(SEQ1).frames, strict=True):
+        assert np.isnan(frame.joints[:, lost]).all()
+        assert np.isfinite(frame.joints[:, kept]).all()
+        assert total(frame) == LEAVES
+        assert frame.tolerance == EXACT
+        assert all(f"missing/{name}" in frame.rejected for name in beyond(joint))
+        # What was possible with the joint is possible without it, the unseen branches written as 0.
+        keep = [k for k in range(1, 14) if k not in lost]
+        known = {"".join(code[k - 1] for k in keep) for code in frame.branches}
+        assert {"".join(code[k - 1] for k in keep) for code in whole.branches} <= known
+        assert len(known) == len(frame)
+        assert {code[k - 1] for code in frame.branches for k in lost} == {"0"}
+
+
+def test_what_hangs_on_an_unseen_torso_joint_has_no_q() -> None:
+    frame = recover(without(SEQ1, "right_wrist")).frames[0]
+    assert (frame.fk_distance < 1e-9).all()
+    names = FIGURE.configuration_names
+    unknown = {names[k] for k in np.flatnonzero(np.isnan(frame.q).any(axis=0))}
+    assert unknown == {"right_shoulder_rotation", "right_elbow_flexion"}
+    shoulderless = recover(without(SEQ1, "right_shoulder")).frames[0]
+    assert np.isnan(shoulderless.q[:, 3:7]).all()
+    assert np.isnan(shoulderless.fk_distance).all()
+
+
+def test_only_the_neck_is_one_posture() -> None:
+    image = np.full_like(SEQ1.image, np.nan)
+    image[:, 0] = SEQ1.image[:, 0]
+    recovery = recover(change(SEQ1, image=image))
+    assert counts(recovery) == [1] * 5
+    assert {total(frame) for frame in recovery.frames} == {LEAVES}
+    assert all(np.isnan(value).all() for value in recovery.frames[0].margins.values())
+
+
+# --- ranges, rules, margins -----------------------------------------------------------------------------
+
+
+def assert_fewer(strict: Recovery, loose: Recovery) -> None:
+    for a, b in zip(strict.frames, loose.frames, strict=True):
+        assert set(a.branches) <= set(b.branches)
+
+
+def test_table1_keeps_the_walker_and_says_its_name() -> None:
+    recovery = recover(SEQ1, ranges="table1")
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+    assert recovery.settings["ranges"] == "table1"
+    assert codes(recovery) == codes(recover(SEQ1, ranges=load_ranges("table1")))
+    assert codes(recovery) != codes(recover(SEQ1))
+
+
+def test_ranges_from_a_file_narrow_the_limits(tmp_path: Any) -> None:
+    path = tmp_path / "stiff.toml"
+    path.write_text(
+        'schema = "posekit.ranges/1"\nkind = "configuration"\n[right_elbow]\nflexion = [0.0, 20.0]\n',
+        encoding="utf-8",
+    )
+    view = view_of(random_views(FIGURE, 20, np.random.default_rng(5)))
+    stiff, free = recover(view, ranges=str(path)), recover(view)
+    assert_fewer(stiff, free)
+    assert 0 < sum(counts(stiff)) < sum(counts(free))
+    column = FIGURE.configuration_names.index("right_elbow_flexion")
+    angles = np.concatenate([frame.q[:, column] for frame in stiff.frames])
+    assert np.degrees(angles).max() <= 20.001
+    assert any("joint_range/right_elbow.flexion" in frame.rejected for frame in stiff.frames)
+
+
+def test_unknown_ranges_checks_and_rules_are_refused() -> None:
+    with pytest.raises(InputError, match=r"--ranges tabel1: no such table or file; expected urdf, table1"):
+        recover(SEQ1, ranges="tabel1")
+    with pytest.raises(
+        InputError, match=r"--checks: 'colision' is not a check; expected some of rigid-parts"
+    ):
+        recover(SEQ1, checks=("colision",))
+    for checks in (ALL, ALL[:3]):
+        with pytest.raises(InputError, match=r"--rules: 9 is not a rule; expected some of 1, 2, 3, 4, 5"):
+            recover(SEQ1, checks=checks, rules=(1, 9))
+
+
+def test_every_rule_only_takes_away() -> None:
+    view = change(SEQ1, camera=LeeChenModel(f=0.05))
+    free = recover(view)
+    both = recover(view, checks=ALL, rules=(1, 2))
+    for rule in range(1, 6):
+        one = recover(view, checks=ALL, rules=(rule,))
+        assert_fewer(one, free)
+        for frame in one.frames:
+            assert total(frame) == LEAVES
+            assert {reason.split(".")[0] for reason in frame.rejected if "walking" in reason} <= {
+                f"walking/rule{rule}"
+            }
+        if rule <= 2:
+            assert_fewer(both, one)
+    assert sum(counts(both)) < sum(counts(free))
+    for before, after in zip(free.frames, both.frames, strict=True):
+        assert after.levels["physical"].tolist() == before.levels["physical"].tolist()
+        assert after.levels["motion"][-1] == len(after)
+        assert (after.levels["motion"] <= after.levels["physical"]).all()
+    assert codes(recover(view, checks=ALL, rules=())) == codes(free)
+
+
+@pytest.mark.parametrize("name", ["seq1", "seq2"])
+def test_more_clearance_never_keeps_more(name: str) -> None:
+    view = builtin_view(name)
+    margins = (-0.05, -0.01, 0.0, 0.01, 0.03, 0.06)
+    found = [recover(view, contact_margin=margin) for margin in margins]
+    for loose, strict in zip(found, found[1:], strict=False):
+        assert_fewer(strict, loose)
+    assert sum(counts(found[-1])) < sum(counts(found[0]))
+    for margin, recovery in zip(margins, found, strict=True):
+        for frame in recovery.frames:
+            assert (frame.margins["collision"] >= -1e-9).all()
+            assert total(frame) == LEAVES
+        assert recovery.settings["contact_margin"] == margin
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_margin_that_is_no_number_is_refused(value: float) -> None:
+    """Nothing compares with NaN: every posture would pass."""
+    with pytest.raises(InputError, match="contact margin is"):
+        recover(SEQ1, contact_margin=value)
+    with pytest.raises(InputError, match="--group"):
+        recover(SEQ1, group=value)
+    with pytest.raises(InputError, match="--rigid-tolerance"):
+        Tolerance(rigid=value, tangent=0.0, placement=False)
+    with pytest.raises(InputError, match="--tangent-tolerance"):
+        Tolerance(rigid=0.0, tangent=value, placement=False)
+    with pytest.raises(InputError, match="angle"):
+        Tolerance(rigid=0.0, tangent=0.0, placement=False, angle=value)
+
+
+# --- tolerances -----------------------------------------------------------------------------------------
+
+
+def noisy(pixels: float, count: int = 40) -> Scene:
+    """See random postures with noise on all but the head, which keeps its place in depth."""
+    scene = random_views(FIGURE, count, np.random.default_rng(6), CameraSphere(distance=(2.5, 3.5)))
+    image = scene.with_noise(pixels, np.random.default_rng(7)).image.copy()
+    image[:, 0] = scene.image[:, 0]
+    return dataclasses.replace(scene, image=image)
+
+
+def test_a_noisy_torso_is_judged_as_measured() -> None:
+    scene = noisy(0.5)
+    recovery = recover(view_of(scene))
+    flagged = [frame.tolerance == MEASURED for frame in recovery.frames]
+    assert all(flagged)
+    assert {total(frame) for frame in recovery.frames} == {LEAVES}
+    assert np.median(truth_at(recovery, scene.joints_cam)) < 0.05
+    kept = np.concatenate([frame.joints for frame in recovery.frames])
+    assert len(kept) > 100
+    text = "\n".join(summary_lines(recovery))
+    assert "measured" in text
+    assert "exact" not in text
+    given = recover(view_of(scene), tolerance=MEASURED)
+    assert codes(given) == codes(recovery)
+
+
+def test_only_the_noisy_frame_is_judged_as_measured() -> None:
+    image = SEQ1.image.copy()
+    image[3] += np.random.default_rng(2).normal(size=(14, 2)) * 5e-6
+    recovery = recover(change(SEQ1, image=image))
+    assert [frame.tolerance == EXACT for frame in recovery.frames] == [True, True, True, False, True]
+    assert recovery.frames[3].tolerance == MEASURED
+    assert len(recovery.frames[3]) > 0
+    assert truth_at(recovery, SEQ1.truth)[3] < 0.05
+    for k in (0, 1, 2, 4):
+        assert recovery.frames[k].branches == recover(SEQ1).frames[k].branches
+
+
+def test_a_segment_a_little_too_short_becomes_a_tangent_with_its_residual() -> None:
+    lengths = {"right_elbow-right_wrist": FIGURE.lengths["right_elbow-right_wrist"]}
+    elbow, wrist = SEQ1.truth[0, JOINT["right_elbow"]], SEQ1.truth[0, JOINT["right_wrist"]]
+    ray = wrist / np.linalg.norm(wrist)
+    reach = float(np.linalg.norm(elbow - (elbow @ ray) * ray))
+    lengths["right_elbow-right_wrist"] = reach - 0.004
+    first = change(
+        SEQ1,
+        time=SEQ1.time[:1],
+        **{name: getattr(SEQ1, name)[:1] for name in ("image", "head_image", "root", "truth")},
+        lengths=lengths,
+    )
+    strict = recover(first, tolerance=EXACT, checks=()).frames[0]
+    loose = recover(
+        first, tolerance=Tolerance(rigid=0.0, tangent=0.005, placement=False), checks=("joint-range",)
+    ).frames[0]
+    code = "".join("1" if bit == "1" else "0" for bit in recover(SEQ1).frames[0].branches[0])
+    assert len(code) == 13
+    assert strict.rejected["no_solution/right_wrist"] > 0
+    assert loose.length_residual.max() == pytest.approx(0.004, abs=1e-9)
+    assert "coincident/right_wrist" in loose.rejected
+    drawn = np.linalg.norm(
+        loose.joints[:, JOINT["right_wrist"]] - loose.joints[:, JOINT["right_elbow"]], axis=-1
+    )
+    np.testing.assert_array_less(drawn, lengths["right_elbow-right_wrist"] + 0.005 + 1e-12)
+
+
+def test_a_looser_tolerance_never_keeps_less() -> None:
+    view = view_of(noisy(1.0, count=15))
+    found = [
+        recover(view, tolerance=Tolerance(rigid=rigid, tangent=0.01, placement=False, angle=2.0))
+        for rigid in (0.005, 0.01, 0.02, 0.04)
+    ]
+    for strict, loose in zip(found, found[1:], strict=False):
+        assert_fewer(strict, loose)
+    assert sum(counts(found[0])) < sum(counts(found[-1]))
+
+
+def test_exact_views_are_kept_by_a_given_tolerance_too() -> None:
+    recovery = recover(SEQ1, tolerance=MEASURED)
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+    assert {frame.tolerance for frame in recovery.frames} == {MEASURED}
+    assert_fewer(recover(SEQ1), recovery)
+
+
+# --- groups and reasons ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radius", [0.02, 0.05, 0.15])
+def test_groups_are_about_their_representatives(radius: float) -> None:
+    recovery = recover(view_of(random_views(FIGURE, 20, np.random.default_rng(8))), group=radius)
+    for frame in recovery.frames:
+        assert frame.groups is not None
+        first = {int(group): k for k, group in reversed(list(enumerate(frame.groups)))}
+        leaders = frame.joints[[first[int(group)] for group in frame.groups]]
+        assert np.linalg.norm(frame.joints - leaders, axis=-1).max(initial=0) <= radius
+        heads = frame.joints[sorted(first.values())]
+        apart = np.linalg.norm(heads[:, None] - heads, axis=-1).max(axis=-1)
+        assert (apart[~np.eye(len(heads), dtype=bool)] > radius).all()
+
+
+def test_without_a_radius_there_are_no_groups() -> None:
+    assert recover(SEQ1).frames[0].groups is None
+
+
+def test_every_pruned_branch_tells_the_finding_that_killed_it() -> None:
+    recovery = recover(SEQ1, checks=ALL)
+    for frame in recovery.frames:
+        pruned = frame.pruned()
+        lost: dict[str, int] = {}
+        for branch in pruned:
+            outside = branch.value < branch.lower or branch.value > branch.upper
+            assert outside or branch.reason.startswith(("coincident/", "missing/", "behind_camera/"))
+            assert branch.joint == JOINTS[len(branch.branch)]
+            assert branch.unit in ("m", "deg")
+            assert branch.unit == ("deg" if branch.reason.startswith("joint_range") else "m")
+            lost[branch.reason] = lost.get(branch.reason, 0) + 2 ** (13 - len(branch.branch))
+        assert lost == dict(frame.rejected)
+        prefixes = sorted(branch.branch for branch in pruned)
+        # No branch is pruned below one that was pruned already, and no survivor either.
+        assert not any(b.startswith(a) for a, b in zip(prefixes, prefixes[1:], strict=False))
+        assert not any(code.startswith(prefix) for code in frame.branches for prefix in prefixes)
+
+
+def test_margins_of_survivors_are_not_negative() -> None:
+    recovery = recover(view_of(random_views(FIGURE, 30, np.random.default_rng(10))), checks=ALL)
+    allowed = {"rigid_parts": 1e-12, "joint_range": 1e-3, "collision": 1e-9, "walking": 0.0}
+    for frame in recovery.frames:
+        assert set(frame.margins) == set(allowed)
+        for name, values in frame.margins.items():
+            assert values.shape == (len(frame),)
+            decided = values[~np.isnan(values)]
+            if name != "joint_range":
+                assert (decided >= -allowed[name]).all()
+
+
+def test_the_result_holds_what_the_recovery_does() -> None:
+    recovery = recover(SEQ1, group=0.05)
+    result = result_of(recovery, unit="cm", explain=True)
+    for frame, written in zip(recovery.frames, result.frames, strict=True):
+        assert np.array_equal(written.joints, frame.joints)
+        assert np.array_equal(written.q, frame.q)
+        assert list(written.branches) == frame.branches
+        assert dict(written.rejected) == frame.rejected
+        assert written.pruned is not None
+        assert len(written.pruned) == len(frame.pruned())
+        assert written.groups is not None
+        assert written.levels["physical"] == tuple(frame.levels["physical"].tolist())
+    assert result_of(recovery).frames[0].pruned is None
+    assert result.settings == recovery.settings

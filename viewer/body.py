@@ -1,0 +1,225 @@
+"""A posture as a body: Pinocchio's capsules, the joints, the bones and the head."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+import pinocchio as pin
+from pinocchio.visualize import MeshcatVisualizer
+
+from posekit.cameras import Array
+from posekit.errors import ViewerError
+from posekit.figure import Figure, with_head
+from posekit.figure.capsules import Capsule
+from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
+from posekit.viewer.colours import ALARM, POINT_SIDES, SIDES, Rgb, side
+from posekit.viewer.scene import Scene
+from posekit.viewer.shapes import add_ball, add_tubes, glow, matte
+from posekit.viewer.world import World
+
+SAME = 1e-6
+"""Metres within which forward kinematics must give a posture back for its bodies to be drawn by q."""
+
+JOINT_RADIUS, HEAD_POINT_RADIUS, BONE_RADIUS, HALO = 0.032, 0.013, 0.010, 2.6
+"""Metres; a halo is that many times the joint it surrounds."""
+
+FADED = 0.25
+"""Opacity of the rest of a body, where something in it is to be pointed at."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Look:
+    """How a body is drawn.
+
+    Parameters
+    ----------
+    body : (r, g, b) or None
+        One colour for all capsules; None colours each by its side: right orange, left blue, torso grey.
+    opacity : float
+        Of the capsules; joints and bones show through those that are translucent.
+    bodies, joints, bones : bool
+        What is drawn of capsules, joint balls (with the head's points), and lines between joints.
+    """
+
+    body: Rgb | None = None
+    opacity: float = 1.0
+    bodies: bool = True
+    joints: bool = True
+    bones: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 < self.opacity <= 1:
+            raise ViewerError(f"opacity is {self.opacity:g}; expected more than 0 and at most 1")
+
+
+SOLID = Look()
+
+
+def add_posture(
+    scene: Scene,
+    name: str,
+    points: Array,
+    *,
+    figure: Figure,
+    world: World,
+    q: Array | None = None,
+    look: Look = SOLID,
+    links: tuple[str, ...] = (),
+    joints: tuple[str, ...] = (),
+    shift: Array | None = None,
+) -> None:
+    """Draw one posture below ``/meshcat/NAME``: ``bodies/LINK``, ``joints/JOINT``, ``head/POINT``, ``bones``.
+
+    The capsules are those that Pinocchio's `MeshcatVisualizer` shows at q. Where q does not give the posture
+    back to 1 µm (a measured or a rejected one) they are laid along the posture's own segments, which is what
+    the collision check judges. What is not known is not drawn.
+
+    Parameters
+    ----------
+    scene : Scene
+    name : str
+        A path may have several parts: ``frame-0/survivor-3``.
+    points : array (14, 3) or (19, 3)
+        Joints, and the head's points where they are known; OpenCV camera frame, metres; NaN where unknown.
+    figure : Figure
+        Whose capsules.
+    world : World
+        Where the posture stands.
+    q : array (nq,), optional
+        The posture's configuration in the camera's frame; it is calculated where it is not given.
+    look : Look
+    links, joints : sequence of str
+        What to point at (see `posekit.viewer.culprit`): drawn in the alarm's colour, the joints with a halo,
+        the rest of the body faded.
+    shift : array (3,), optional
+        Moves the body in the world, metres.
+
+    Raises
+    ------
+    ViewerError
+        Where no joint is known.
+    """
+    points = with_head(np.asarray(points, dtype=np.float64)[None])[0]
+    if not np.isfinite(points[: len(JOINTS)]).all(axis=1).any():
+        raise ViewerError(f"{name}: no joint of the posture is known (all are NaN); expected at least one")
+    shift = np.zeros(3) if shift is None else shift
+    placed = world.place(points) + shift
+    scene.transform(f"/meshcat/{name}", np.eye(4))
+    pointed = bool(links or joints)
+    opacity = min(look.opacity, FADED) if pointed else look.opacity
+    if look.bodies:
+        colours = {
+            capsule.link: (*ALARM, 1.0)
+            if capsule.link in links
+            else (*(look.body or SIDES[side(capsule.link)]), opacity)
+            for capsule in figure.capsules
+        }
+        template = _template(figure, tuple(sorted(colours.items())))
+        T_world_cam = world.T_world_cam
+        T_world_cam[:3, 3] += shift
+        _add_capsules(scene, name, points, template=template, figure=figure, q=q, T_world_cam=T_world_cam)
+    if look.joints:
+        for index, point in enumerate(POINTS):
+            in_head = index in HEAD
+            _add_joint(scene, name, point, placed[index], in_head=in_head, alarm=point in joints)
+    if look.bones:
+        pairs = np.array(TREE_SEGMENTS)
+        colours = np.array([SIDES[POINT_SIDES[child]] for _, child in TREE_SEGMENTS])
+        add_tubes(
+            scene, f"{name}/bones", placed[pairs[:, 0]], placed[pairs[:, 1]], colours, radius=BONE_RADIUS
+        )
+
+
+def _add_joint(scene: Scene, name: str, point: str, middle: Array, *, in_head: bool, alarm: bool) -> None:
+    if not np.isfinite(middle).all():
+        return
+    colour = ALARM if alarm else SIDES[side(point)]
+    if in_head:
+        add_ball(scene, f"{name}/head/{point}", middle, HEAD_POINT_RADIUS, matte(colour))
+        return
+    add_ball(scene, f"{name}/joints/{point}", middle, JOINT_RADIUS, matte(colour))
+    if alarm:
+        add_ball(scene, f"{name}/halos/{point}", middle, HALO * JOINT_RADIUS, glow(ALARM, 0.35))
+
+
+def _add_capsules(
+    scene: Scene,
+    name: str,
+    points: Array,
+    *,
+    template: _Template,
+    figure: Figure,
+    q: Array | None,
+    T_world_cam: Array,
+) -> None:
+    q = figure.inverse_kinematics(points[None])[0] if q is None else np.asarray(q, dtype=np.float64)
+    T_cam_link = template.display(q) if _gives_back(figure, q, points) else {}
+    for capsule in figure.capsules:
+        path = f"/meshcat/{name}/bodies/{capsule.link}"
+        T = T_cam_link.get(capsule.link)
+        if T is None:
+            T = _laid(capsule, points)
+        if np.isfinite(T).all():
+            scene.adopt(template.scene, template.path(capsule.link), path)
+            scene.transform(path, T_world_cam @ T)
+
+
+def _gives_back(figure: Figure, q: Array, points: Array) -> bool:
+    if not np.isfinite(q[:7]).all():
+        return False
+    seen = np.isfinite(points).all(axis=1)
+    gap = np.linalg.norm(figure.forward_kinematics(q[None])[0] - points, axis=1)[seen]
+    return bool((gap < SAME).all())
+
+
+def _laid(capsule: Capsule, points: Array) -> Array:
+    """Lay a capsule along the posture's own points: T_cam_capsule (4, 4), its axis along z."""
+    middle, axis = capsule.place(points[None, list(capsule.points)])
+    T = np.eye(4)
+    T[:3, 3], z = middle[0], axis[0]
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x = x / np.linalg.norm(x)
+    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    return T
+
+
+class _Template:
+    """The figure in Pinocchio's `MeshcatVisualizer`, which draws into a scene of its own."""
+
+    def __init__(self, figure: Figure, colours: dict[str, tuple[float, float, float, float]]) -> None:
+        self.scene = Scene()
+        self.names = {}
+        geometry = figure.geometry.copy()
+        for body in geometry.geometryObjects:
+            link = figure.model.frames[body.parentFrame].name
+            body.meshColor = np.array(colours[link])
+            self.names[link] = body.name
+        self.visualizer = MeshcatVisualizer(figure.model, pin.GeometryModel(), geometry)
+        self.visualizer.initViewer(viewer=self.scene.meshcat)
+        self.visualizer.loadViewerModel(rootNodeName="body")
+        for node in self.scene.nodes.values():
+            if node.object is not None and node.object["material"]["transparent"]:
+                node.object["material"]["depthWrite"] = False  # bones and joints show through
+
+    def path(self, link: str) -> str:
+        """Return where in its scene the link's capsule is."""
+        return f"/meshcat/body/visuals/{self.names[link]}"
+
+    def display(self, q: Array) -> dict[str, Array | None]:
+        """Let Pinocchio place the capsules at q: T_cam_capsule (4, 4) by link; None where q is not known."""
+        self.visualizer.display(q)
+        nodes = {link: self.scene.nodes[self.path(link)] for link in self.names}
+        return {
+            link: None
+            if node.properties.get("visible") is False
+            else np.reshape(node.transform or (), (4, 4)).T
+            for link, node in nodes.items()
+        }
+
+
+@lru_cache(maxsize=32)
+def _template(figure: Figure, colours: tuple[tuple[str, tuple[float, ...]], ...]) -> _Template:
+    """Keep the capsules that were made: their meshes take longer than all the rest."""
+    return _Template(figure, dict(colours))
