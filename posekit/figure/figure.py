@@ -17,10 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Array
 from posekit.errors import FigureError
 from posekit.figure.angles import Limits
+from posekit.figure.axes import axis_signs
 from posekit.figure.capsules import Capsule, read_capsules
 from posekit.figure.closed_form import ClosedForm, with_head
 from posekit.figure.frames import quaternions, torso_frame
-from posekit.figure.layout import axis_signs, check_layout
 from posekit.figure.lengths import check_lengths
 from posekit.figure.pool import collides, make_pool
 from posekit.figure.stature import lengths_from_stature
@@ -108,7 +108,7 @@ class Figure:
                 f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
             )
         _ = self.limits, self.capsules
-        check_layout(self)
+        self._check_layout()
 
     @cached_property
     def model(self) -> pin.Model:
@@ -348,6 +348,20 @@ class Figure:
         if not np.isfinite(head).all() or np.linalg.norm(head.mean(axis=0)) == 0:
             raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
         return head
+
+    def _check_layout(self) -> None:
+        """Refuse joints that lie otherwise than the closed form takes them to: place a posture and take it back."""
+        q = pin.neutral(self.model)[None]
+        lower, upper = self.limits.lower, self.limits.upper
+        q[:, self.angle_index] = lower + 0.4 * (upper - lower)
+        points = self.forward_kinematics(q)
+        back = self.forward_kinematics(self.inverse_kinematics(points))
+        apart = np.linalg.norm(back - points, axis=-1)[0]
+        if not (apart < 1e-6).all():
+            raise FigureError(
+                f"{self.source}: the joint before {POINTS[int(np.argmin(apart < 1e-6))]!r} does not lie as the stick "
+                "figure's; expected limbs along -z, joint origins without rpy, and the stick figure's order of joints"
+            )
 
 
 def _figure(urdf: str, srdf: str, source: str) -> Figure:
