@@ -20,6 +20,9 @@ from posekit.validators.ranges import URDF_RANGES, Ranges
 TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
 
+UNSEEN = 45.0
+"""Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
+
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
@@ -109,7 +112,7 @@ class Limb:
     """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
 
     A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
-    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be off.
+    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be off; beyond `UNSEEN` it is undecided.
 
     Parameters
     ----------
@@ -144,9 +147,11 @@ class Limb:
         R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
-        tolerance = np.full((len(angles), len(self.where)), self.tolerance, dtype=np.float64)
+        angles = angles[:, : len(self.where)].copy()
+        tolerance = np.full(angles.shape, self.tolerance, dtype=np.float64)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
-        return _findings(self.figure, self.where, angles[:, : len(self.where)], tolerance)
+            angles[tolerance[:, 2] > UNSEEN, 2] = np.nan
+        return _findings(self.figure, self.where, angles, tolerance)

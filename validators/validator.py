@@ -12,6 +12,7 @@ from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure, with_head
 from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.validators.joint_range import TOLERANCE
 from posekit.validators.ranges import load_ranges
 from posekit.validators.suite import PHYSICAL, Judgement, check_names, judge, make_checks
 from posekit.validators.walking import DEFAULT_RULES
@@ -94,6 +95,8 @@ class Validator:
         Rules of walking.
     rigid_tolerance : float
         Metres by which distances inside torso and hips, and the lengths of the limbs, may be off.
+    angle_tolerance : float
+        Degrees by which the direction of a segment may be off.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration.
 
@@ -113,6 +116,7 @@ class Validator:
         ranges: str = "urdf",
         rules: Sequence[int] = DEFAULT_RULES,
         rigid_tolerance: float = RIGID_TOLERANCE,
+        angle_tolerance: float = TOLERANCE,
         contact_margin: float = 0.0,
     ) -> None:
         if isinstance(urdf, Figure):
@@ -128,6 +132,7 @@ class Validator:
             ranges=load_ranges(ranges),
             rigid_tolerance=rigid_tolerance,
             rigid_mode="distances",
+            angle_tolerance=angle_tolerance,
             limbs=True,
             rules=rules,
             contact_margin=contact_margin,

@@ -105,6 +105,16 @@ class Scene:
                 )
         self.geometries.update(other.geometries)
 
+    def copy(self) -> Scene:
+        """Return a scene of the same nodes, which may be changed without changing this one."""
+        twin = Scene()
+        twin.geometries = dict(self.geometries)
+        for path, node in self.nodes.items():
+            twin.nodes[path] = Node(
+                object=node.object, transform=node.transform, properties=dict(node.properties)
+            )
+        return twin
+
     def document(self, since: Scene | None = None, known: set[str] | None = None) -> Json:
         """Return what draws this scene: ``{"geometries": {...}, "commands": [...]}``, plain JSON.
 

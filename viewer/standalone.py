@@ -92,7 +92,7 @@ def standalone_page(
         style=style,
         body=body,
         licence=_dist("main.min.js.LICENSE.txt").replace("--", "- -"),
-        meshcat=_dist("main.min.js"),
+        meshcat=meshcat_script(),
         player=player(),
         animate="true" if animate else "false",
         document=script_json(scene.document()),
@@ -111,6 +111,11 @@ def script_json(value: Json | list[Json]) -> str:
 def player() -> str:
     """Return the text of ``player.js``."""
     return (resources.files("posekit.viewer") / "player.js").read_text(encoding="utf-8")
+
+
+def meshcat_script() -> str:
+    """Return meshcat's viewer, JavaScript."""
+    return _dist("main.min.js")
 
 
 @lru_cache(maxsize=2)

@@ -34,6 +34,12 @@ ContactMargin = Annotated[
         help="Clearance that bodies must keep, as 1cm; negative allows penetration.",
     ),
 ]
+AngleTolerance = Annotated[
+    float | None,
+    typer.Option(
+        "--angle-tolerance", min=0.0, metavar="DEGREES", help="How far the direction of a segment may be off."
+    ),
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random numbers.")]
 Noise = Annotated[
     float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")

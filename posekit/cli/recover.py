@@ -9,6 +9,7 @@ import typer
 
 from posekit.cli.options import (
     PHYSICAL,
+    AngleTolerance,
     Checks,
     ContactMargin,
     RangesOption,
@@ -59,7 +60,16 @@ def recover(
             help="How much too short for its image a segment may be. Default: as above, 1cm.",
         ),
     ] = "",
+    angle_tolerance: AngleTolerance = None,
     contact_margin: ContactMargin = "0cm",
+    write_urdf: Annotated[
+        Path | None,
+        typer.Option(
+            "--write-urdf",
+            metavar="FILE",
+            help="Also write the person's figure as URDF, for `validate --urdf`.",
+        ),
+    ] = None,
     explain: Annotated[
         bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
     ] = False,
@@ -76,28 +86,30 @@ def recover(
             checks=split(checks),
             ranges=table,
             rules=rule_numbers(rules),
-            tolerance=_tolerance(rigid_tolerance, tangent_tolerance),
+            tolerance=_tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
             contact_margin=signed_length(contact_margin, "--contact-margin"),
             group=files.parse_length(group, name="--group") if group else None,
             progress=done,
         )
+    if write_urdf is not None:
+        recovery.figure.write(write_urdf)
     files.write_result(output, pipeline.result_of(recovery, unit=seen.unit, explain=explain))
     summarize(recovery)
     typer.echo(f"written: {output}")
 
 
-def _tolerance(rigid: str, tangent: str) -> Tolerance | None:
+def _tolerance(rigid: str, tangent: str, angle: float | None) -> Tolerance | None:
     from posekit.files import parse_length
     from posekit.pipeline import EXACT, MEASURED, Tolerance
 
-    if not rigid and not tangent:
+    if not rigid and not tangent and angle is None:
         return None
     metres = parse_length(rigid, name="--rigid-tolerance") if rigid else MEASURED.rigid
     return Tolerance(
         rigid=metres,
         tangent=parse_length(tangent, name="--tangent-tolerance") if tangent else MEASURED.tangent,
         placement=metres <= EXACT.rigid,
-        angle=EXACT.angle if metres <= EXACT.rigid else MEASURED.angle,
+        angle=MEASURED.angle if angle is None else angle,
     )
 
 

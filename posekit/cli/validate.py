@@ -9,6 +9,7 @@ import typer
 
 from posekit.cli.options import (
     PHYSICAL,
+    AngleTolerance,
     Checks,
     ContactMargin,
     RangesOption,
@@ -46,6 +47,7 @@ def validate(
             help="How far distances inside torso and hips may be off.",
         ),
     ] = "3cm",
+    angle_tolerance: AngleTolerance = 0.001,
     contact_margin: ContactMargin = "0cm",
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
@@ -61,6 +63,7 @@ def validate(
         ranges=ranges,
         rules=rule_numbers(rules),
         rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
+        angle_tolerance=angle_tolerance or 0.0,
         contact_margin=signed_length(contact_margin, "--contact-margin"),
     )
     settings = {
@@ -68,6 +71,7 @@ def validate(
         "ranges": ranges,
         "rules": rules,
         "rigid_tolerance": rigid_tolerance,
+        "angle_tolerance": angle_tolerance,
         "contact_margin": contact_margin,
     }
     with about(postures):

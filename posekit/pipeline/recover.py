@@ -131,6 +131,7 @@ def recover(
         "contact_margin": contact_margin,
         "group": group,
         "figure": person.hash,
+        "lengths": dict(person.lengths),
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
     return Recovery(figure=person, fit=fit, frames=frames, settings=settings)

@@ -209,7 +209,9 @@ def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int)
         )
         head = np.broadcast_to(recovery.fit.head[k], (len(leaves), len(HEAD), 3))
         points = np.concatenate([leaves, head], axis=1)
-        violated = {judgement.check: judgement.violated.any(axis=1) for judgement in judge(checks, points)}
+        violated = {
+            judgement.check: np.asarray(judgement.violated.any(axis=1)) for judgement in judge(checks, points)
+        }
         possible = ~violated["rigid_parts"] & ~violated["joint_range"]
         survivors = [int(code, 2) for code in frame.branches]
         assert codes[possible & ~violated["collision"]].tolist() == survivors
@@ -237,7 +239,8 @@ def at_the_limits(count: int, rng: np.random.Generator) -> np.ndarray:
     angles = np.choose(rng.integers(0, 5, shape), [*places, quarter, rng.uniform(lower, upper, shape)])
     q = np.tile(pin.neutral(FIGURE.model), (count, 1))
     q[:, FIGURE.angle_index] = angles
-    return q[~hit(q)]
+    free = ~hit(q)
+    return np.asarray(q[free])
 
 
 def test_limits_met_exactly_and_straight_limbs_are_no_exception() -> None:

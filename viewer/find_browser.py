@@ -1,0 +1,45 @@
+"""Find the Chromium or Chrome that is installed on this machine."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from typing import Final
+
+from posekit.errors import ViewerError
+
+VARIABLE: Final = "POSEKIT_BROWSER"
+NAMES: Final = (
+    "chromium",
+    "chromium-browser",
+    "google-chrome",
+    "google-chrome-stable",
+    "chrome",
+    "chrome-headless-shell",
+    "microsoft-edge",
+)
+REMEDY: Final = (
+    f"install one (Debian, Ubuntu: apt-get install chromium) or name its program in {VARIABLE}; "
+    "pages (.html) and plots need none"
+)
+
+
+def find_browser() -> str:
+    """Return the program's path: from ``POSEKIT_BROWSER``, else the first of `NAMES` on PATH.
+
+    Raises
+    ------
+    ViewerError
+        Where there is none, or where the variable names none.
+    """
+    named = os.environ.get(VARIABLE)
+    if named:
+        found = shutil.which(named)
+        if found is None:
+            raise ViewerError(f"{VARIABLE}: {named!r} is no program that can be run; {REMEDY}")
+        return found
+    for name in NAMES:
+        found = shutil.which(name)
+        if found is not None:
+            return found
+    raise ViewerError(f"no browser to draw with: none of {', '.join(NAMES)} is on PATH; {REMEDY}")

@@ -1,0 +1,205 @@
+// The page's scene: the chosen survivor's body is moved, not made again; positions are whole steps of DATA.steps
+// a metre, in a world whose z is up. It runs after meshcat's viewer was made; `page` is page_panel.js.
+"use strict";
+const scene = (() => {
+  const T = MeshCat.THREE;
+  const UP = new T.Vector3(0, 1, 0);
+  const JOINT_RADIUS = 0.03, BONE_RADIUS = 0.009, IMAGE_DEPTH = 0.6;
+  const shownNow = { bodies: true, others: false, rays: false, truth: false };
+  const ball = new T.SphereGeometry(1, 24, 16), tube = new T.CylinderGeometry(1, 1, 1, 20, 1, true);
+  const layers = {};
+  for (const name of ["bodies", "joints", "others", "rays", "truth"]) {
+    layers[name] = new T.Group();
+    viewer.set_object(["posekit", name], layers[name]);
+  }
+  const eye = new T.Vector3(...DATA.camera.position), forward = new T.Vector3(...DATA.camera.forward);
+
+  function points(row) {
+    const found = [];
+    for (let k = 0; k < row.length; k += 3) {
+      found.push(row[k] === null ? null : new T.Vector3(row[k], row[k + 1], row[k + 2]).divideScalar(DATA.steps));
+    }
+    return found;
+  }
+
+  const material = (colour, options) => new T.MeshLambertMaterial({ color: colour, ...options });
+
+  // A tube from a to b: made once, laid anew for every posture.
+  function lay(mesh, a, b, radius) {
+    mesh.visible = a !== null && b !== null;
+    if (!mesh.visible) return;
+    const axis = b.clone().sub(a), length = axis.length();
+    mesh.position.copy(a).addScaledVector(axis, 0.5);
+    mesh.scale.set(radius, Math.max(length, 1e-6), radius);
+    if (length > 0) mesh.quaternion.setFromUnitVectors(UP, axis.divideScalar(length));
+  }
+
+  function mean(all, indices) {
+    const chosen = indices.map((index) => all[index]);
+    if (chosen.some((point) => !point)) return null;
+    return chosen.reduce((sum, point) => sum.add(point), new T.Vector3()).divideScalar(chosen.length);
+  }
+
+  const capsules = DATA.capsules.map((capsule) => {
+    const skin = material(DATA.colours[capsule.side], { transparent: true, opacity: 0.55, depthWrite: false });
+    const parts = [new T.Mesh(tube, skin), new T.Mesh(ball, skin), new T.Mesh(ball, skin)];
+    layers.bodies.add(...parts);
+    return { ...capsule, parts };
+  });
+  const joints = DATA.points.map((name, index) => {
+    const mesh = new T.Mesh(ball, material(DATA.colours[DATA.pointSides[index]]));
+    mesh.scale.setScalar(index < DATA.joints ? JOINT_RADIUS : 0.4 * JOINT_RADIUS);
+    mesh.name = name;
+    layers.joints.add(mesh);
+    return mesh;
+  });
+  const bones = DATA.segments.map(([, , side]) => {
+    const mesh = new T.Mesh(tube, material(DATA.colours[side]));
+    layers.joints.add(mesh);
+    return mesh;
+  });
+
+  function drawBody(all) {
+    joints.forEach((mesh, index) => {
+      mesh.visible = Boolean(all?.[index]);
+      if (mesh.visible) mesh.position.copy(all[index]);
+    });
+    bones.forEach((mesh, index) => {
+      const [a, b] = DATA.segments[index];
+      lay(mesh, all?.[a] ?? null, all?.[b] ?? null, BONE_RADIUS);
+    });
+    for (const capsule of capsules) {
+      const [start, end] = all ? [mean(all, capsule.start), mean(all, capsule.end)] : [null, null];
+      const known = start !== null && end !== null;
+      capsule.parts.forEach((part) => (part.visible = known));
+      if (!known) continue;
+      const axis = end.clone().sub(start);
+      const [low, high] = [-1, 1].map((end) => start.clone().addScaledVector(axis, capsule.center + end * capsule.half));
+      lay(capsule.parts[0], low, high, capsule.radius);
+      [low, high].forEach((place, k) => {
+        capsule.parts[1 + k].position.copy(place);
+        capsule.parts[1 + k].scale.setScalar(capsule.radius);
+      });
+    }
+  }
+
+  function lines(layer, ends, colour, options) {
+    const shape = new T.BufferGeometry().setFromPoints(ends);
+    layer.add(new T.LineSegments(shape, new T.LineBasicMaterial({ color: colour, ...options })));
+  }
+
+  function clear(layer) {
+    for (const made of [...layer.children]) {
+      made.geometry.dispose();
+      made.material.dispose();
+      layer.remove(made);
+    }
+  }
+
+  function stick(all) {
+    return DATA.segments.flatMap(([a, b]) => (all[a] && all[b] ? [all[a], all[b]] : []));
+  }
+
+  function drawOthers() {
+    clear(layers.others);
+    if (!shownNow.others) return;
+    page.frame().points.forEach((row, index) => {
+      if (index === page.state.survivor) return;
+      lines(layers.others, stick(points(row)), page.groupColour(index), { transparent: true, opacity: 0.75 });
+    });
+  }
+
+  function drawTruth() {
+    clear(layers.truth);
+    const row = page.frame().truth;
+    if (shownNow.truth && row) lines(layers.truth, stick(points(row)), 0x111111);
+  }
+
+  // The camera's pyramid, the rays to the joints, and the image that they make on a plane in front of it.
+  function drawRays(all) {
+    clear(layers.rays);
+    if (!shownNow.rays || !all) return;
+    const [right, down] = [new T.Vector3(...DATA.camera.right), new T.Vector3(...DATA.camera.down)];
+    const onImage = (point) => {
+      const ray = point.clone().sub(eye), depth = ray.dot(forward);
+      return depth > IMAGE_DEPTH ? eye.clone().addScaledVector(ray, IMAGE_DEPTH / depth) : null;
+    };
+    const image = all.map((point) => point && onImage(point));
+    const seen = image.filter((point) => point);
+    if (!seen.length) return;
+    lines(layers.rays, all.slice(0, DATA.joints).flatMap((point) => (point ? [eye, point] : [])), 0x8a949e, { transparent: true, opacity: 0.6 });
+    for (const side of ["middle", "right", "left"]) {
+      const ends = DATA.segments.filter((one) => one[2] === side).flatMap(([a, b]) => (image[a] && image[b] ? [image[a], image[b]] : []));
+      lines(layers.rays, ends, DATA.colours[side]);
+    }
+    const reach = (axis) => Math.max(...seen.map((point) => Math.abs(point.clone().sub(eye).dot(axis)))) * 1.15 + 0.01;
+    const corner = (x, y) => eye.clone().addScaledVector(forward, IMAGE_DEPTH).addScaledVector(right, x * reach(right)).addScaledVector(down, y * reach(down));
+    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
+    lines(layers.rays, corners.flatMap((place, k) => [place, corners[(k + 1) % 4], eye, place]), 0x303030);
+  }
+
+  function draw() {
+    const row = page.frame().points[page.state.survivor];
+    const all = row ? points(row) : null;
+    drawBody(all);
+    drawOthers();
+    drawRays(all);
+    drawTruth();
+    layers.bodies.visible = shownNow.bodies;
+    viewer.set_dirty();
+  }
+
+  // Where all postures are, for the points of view.
+  const low = new T.Vector3(Infinity, Infinity, Infinity), high = low.clone().negate();
+  for (const frame of DATA.frames) {
+    for (const row of frame.points) {
+      for (const point of points(row)) {
+        if (point) {
+          low.min(point);
+          high.max(point);
+        }
+      }
+    }
+  }
+  const middle = low.clone().add(high).multiplyScalar(0.5), extent = Math.max(0.5, low.distanceTo(high));
+
+  function look(name) {
+    const pane = document.getElementById("meshcat-pane"), narrow = Math.min(1, pane.offsetWidth / pane.offsetHeight);
+    const back = new T.Vector3(-forward.x, -forward.y, 0).normalize();
+    const across = new T.Vector3(-back.y, back.x, 0);
+    const along = {
+      camera: back,
+      side: across,
+      above: back.clone().multiplyScalar(0.02).add(new T.Vector3(0, 0, 1)),
+      free: back.clone().add(across).add(new T.Vector3(0, 0, 0.45)),
+    }[name];
+    const fov = 30, distance = (0.6 * extent) / Math.tan((fov * Math.PI) / 360) / narrow;
+    let position = middle.clone().addScaledVector(along.normalize(), distance), angle = fov;
+    if (name === "camera") {
+      position = eye;
+      angle = (2 * Math.atan((0.6 * extent) / narrow / eye.distanceTo(middle)) * 180) / Math.PI;
+    }
+    posekit.look({ position: position.toArray(), target: middle.toArray(), fov: angle });
+    for (const button of document.querySelectorAll("#looks button")) {
+      button.setAttribute("aria-pressed", button.dataset.look === name);
+    }
+  }
+
+  viewer.set_property(["Background"], "top_color", [0.97, 0.98, 0.99]);
+  viewer.set_property(["Background"], "bottom_color", [0.88, 0.9, 0.93]);
+  viewer.set_property(["Axes"], "visible", false);
+  for (const button of document.querySelectorAll("#looks button")) button.onclick = () => look(button.dataset.look);
+  for (const box of document.querySelectorAll("#shown input")) {
+    box.onchange = () => {
+      shownNow[box.dataset.show] = box.checked;
+      draw();
+    };
+  }
+  page.onChange(draw);
+  draw();
+  look("free");
+
+  // What is drawn now, metres; for tests and for the console.
+  const drawn = () => joints.slice(0, DATA.joints).map((mesh) => (mesh.visible ? mesh.position.toArray() : null));
+  return { drawn, look, layers };
+})();
