@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -16,14 +17,17 @@ from posekit.figure.capsules import Capsule
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.colours import ALARM, POINT_SIDES, SIDES, Rgb, side
 from posekit.viewer.scene import Scene
-from posekit.viewer.shapes import add_ball, add_tubes, glow, matte
+from posekit.viewer.shapes import add_ball, add_tubes, glow, matte, smooth
 from posekit.viewer.world import World
 
 SAME = 1e-6
 """Metres within which forward kinematics must give a posture back for its bodies to be drawn by q."""
 
-JOINT_RADIUS, HEAD_POINT_RADIUS, BONE_RADIUS, HALO = 0.032, 0.013, 0.010, 2.6
+JOINT_RADIUS, HEAD_POINT_RADIUS, BONE_RADIUS, HALO = 0.032, 0.013, 0.010, 2.2
 """Metres; a halo is that many times the joint it surrounds."""
+
+HEAD_OPACITY = 0.45
+"""Through which nose, eyes and ears are seen: they tell where the head looks."""
 
 FADED = 0.25
 """Opacity of the rest of a body, where something in it is to be pointed at."""
@@ -35,26 +39,29 @@ class Look:
 
     Parameters
     ----------
-    body : (r, g, b) or None
-        One colour for all capsules; None colours each by its side: right orange, left blue, torso grey.
+    body : mapping of str to (r, g, b)
+        Colours of capsules, by link; of the others each has its side's: right orange, left blue, torso grey.
     opacity : float
         Of the capsules; joints and bones show through those that are translucent.
     bodies, joints, bones : bool
         What is drawn of capsules, joint balls (with the head's points), and lines between joints.
+    without : set of str
+        What is left out: capsules by their link, balls by their joint, bones as ``bone-JOINT`` by their end.
     """
 
-    body: Rgb | None = None
-    opacity: float = 1.0
+    body: Mapping[str, Rgb] = field(default_factory=dict)
+    opacity: float = 0.55
     bodies: bool = True
     joints: bool = True
     bones: bool = True
+    without: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         if not 0 < self.opacity <= 1:
             raise ViewerError(f"opacity is {self.opacity:g}; expected more than 0 and at most 1")
 
 
-SOLID = Look()
+TRANSLUCENT = Look()
 
 
 def add_posture(
@@ -65,7 +72,7 @@ def add_posture(
     figure: Figure,
     world: World,
     q: Array | None = None,
-    look: Look = SOLID,
+    look: Look = TRANSLUCENT,
     links: tuple[str, ...] = (),
     joints: tuple[str, ...] = (),
     shift: Array | None = None,
@@ -113,20 +120,26 @@ def add_posture(
         colours = {
             capsule.link: (*ALARM, 1.0)
             if capsule.link in links
-            else (*(look.body or SIDES[side(capsule.link)]), opacity)
+            else (*look.body.get(capsule.link, SIDES[side(capsule.link)]), _opacity(capsule.link, opacity))
             for capsule in figure.capsules
         }
         template = _template(figure, tuple(sorted(colours.items())))
         T_world_cam = world.T_world_cam
         T_world_cam[:3, 3] += shift
-        _add_capsules(scene, name, points, template=template, figure=figure, q=q, T_world_cam=T_world_cam)
+        drawn = [capsule for capsule in figure.capsules if capsule.link not in look.without]
+        _add_capsules(
+            scene, name, points, capsules=drawn, template=template, figure=figure, q=q, T_world_cam=T_world_cam
+        )
     if look.joints:
         for index, point in enumerate(POINTS):
+            if point in look.without:
+                continue
             in_head = index in HEAD
             _add_joint(scene, name, point, placed[index], in_head=in_head, alarm=point in joints)
     if look.bones:
-        pairs = np.array(TREE_SEGMENTS)
-        colours = np.array([SIDES[POINT_SIDES[child]] for _, child in TREE_SEGMENTS])
+        drawn_bones = [pair for pair in TREE_SEGMENTS if f"bone-{POINTS[pair[1]]}" not in look.without]
+        pairs = np.array(drawn_bones, dtype=np.intp).reshape(-1, 2)
+        colours = np.array([SIDES[POINT_SIDES[child]] for _, child in drawn_bones]).reshape(-1, 3)
         add_tubes(
             scene, f"{name}/bones", placed[pairs[:, 0]], placed[pairs[:, 1]], colours, radius=BONE_RADIUS
         )
@@ -149,6 +162,7 @@ def _add_capsules(
     name: str,
     points: Array,
     *,
+    capsules: Sequence[Capsule],
     template: _Template,
     figure: Figure,
     q: Array | None,
@@ -156,7 +170,7 @@ def _add_capsules(
 ) -> None:
     q = figure.inverse_kinematics(points[None])[0] if q is None else np.asarray(q, dtype=np.float64)
     T_cam_link = template.display(q) if _gives_back(figure, q, points) else {}
-    for capsule in figure.capsules:
+    for capsule in capsules:
         path = f"/meshcat/{name}/bodies/{capsule.link}"
         T = T_cam_link.get(capsule.link)
         if T is None:
@@ -164,6 +178,10 @@ def _add_capsules(
         if np.isfinite(T).all():
             scene.adopt(template.scene, template.path(capsule.link), path)
             scene.transform(path, T_world_cam @ T)
+
+
+def _opacity(link: str, opacity: float) -> float:
+    return min(opacity, HEAD_OPACITY) if link == "head" else opacity
 
 
 def _gives_back(figure: Figure, q: Array, points: Array) -> bool:
@@ -199,9 +217,12 @@ class _Template:
         self.visualizer = MeshcatVisualizer(figure.model, pin.GeometryModel(), geometry)
         self.visualizer.initViewer(viewer=self.scene.meshcat)
         self.visualizer.loadViewerModel(rootNodeName="body")
-        for node in self.scene.nodes.values():
-            if node.object is not None and node.object["material"]["transparent"]:
-                node.object["material"]["depthWrite"] = False  # bones and joints show through
+        for capsule in figure.capsules:
+            drawn = self.scene.nodes[self.path(capsule.link)].object or {}
+            smooth(self.scene.geometries[drawn["geometry"]], capsule.half_length)
+            drawn["material"] |= {"type": "MeshLambertMaterial", "side": 0}
+            if drawn["material"]["transparent"]:
+                drawn["material"]["depthWrite"] = False  # bones and joints show through
 
     def path(self, link: str) -> str:
         """Return where in its scene the link's capsule is."""

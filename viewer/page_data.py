@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from math import isnan
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
-from posekit.figure import Figure, load_figure
-from posekit.files.camera_model import OpenCVModel
+from posekit.figure import Figure
 from posekit.files.postures import Postures
 from posekit.files.result import Result, ResultFrame
 from posekit.files.view import View
-from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, POINTS, SEGMENTS
+from posekit.skeleton import JOINTS, POINTS, SEGMENTS
 from posekit.viewer.colours import GROUPS, SIDES, number, side
-from posekit.viewer.world import World, upright_world
+from posekit.viewer.subject import Shown, subject_of
+from posekit.viewer.world import upright_world
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
@@ -32,8 +33,6 @@ MARGIN_UNITS: Final = {
     "collision": ("mm", 1000.0),
 }
 """How the margins of these checks are shown; those of others as they are."""
-UNIT_LENGTH: Final = 1e-6
-"""How far a quaternion may be from unit length for forward kinematics to place the head by it."""
 
 
 def page_data(
@@ -66,41 +65,29 @@ def page_data(
     ViewerError
         Where there is no posture in any frame, too many for one page, or the view has other frames.
     """
-    result = given if isinstance(given, Result) else None
-    chosen = _chosen(1 if result is None else len(result.frames), frames)
-    if result is not None and view is not None and len(view) != len(result.frames):
-        raise ViewerError(
-            f"the view has {len(view)} frames, the result {len(result.frames)}; give the view that it was "
-            "recovered from"
-        )
-    figure = load_figure()
-    if result is not None:
-        bodies = [_with_head(result.frames[index], figure) for index in chosen]
-    else:
-        assert isinstance(given, Postures)  # noqa: S101 - narrows the type for the checker
-        head = np.full((len(given.joints), len(HEAD_POINTS), 3), np.nan) if given.head is None else given.head
-        bodies = [np.concatenate([given.joints, head], axis=1)]
+    result = None if isinstance(given, Postures) else given
+    subject = subject_of(given, view)
+    chosen = _chosen(len(subject.frames), frames)
+    bodies = [subject.frames[index].points for index in chosen]
     _check_count(bodies)
     truth = None if view is None else view.truth[chosen]
-    world = upright_world(np.concatenate([body[:, : len(JOINTS)] for body in bodies]), _tilt(view))
+    world = upright_world(np.concatenate([body[:, : len(JOINTS)] for body in bodies]), subject.R_cam_world)
     return {
         "title": title,
         "kind": "postures" if result is None else "result",
         "points": list(POINTS),
         "joints": len(JOINTS),
-        "parents": list(PARENTS),
         "steps": STEPS,
         "colours": {name or "middle": number(colour) for name, colour in SIDES.items()},
         "groupColours": [number(colour) for colour in GROUPS],
         "pointSides": [side(name) or "middle" for name in POINTS],
         "segments": [[a, b, _segment_side(a, b)] for a, b in SEGMENTS],
-        "capsules": _capsules(figure),
+        "capsules": _capsules(subject.figure),
         "camera": {
             "position": world.t_world_cam.tolist(),
             "forward": world.R_world_cam[:, 2].tolist(),
             "right": world.R_world_cam[:, 0].tolist(),
             "down": world.R_world_cam[:, 1].tolist(),
-            "pixels": view is not None and isinstance(view.camera, OpenCVModel),
         },
         "margins": [] if result is None else _margins(result.frames[0]),
         "settings": [] if result is None else _settings(result.settings),
@@ -109,9 +96,8 @@ def page_data(
                 "number": index + 1,
                 "points": _steps(world.place(body)),
                 **({} if result is None else _frame(result.frames[index])),
-                "image": None if view is None else _rows(view.image[index]),
-                "headImage": None if view is None else _rows(view.head_image[index]),
-                "truth": None if truth is None or np.isnan(truth[k]).all() else _steps(world.place(truth[k : k + 1]))[0],
+                "image": _image(subject.frames[index], view, index),
+                "truth": None if truth is None else _steps(world.place(truth[k : k + 1]))[0],
             }
             for k, (index, body) in enumerate(zip(chosen, bodies, strict=True))
         ],
@@ -137,12 +123,12 @@ def _frame(frame: ResultFrame) -> Json:
 
 
 def _chosen(count: int, frames: Sequence[int] | None) -> list[int]:
-    chosen = list(range(count) if frames is None else frames)
-    outside = [index for index in chosen if not 0 <= index < count]
-    if outside or not chosen:
-        got = f"frame {outside[0]}" if outside else "none"
-        raise ViewerError(f"frames: got {got}; expected some of 0 to {count - 1}")
-    return chosen
+    wanted: Sequence[int] = range(count) if frames is None else frames
+    if not 0 < len(wanted) <= count or min(wanted) < 0 or max(wanted) >= count:
+        raise ViewerError(
+            f"frames: got some that do not exist, or none; there are {count}; choose among them"
+        )
+    return list(wanted)
 
 
 def _check_count(bodies: Sequence[Array]) -> None:
@@ -155,25 +141,6 @@ def _check_count(bodies: Sequence[Array]) -> None:
         )
 
 
-def _with_head(frame: ResultFrame, figure: Figure) -> Array:
-    """Return the survivors with the head (N, 19, 3): files hold the joints, and the head's turn in q."""
-    points = np.full((len(frame.joints), len(POINTS), 3), np.nan)
-    points[:, : len(JOINTS)] = frame.joints
-    if frame.q.shape[1] != figure.model.nq:
-        return points
-    sound = np.isfinite(frame.q[:, :7]).all(axis=1)
-    sound &= np.abs(np.linalg.norm(frame.q[:, 3:7], axis=1) - 1) < UNIT_LENGTH
-    if sound.any():
-        # The head hangs on the torso alone: other lengths of the limbs, or unknown angles, do not move it.
-        q = np.where(np.isnan(frame.q[sound]), 0.0, frame.q[sound])
-        points[sound, len(JOINTS) :] = figure.forward_kinematics(q)[:, len(JOINTS) :]
-    return points
-
-
-def _tilt(view: View | None) -> Array | None:
-    return view.camera.R if view is not None and isinstance(view.camera, OpenCVModel) else None
-
-
 def _segment_side(a: int, b: int) -> str:
     """Return the limb's side; the trunk, whose segments have no child in a limb, is in the middle."""
     name = JOINTS[max(a, b)]
@@ -182,7 +149,7 @@ def _segment_side(a: int, b: int) -> str:
 
 
 def _capsules(figure: Figure) -> list[Json]:
-    """Describe the bodies relative to the distance of the points that place them: lengths differ by person."""
+    """Describe the bodies relative to the distance of the points that place them: a measured limb may differ."""
     neutral = figure.neutral_points
     found = []
     for capsule in figure.capsules:
@@ -218,8 +185,15 @@ def _settings(settings: Mapping[str, Any]) -> list[list[str]]:
 
 def _steps(points: Array) -> list[list[int | None]]:
     """Return points (N, K, 3) as N rows of 3 K whole 0.1 mm; None where unknown."""
-    steps = np.rint(points * STEPS).reshape(len(points), -1)
-    return [[None if value != value else int(value) for value in row] for row in steps.tolist()]
+    steps = np.rint(points * STEPS).reshape(len(points), 3 * points.shape[1])
+    return [[None if isnan(value) else int(value) for value in row] for row in steps.tolist()]
+
+
+def _image(shown: Shown, view: View | None, index: int) -> list[list[float] | None] | None:
+    """Return the 19 image points: the view's, or those that the result's own camera makes of its survivors."""
+    if view is not None:
+        return _rows(np.concatenate([view.image[index], view.head_image[index]]))
+    return None if shown.sight is None else _rows(shown.sight.image)
 
 
 def _rows(points: Array) -> list[list[float] | None]:
@@ -227,7 +201,4 @@ def _rows(points: Array) -> list[list[float] | None]:
 
 
 def _numbers(values: Array) -> list[float | None]:
-    return [None if value != value else float(f"{value:.6g}") for value in values.tolist()]
-
-
-__all__ = ["MARGIN_UNITS", "MOST_POSTURES", "STEPS", "Json", "World", "page_data"]
+    return [None if isnan(value) else float(f"{value:.6g}") for value in values.tolist()]

@@ -6,7 +6,7 @@ const page = (() => {
   const listeners = [];
   const byId = (id) => document.getElementById(id);
   const frame = () => DATA.frames[state.frame];
-  const words = (name) => name.replaceAll("_", " ");
+  const words = (name) => name.replaceAll(/[_.]/g, " ");
   const css = (colour) => "#" + colour.toString(16).padStart(6, "0");
   const plural = (count, one, many) => `${count.toLocaleString("en")} ${count === 1 ? one : many}`;
 
@@ -27,6 +27,7 @@ const page = (() => {
   function shown(value, scale) {
     if (value === null || value === undefined) return "–";
     const scaled = value * scale, size = Math.abs(scaled);
+    if (size !== 0 && size < 0.001) return scaled.toExponential(0);
     return scaled.toFixed(size !== 0 && size < 0.1 ? 3 : size < 100 ? 1 : 0);
   }
 
@@ -91,13 +92,15 @@ const page = (() => {
       count === 0
         ? "No posture survived in this frame"
         : DATA.kind === "result"
-          ? `${plural(count, "posture survives", "postures survive")}${groups}` +
-            (DATA.margins.length ? "; room left to each check's bound:" : "")
+          ? `${plural(count, "posture survives", "postures survive")}${groups}`
           : plural(count, "posture", "postures");
+    if (count && DATA.margins.length) {
+      byId("survivors-title").append(element("span", " – with the room left to each check's bound", "soft"));
+    }
     row(
       head,
       columns().map((column) => {
-        const mark = state.sort.key === column.key ? (state.sort.down ? " ▾" : " ▴") : "";
+        const mark = state.sort.key === column.key ? (state.sort.down ? "\u00a0▾" : "\u00a0▴") : "";
         const made = element("th", column.title + mark, "sort");
         made.onclick = () => {
           state.sort = { key: column.key, down: state.sort.key === column.key && !state.sort.down };
@@ -138,8 +141,8 @@ const page = (() => {
     const motion = levels.motion.some((count, level) => count !== levels.physical[level]);
     const top = Math.log2(1 + Math.max(1, ...levels.physical));
     section.querySelector("p").textContent =
-      "From the neck down, each joint may be nearer to the camera than the one it hangs on, or farther: the tree " +
-      "doubles at every level, and checks prune it. Beside the number of branches that live: what the chosen posture took.";
+      "Each joint may be nearer to the camera or farther: the tree doubles at every level, and checks prune it. " +
+      "Shown are the branches that survive, and what the chosen posture took.";
     head.replaceChildren();
     body.replaceChildren();
     const titles = ["joint", "physical checks", ...(motion ? ["and motion model"] : []), "chosen"];
@@ -190,7 +193,7 @@ const page = (() => {
     byId("seen").hidden = !here.image;
     drawing.replaceChildren();
     if (!here.image) return;
-    const all = DATA.frames.flatMap((one) => [...one.image, ...one.headImage]).filter((point) => point);
+    const all = DATA.frames.flatMap((one) => one.image ?? []).filter((point) => point);
     const [us, vs] = [all.map((point) => point[0]), all.map((point) => point[1])];
     const [left, top] = [Math.min(...us), Math.min(...vs)];
     const [width, height] = [Math.max(...us) - left || 1, Math.max(...vs) - top || 1];
@@ -209,7 +212,7 @@ const page = (() => {
         "stroke-linecap": "round", ...(side === "left" ? { "stroke-dasharray": `${0.03 * size} ${0.03 * size}` } : {}),
       });
     }
-    for (const point of [...here.image, ...here.headImage]) {
+    for (const point of here.image) {
       if (point) add("circle", { cx: point[0], cy: point[1], r: 0.011 * size, fill: "#1d2329" });
     }
   }
@@ -261,7 +264,8 @@ const page = (() => {
       : "Choose a posture from the list.";
   byId("key-right").style.background = css(DATA.colours.right);
   byId("key-left").style.background = css(DATA.colours.left);
-  byId("truth-box").hidden = !DATA.frames.some((one) => one.truth);
+  byId("truth-box").hidden = !DATA.frames.some((one) => one.truth?.some((step) => step !== null));
+  byId("look-camera").hidden = byId("rays-box").hidden = DATA.kind !== "result";
   byId("time").hidden = DATA.frames.length < 2;
   byId("tabs").hidden = byId("levels").hidden = DATA.kind !== "result";
   byId("frame").max = DATA.frames.length - 1;
@@ -273,6 +277,7 @@ const page = (() => {
   chooseFrame(0);
   // Without WebGL meshcat's viewer throws when it is made, and page_scene.js is never reached.
   window.addEventListener("error", () => {
+    if (state.drawn) return;
     byId("meshcat-pane").replaceChildren(
       element("p", "The scene cannot be drawn: this browser has no WebGL. The tables work without it.", "failed"),
     );

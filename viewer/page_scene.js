@@ -6,7 +6,7 @@ const scene = (() => {
   const UP = new T.Vector3(0, 1, 0);
   const JOINT_RADIUS = 0.03, BONE_RADIUS = 0.009, IMAGE_DEPTH = 0.6;
   const shownNow = { bodies: true, others: false, rays: false, truth: false };
-  const ball = new T.SphereGeometry(1, 24, 16), tube = new T.CylinderGeometry(1, 1, 1, 20, 1, true);
+  const ball = new T.SphereGeometry(1, 24, 16), dome = new T.SphereGeometry(1, 24, 8, 0, 2 * Math.PI, 0, Math.PI / 2), tube = new T.CylinderGeometry(1, 1, 1, 20, 1, true);
   const layers = {};
   for (const name of ["bodies", "joints", "others", "rays", "truth"]) {
     layers[name] = new T.Group();
@@ -42,7 +42,7 @@ const scene = (() => {
 
   const capsules = DATA.capsules.map((capsule) => {
     const skin = material(DATA.colours[capsule.side], { transparent: true, opacity: 0.55, depthWrite: false });
-    const parts = [new T.Mesh(tube, skin), new T.Mesh(ball, skin), new T.Mesh(ball, skin)];
+    const parts = [new T.Mesh(tube, skin), new T.Mesh(dome, skin), new T.Mesh(dome, skin)];
     layers.bodies.add(...parts);
     return { ...capsule, parts };
   });
@@ -79,6 +79,7 @@ const scene = (() => {
       [low, high].forEach((place, k) => {
         capsule.parts[1 + k].position.copy(place);
         capsule.parts[1 + k].scale.setScalar(capsule.radius);
+        capsule.parts[1 + k].quaternion.setFromUnitVectors(UP, axis.clone().normalize().multiplyScalar(k ? 1 : -1));
       });
     }
   }
@@ -90,7 +91,7 @@ const scene = (() => {
 
   function clear(layer) {
     for (const made of [...layer.children]) {
-      made.geometry.dispose();
+      if (made.geometry !== tube) made.geometry.dispose();
       made.material.dispose();
       layer.remove(made);
     }
@@ -100,13 +101,25 @@ const scene = (() => {
     return DATA.segments.flatMap(([a, b]) => (all[a] && all[b] ? [all[a], all[b]] : []));
   }
 
+  // One mesh for the bones of all: hundreds of their own would be slow without a graphics card.
   function drawOthers() {
     clear(layers.others);
     if (!shownNow.others) return;
-    page.frame().points.forEach((row, index) => {
-      if (index === page.state.survivor) return;
-      lines(layers.others, stick(points(row)), page.groupColour(index), { transparent: true, opacity: 0.75 });
+    const bones = page.frame().points.flatMap((row, index) => {
+      const ends = index === page.state.survivor ? [] : stick(points(row));
+      return ends.flatMap((end, k) => (k % 2 ? [] : [[end, ends[k + 1], page.groupColour(index)]]));
     });
+    if (!bones.length) return;
+    const mesh = new T.InstancedMesh(tube, new T.MeshLambertMaterial({ color: 0xffffff }), bones.length);
+    const one = new T.Object3D();
+    bones.forEach(([a, b, colour], k) => {
+      lay(one, a, b, 0.5 * BONE_RADIUS);
+      one.updateMatrix();
+      mesh.setMatrixAt(k, one.matrix);
+      mesh.setColorAt(k, new T.Color(colour));
+    });
+    mesh.frustumCulled = false;
+    layers.others.add(mesh);
   }
 
   function drawTruth() {
@@ -173,11 +186,11 @@ const scene = (() => {
       above: back.clone().multiplyScalar(0.02).add(new T.Vector3(0, 0, 1)),
       free: back.clone().add(across).add(new T.Vector3(0, 0, 0.45)),
     }[name];
-    const fov = 30, distance = (0.6 * extent) / Math.tan((fov * Math.PI) / 360) / narrow;
+    const fov = 30, distance = (0.68 * extent) / Math.tan((fov * Math.PI) / 360) / narrow;
     let position = middle.clone().addScaledVector(along.normalize(), distance), angle = fov;
     if (name === "camera") {
       position = eye;
-      angle = (2 * Math.atan((0.6 * extent) / narrow / eye.distanceTo(middle)) * 180) / Math.PI;
+      angle = (2 * Math.atan((0.68 * extent) / narrow / eye.distanceTo(middle)) * 180) / Math.PI;
     }
     posekit.look({ position: position.toArray(), target: middle.toArray(), fov: angle });
     for (const button of document.querySelectorAll("#looks button")) {
@@ -198,6 +211,7 @@ const scene = (() => {
   page.onChange(draw);
   draw();
   look("free");
+  page.state.drawn = true;
 
   // What is drawn now, metres; for tests and for the console.
   const drawn = () => joints.slice(0, DATA.joints).map((mesh) => (mesh.visible ? mesh.position.toArray() : null));

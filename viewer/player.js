@@ -18,6 +18,7 @@ const posekit = (() => {
 
   // Draws a document on top of what is drawn.
   function apply(document) {
+    viewer.renderer.shadowMap.enabled = false; // they cost more than all the rest
     for (const [key, geometry] of Object.entries(document.geometries)) {
       geometries[key] = decoded(geometry);
       geometries[key].uuid = key;

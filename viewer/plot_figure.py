@@ -26,7 +26,7 @@ MUTED: Final = "#767676"
 """What is only there to compare with: printed numbers, what was pruned, hints."""
 FAINT: Final = "#DDDDDD"
 
-STYLE: Final[dict[str, Any]] = {
+STYLE: Final[Any] = {  # matplotlib's annotations list every key there is
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
     "font.size": 9.0,
     "axes.titlesize": 9.5,
@@ -76,7 +76,7 @@ def save(figure: Figure, path: str | Path) -> None:
     Parameters
     ----------
     figure : matplotlib.figure.Figure
-        What a function of `posekit.viewer.plots` returned, or any other.
+        What one of the `plot_` functions returned, or any other.
     path : path
         Its suffix decides the format. The same figure gives the same bytes: no date is written.
 

@@ -49,9 +49,7 @@ def plot_image(view: View, frames: Sequence[int] | None = None) -> Figure:
         for panel, frame, points, face in zip(axes, chosen, image, head, strict=True):
             panel.invert_yaxis()
             draw_stick(panel, points, extent=extent)
-            panel.plot(
-                *face.T, linestyle="none", marker=".", markersize=3.5, color=TRUNK, gid="head"
-            )
+            panel.plot(*face.T, linestyle="none", marker=".", markersize=3.5, color=TRUNK, gid="head")
             panel.set_title(f"frame {frame + 1}, {view.time[frame]:.3g} s")
         figure.supxlabel(f"image x ({view.unit})" if metric else "image u (pixels)", fontsize=9)
         figure.supylabel(f"image y, down ({view.unit})" if metric else "image v, down (pixels)", fontsize=9)

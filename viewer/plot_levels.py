@@ -61,7 +61,9 @@ def plot_levels(
         for index, (panel, frame, name) in enumerate(zip(axes, frames, names, strict=True)):
             rows = {stage: np.asarray(frame.levels[stage]) for stage in stages}
             print_rows = {stage: np.asarray((printed or {})[stage][index]) for stage in printed or {}}
-            largest = max(largest, *(int(row.max(initial=1)) for row in (*rows.values(), *print_rows.values())))
+            largest = max(
+                largest, *(int(row.max(initial=1)) for row in (*rows.values(), *print_rows.values()))
+            )
             _draw(panel, rows, print_rows)
             panel.set_title(name)
             panel.set_yticks(range(len(frame.levels["joint"])), [_label(j) for j in frame.levels["joint"]])
@@ -101,7 +103,8 @@ def _draw(panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, 
     for stage, counts in print_rows.items():
         label, colour, marker = STAGES[stage]
         panel.plot(
-            counts, np.arange(len(counts)), linestyle="none", marker=marker, markersize=8, markerfacecolor="none", markeredgecolor=colour, markeredgewidth=0.7,
+            counts, np.arange(len(counts)), linestyle="none", marker=marker, markersize=8,
+            markerfacecolor="none", markeredgecolor=colour, markeredgewidth=0.7,
             label=f"printed: {label}", gid=f"printed {stage}",
         )  # fmt: skip
     depth = len(next(iter(rows.values())))

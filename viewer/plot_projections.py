@@ -43,7 +43,8 @@ def side_view(joints: Array, eye: float | None = None) -> Array:
         Depth and height, metres. The paper's z_c is f less: its frame starts on the image plane.
     """
     if eye is None:
-        return joints[..., [2, 1]] * np.array([1.0, -1.0])
+        flat: Array = joints[..., [2, 1]] * np.array([1.0, -1.0])
+        return flat
     centre = joints[0, 0]
     distance = eye + joints[..., 0] - centre[0]
     nearest = float(np.nanmin(distance))
@@ -113,7 +114,7 @@ def plot_projections(
 
 
 def letter(index: int) -> str:
-    """Name a panel: (a) to (z), then (aa), (ab), …"""
+    """Name a panel: (a) to (z), then (aa), (ab) and so on."""
     name = ""
     index += 1
     while index:

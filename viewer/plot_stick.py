@@ -71,9 +71,7 @@ def draw_stick(
             solid_joinstyle="round",
             gid=f"{whose}:{segment_name(segment)}",
         )
-    axes.plot(
-        *points.T, linestyle="none", marker="o", markersize=2.2, color=TRUNK, alpha=alpha, gid="joints"
-    )
+    axes.plot(*points.T, linestyle="none", marker="o", markersize=2.2, color=TRUNK, alpha=alpha, gid="joints")
 
 
 def wave(ends: Array, amplitude: float) -> Array:

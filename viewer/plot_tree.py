@@ -135,13 +135,14 @@ def _draw(axes: Axes, ends: Sequence[Tip], shown: int, colours: dict[str, str]) 
 
 def marker_of(reason: str) -> str:
     """Return the shape of a reason's check."""
-    return MARKERS.get(reason.split("/")[0], "P")
+    return MARKERS.get(reason.split("/", maxsplit=1)[0], "P")
 
 
 def words(reason: str) -> str:
     """Spell ``check/where`` for a reader."""
     check, _, where = reason.partition("/")
-    return f"{check.replace('_', ' ')}: {where.replace('_', ' ')}" if where else check.replace("_", " ")
+    spelled = check.replace("_", " ")
+    return f"{spelled}: {where.replace('_', ' ').replace('.', ' ')}" if where else spelled
 
 
 def _legend(figure: Figure, lost: Counter[str], colours: dict[str, str]) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import meshcat.geometry as mg
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.viewer.colours import Rgb, number
-from posekit.viewer.scene import Scene
+from posekit.viewer.scene import Json, Scene
 
 BALL = mg.Sphere(1.0)
 """Every ball is this one, scaled: one geometry for all."""
@@ -88,6 +90,35 @@ def tubes(starts: Array, ends: Array, radius: float) -> tuple[Array, Array]:
     )
     offset = 2 * AROUND * np.arange(len(starts))
     return vertices, (offset[:, None, None] + faces).reshape(-1, 3)
+
+
+def smooth(geometry: Json, half_length: float) -> None:
+    """Give a capsule's mesh, its axis along z, the normals of the capsule itself, and turn its faces outward.
+
+    The viewer would average the normals of the triangles, which are long and thin: that shows as stripes.
+    """
+    attributes = geometry["data"]["attributes"]
+    if "normal" in attributes:
+        return
+    vertices = _unpacked(attributes["position"], "<f4")
+    normals = vertices.copy()
+    normals[:, 2] -= np.clip(vertices[:, 2], -half_length, half_length)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    attributes["normal"] = _packed(attributes["position"], normals)
+    index = geometry["data"]["index"]
+    faces = _unpacked(index, "<u4")
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), normals[faces].sum(axis=1)) < 0
+    geometry["data"]["index"] = _packed(index, np.where(inward[:, None], faces[:, ::-1], faces))
+
+
+def _unpacked(attribute: Json, dtype: str) -> NDArray[Any]:
+    return np.frombuffer(base64.b64decode(attribute["array"]["base64"]), dtype=dtype).reshape(-1, 3)
+
+
+def _packed(attribute: Json, values: NDArray[Any]) -> Json:
+    text = base64.b64encode(values.tobytes()).decode("ascii")
+    return {**attribute, "array": {**attribute["array"], "base64": text}}
 
 
 def add_sheet(scene: Scene, path: str, corners: Array, material: mg.Material) -> None:

@@ -14,8 +14,10 @@ from posekit.viewer.shapes import add_ball, add_sheet, add_tubes, glow
 from posekit.viewer.world import World
 
 PLANE = rgb("#dfe5ec")
-RAY_RADIUS, EDGE_RADIUS, IMAGE_RADIUS, DOT = 0.0022, 0.006, 0.004, 0.011
+RAY_RADIUS, EDGE_RADIUS, IMAGE_RADIUS, DOT = 0.0022, 0.004, 0.004, 0.011
 """Metres: rays, the frustum's edges, the image's segments and points."""
+
+RAY_OPACITY = 0.45
 
 BORDER = 0.08
 """Of an image whose size is not known: the share of its points' extent that is added on each side."""
@@ -91,7 +93,7 @@ def add_sight(
         colours = np.tile(FRUSTUM, (8, 1))
         add_tubes(scene, f"{name}/frustum", *edges, colours, radius=EDGE_RADIUS)
         add_sheet(scene, f"{name}/plane", corners, glow(PLANE, 0.55))
-    add_ball(scene, f"{name}/eye", apex, 4 * EDGE_RADIUS, glow(FRUSTUM))
+    add_ball(scene, f"{name}/eye", apex, 8 * EDGE_RADIUS, glow(FRUSTUM))
     on_plane = world.place(depth * sight.rays(sight.image))
     colours = np.array([SIDES[POINT_SIDES[k]] for k in range(len(sight.image))])
     ends = np.arange(1, len(PARENTS))
@@ -106,7 +108,7 @@ def add_sight(
     if rays:
         reach = np.where(np.isfinite(far), far, np.nanmax(far) if np.isfinite(far).any() else 2 * depth)
         tips = world.place(sight.rays(sight.image) * reach[:, None])
-        add_tubes(scene, f"{name}/rays", np.tile(apex, (len(tips), 1)), tips, colours, radius=RAY_RADIUS, opacity=0.6)
+        add_tubes(scene, f"{name}/rays", np.tile(apex, (len(tips), 1)), tips, colours, radius=RAY_RADIUS, opacity=RAY_OPACITY)
 
 
 def _depths(points: Array | None, count: int) -> Array:

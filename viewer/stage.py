@@ -16,6 +16,13 @@ BACKGROUNDS: dict[str, Rgb] = {"white": rgb("#ffffff"), "grey": rgb("#e8ebee"), 
 GRID, SQUARE = rgb("#b8bec6"), 0.5
 """Colour of the ground's grid and the side of its squares, metres."""
 
+SUNS = (
+    ("key", (-5.0, -4.0, 5.0), 0.34),
+    ("fill", (-3.0, 6.0, 3.0), 0.16),
+    ("back", (6.0, 1.0, 4.0), 0.14),
+)
+"""Name, direction and strength of the lights: from the view's camera and the right, from the left, from behind."""
+
 MARGIN = 0.75
 """Metres of ground around what stands on it, at least."""
 
@@ -50,14 +57,16 @@ def add_stage(scene: Scene, points: Array, *, background: str = "white", ground:
         scene.show(path, False)
     scene.show("/Lights/FillLight", False)
     scene.show("/Lights/AmbientLight", False)
-    _add_light(scene, "sky", {"type": "HemisphereLight", "color": 0xFFFFFF, "groundColor": 0xB0A8A0, "intensity": 0.72})
-    _add_light(scene, "sun", {"type": "DirectionalLight", "color": 0xFFFFFF, "intensity": 0.42}, (-4.0, 3.0, 6.0))
+    sky = {"type": "HemisphereLight", "color": 0xFFFFFF, "groundColor": 0x8C8680, "intensity": 0.66}
+    _add_light(scene, "sky", sky)
+    for name, position, intensity in SUNS:
+        light = {"type": "DirectionalLight", "color": 0xFFFFFF, "intensity": intensity}
+        _add_light(scene, name, light, position)
     if colour is None:
         scene.show("/Background", False)
     else:
         for name in ("top_color", "bottom_color"):
-            # The viewer's gradient takes bytes.
-            scene.send(_Property("/Background", name, [round(255 * part) for part in colour]))
+            scene.send(_Property("/Background", name, list(colour)))
     if ground:
         _add_grid(scene, points)
 
@@ -102,7 +111,7 @@ class _Object:
 class _Property:
     """A set_property command outside of ``/meshcat``."""
 
-    def __init__(self, path: str, name: str, value: list[int]) -> None:
+    def __init__(self, path: str, name: str, value: list[float]) -> None:
         self.path, self.name, self.value = path, name, value
 
     def lower(self) -> Json:

@@ -21,6 +21,15 @@ Pixels = NDArray[np.uint8]
 LARGEST = 8192
 """Pixels of a picture's side before supersampling is taken off: what WebGL draws everywhere."""
 
+PLAIN_CONTEXT = """
+const made = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, options) {
+  return made.call(this, kind, options && { ...options, antialias: false });
+};
+0
+"""
+"""Supersampling smooths edges already; multisampling on top of it would double the time."""
+
 APART, FEWEST = 8, 2e-4
 """A pixel is drawn on where a channel is further than this from the background; a picture needs this share."""
 
@@ -128,6 +137,7 @@ class Studio:
         self._browser.evaluate(
             "document.body.innerHTML = '<div><div id=\"meshcat-pane\"></div></div>'; document.body.style.margin = 0"
         )
+        self._browser.evaluate(PLAIN_CONTEXT)
         self._browser.evaluate(meshcat_script() + "\n;0")
         self._browser.evaluate(player() + "\n;0")
         try:

@@ -1,0 +1,119 @@
+"""`posekit view`: look at a result in the browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posekit.cli.options import about, examples
+from posekit.errors import InputError
+
+if TYPE_CHECKING:
+    from posekit.files import Postures, Result, View
+
+LAST_PORT = 65535
+
+EXAMPLES = examples(
+    "posekit view postures.json --view walk.json",
+    "posekit view walk.json --frames 1-20 --no-open --port 8000",
+)
+
+
+def view(
+    given: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT|POSTURES|VIEW", help="A view is recovered with default settings."),
+    ],
+    seen: Annotated[
+        Path | None,
+        typer.Option(
+            "--view", metavar="VIEW", help="What the result was recovered from: shows the image too."
+        ),
+    ] = None,
+    frames: Annotated[
+        str, typer.Option("--frames", metavar="A-B", help="Only these frames, from 1, as 1-100 or 7.")
+    ] = "",
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=LAST_PORT, help="0: any free one.", show_default=False)
+    ] = 0,
+    open_: Annotated[
+        bool, typer.Option("--open/--no-open", help="Open the browser, where there is a screen.")
+    ] = True,
+) -> None:
+    """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
+    from posekit.viewer.page import page_html
+    from posekit.viewer.page_server import PageServer
+
+    content, behind = _read(given, seen)
+    chosen = _frames(frames)
+    with about(given):
+        page = page_html(content, behind, title=given.name, frames=chosen)
+    with PageServer(page, port) as server:
+        try:
+            typer.echo(f"{server.url}  (this machine only; Ctrl-C ends)")
+            if open_ and _has_screen():
+                webbrowser.open(server.url)
+            server.serve_forever()
+        except KeyboardInterrupt:
+            typer.echo("stopped")
+
+
+def _read(path: Path, seen: Path | None) -> tuple[Result | Postures, View | None]:
+    """Read a file of any of the three schemas; a view is recovered first."""
+    from posekit import files, pipeline
+
+    name = _schema(path)
+    behind = files.read_view(seen) if seen is not None else None
+    if name.startswith("posekit.view/"):
+        if behind is not None:
+            raise InputError(
+                f"--view: {path} is a view itself; expected a result beside it; leave the option out"
+            )
+        behind = files.read_view(path)
+        recovery = pipeline.recover(behind, group=0.05)
+        return pipeline.result_of(recovery, unit=behind.unit), behind
+    if name.startswith("posekit.result/"):
+        return files.read_result(path), behind
+    if behind is not None:
+        raise InputError(f"--view: {path} holds no result; expected one, recovered from that view")
+    return files.read_postures(path), None
+
+
+def _schema(path: Path) -> str:
+    """Tell what a file says it is; what is no archive or object is left to the readers' own errors."""
+    from posekit import files
+    from posekit.files.npz import open_npz
+    from posekit.files.result_npz import MAX_PADDED
+
+    if path.suffix.lower() == ".npz":
+        with open_npz(path, limit=MAX_PADDED) as archive:
+            return str(archive.array("schema", "U", ())) if "schema" in archive.names else ""
+    document = files.read_json(path)
+    return str(document.get("schema", "")) if isinstance(document, dict) else ""
+
+
+def _frames(text: str) -> range | None:
+    """Read ``A-B`` or ``A``, counted from 1."""
+    if not text:
+        return None
+    first, dash, last = text.partition("-")
+    last = last if dash else first
+    # Nine digits are more than any file's frames, and no work to read.
+    digits = all(number.isdecimal() and len(number) < 10 for number in (first, last))
+    if not digits or not 0 < int(first) <= int(last):
+        raise InputError(
+            f"--frames: {text!r}; expected numbers from 1, the first not after the last, as 1-100"
+        )
+    return range(int(first) - 1, int(last))
+
+
+def _has_screen() -> bool:
+    """Whether a browser would have a window; without one, a text browser would take the terminal over."""
+    return sys.platform in ("darwin", "win32") or any(
+        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
+    )

@@ -1,0 +1,128 @@
+"""`posekit view` and its server: one page, to this machine alone."""
+
+import http.client
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+
+import pytest
+
+from posekit.cli import view
+from posekit.errors import InputError, ViewerError
+from posekit.files import Postures, Result, View, write_postures, write_view
+from posekit.pipeline import builtin_view
+from posekit.viewer.page_server import PageServer
+
+COMMAND = (
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from posekit.cli import main; main()"
+)
+
+
+@pytest.fixture
+def served():
+    with PageServer("<p>Guten Tag, Grüße</p>") as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        yield server
+        server.shutdown()
+        thread.join()
+
+
+def ask(server, path="/", method="GET", host=None):
+    connection = http.client.HTTPConnection("127.0.0.1", server.server_port, timeout=5)
+    try:
+        connection.request(method, path, headers={"Host": host or f"127.0.0.1:{server.server_port}"})
+        answer = connection.getresponse()
+        return answer.status, answer.read()
+    finally:
+        connection.close()
+
+
+def test_the_page_is_served_and_nothing_else_is(served):
+    assert ask(served) == (200, "<p>Guten Tag, Grüße</p>".encode())
+    assert ask(served, method="HEAD") == (200, b"")
+    for path in ("/index.html", "/../etc/passwd", "/?x=1", "/%2e%2e/"):
+        assert ask(served, path)[0] == 404
+    assert ask(served, method="POST")[0] == 501
+
+
+def test_another_name_for_this_machine_is_refused(served):
+    assert ask(served, host="evil.example")[0] == 403
+    assert ask(served, host=f"evil.example:{served.server_port}")[0] == 403
+    assert ask(served, host=f"localhost:{served.server_port}")[0] == 200
+
+
+def test_it_listens_on_the_loopback_address_only(served):
+    assert served.socket.getsockname()[0] == "127.0.0.1"
+    # 127.0.0.2 is this machine too: a server on all addresses would answer there.
+    for family, address in ((socket.AF_INET, "127.0.0.2"), (socket.AF_INET6, "::1")):
+        try:
+            probe = socket.socket(family)
+        except OSError:
+            continue  # no IPv6 here
+        with probe:
+            probe.settimeout(1)
+            assert probe.connect_ex((address, served.server_port)) != 0
+
+
+def test_a_taken_port_is_said_in_one_line(served):
+    with pytest.raises(ViewerError, match=f"port {served.server_port}") as caught:
+        PageServer("", served.server_port)
+    assert "\n" not in str(caught.value)
+    with pytest.raises(ViewerError, match="port 70000"):
+        PageServer("", 70000)
+
+
+def test_the_command_serves_a_view_until_it_is_interrupted(tmp_path):
+    path = tmp_path / "walk.json"
+    write_view(path, builtin_view("seq1"))
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND, "view", str(path), "--no-open"],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        assert line.startswith("http://127.0.0.1:"), process.communicate(timeout=10)
+        port = int(line.split("/")[2].split(":")[1])
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+        connection.request("GET", "/")
+        page = connection.getresponse().read().decode()
+        connection.close()
+        assert "walk.json" in page
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=10)
+    assert (process.returncode, out, err) == (0, "stopped\n", "")
+
+
+def test_the_kinds_of_files_are_told_apart(tmp_path):
+    joints = builtin_view("seq1").truth
+    for name in ("postures.json", "postures.npz"):
+        write_postures(tmp_path / name, Postures(joints=joints))
+        given, behind = view._read(tmp_path / name, None)
+        assert isinstance(given, Postures)
+        assert behind is None
+    write_view(tmp_path / "view.json", builtin_view("seq1"))
+    given, behind = view._read(tmp_path / "view.json", None)
+    assert isinstance(given, Result)
+    assert isinstance(behind, View)
+    assert len(given.frames) == len(behind) == 5
+    for name in ("postures.json", "view.json"):
+        with pytest.raises(InputError, match="--view"):
+            view._read(tmp_path / name, tmp_path / "view.json")
+
+
+@pytest.mark.parametrize("text", ["0", "3-2", "a", "1-", "-1", "1-2-3", "²"])
+def test_frames_that_are_no_range_are_refused(text):
+    with pytest.raises(InputError, match="--frames"):
+        view._frames(text)
+
+
+def test_frames_count_from_one():
+    assert view._frames("") is None
+    assert view._frames("7") == range(6, 7)
+    assert view._frames("1-3") == range(3)

@@ -1,0 +1,172 @@
+"""Compose a picture: postures side by side or superposed, the camera, the ground."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.errors import ViewerError
+from posekit.figure import Figure
+from posekit.skeleton import JOINT, PARENTS, POINTS
+from posekit.viewer.body import Look, add_posture
+from posekit.viewer.culprit import Culprit, culprit
+from posekit.viewer.framing import sight_axes
+from posekit.viewer.scene import Scene
+from posekit.viewer.sight import add_sight
+from posekit.viewer.stage import add_stage
+from posekit.viewer.subject import Shown
+from posekit.viewer.superposed import superposed_looks
+from posekit.viewer.world import World
+
+LAYOUTS: Final = ("side-by-side", "superposed")
+MOST: Final = 200
+"""Postures in one picture: more are neither drawn quickly nor told apart."""
+
+GAP = 0.25
+"""Metres between two bodies side by side."""
+
+ROW_GAP, ONE_ROW = 1.3, 7
+"""Metres between two rows, and how many stand in one."""
+
+NEAR_CAMERA = 7.0
+"""Metres: a camera that is farther from the postures is left out of the picture's frame."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Style:
+    """How a picture is composed.
+
+    Parameters
+    ----------
+    layout : {"side-by-side", "superposed"}
+    look : Look, optional
+        Of the bodies; by default translucent.
+    background : str
+        See `posekit.viewer.stage.background_colour`.
+    azimuth : float
+        Degrees: those side by side stand in rows across the sight of one who looks from there.
+    camera, ground : bool
+        Whether the camera with its rays, and the ground's grid, are drawn. Side by side there is no camera:
+        its rays go to one place.
+    """
+
+    layout: str = "side-by-side"
+    look: Look | None = None
+    background: str = "white"
+    azimuth: float = 0.0
+    camera: bool = True
+    ground: bool = True
+
+    def __post_init__(self) -> None:
+        if self.layout not in LAYOUTS:
+            raise ViewerError(f"layout: {self.layout!r}; expected {' or '.join(LAYOUTS)}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Composition:
+    """A scene, and the points (M, 3), world, metres, that should be in its picture."""
+
+    scene: Scene
+    points: Array
+
+
+def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: Array | None = None) -> Composition:
+    """Draw one frame's postures.
+
+    Parameters
+    ----------
+    shown : Shown
+        One posture or more; those without any known joint are left out.
+    figure : Figure
+    world : World
+    style : Style
+        What superposed bodies have in common is drawn once. Where they are of several groups, what is one
+        group's alone has its colour and what several share is grey; else all has its side's colour.
+    stage : array (M, 3), optional
+        Points, world, that the ground shall reach under: a sequence keeps its ground.
+
+    Raises
+    ------
+    ViewerError
+        Where nothing is known of any posture, or there are more than 200.
+    """
+    if len(shown) > MOST:
+        raise ViewerError(
+            f"{len(shown)} postures in one picture; expected at most {MOST}; choose some, as --posture 0,5,7 or "
+            "--posture groups"
+        )
+    known = [k for k in range(len(shown)) if np.isfinite(shown.points[k]).all(axis=1).any()]
+    if not known:
+        raise ViewerError("no joint of the postures is known (all are NaN); expected at least one posture to draw")
+    scene = Scene()
+    apart = style.layout == "side-by-side" and len(known) > 1
+    placed = world.place(shown.points[known])
+    shifts = _shifts(placed, world, style.azimuth) if apart else np.zeros((len(known), 3))
+    together = len(known) > 1 and not apart and style.look is None
+    looks = superposed_looks(shown.chosen(known), figure) if together else [style.look or Look()] * len(known)
+    drawn = []
+    for k, shift, look in zip(known, shifts, looks, strict=True):
+        points = shown.points[k]
+        found = _visible(culprit(shown.reasons[k]), points) if shown.reasons else Culprit()
+        add_posture(
+            scene,
+            f"posture-{k}",
+            points,
+            figure=figure,
+            world=world,
+            q=None if shown.q is None else shown.q[k],
+            look=look,
+            links=found.links,
+            joints=found.joints,
+            shift=shift,
+        )
+        drawn.append(world.place(points) + shift)
+    bodies = np.concatenate(drawn)
+    points = bodies
+    if style.camera and shown.sight is not None and not apart:
+        add_sight(scene, shown.sight, world=world, points=shown.points[known])
+        apex = world.place(np.zeros((1, 3)))
+        if np.nanmin(np.linalg.norm(bodies - apex, axis=1)) < NEAR_CAMERA:
+            points = np.concatenate([bodies, apex])
+    add_stage(
+        scene, points if stage is None else stage, background=style.background, ground=style.ground
+    )
+    return Composition(scene=scene, points=points)
+
+
+def _visible(found: Culprit, points: Array) -> Culprit:
+    """Point at the parent of a joint that has no place: no ray reaches it, or the branch ended before."""
+    joints = []
+    for name in found.joints:
+        joint = JOINT[name]
+        while joint > 0 and not np.isfinite(points[joint]).all():
+            joint = PARENTS[joint]
+        joints.append(POINTS[joint])
+    return Culprit(links=found.links, joints=tuple(dict.fromkeys(joints)))
+
+
+def _shifts(placed: Array, world: World, azimuth: float) -> Array:
+    """Return where the postures (N, K, 3) go side by side (N, 3): in rows, from the left, from the front."""
+    count = len(placed)
+    right, ahead = sight_axes(world, azimuth)
+    rows = row_count(count)
+    columns = int(np.ceil(count / rows))
+    widest, deepest = (_extent(placed @ axis) + gap for axis, gap in ((right, GAP), (ahead, ROW_GAP)))
+    k = np.arange(count)
+    across = (k % columns - (columns - 1) / 2) * widest
+    back = (k // columns - (rows - 1) / 2) * deepest
+    return np.asarray(across[:, None] * right + back[:, None] * ahead)
+
+
+def row_count(count: int) -> int:
+    """Return in how many rows that many postures stand side by side."""
+    return 1 if count <= ONE_ROW else int(np.ceil(count / np.ceil(np.sqrt(2.2 * count))))
+
+
+def _extent(values: Iterable[Array]) -> float:
+    """Return the largest extent of any posture along an axis, from values (N, K), metres."""
+    return max(float(np.nanmax(row) - np.nanmin(row)) for row in values if np.isfinite(row).any())

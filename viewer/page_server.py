@@ -1,0 +1,98 @@
+"""Serve exactly one page, to this machine alone."""
+
+from __future__ import annotations
+
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, Final
+
+from posekit.errors import ViewerError
+
+HOST: Final = "127.0.0.1"
+PATIENCE: Final = 10.0
+"""Seconds that a connection may be idle."""
+
+
+class PageServer(ThreadingHTTPServer):
+    """Serve one page at ``http://127.0.0.1:PORT/``, and nothing else, to nobody else.
+
+    Parameters
+    ----------
+    page : str
+        HTML.
+    port : int
+        0 lets the system choose a free one.
+
+    Raises
+    ------
+    ViewerError
+        Where the port is taken or not allowed.
+
+    Examples
+    --------
+    >>> with PageServer("<p>Hello</p>") as server:
+    ...     server.url.startswith("http://127.0.0.1:")
+    True
+    """
+
+    daemon_threads = True
+    # Rebinding while an old connection lingers is fine; a second server on the same port is not.
+    allow_reuse_address = True
+    allow_reuse_port = False
+
+    def __init__(self, page: str, port: int = 0) -> None:
+        self.page = page.encode("utf-8")
+        try:
+            super().__init__((HOST, port), _Handler)
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or str(error)
+            raise ViewerError(
+                f"port {port} of {HOST}: {reason}; expected a free port; give another one, or none"
+            ) from error
+
+    @property
+    def url(self) -> str:
+        """The page's address."""
+        return f"http://{HOST}:{self.server_port}/"
+
+    @property
+    def hosts(self) -> tuple[str, str]:
+        """The names by which a browser on this machine asks."""
+        return f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Say nothing when a browser hangs up."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: PageServer
+    server_version = "posekit"
+    sys_version = ""
+    timeout = PATIENCE
+
+    def do_GET(self) -> None:
+        self._answer(with_body=True)
+
+    def do_HEAD(self) -> None:
+        self._answer(with_body=False)
+
+    def _answer(self, *, with_body: bool) -> None:
+        # A page of somebody else's could point its own host name at 127.0.0.1 and read along.
+        if self.headers.get("Host") not in self.server.hosts:
+            self.send_error(HTTPStatus.FORBIDDEN)
+            return
+        if self.path != "/":
+            self.send_error(HTTPStatus.NOT_FOUND)
+            return
+        self.send_response(HTTPStatus.OK)
+        self.send_header("Content-Type", "text/html; charset=utf-8")
+        self.send_header("Content-Length", str(len(self.server.page)))
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        self.end_headers()
+        if with_body:
+            self.wfile.write(self.server.page)
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Keep the terminal quiet."""

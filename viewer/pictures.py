@@ -1,0 +1,211 @@
+"""Files with pictures: PNG, animated GIF, MP4, and pages to be turned by hand."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from PIL import Image
+
+from posekit.cameras import Array
+from posekit.errors import ViewerError
+from posekit.files.writing import replacing, write_text
+from posekit.viewer.compose import Composition, Style, compose, row_count
+from posekit.viewer.eye import Eye, ViewEye
+from posekit.viewer.framing import fitted_eye, orbit, view_eye
+from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
+from posekit.viewer.scene import Scene
+from posekit.viewer.standalone import standalone_page
+from posekit.viewer.studio import TIMEOUT, Pixels, Studio
+from posekit.viewer.subject import Shown, Subject
+from posekit.viewer.world import upright_world
+
+FORMATS: Final = (".png", ".gif", ".mp4", ".html")
+AZIMUTH_WITH_CAMERA, AZIMUTH = 55.0, 35.0
+ELEVATION, ELEVATION_OF_ROWS = 14.0, 30.0
+"""Degrees: from where one looks when nothing is said."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shot:
+    """How pictures are taken.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height, pixels.
+    supersample : int
+        How many times larger, in both directions, a picture is drawn before it is scaled down.
+    azimuth, elevation : float, optional
+        Degrees, from where one looks: see `posekit.viewer.compose.fitted_eye`.
+    fov : float
+        Vertical field of view, degrees.
+    eye : Eye, optional
+        A pose instead of azimuth and elevation.
+    through_view : bool
+        Look through the view's own camera instead.
+    turntable : int
+        Pictures of one turn around the postures; 0 for none.
+    fps : float
+        Pictures a second.
+    timeout : float
+        Seconds that one picture may take.
+    """
+
+    size: tuple[int, int] = (1280, 720)
+    supersample: int = 2
+    azimuth: float | None = None
+    elevation: float | None = None
+    fov: float = 25.0
+    eye: Eye | None = None
+    through_view: bool = False
+    turntable: int = 0
+    fps: float = 10.0
+    timeout: float = TIMEOUT
+
+
+def picture_format(path: str | Path) -> str:
+    """Return the format that a file's name asks for.
+
+    Raises
+    ------
+    ViewerError
+        Where it is none of png, gif, mp4 and html, or mp4 without ffmpeg.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in FORMATS:
+        raise ViewerError(f"{path}: the format is {suffix or 'none'}; expected one of {', '.join(FORMATS)}")
+    if suffix == ".mp4":
+        find_ffmpeg()
+    return suffix
+
+
+def write_picture(
+    path: str | Path,
+    subject: Subject,
+    frames: Sequence[Shown] | None = None,
+    *,
+    style: Style | None = None,
+    shot: Shot | None = None,
+    title: str = "posekit",
+    progress: Callable[[int], None] | None = None,
+) -> int:
+    """Draw postures into a file, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        ``.png`` and ``.html``: the first of the frames; ``.gif`` and ``.mp4``: all of them one after another, or
+        a turn around the first.
+    subject : Subject
+        Whose figure, and which world.
+    frames : sequence of Shown, optional
+        Those of the subject, or some of them, with some of their postures, or rejected branches.
+    style : Style, optional
+    shot : Shot, optional
+    title : str
+        Of a page.
+    progress : callable, optional
+        Called with 1 after each picture.
+
+    Returns
+    -------
+    int
+        The number of pictures drawn.
+
+    Raises
+    ------
+    ViewerError
+        Where there is nothing to draw, or no browser draws it.
+    InputError
+        Where the file cannot be written.
+    """
+    kind = picture_format(path)
+    style, shot = style or Style(), shot or Shot()
+    frames = [frame for frame in (subject.frames if frames is None else frames) if len(frame)]
+    if not frames:
+        raise ViewerError("there is no posture in these frames; nothing can be drawn; choose another frame")
+    moving = kind in (".gif", ".mp4")
+    frames = frames if moving and not shot.turntable else frames[:1]
+    film = _Film(subject=subject, frames=frames, style=style, shot=shot)
+    if kind == ".html":
+        write_text(path, [standalone_page(film.compositions[0].scene, eye=film.page_eye(), title=title)])
+        return 1
+    if moving:
+        check_speed(shot.fps)
+    with replacing(path) as file, Studio(timeout=shot.timeout) as studio:
+        pictures = film.pictures(studio, progress)
+        if kind == ".gif":
+            return write_gif(file, pictures, fps=shot.fps)
+        if kind == ".mp4":
+            return write_mp4(file, pictures, fps=shot.fps)
+        file.write(png(next(pictures)))
+    return 1
+
+
+def png(pixels: Pixels) -> bytes:
+    """Return a picture (H, W, 4) as the content of a PNG file."""
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, format="PNG")
+    return file.getvalue()
+
+
+class _Film:
+    """Scenes one after another, in one world, and from where they are looked at."""
+
+    def __init__(self, subject: Subject, frames: Sequence[Shown], style: Style, shot: Shot) -> None:
+        self.shot = shot
+        alone = style.layout == "superposed" or all(len(frame) == 1 for frame in frames)
+        self.with_camera = style.camera and alone and not shot.through_view and frames[0].sight is not None
+        self.rows = 1 if alone else max(row_count(len(frame)) for frame in frames)
+        style = replace(style, azimuth=self._angles()["azimuth"], camera=self.with_camera)
+        self.world = upright_world(np.concatenate([frame.points.reshape(-1, 3) for frame in frames]), subject.R_cam_world)
+        stage = None
+        if len(frames) > 1:  # the ground is the same in all frames
+            stage = self._points([self._compose(frame, subject, style, None) for frame in frames])
+        self.compositions = [self._compose(frame, subject, style, stage) for frame in frames]
+        self.sights = [frame.sight for frame in frames]
+
+    def pictures(self, studio: Studio, progress: Callable[[int], None] | None) -> Iterator[Pixels]:
+        """Draw them."""
+        for scene, eye in self._shots():
+            yield studio.draw(scene, eye, size=self.shot.size, supersample=self.shot.supersample)
+            if progress is not None:
+                progress(1)
+
+    def page_eye(self) -> Eye:
+        """Return from where a page looks at first: free, whatever was asked."""
+        return self.shot.eye or fitted_eye(self._points(self.compositions), self.world, **self._angles())
+
+    def _shots(self) -> Iterator[tuple[Scene, Eye | ViewEye]]:
+        shot = self.shot
+        if shot.turntable:
+            points = self.compositions[0].points
+            for eye in orbit(points, self.world, count=shot.turntable, **self._angles()):
+                yield self.compositions[0].scene, eye
+            return
+        eye = self.page_eye()
+        for composition, sight in zip(self.compositions, self.sights, strict=True):
+            if shot.through_view:
+                yield composition.scene, view_eye(sight, self.world, shot.size)
+            else:
+                yield composition.scene, eye
+
+    def _compose(self, frame: Shown, subject: Subject, style: Style, stage: Array | None) -> Composition:
+        return compose(frame, figure=subject.figure, world=self.world, style=style, stage=stage)
+
+    @staticmethod
+    def _points(compositions: Sequence[Composition]) -> Array:
+        return np.concatenate([composition.points for composition in compositions])
+
+    def _angles(self) -> dict[str, float]:
+        shot = self.shot
+        azimuth = AZIMUTH_WITH_CAMERA if self.with_camera else AZIMUTH
+        azimuth = azimuth if shot.azimuth is None else shot.azimuth
+        elevation = ELEVATION_OF_ROWS if self.rows > 1 else ELEVATION
+        elevation = elevation if shot.elevation is None else shot.elevation
+        return {"azimuth": azimuth, "elevation": elevation, "fov": shot.fov, "aspect": shot.size[0] / shot.size[1]}

@@ -1,0 +1,202 @@
+"""What is to be drawn, frame by frame, whatever kind of file it came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array, PinholeCamera, lee_chen
+from posekit.errors import FigureError, ViewerError
+from posekit.figure import Figure, load_figure, with_head
+from posekit.files import LeeChenModel, OpenCVModel, Postures, Result, ResultFrame, View
+from posekit.skeleton import JOINTS
+from posekit.viewer.sight import Sight
+
+UNIT = 1e-6
+"""How far a quaternion's length may be off for forward kinematics to be asked."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shown:
+    """The postures of one frame.
+
+    Parameters
+    ----------
+    points : array (N, 19, 3)
+        Joints and head, OpenCV camera frame, metres; NaN where unknown.
+    q : array (N, nq), optional
+        Their configurations.
+    groups : int array (N,), optional
+    reasons : sequence of N str
+        Why each was rejected; empty texts for those that were not.
+    sight : Sight, optional
+        What the camera sees in this frame.
+    time : float
+        Seconds.
+    """
+
+    points: Array
+    q: Array | None = None
+    groups: NDArray[np.int64] | None = None
+    reasons: Sequence[str] = ()
+    sight: Sight | None = None
+    time: float = 0.0
+
+    def __len__(self) -> int:
+        """Count the postures."""
+        return len(self.points)
+
+    def chosen(self, rows: Sequence[int]) -> Shown:
+        """Return the frame with some of its postures."""
+        index = np.array(rows, dtype=np.intp)
+        return replace(
+            self,
+            points=self.points[index],
+            q=None if self.q is None else self.q[index],
+            groups=None if self.groups is None else self.groups[index],
+            reasons=[self.reasons[row] for row in rows] if self.reasons else (),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Subject:
+    """All frames, and whose figure it is.
+
+    Parameters
+    ----------
+    figure : Figure
+    frames : sequence of Shown
+    R_cam_world : array (3, 3), optional
+        The view's rotation from a world whose z is up.
+    """
+
+    figure: Figure
+    frames: Sequence[Shown]
+    R_cam_world: Array | None = None
+
+    def points(self, frames: Sequence[int] | None = None) -> Array:
+        """Return all points of some frames (M, 3)."""
+        chosen = self.frames if frames is None else [self.frames[k] for k in frames]
+        return np.concatenate([frame.points.reshape(-1, 3) for frame in chosen])
+
+
+def subject_of(given: Result | Postures | View, view: View | None = None) -> Subject:
+    """Gather what is to be drawn.
+
+    Parameters
+    ----------
+    given : Result, Postures or View
+        The survivors; or postures, all in one frame; or a view: its truth, and what its camera sees.
+    view : View, optional
+        What the result was recovered from: it gives the camera and the person's lengths.
+
+    Raises
+    ------
+    ViewerError
+        Where there is no posture, or the view has other frames than the result.
+    """
+    if isinstance(given, View):
+        return _of_view(given)
+    if isinstance(given, Postures):
+        frames = [_of_postures(given)]
+        figure = load_figure()
+    else:
+        if view is not None and len(view) != len(given.frames):
+            raise ViewerError(
+                f"the view has {len(view)} frames, the result {len(given.frames)}; give the view that it was "
+                "recovered from"
+            )
+        figure = _figure_of(given)
+        frames = [_of_frame(frame, figure, view, k) for k, frame in enumerate(given.frames)]
+    if not any(len(frame) for frame in frames):
+        raise ViewerError("there is no posture in any frame; nothing can be drawn; was everything rejected?")
+    return Subject(figure=figure, frames=frames, R_cam_world=_rotation(view))
+
+
+def _of_postures(given: Postures) -> Shown:
+    joints = np.asarray(given.joints)
+    points = with_head(joints) if given.head is None else np.concatenate([joints, given.head], axis=1)
+    return Shown(points=points)
+
+
+def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int) -> Shown:
+    points = with_head(np.asarray(frame.joints)).copy()
+    q = frame.q if frame.q.shape[1] == figure.model.nq else None
+    if q is not None and len(q):
+        placed = np.isfinite(q[:, :7]).all(axis=1)
+        placed &= np.abs(np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1) - 1) < UNIT
+        if placed.any():
+            # A result has no head points; they hang on the torso alone, by the neck's angles in q.
+            head = figure.forward_kinematics(np.where(np.isnan(q[placed]), 0.0, q[placed]))[:, len(JOINTS) :]
+            points[placed, len(JOINTS) :] = head
+    return Shown(
+        points=points,
+        q=q,
+        groups=frame.groups,
+        sight=_sight(frame, view, index),
+        time=frame.time,
+    )
+
+
+def _sight(frame: ResultFrame, view: View | None, index: int) -> Sight | None:
+    f = frame.camera["f"]
+    if view is not None:
+        image = np.concatenate([view.image[index], view.head_image[index]])
+        return _view_sight(view, image, f)
+    if f is None or len(frame.joints) == 0:
+        return None
+    camera = lee_chen.pinhole(f)
+    return Sight(camera=camera, image=camera.project(frame.joints[:1])[0])  # all survivors have one image
+
+
+def _of_view(view: View) -> Subject:
+    points = with_head(np.asarray(view.truth)).copy()
+    unseen = np.isnan(points[:, 0]).any(axis=1)
+    points[unseen, 0] = view.root[unseen]
+    frames = []
+    for k in range(len(view)):
+        image = np.concatenate([view.image[k], view.head_image[k]])
+        known = np.isfinite(points[k, : len(JOINTS)]).any()
+        frames.append(
+            Shown(
+                points=points[k : k + 1] if known else points[:0],
+                sight=_view_sight(view, image, None),
+                time=float(view.time[k]),
+            )
+        )
+    if not any(len(frame) for frame in frames):
+        raise ViewerError(
+            "the view holds no posture (neither truth nor root); recover it first and draw the result: "
+            "posekit recover VIEW -o RESULT"
+        )
+    figure = load_figure()
+    figure = figure if view.stature is None else figure.from_stature(view.stature)
+    return Subject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
+
+
+def _view_sight(view: View, image: Array, f: float | None) -> Sight | None:
+    model = view.camera
+    if isinstance(model, OpenCVModel):
+        return Sight(camera=PinholeCamera(K=model.K, distortion=model.distortion), image=image, size=model.size)
+    if isinstance(model, LeeChenModel):
+        f = model.f if f is None else f
+        return None if f is None else Sight(camera=lee_chen.pinhole(f), image=image)
+    return None
+
+
+def _figure_of(result: Result) -> Figure:
+    """Return the built-in figure with the result's lengths; capsules and head grow with them."""
+    lengths = result.settings.get("lengths")
+    if not isinstance(lengths, dict):
+        return load_figure()
+    try:
+        return load_figure().scaled(lengths)
+    except (FigureError, TypeError) as error:
+        raise ViewerError(f"settings.lengths of the result: {error}") from None
+
+
+def _rotation(view: View | None) -> Array | None:
+    return view.camera.R if view is not None and isinstance(view.camera, OpenCVModel) else None
