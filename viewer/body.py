@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ from posekit.errors import ViewerError
 from posekit.figure import Figure, with_head
 from posekit.figure.capsules import Capsule
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
-from posekit.viewer.colours import ALARM, POINT_SIDES, SIDES, Rgb, side
+from posekit.viewer.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
 from posekit.viewer.scene import Scene
 from posekit.viewer.shapes import add_ball, add_tubes, glow, matte, smooth
 from posekit.viewer.world import World
@@ -118,18 +118,15 @@ def add_posture(
     opacity = min(look.opacity, FADED) if pointed else look.opacity
     if look.bodies:
         colours = {
-            capsule.link: (*ALARM, 1.0)
+            capsule: (*ALARM, 1.0)
             if capsule.link in links
             else (*look.body.get(capsule.link, SIDES[side(capsule.link)]), _opacity(capsule.link, opacity))
             for capsule in figure.capsules
+            if capsule.link not in look.without
         }
-        template = _template(figure, tuple(sorted(colours.items())))
         T_world_cam = world.T_world_cam
         T_world_cam[:3, 3] += shift
-        drawn = [capsule for capsule in figure.capsules if capsule.link not in look.without]
-        _add_capsules(
-            scene, name, points, capsules=drawn, template=template, figure=figure, q=q, T_world_cam=T_world_cam
-        )
+        _add_capsules(scene, name, points, figure=figure, colours=colours, q=q, T_world_cam=T_world_cam)
     if look.joints:
         for index, point in enumerate(POINTS):
             if point in look.without:
@@ -139,10 +136,9 @@ def add_posture(
     if look.bones:
         drawn_bones = [pair for pair in TREE_SEGMENTS if f"bone-{POINTS[pair[1]]}" not in look.without]
         pairs = np.array(drawn_bones, dtype=np.intp).reshape(-1, 2)
-        colours = np.array([SIDES[POINT_SIDES[child]] for _, child in drawn_bones]).reshape(-1, 3)
-        add_tubes(
-            scene, f"{name}/bones", placed[pairs[:, 0]], placed[pairs[:, 1]], colours, radius=BONE_RADIUS
-        )
+        shades = np.array([SIDES[POINT_SIDES[child]] for _, child in drawn_bones]).reshape(-1, 3)
+        starts, ends = placed[pairs[:, 0]], placed[pairs[:, 1]]
+        add_tubes(scene, f"{name}/bones", starts, ends, shades, radius=BONE_RADIUS)
 
 
 def _add_joint(scene: Scene, name: str, point: str, middle: Array, *, in_head: bool, alarm: bool) -> None:
@@ -162,21 +158,22 @@ def _add_capsules(
     name: str,
     points: Array,
     *,
-    capsules: Sequence[Capsule],
-    template: _Template,
     figure: Figure,
+    colours: Mapping[Capsule, tuple[float, float, float, float]],
     q: Array | None,
     T_world_cam: Array,
 ) -> None:
     q = figure.inverse_kinematics(points[None])[0] if q is None else np.asarray(q, dtype=np.float64)
-    T_cam_link = template.display(q) if _gives_back(figure, q, points) else {}
-    for capsule in capsules:
-        path = f"/meshcat/{name}/bodies/{capsule.link}"
+    bodies = _bodies(figure)
+    T_cam_link = bodies.display(q) if _gives_back(figure, q, points) else {}
+    for capsule, colour in colours.items():
         T = T_cam_link.get(capsule.link)
         if T is None:
             T = _laid(capsule, points)
         if np.isfinite(T).all():
-            scene.adopt(template.scene, template.path(capsule.link), path)
+            path = f"/meshcat/{name}/bodies/{capsule.link}"
+            scene.adopt(bodies.scene, bodies.path(capsule.link), path)
+            scene.recolour(path, number(colour[:3]), colour[3])
             scene.transform(path, T_world_cam @ T)
 
 
@@ -203,26 +200,20 @@ def _laid(capsule: Capsule, points: Array) -> Array:
     return T
 
 
-class _Template:
+class _Bodies:
     """The figure in Pinocchio's `MeshcatVisualizer`, which draws into a scene of its own."""
 
-    def __init__(self, figure: Figure, colours: dict[str, tuple[float, float, float, float]]) -> None:
+    def __init__(self, figure: Figure) -> None:
         self.scene = Scene()
-        self.names = {}
-        geometry = figure.geometry.copy()
-        for body in geometry.geometryObjects:
-            link = figure.model.frames[body.parentFrame].name
-            body.meshColor = np.array(colours[link])
-            self.names[link] = body.name
-        self.visualizer = MeshcatVisualizer(figure.model, pin.GeometryModel(), geometry)
+        links = figure.model.frames
+        self.names = {links[body.parentFrame].name: body.name for body in figure.geometry.geometryObjects}
+        self.visualizer = MeshcatVisualizer(figure.model, pin.GeometryModel(), figure.geometry)
         self.visualizer.initViewer(viewer=self.scene.meshcat)
         self.visualizer.loadViewerModel(rootNodeName="body")
         for capsule in figure.capsules:
             drawn = self.scene.nodes[self.path(capsule.link)].object or {}
             smooth(self.scene.geometries[drawn["geometry"]], capsule.half_length)
             drawn["material"] |= {"type": "MeshLambertMaterial", "side": 0}
-            if drawn["material"]["transparent"]:
-                drawn["material"]["depthWrite"] = False  # bones and joints show through
 
     def path(self, link: str) -> str:
         """Return where in its scene the link's capsule is."""
@@ -241,6 +232,6 @@ class _Template:
 
 
 @lru_cache(maxsize=32)
-def _template(figure: Figure, colours: tuple[tuple[str, tuple[float, ...]], ...]) -> _Template:
+def _bodies(figure: Figure) -> _Bodies:
     """Keep the capsules that were made: their meshes take longer than all the rest."""
-    return _Template(figure, dict(colours))
+    return _Bodies(figure)

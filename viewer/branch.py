@@ -66,6 +66,12 @@ def rejected_of(result: Result, subject: Subject, frame: int) -> Shown:
     )
 
 
+def one_a_reason(shown: Shown) -> Shown:
+    """Keep the last pruned branch of each reason, the one that got farthest."""
+    last = {reason: row for row, reason in enumerate(shown.reasons)}
+    return shown.chosen(list(last.values()))
+
+
 def lift_branch(
     camera: Camera, root: Array, image: Array, lengths: Array, bits: str, *, tolerance: float = TANGENT
 ) -> Array:
@@ -87,9 +93,7 @@ def lift_branch(
     joints = np.full((len(JOINTS), 3), np.nan)
     joints[0] = root
     for (parent, child), length, bit in zip(TREE_SEGMENTS, lengths, bits, strict=False):
-        lift = camera.lift(
-            joints[None, parent], image[None, child], np.array([length]), tolerance=tolerance
-        )
+        lift = camera.lift(joints[None, parent], image[None, child], np.array([length]), tolerance=tolerance)
         if lift.valid[0, int(bit)]:
             joints[child] = lift.points[0, int(bit)]
     return joints

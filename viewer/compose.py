@@ -13,11 +13,12 @@ from posekit.errors import ViewerError
 from posekit.figure import Figure
 from posekit.skeleton import JOINT, PARENTS, POINTS
 from posekit.viewer.body import Look, add_posture
+from posekit.viewer.colours import GROUPS
 from posekit.viewer.culprit import Culprit, culprit
 from posekit.viewer.framing import sight_axes
 from posekit.viewer.scene import Scene
 from posekit.viewer.sight import add_sight
-from posekit.viewer.stage import add_stage
+from posekit.viewer.stage import add_mat, add_stage
 from posekit.viewer.subject import Shown
 from posekit.viewer.superposed import superposed_looks
 from posekit.viewer.world import World
@@ -74,7 +75,9 @@ class Composition:
     points: Array
 
 
-def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: Array | None = None) -> Composition:
+def compose(
+    shown: Shown, *, figure: Figure, world: World, style: Style, stage: Array | None = None
+) -> Composition:
     """Draw one frame's postures.
 
     Parameters
@@ -85,7 +88,8 @@ def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: 
     world : World
     style : Style
         What superposed bodies have in common is drawn once. Where they are of several groups, what is one
-        group's alone has its colour and what several share is grey; else all has its side's colour.
+        group's alone has its colour and what several share is grey; else all has its side's colour. Side by
+        side each stands on a mat of its group's colour.
     stage : array (M, 3), optional
         Points, world, that the ground shall reach under: a sequence keeps its ground.
 
@@ -101,7 +105,9 @@ def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: 
         )
     known = [k for k in range(len(shown)) if np.isfinite(shown.points[k]).all(axis=1).any()]
     if not known:
-        raise ViewerError("no joint of the postures is known (all are NaN); expected at least one posture to draw")
+        raise ViewerError(
+            "no joint of the postures is known (all are NaN); expected at least one posture to draw"
+        )
     scene = Scene()
     apart = style.layout == "side-by-side" and len(known) > 1
     placed = world.place(shown.points[known])
@@ -125,6 +131,8 @@ def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: 
             shift=shift,
         )
         drawn.append(world.place(points) + shift)
+        if apart and shown.groups is not None:
+            add_mat(scene, f"posture-{k}/mat", drawn[-1], GROUPS[int(shown.groups[k]) % len(GROUPS)])
     bodies = np.concatenate(drawn)
     points = bodies
     if style.camera and shown.sight is not None and not apart:
@@ -132,9 +140,7 @@ def compose(shown: Shown, *, figure: Figure, world: World, style: Style, stage: 
         apex = world.place(np.zeros((1, 3)))
         if np.nanmin(np.linalg.norm(bodies - apex, axis=1)) < NEAR_CAMERA:
             points = np.concatenate([bodies, apex])
-    add_stage(
-        scene, points if stage is None else stage, background=style.background, ground=style.ground
-    )
+    add_stage(scene, points if stage is None else stage, background=style.background, ground=style.ground)
     return Composition(scene=scene, points=points)
 
 

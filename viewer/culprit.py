@@ -53,7 +53,7 @@ def _joints(part: str) -> list[str]:
         return [part]
     limbs = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
     side, _, limb = part.rpartition("_")
-    names = limbs.get(limb.removesuffix("s"), ())
+    names: tuple[str, ...] = limbs.get(limb.removesuffix("s"), ())
     if part in ("right", "left"):  # rule 2: arm and leg of that side
         side, names = part, ("elbow", "knee")
     sides = [side] if side else ["right", "left"]

@@ -39,7 +39,9 @@ class Eye:
         for name in ("position", "target"):
             array = np.array(getattr(self, name), dtype=np.float64)
             if array.shape != (3,) or not np.isfinite(array).all():
-                raise ViewerError(f"the camera's {name} is {array.tolist()}; expected three finite numbers, metres")
+                raise ViewerError(
+                    f"the camera's {name} is {array.tolist()}; expected three finite numbers, metres"
+                )
             array.flags.writeable = False
             object.__setattr__(self, name, array)
         if not 0 < self.fov < 180:

@@ -14,17 +14,20 @@ from PIL import Image
 from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.files.writing import replacing, write_text
+from posekit.viewer.browser import TIMEOUT
 from posekit.viewer.compose import Composition, Style, compose, row_count
 from posekit.viewer.eye import Eye, ViewEye
+from posekit.viewer.find_browser import find_browser
 from posekit.viewer.framing import fitted_eye, orbit, view_eye
 from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
 from posekit.viewer.scene import Scene
 from posekit.viewer.standalone import standalone_page
-from posekit.viewer.studio import TIMEOUT, Pixels, Studio
+from posekit.viewer.studio import Pixels, Studio, check_size
 from posekit.viewer.subject import Shown, Subject
 from posekit.viewer.world import upright_world
 
-FORMATS: Final = (".png", ".gif", ".mp4", ".html")
+MOVING: Final = (".gif", ".mp4")
+FORMATS: Final = (".png", ".html", *MOVING)
 AZIMUTH_WITH_CAMERA, AZIMUTH = 55.0, 35.0
 ELEVATION, ELEVATION_OF_ROWS = 14.0, 30.0
 """Degrees: from where one looks when nothing is said."""
@@ -68,20 +71,28 @@ class Shot:
     timeout: float = TIMEOUT
 
 
-def picture_format(path: str | Path) -> str:
-    """Return the format that a file's name asks for.
+def check_picture(path: str | Path, shot: Shot) -> bool:
+    """Refuse what cannot be drawn before the work that it needs is done; return whether it will move.
 
     Raises
     ------
     ViewerError
-        Where it is none of png, gif, mp4 and html, or mp4 without ffmpeg.
+        Where the file's name asks for none of png, gif, mp4 and html, for mp4 without ffmpeg, or where the
+        picture's size or speed is none.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in FORMATS:
         raise ViewerError(f"{path}: the format is {suffix or 'none'}; expected one of {', '.join(FORMATS)}")
+    check_size(shot.size, shot.supersample)
     if suffix == ".mp4":
         find_ffmpeg()
-    return suffix
+    if shot.turntable and suffix not in MOVING:
+        raise ViewerError(f"{path}: a turntable moves; expected {' or '.join(MOVING)}")
+    if suffix in MOVING:
+        check_speed(shot.fps)
+    if suffix != ".html":
+        find_browser()
+    return suffix in MOVING
 
 
 def write_picture(
@@ -124,19 +135,17 @@ def write_picture(
     InputError
         Where the file cannot be written.
     """
-    kind = picture_format(path)
     style, shot = style or Style(), shot or Shot()
+    moving = check_picture(path, shot)
+    kind = Path(path).suffix.lower()
     frames = [frame for frame in (subject.frames if frames is None else frames) if len(frame)]
     if not frames:
         raise ViewerError("there is no posture in these frames; nothing can be drawn; choose another frame")
-    moving = kind in (".gif", ".mp4")
     frames = frames if moving and not shot.turntable else frames[:1]
     film = _Film(subject=subject, frames=frames, style=style, shot=shot)
     if kind == ".html":
         write_text(path, [standalone_page(film.compositions[0].scene, eye=film.page_eye(), title=title)])
         return 1
-    if moving:
-        check_speed(shot.fps)
     with replacing(path) as file, Studio(timeout=shot.timeout) as studio:
         pictures = film.pictures(studio, progress)
         if kind == ".gif":
@@ -163,7 +172,9 @@ class _Film:
         self.with_camera = style.camera and alone and not shot.through_view and frames[0].sight is not None
         self.rows = 1 if alone else max(row_count(len(frame)) for frame in frames)
         style = replace(style, azimuth=self._angles()["azimuth"], camera=self.with_camera)
-        self.world = upright_world(np.concatenate([frame.points.reshape(-1, 3) for frame in frames]), subject.R_cam_world)
+        self.world = upright_world(
+            np.concatenate([frame.points.reshape(-1, 3) for frame in frames]), subject.R_cam_world
+        )
         stage = None
         if len(frames) > 1:  # the ground is the same in all frames
             stage = self._points([self._compose(frame, subject, style, None) for frame in frames])
@@ -208,4 +219,9 @@ class _Film:
         azimuth = azimuth if shot.azimuth is None else shot.azimuth
         elevation = ELEVATION_OF_ROWS if self.rows > 1 else ELEVATION
         elevation = elevation if shot.elevation is None else shot.elevation
-        return {"azimuth": azimuth, "elevation": elevation, "fov": shot.fov, "aspect": shot.size[0] / shot.size[1]}
+        return {
+            "azimuth": azimuth,
+            "elevation": elevation,
+            "fov": shot.fov,
+            "aspect": shot.size[0] / shot.size[1],
+        }

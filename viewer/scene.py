@@ -87,6 +87,17 @@ class Scene:
         else:
             node.properties["visible"] = False
 
+    def recolour(self, path: str, colour: int, opacity: float) -> None:
+        """Give the object at `path` another colour (0xrrggbb) and opacity.
+
+        What is translucent does not hide what is behind it.
+        """
+        node = self.nodes[path]
+        if node.object is not None:
+            solid = opacity >= 1
+            material = {"color": colour, "opacity": opacity, "transparent": not solid, "depthWrite": solid}
+            node.object = {**node.object, "material": {**node.object["material"], **material}}
+
     def show(self, path: str, visible: bool) -> None:
         """Show or hide the node at `path` with all below it."""
         self.nodes.setdefault(path, Node()).properties["visible"] = visible

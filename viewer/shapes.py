@@ -47,7 +47,14 @@ def add_ball(scene: Scene, path: str, middle: Array, radius: float, material: mg
 
 
 def add_tubes(
-    scene: Scene, path: str, starts: Array, ends: Array, colours: Array, *, radius: float, opacity: float = 1.0
+    scene: Scene,
+    path: str,
+    starts: Array,
+    ends: Array,
+    colours: Array,
+    *,
+    radius: float,
+    opacity: float = 1.0,
 ) -> None:
     """Put straight tubes at `path` as one mesh; those of which an end is not known are left out.
 
@@ -61,7 +68,8 @@ def add_tubes(
         Metres.
     """
     known = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
-    known &= np.linalg.norm(np.where(known[:, None], ends - starts, 0.0), axis=1) > 0
+    lengths = np.linalg.norm(np.where(known[:, None], ends - starts, 0.0), axis=1)
+    known = np.asarray(known & (lengths > 0))
     if not known.any():
         return
     vertices, faces = tubes(starts[known], ends[known], radius)

@@ -89,7 +89,10 @@ def add_sight(
     apex = world.place(np.zeros(3))
     corners = world.place(depth * sight.rays(sight.frame()))
     if np.isfinite(corners).all():
-        edges = np.concatenate([corners, corners]), np.concatenate([np.tile(apex, (4, 1)), np.roll(corners, -1, 0)])
+        edges = (
+            np.concatenate([corners, corners]),
+            np.concatenate([np.tile(apex, (4, 1)), np.roll(corners, -1, 0)]),
+        )
         colours = np.tile(FRUSTUM, (8, 1))
         add_tubes(scene, f"{name}/frustum", *edges, colours, radius=EDGE_RADIUS)
         add_sheet(scene, f"{name}/plane", corners, glow(PLANE, 0.55))
@@ -98,7 +101,11 @@ def add_sight(
     colours = np.array([SIDES[POINT_SIDES[k]] for k in range(len(sight.image))])
     ends = np.arange(1, len(PARENTS))
     add_tubes(
-        scene, f"{name}/image", on_plane[np.array(PARENTS)[1:]], on_plane[1 : len(PARENTS)], colours[ends],
+        scene,
+        f"{name}/image",
+        on_plane[np.array(PARENTS)[1:]],
+        on_plane[1 : len(PARENTS)],
+        colours[ends],
         radius=IMAGE_RADIUS,
     )
     for k, middle in enumerate(on_plane):
@@ -108,7 +115,15 @@ def add_sight(
     if rays:
         reach = np.where(np.isfinite(far), far, np.nanmax(far) if np.isfinite(far).any() else 2 * depth)
         tips = world.place(sight.rays(sight.image) * reach[:, None])
-        add_tubes(scene, f"{name}/rays", np.tile(apex, (len(tips), 1)), tips, colours, radius=RAY_RADIUS, opacity=RAY_OPACITY)
+        add_tubes(
+            scene,
+            f"{name}/rays",
+            np.tile(apex, (len(tips), 1)),
+            tips,
+            colours,
+            radius=RAY_RADIUS,
+            opacity=RAY_OPACITY,
+        )
 
 
 def _depths(points: Array | None, count: int) -> Array:

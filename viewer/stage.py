@@ -9,7 +9,7 @@ from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.viewer.colours import Rgb, rgb
 from posekit.viewer.scene import Json, Scene
-from posekit.viewer.shapes import glow
+from posekit.viewer.shapes import BALL, glow
 
 BACKGROUNDS: dict[str, Rgb] = {"white": rgb("#ffffff"), "grey": rgb("#e8ebee"), "black": rgb("#101418")}
 
@@ -22,6 +22,9 @@ SUNS = (
     ("back", (6.0, 1.0, 4.0), 0.14),
 )
 """Name, direction and strength of the lights: from the view's camera and the right, from the left, from behind."""
+
+MAT = 0.3
+"""Radius of the mat below a body, metres."""
 
 MARGIN = 0.75
 """Metres of ground around what stands on it, at least."""
@@ -71,7 +74,19 @@ def add_stage(scene: Scene, points: Array, *, background: str = "white", ground:
         _add_grid(scene, points)
 
 
-def _add_light(scene: Scene, name: str, light: Json, position: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> None:
+def add_mat(scene: Scene, name: str, points: Array, colour: Rgb) -> None:
+    """Lay a round mat on the ground below a body's points (K, 3), world, metres."""
+    known = points[np.isfinite(points).all(axis=1)]
+    middle = np.median(known, axis=0)
+    scene.meshcat[name].set_object(mg.Mesh(BALL, glow(colour, 0.8)))
+    matrix = np.diag([MAT, MAT, 0.003, 1.0])
+    matrix[:2, 3] = middle[:2]
+    scene.transform(f"/meshcat/{name}", matrix)
+
+
+def _add_light(
+    scene: Scene, name: str, light: Json, position: tuple[float, float, float] = (0.0, 0.0, 1.0)
+) -> None:
     scene.nodes.pop(f"/Lights/{name}", None)
     scene.send(_Object(f"/Lights/{name}", light))
     matrix = np.eye(4)

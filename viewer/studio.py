@@ -108,15 +108,9 @@ class Studio:
         check_drawn(pixels)
         return pixels
 
-    def _shoot(
-        self, scene: Scene, eye: Eye | ViewEye, size: tuple[int, int], supersample: int
-    ) -> Pixels:
+    def _shoot(self, scene: Scene, eye: Eye | ViewEye, size: tuple[int, int], supersample: int) -> Pixels:
         width, height = size
-        if min(width, height, supersample) < 1 or max(size) * supersample > LARGEST:
-            raise ViewerError(
-                f"a picture of {width}x{height} pixels drawn {supersample} times larger; expected sides from 1 to "
-                f"{LARGEST} pixels, supersampling included"
-            )
+        check_size(size, supersample)
         world, projection = eye.matrices(width, height)
         document = scene.document(self._drawn, self._known)
         shot = {
@@ -145,7 +139,19 @@ class Studio:
                 'const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"), false); 0'
             )
         except ViewerError as error:
-            raise ViewerError(f"the browser has no WebGL to draw with ({error}); use another browser") from None
+            raise ViewerError(
+                f"the browser has no WebGL to draw with ({error}); use another browser"
+            ) from None
+
+
+def check_size(size: tuple[int, int], supersample: int) -> None:
+    """Refuse a picture that cannot be drawn."""
+    width, height = size
+    if min(width, height, supersample) < 1 or max(size) * supersample > LARGEST:
+        raise ViewerError(
+            f"a picture of {width}x{height} pixels drawn {supersample} times larger; expected sides from 1 to "
+            f"{LARGEST} pixels, supersampling included; draw it smaller"
+        )
 
 
 def check_drawn(pixels: Pixels) -> None:

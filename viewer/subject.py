@@ -127,7 +127,8 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
     q = frame.q if frame.q.shape[1] == figure.model.nq else None
     if q is not None and len(q):
         placed = np.isfinite(q[:, :7]).all(axis=1)
-        placed &= np.abs(np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1) - 1) < UNIT
+        norms = np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1)
+        placed = np.asarray(placed & (np.abs(norms - 1) < UNIT))
         if placed.any():
             # A result has no head points; they hang on the torso alone, by the neck's angles in q.
             head = figure.forward_kinematics(np.where(np.isnan(q[placed]), 0.0, q[placed]))[:, len(JOINTS) :]
@@ -180,7 +181,9 @@ def _of_view(view: View) -> Subject:
 def _view_sight(view: View, image: Array, f: float | None) -> Sight | None:
     model = view.camera
     if isinstance(model, OpenCVModel):
-        return Sight(camera=PinholeCamera(K=model.K, distortion=model.distortion), image=image, size=model.size)
+        return Sight(
+            camera=PinholeCamera(K=model.K, distortion=model.distortion), image=image, size=model.size
+        )
     if isinstance(model, LeeChenModel):
         f = model.f if f is None else f
         return None if f is None else Sight(camera=lee_chen.pinhole(f), image=image)

@@ -23,7 +23,8 @@ def superposed_looks(shown: Shown, figure: Figure) -> list[Look]:
 
     What several have in common (a limb that points the same way) is drawn with the first of them only: else
     translucent bodies would add up to a solid one. Where the postures are of several groups, a capsule that one
-    group has alone is in that group's colour, and one that groups share is grey.
+    group has alone is in that group's colour, and one that groups share is grey; where all are shared, sides have
+    their colours.
 
     Parameters
     ----------
@@ -48,6 +49,8 @@ def superposed_looks(shown: Shown, figure: Figure) -> list[Look]:
             for k in np.unique(first):
                 owners = set(groups[first == k].tolist())
                 colours[k][name] = GROUPS[owners.pop() % len(GROUPS)] if len(owners) == 1 else MIDDLE
+    if all(colour == MIDDLE for own in colours for colour in own.values()):
+        colours = [{} for _ in range(count)]  # groups that differ in combination alone: sides say more
     return [Look(body=body, without=frozenset(names)) for body, names in zip(colours, without, strict=True)]
 
 

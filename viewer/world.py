@@ -51,7 +51,9 @@ class World:
     def level_axes(self) -> tuple[Array, Array]:
         """Return where the view's camera looks and its right-hand side, both level (3,)."""
         forward = self.R_world_cam[:, 2] * [1.0, 1.0, 0.0]
-        if np.linalg.norm(forward) < 1e-3:  # it looks straight down or up: what is above in its picture is ahead
+        if (
+            np.linalg.norm(forward) < 1e-3
+        ):  # it looks straight down or up: what is above in its picture is ahead
             forward = -self.R_world_cam[:, 1] * [1.0, 1.0, 0.0]
         forward = forward / np.linalg.norm(forward)
         return forward, np.cross(forward, [0.0, 0.0, 1.0])

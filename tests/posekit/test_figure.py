@@ -117,7 +117,7 @@ class TestThereAndBack:
     def test_abduction_beyond_90(self, rng: np.random.Generator) -> None:
         q = random_configurations(rng, 1000)
         arms = [DOFS.index(f"{s}_shoulder.abduction") for s in ("right", "left")]
-        q[:, FIGURE.angle_index[arms]] = rng.uniform(np.pi / 2, np.pi, (1000, 2))
+        q[:, FIGURE.angle_index[arms]] = rng.uniform(np.pi / 2, FIGURE.limits.upper[arms], (1000, 2))
         assert_there_and_back(q)
 
     @pytest.mark.parametrize("bend", [160.0, 175.0, 179.9999999, 180.0])

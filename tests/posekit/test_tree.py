@@ -306,7 +306,10 @@ def test_a_segment_too_short_says_which_and_by_how_much() -> None:
     assert len(leaves.code) == 0
     assert leaves.counts().sum() == 0
     assert sum(leaves.rejected()[0].values()) == 8192
-    assert leaves.rejected()[0]["no_solution/left_knee"] == 8192
+    # Branches that die earlier are short of another segment, in a posture that is not the true one.
+    reasons = leaves.rejected()[0]
+    assert all(reason.startswith("no_solution/") for reason in reasons)
+    assert reasons["no_solution/left_knee"] > 0
     group = next(group for group in leaves.pruned if group.check == "no_solution")
     assert (group.value > 0).all()
     assert (group.upper == 0).all()

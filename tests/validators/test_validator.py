@@ -128,13 +128,11 @@ def test_a_range_that_is_broken_is_named_with_its_value(dof: str, angle: float) 
     assert finding(report, f"joint_range/{dof}")[0] == pytest.approx(angle, abs=1e-6)
 
 
-@pytest.mark.xfail(reason="flexion and abduction of 180 degrees each are half a turn about a hanging arm")
 @pytest.mark.parametrize("side", ["right", "left"])
 def test_the_elbow_of_a_hanging_arm_does_not_bend_backward(side: str) -> None:
     assert Validator().check(posed(**{f"{side}_elbow_flexion": -20.0})[:, :14]).verdicts == ["invalid"]
 
 
-@pytest.mark.xfail(reason="the forearms reach 0.4 mm into the thighs")
 @pytest.mark.parametrize("stature", [1.2, 1.75, 2.0])
 def test_a_person_of_any_stature_may_stand(stature: float) -> None:
     person = FIGURE.from_stature(stature)

@@ -1,0 +1,264 @@
+"""`posekit render`: postures as pictures, animations and pages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posekit.cli.given import schema_of
+from posekit.cli.options import about, examples, numbers, progress, split
+from posekit.errors import InputError, ViewerError
+
+if TYPE_CHECKING:
+    from posekit.files import Postures, Result, View
+    from posekit.viewer.subject import Shown, Subject
+
+EXAMPLES = examples(
+    "posekit render postures.json -o survivors.png --posture groups",
+    "posekit render postures.json --view walk.json -o first.png --frame 1 --posture 1 --supersample 3",
+    "posekit render postures.json -o all.png --layout superposed --background grey",
+    "posekit render postures.json -o walk.gif --posture 1 --fps 5",
+    "posekit render postures.json -o turn.gif --frame 2 --posture 1 --turntable 36 --size 640x480",
+    "posekit render explained.json --view walk.json -o rejected.png --rejected",
+)
+
+
+class Layout(StrEnum):
+    """How several postures are arranged."""
+
+    SIDE_BY_SIDE = "side-by-side"
+    SUPERPOSED = "superposed"
+
+
+def render(
+    given: Annotated[
+        Path,
+        typer.Argument(metavar="RESULT|POSTURES|VIEW", help="A view is recovered with default settings."),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="FILE",
+            help="The picture: .png, .gif, .mp4; or .html: the page of all survivors, or, with --posture, --layout, "
+            "--rejected or --eye, that scene alone.",
+        ),
+    ],
+    seen: Annotated[
+        Path | None,
+        typer.Option(
+            "--view", metavar="VIEW", help="What the result was recovered from: shows its camera and image."
+        ),
+    ] = None,
+    frame: Annotated[
+        str,
+        typer.Option(
+            "--frame", metavar="K|A-B", help="From 1. Default: the first with a posture; all where it moves."
+        ),
+    ] = "",
+    posture: Annotated[
+        str,
+        typer.Option(
+            "--posture", metavar="LIST", help="From 1, as 1,5; all; or groups, the first of each group."
+        ),
+    ] = "all",
+    rejected: Annotated[
+        bool,
+        typer.Option(
+            "--rejected",
+            help="Instead of survivors, one pruned branch for each reason, with what killed it highlighted; "
+            "of a result that was recovered with --explain.",
+        ),
+    ] = False,
+    layout: Annotated[
+        Layout | None,
+        typer.Option(
+            "--layout", help="Of several postures. Default: side-by-side; superposed where it moves."
+        ),
+    ] = None,
+    size: Annotated[str, typer.Option("--size", metavar="WxH", help="Pixels.")] = "1280x720",
+    supersample: Annotated[
+        int, typer.Option("--supersample", min=1, max=8, help="Draw this many times larger, then scale down.")
+    ] = 2,
+    background: Annotated[
+        str,
+        typer.Option(
+            "--background", metavar="COLOUR", help="white, grey, black, transparent, or as #e8ebee."
+        ),
+    ] = "white",
+    azimuth: Annotated[
+        float | None,
+        typer.Option(
+            "--azimuth",
+            help="Degrees: 0 looks from the view's camera, 90 from its right.",
+            show_default=False,
+        ),
+    ] = None,
+    elevation: Annotated[
+        float | None, typer.Option("--elevation", help="Degrees above the level.", show_default=False)
+    ] = None,
+    eye: Annotated[
+        str,
+        typer.Option("--eye", metavar="X,Y,Z", help="Look from this point: metres, z up, the ground at 0."),
+    ] = "",
+    target: Annotated[
+        str, typer.Option("--target", metavar="X,Y,Z", help="With --eye: the point to look at.")
+    ] = "0,0,0.9",
+    fov: Annotated[float, typer.Option("--fov", help="Vertical field of view, degrees.")] = 25.0,
+    through_view: Annotated[
+        bool, typer.Option("--through-view", help="Look through the view's own camera.")
+    ] = False,
+    camera: Annotated[
+        bool, typer.Option("--camera/--no-camera", help="Draw the view's camera, image and rays.")
+    ] = True,
+    ground: Annotated[bool, typer.Option("--ground/--no-ground", help="Draw the ground's grid.")] = True,
+    turntable: Annotated[
+        int,
+        typer.Option("--turntable", min=0, help="Go around once in this many pictures.", show_default=False),
+    ] = 0,
+    fps: Annotated[float, typer.Option("--fps", help="Pictures a second, where it moves.")] = 10.0,
+    timeout: Annotated[
+        float, typer.Option("--timeout", min=1, help="Seconds after which a browser that hangs is ended.")
+    ] = 60.0,
+) -> None:
+    """Draw postures as a picture, an animation, or a page to be turned by hand.
+
+    Right limbs are orange, left ones blue. Pictures are drawn by an installed Chromium or Chrome, found by
+    POSEKIT_BROWSER or on PATH, without a window, a server or an open port; pages (.html) need none.
+    """
+    import numpy as np
+
+    from posekit.viewer.compose import Style
+    from posekit.viewer.eye import Eye
+    from posekit.viewer.pictures import Shot, check_picture, write_picture
+    from posekit.viewer.stage import background_colour
+
+    background_colour(background)
+    pose = None
+    if eye:
+        position, middle = numbers(eye, 3, "--eye"), numbers(target, 3, "--target")
+        pose = Eye(position=np.array(position), target=np.array(middle), fov=fov)
+    shot = Shot(
+        size=_size(size),
+        supersample=supersample,
+        azimuth=azimuth,
+        elevation=elevation,
+        fov=fov,
+        eye=pose,
+        through_view=through_view,
+        turntable=turntable,
+        fps=fps,
+        timeout=timeout,
+    )
+    moving = check_picture(output, shot)
+    arranged = layout or (Layout.SUPERPOSED if moving and not turntable else Layout.SIDE_BY_SIDE)
+    style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
+    content, behind = _read(given, seen, explain=rejected)
+    if output.suffix.lower() == ".html" and posture == "all" and layout is None and not rejected and not eye:
+        with about(given):
+            _write_page(output, content, behind, frame, title=given.name)
+        return
+    with about(given):
+        subject, frames = _shown(content, behind, frame, posture, rejected, moving=moving and not turntable)
+    with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
+        count = write_picture(
+            output, subject, frames, style=style, shot=shot, title=given.name, progress=done
+        )
+    pictures = f" ({count} pictures)" if moving else ""
+    typer.echo(f"written: {output}{pictures}")
+
+
+def _write_page(
+    output: Path, content: Result | Postures, view: View | None, frame: str, *, title: str
+) -> None:
+    from posekit.files import Postures
+    from posekit.viewer.page import write_page
+
+    frames = _frames(frame, 1 if isinstance(content, Postures) else len(content.frames))
+    write_page(output, content, view, title=title, frames=frames)
+    typer.echo(f"written: {output}")
+
+
+def _shown(
+    content: Result | Postures, view: View | None, frame: str, posture: str, rejected: bool, *, moving: bool
+) -> tuple[Subject, list[Shown]]:
+    """Choose what is drawn of a file."""
+    from posekit.files import Result
+    from posekit.viewer.branch import one_a_reason, rejected_of
+    from posekit.viewer.subject import subject_of
+
+    subject = subject_of(content, view)
+    numbers_of_frames = _frames(frame, len(subject.frames))
+    if numbers_of_frames is None:
+        filled = [k for k, shown in enumerate(subject.frames) if len(shown)]
+        numbers_of_frames = filled if moving else filled[:1]
+    if not moving:
+        numbers_of_frames = numbers_of_frames[:1]
+    if rejected:
+        if not isinstance(content, Result):
+            raise InputError("--rejected: postures have no pruned branches; expected a result or a view")
+        return subject, [one_a_reason(rejected_of(content, subject, k)) for k in numbers_of_frames]
+    return subject, [_chosen(subject.frames[k], posture, k) for k in numbers_of_frames]
+
+
+def _read(path: Path, seen: Path | None, *, explain: bool) -> tuple[Result | Postures, View | None]:
+    from posekit import files, pipeline
+
+    name = schema_of(path)
+    view = files.read_view(seen) if seen is not None else None
+    if name.startswith("posekit.view/"):
+        if view is not None:
+            raise InputError("--view: the file is a view itself; expected a result beside it; leave it out")
+        view = files.read_view(path)
+        recovery = pipeline.recover(view, group=0.05)
+        return pipeline.result_of(recovery, unit=view.unit, explain=explain), view
+    if name.startswith("posekit.result/"):
+        return files.read_result(path), view
+    if view is not None:
+        raise InputError("--view: the file holds no result; expected one, recovered from that view")
+    return files.read_postures(path), None
+
+
+def _chosen(shown: Shown, text: str, frame: int) -> Shown:
+    """Choose postures of a frame by a list of numbers from 1, ``all`` or ``groups``."""
+    if text == "all" or len(shown) == 0:
+        return shown
+    if text == "groups":
+        if shown.groups is None:
+            raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
+        groups = shown.groups.tolist()
+        return shown.chosen([groups.index(group) for group in sorted(set(groups))])
+    rows = [_number(word, len(shown), f"--posture: frame {frame + 1}: {word!r}") for word in split(text)]
+    if not rows:
+        raise InputError(f"--posture: {text!r}; expected numbers from 1 with commas, all, or groups")
+    return shown.chosen(rows)
+
+
+def _frames(text: str, count: int) -> list[int] | None:
+    if not text:
+        return None
+    first, dash, last = text.partition("-")
+    start = _number(first, count, f"--frame: {text!r}")
+    end = _number(last, count, f"--frame: {text!r}") if dash else start
+    if end < start:
+        raise InputError(f"--frame: {text!r}; expected the first frame before the last, as 1-5")
+    return list(range(start, end + 1))
+
+
+def _number(word: str, count: int, what: str) -> int:
+    """Read a number from 1 to `count`; return it from 0."""
+    if not (word.isdecimal() and len(word) < 10 and 1 <= int(word) <= count):
+        raise InputError(f"{what}; expected a number from 1 to {count}")
+    return int(word) - 1
+
+
+def _size(text: str) -> tuple[int, int]:
+    words: Sequence[str] = text.lower().split("x")
+    if len(words) != 2 or not all(word.isdecimal() and len(word) < 6 and int(word) > 0 for word in words):
+        raise ViewerError(f"--size: {text!r}; expected width x height in pixels, as 1280x720")
+    return int(words[0]), int(words[1])
