@@ -67,7 +67,7 @@ def add_tubes(
     radius : float
         Metres.
     """
-    known = np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1)
+    known = np.asarray(np.isfinite(starts).all(axis=1) & np.isfinite(ends).all(axis=1))
     lengths = np.linalg.norm(np.where(known[:, None], ends - starts, 0.0), axis=1)
     known = np.asarray(known & (lengths > 0))
     if not known.any():

@@ -126,7 +126,7 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
     points = with_head(np.asarray(frame.joints)).copy()
     q = frame.q if frame.q.shape[1] == figure.model.nq else None
     if q is not None and len(q):
-        placed = np.isfinite(q[:, :7]).all(axis=1)
+        placed = np.asarray(np.isfinite(q[:, :7]).all(axis=1))
         norms = np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1)
         placed = np.asarray(placed & (np.abs(norms - 1) < UNIT))
         if placed.any():
