@@ -45,7 +45,7 @@ $(BIN)/python:
 $(VENV)/runtime.stamp: pyproject.toml constraints.txt | $(BIN)/python
 	@echo "Installing posekit into $(VENV)"
 	@$(PIP_INSTALL) -c constraints.txt --upgrade setuptools
-	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e .
+	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[pictures]'
 	@touch $@
 
 $(VENV)/dev.stamp: $(VENV)/runtime.stamp
@@ -87,16 +87,40 @@ export WRITE_LOCK
 lock: ## write constraints.txt anew: the newest versions that pyproject.toml allows
 	@bash -c "$$WRITE_LOCK"
 
+# Pictures are drawn by an installed Chromium or Chrome. Where there is none, Debian's is installed if that may be
+# done; without one everything but pictures works.
+define FIND_BROWSER
+for browser in $${POSEKIT_BROWSER:-} chromium chromium-browser google-chrome google-chrome-stable chrome; do
+    if command -v "$$browser" >/dev/null; then exit 0; fi
+done
+as_root() { if [ "$$(id -u)" = 0 ]; then "$$@"; elif command -v sudo >/dev/null; then sudo -n "$$@"; else false; fi; }
+if command -v apt-get >/dev/null && as_root true 2>/dev/null; then
+    echo "Installing chromium with apt-get"
+    as_root apt-get update -qq </dev/null || true
+    as_root env DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium </dev/null >/dev/null && exit 0
+fi
+echo "make: no Chromium or Chrome was found and none could be installed: there will be no pictures" >&2
+endef
+export FIND_BROWSER
+
+.PHONY: browser
+browser: ## install Debian's chromium where no browser is found
+	@bash -c "$$FIND_BROWSER"
+
 # --- the main job ---------------------------------------------------------------------------------------
 
 .PHONY: demo
-demo: $(VENV)/runtime.stamp ## run posekit on the built-in views, results in demo-results/
+demo: $(VENV)/runtime.stamp browser ## run posekit on the built-in views, results in demo-results/
 	$(BIN)/posekit demo -o $(DEMO_RESULTS)
+
+.PHONY: pictures
+pictures: $(VENV)/runtime.stamp browser ## make the pictures of README and docs anew
+	$(BIN)/python docs/make_pictures.py docs/pictures
 
 # --- checks ---------------------------------------------------------------------------------------------
 
 .PHONY: test
-test: $(VENV)/dev.stamp ## run the tests
+test: $(VENV)/dev.stamp browser ## run the tests
 	$(BIN)/python -m pytest -n $(WORKERS) tests
 
 .PHONY: format

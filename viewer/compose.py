@@ -132,7 +132,8 @@ def compose(
         )
         drawn.append(world.place(points) + shift)
         if apart and shown.groups is not None:
-            add_mat(scene, f"posture-{k}/mat", drawn[-1], GROUPS[int(shown.groups[k]) % len(GROUPS)])
+            mat = add_mat(scene, f"posture-{k}/mat", drawn[-1], GROUPS[int(shown.groups[k]) % len(GROUPS)])
+            drawn.append(mat)
     bodies = np.concatenate(drawn)
     points = bodies
     if style.camera and shown.sight is not None and not apart:

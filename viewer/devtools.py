@@ -49,6 +49,7 @@ FLAGS = (
 READ_FD, WRITE_FD = 3, 4
 """The descriptors at which Chromium expects its two pipes."""
 
+CHATTER = (":ERROR:", ":WARNING:", ":INFO:", "DevTools")
 CHUNK = 1 << 20
 LEAVE = 3.0
 """Seconds that a browser is given to end by itself."""
@@ -209,5 +210,6 @@ def _last_line(path: Path) -> str:
         lines = path.read_text(encoding="utf-8", errors="replace").split("\n")
     except OSError:
         return ""
-    said = [line.strip() for line in lines if line.strip()]
+    # Chromium always complains of a missing desktop; that says nothing of why it ended.
+    said = [line.strip() for line in lines if line.strip() and not any(word in line for word in CHATTER)]
     return said[-1][-160:] if said else ""

@@ -8,6 +8,7 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.viewer.colours import Rgb, rgb
+from posekit.viewer.framing import FLESH
 from posekit.viewer.scene import Json, Scene
 from posekit.viewer.shapes import BALL, glow
 
@@ -23,7 +24,7 @@ SUNS = (
 )
 """Name, direction and strength of the lights: from the view's camera and the right, from the left, from behind."""
 
-MAT = 0.3
+MAT = 0.24
 """Radius of the mat below a body, metres."""
 
 MARGIN = 0.75
@@ -74,14 +75,19 @@ def add_stage(scene: Scene, points: Array, *, background: str = "white", ground:
         _add_grid(scene, points)
 
 
-def add_mat(scene: Scene, name: str, points: Array, colour: Rgb) -> None:
-    """Lay a round mat on the ground below a body's points (K, 3), world, metres."""
+def add_mat(scene: Scene, name: str, points: Array, colour: Rgb) -> Array:
+    """Lay a round mat on the ground below a body's points (K, 3), world, metres; return its outermost points."""
     known = points[np.isfinite(points).all(axis=1)]
     middle = np.median(known, axis=0)
     scene.meshcat[name].set_object(mg.Mesh(BALL, glow(colour, 0.8)))
     matrix = np.diag([MAT, MAT, 0.003, 1.0])
     matrix[:2, 3] = middle[:2]
     scene.transform(f"/meshcat/{name}", matrix)
+    reach = MAT - FLESH
+    return np.asarray(
+        matrix[:3, 3]
+        + reach * np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
+    )
 
 
 def _add_light(

@@ -18,6 +18,7 @@ from posekit.files import (
     write_result,
     write_view,
 )
+from posekit.pipeline.illustrate import illustrate
 from posekit.pipeline.recover import recover
 from posekit.pipeline.recovery import Recovery
 from posekit.pipeline.reproduce import reproduce_lee_chen, table_lines
@@ -37,7 +38,7 @@ def demo(folder: Path) -> Iterator[str]:
     Parameters
     ----------
     folder : Path
-        Where views, results, reports and tables are written; must exist.
+        Where views, results, pictures, reports and tables are written; must exist.
     """
     random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(SEED)))
     jobs = (
@@ -50,7 +51,9 @@ def demo(folder: Path) -> Iterator[str]:
     for name, view, checks in jobs:
         write_view(folder / f"{name}.view.json", view)
         recovery = recover(view, checks=checks, group=0.05)
-        write_result(folder / f"{name}.result.json", result_of(recovery, unit=view.unit, explain=True))
+        result = result_of(recovery, unit=view.unit, explain=True)
+        write_result(folder / f"{name}.result.json", result)
+        yield from illustrate(folder, name, result, view)
         rows.append((name, *_row(view, recovery)))
         yield f"{name}: {rows[-1][3]} postures in {rows[-1][1]} frames"
     head = (
@@ -74,7 +77,7 @@ def demo(folder: Path) -> Iterator[str]:
     write_lines(folder / "demo.md", table)
     yield from table[2:]
     reproduce_lee_chen(folder)
-    yield f"written: {folder}: views, results, reports, demo.md, lee-chen.md"
+    yield f"written: {folder}: views, results, reports, pictures (*.png), pages (*.page.html), demo.md, lee-chen.md"
 
 
 def _row(view: View, recovery: Recovery) -> tuple[int, int, int, int, str, str]:

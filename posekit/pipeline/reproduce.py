@@ -11,16 +11,26 @@ import numpy as np
 
 from posekit.files import write_json, write_lines
 from posekit.pipeline import printed
+from posekit.pipeline.illustrate import illustrate
+from posekit.pipeline.result import result_of
 from posekit.pipeline.table2 import CameraEstimate, camera_estimates, exact_tables
-from posekit.pipeline.tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest
+from posekit.pipeline.tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, recover_sequence
 from posekit.skeleton import JOINTS
 from posekit.synthesis.walker_scene import SEQ_VELOCITY
 
+FIGURES = (
+    "## The figures",
+    "",
+    "For SEQ1 and SEQ2 each, beside this file: `lee-chen.SEQ.image.png` (as Fig. A.1), `.projections.png` (as Figs. 6 "
+    "and 8), `.tree.png` (as Fig. 4), `.levels.png` (Tables 3 and 4, hollow marks are the print), `.scene.png` and "
+    "`.page.html`.",
+    "",
+)
 TABLE = {"seq1": "Table 3 (SEQ1)", "seq2": "Table 4 (SEQ2)"}
 
 
 def reproduce_lee_chen(folder: Path) -> list[str]:
-    """Write ``lee-chen.md`` and ``lee-chen.json`` into a folder: Tables 2, 3, 4 and §4.2 beside the print.
+    """Write ``lee-chen.md`` and ``lee-chen.json`` into a folder, and the figures: Tables 2-4 and §4.2 beside the print.
 
     Parameters
     ----------
@@ -40,6 +50,7 @@ def reproduce_lee_chen(folder: Path) -> list[str]:
         *_table2_lines(estimates, tables),
         *(line for sequence in found for line in _levels_lines(sequence)),
         *_frame1_lines(found),
+        *FIGURES,
         *_differences_lines(found),
     ]
     document = {
@@ -50,9 +61,25 @@ def reproduce_lee_chen(folder: Path) -> list[str]:
         },
         "sequences": [_plain(sequence) for sequence in found],
     }
+    lines += [f"- {line}" for sequence in found for line in _illustrate(folder, sequence)]
     write_lines(folder / "lee-chen.md", lines)
     write_json(folder / "lee-chen.json", document)
     return lines
+
+
+def _illustrate(folder: Path, sequence: Sequence1985) -> list[str]:
+    """Draw the figures of a sequence, the printed counts beside its own; return what was left out, and why."""
+    view, recovery = recover_sequence(sequence)
+    return list(
+        illustrate(
+            folder,
+            f"lee-chen.{sequence.name}",
+            result_of(recovery, unit=view.unit, explain=True),
+            view,
+            printed={"physical": printed.PHYSICAL[sequence.name], "motion": printed.MOTION[sequence.name]},
+            printed_frames=[frame - 1 for frame in printed.FRAMES],
+        )
+    )
 
 
 def _plain(sequence: Sequence1985) -> dict[str, Any]:

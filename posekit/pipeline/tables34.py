@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.files import View
 from posekit.pipeline import printed
 from posekit.pipeline.recover import recover
 from posekit.pipeline.recovery import FrameRecovery, Recovery
@@ -114,6 +115,13 @@ def closest(name: str, velocity: float) -> Sequence1985:
     candidates = sequences(name, velocity)
     allowed = [one for one in candidates if one.truth_survives and one.final[1] <= printed.FINAL[name][2]]
     return min(allowed or candidates, key=lambda one: one.distance)
+
+
+def recover_sequence(found: Sequence1985) -> tuple[View, Recovery]:
+    """Recover the five frames of a sequence as the paper does, with Rules 1 and 2."""
+    walker = Walker(velocity=found.velocity)
+    scene = walker_scene(walker, camera=CAMERAS[found.name], dt=FRAME_TIME, phase0=found.phase)
+    return view_of(scene), _recover(scene, (1, 2))
 
 
 def _recover(scene: Scene, rules: tuple[int, ...]) -> Recovery:

@@ -1,0 +1,42 @@
+"""Make the pictures of the README and the documentation: `make pictures`."""
+
+import sys
+from pathlib import Path
+
+from posekit.files import make_folder
+from posekit.pipeline import builtin_view, recover, result_of
+from posekit.viewer.compose import Style
+from posekit.viewer.pictures import Shot, write_picture
+from posekit.viewer.plot_figure import save
+from posekit.viewer.plot_image import plot_image
+from posekit.viewer.plot_projections import plot_projections
+from posekit.viewer.plot_tree import plot_tree
+from posekit.viewer.subject import subject_of
+
+
+def main(folder: Path) -> None:
+    """Write the pictures into a folder."""
+    make_folder(folder)
+    view = builtin_view("seq2")
+    result = result_of(recover(view, group=0.05), unit="cm", explain=True)
+    subject = subject_of(result, view)
+    frame = result.frames[0]
+    assert frame.groups is not None
+    groups = frame.groups.tolist()
+    firsts = [groups.index(group) for group in sorted(set(groups))]
+    shown = subject.frames[0]
+    write_picture(folder / "survivors.png", subject, [shown.chosen(firsts)], shot=Shot(size=(1000, 560)))
+    write_picture(
+        folder / "superposed.png",
+        subject,
+        [shown],
+        style=Style(layout="superposed"),
+        shot=Shot(size=(1000, 640), azimuth=60.0),
+    )
+    save(plot_image(view), folder / "image.png")
+    save(plot_projections(frame.joints[firsts]), folder / "projections.png")
+    save(plot_tree(frame), folder / "tree.png")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

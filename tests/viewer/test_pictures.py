@@ -1,0 +1,219 @@
+"""Picture files, and `posekit render`: what is written, and what is refused."""
+
+from __future__ import annotations
+
+import os
+import stat
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import posekit
+from posekit.cli.main import main
+from posekit.errors import InputError, ViewerError
+from posekit.files import Postures
+from posekit.viewer.compose import Style
+from posekit.viewer.pictures import Shot, check_picture, write_picture
+from posekit.viewer.subject import Subject, subject_of
+
+SMALL = Shot(size=(200, 150), supersample=1)
+FAKE_FFMPEG = """#!{python}
+import sys
+count = len(sys.stdin.buffer.read())
+if {fails}:
+    print("Unknown encoder 'libx264'", file=sys.stderr)
+    sys.exit(1)
+open(sys.argv[-1], "w").write(str(count))
+"""
+
+
+def render(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["posekit", "render", *map(str, words)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    assert render(monkeypatch, *words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("posekit: error: ")
+    assert error.count("\n") == 1
+    return error
+
+
+def fake_ffmpeg(folder: Path, *, fails: bool = False) -> None:
+    program = folder / "ffmpeg"
+    program.write_text(FAKE_FFMPEG.format(python=sys.executable, fails=fails))
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+
+
+def test_sequence_becomes_a_gif_that_moves(subject: Subject, tmp_path: Path) -> None:
+    film = tmp_path / "walk.gif"
+    frames = [frame.chosen([0]) for frame in subject.frames]
+    done: list[int] = []
+    assert write_picture(film, subject, frames, shot=SMALL, progress=done.append) == 5
+    assert done == [1] * 5
+    with Image.open(film) as gif:
+        assert gif.size == (200, 150)
+        assert gif.n_frames == 5
+        assert gif.info["duration"] == 100
+        pictures = []
+        for k in range(5):
+            gif.seek(k)
+            pictures.append(np.asarray(gif.convert("RGB")).astype(int))
+    assert all(
+        (np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in zip(pictures, pictures[1:], strict=False)
+    )
+
+
+def test_turntable_goes_around(subject: Subject, tmp_path: Path) -> None:
+    film = tmp_path / "turn.gif"
+    shot = Shot(size=(200, 150), supersample=1, turntable=4, fps=50)
+    style = Style(camera=False)
+    assert write_picture(film, subject, [subject.frames[0].chosen([0])], style=style, shot=shot) == 4
+    with Image.open(film) as gif:
+        assert gif.n_frames == 4
+        assert gif.info["duration"] == 20
+
+
+def test_mp4_is_handed_to_ffmpeg(subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    film = tmp_path / "walk.mp4"
+    frames = [frame.chosen([0]) for frame in subject.frames[:2]]
+    programs = tmp_path / "programs"
+    programs.mkdir()
+    path = os.environ["PATH"]
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "ffmpeg" else f"/nowhere/{name}")
+    with pytest.raises(ViewerError, match=r"apt-get install ffmpeg\), or write a \.gif"):
+        write_picture(film, subject, frames, shot=SMALL)
+    monkeypatch.undo()
+    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{path}")
+    fake_ffmpeg(programs)
+    assert write_picture(film, subject, frames, shot=SMALL) == 2
+    assert film.read_text() == str(2 * 200 * 150 * 3)
+    film.unlink()
+    fake_ffmpeg(programs, fails=True)
+    with pytest.raises(ViewerError, match="Unknown encoder 'libx264'"):
+        write_picture(film, subject, frames, shot=SMALL)
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["programs"]
+
+
+@pytest.mark.parametrize(
+    ("name", "shot", "match"),
+    [
+        ("a.bmp", Shot(), "format is .bmp; expected one of .png"),
+        ("a", Shot(), "format is none"),
+        ("a.png", Shot(turntable=12), "a turntable moves"),
+        ("a.gif", Shot(fps=0), "0 pictures a second"),
+        ("a.gif", Shot(fps=float("nan")), "nan pictures a second"),
+        ("a.png", Shot(size=(0, 10)), "picture of 0x10"),
+        ("a.png", Shot(size=(5000, 10), supersample=4), "drawn 4 times larger"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_first(name: str, shot: Shot, match: str) -> None:
+    with pytest.raises(ViewerError, match=match):
+        check_picture(name, shot)
+
+
+def test_nothing_is_written_where_nothing_is_drawn(
+    subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(ViewerError, match="no posture in these frames"):
+        write_picture(tmp_path / "a.png", subject, [subject.frames[0].chosen([])])
+    with pytest.raises(InputError, match="directory that does not exist"):
+        write_picture(tmp_path / "none" / "a.png", subject, [subject.frames[0]])
+    unknown = subject_of(Postures(joints=np.full((1, 14, 3), np.nan)))
+    with pytest.raises(ViewerError, match="all are NaN"):
+        write_picture(tmp_path / "a.html", unknown)
+    with pytest.raises(ViewerError, match="camera is not known"):
+        standing = posekit.load_figure().neutral_points[None, :14]
+        write_picture(tmp_path / "a.png", subject_of(Postures(joints=standing)), shot=Shot(through_view=True))
+    monkeypatch.setenv("POSEKIT_BROWSER", "/bin/false")
+    with pytest.raises(ViewerError, match="/bin/false: it ended"):
+        write_picture(tmp_path / "a.png", subject, [subject.frames[0]])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_page_needs_no_browser(subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("POSEKIT_BROWSER", "/bin/false")
+    page = tmp_path / "a.html"
+    assert write_picture(page, subject, [subject.frames[0]], title="36 <postures>") == 1
+    text = page.read_text(encoding="utf-8")
+    assert "<title>36 &lt;postures&gt;</title>" in text
+    assert text.count("set_object") > 100
+
+
+# --- the command ----------------------------------------------------------------------------------------
+
+
+def test_render_draws_chosen_postures(
+    walk_files: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result, view = walk_files
+    picture = tmp_path / "a.png"
+    words = (result, "--view", view, "-o", picture, "--frame", 2, "--posture", "1,3", "--size", "320x200")
+    assert render(monkeypatch, *words) == 0
+    assert capsys.readouterr().out == f"written: {picture}\n"
+    with Image.open(picture) as drawn:
+        assert drawn.size == (320, 200)
+    film = tmp_path / "a.gif"
+    small = ("--size", "160x120", "--supersample", 1)
+    assert render(monkeypatch, result, "-o", film, "--frame", "2-4", "--posture", 1, *small) == 0
+    assert capsys.readouterr().out == f"written: {film} (3 pictures)\n"
+    assert render(monkeypatch, result, "-o", picture, "--rejected", *small) == 0
+    assert render(monkeypatch, view, "-o", tmp_path / "page.html") == 0
+    assert render(monkeypatch, result, "-o", tmp_path / "scene.html", "--layout", "superposed") == 0
+
+
+def test_render_draws_what_is_known_of_postures(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    standing = np.array(posekit.load_figure().neutral_points[:14]) @ [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]
+    two = np.stack([standing, np.full((14, 3), np.nan)])
+    two[0, 8] = np.nan
+    posekit.write_postures(tmp_path / "p.json", two)
+    small = ("--size", "160x120", "--supersample", 1)
+    assert render(monkeypatch, tmp_path / "p.json", "-o", tmp_path / "a.png", *small) == 0
+    capsys.readouterr()
+    text = refused(monkeypatch, capsys, tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", 2, *small)
+    assert "all are NaN" in text
+    assert not (tmp_path / "b.png").exists()
+
+
+def test_render_refuses(
+    walk_files: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result, view = walk_files
+    picture = tmp_path / "a.png"
+    empty = tmp_path / "empty.json"
+    posekit.write_postures(empty, np.empty((0, 14, 3)))
+    for words, expected in (
+        ((result, "-o", tmp_path / "a.bmp"), "the format is .bmp"),
+        ((result, "-o", picture, "--frame", "9"), "--frame: '9'; expected a number from 1 to 5"),
+        ((result, "-o", picture, "--frame", "3-2"), "the first frame before the last"),
+        ((result, "-o", picture, "--posture", "0"), "expected a number from 1 to"),
+        ((result, "-o", picture, "--posture", ","), "expected numbers from 1 with commas"),
+        ((result, "-o", picture, "--size", "1e9x2"), "--size: '1e9x2'"),
+        ((result, "-o", picture, "--eye", "1,2"), "--eye: '1,2'; expected 3 numbers"),
+        ((result, "-o", picture, "--fov", "0"), "field of view is 0 degrees"),
+        ((result, "-o", picture, "--elevation", "95"), "elevation 95 degrees"),
+        ((result, "-o", picture, "--background", "blurple"), "background: 'blurple'"),
+        ((view, "-o", picture, "--view", view), "--view: the file is a view itself"),
+        ((empty, "-o", picture), "empty.json: there is no posture in any frame"),
+        ((empty, "-o", picture, "--view", view), "--view: the file holds no result"),
+        ((result, "-o", tmp_path / "no" / "a.png"), "a directory that does not exist"),
+        ((result, "-o", tmp_path / "a.png", "--eye", "90,90,1", "--target", "99,99,1"), "picture is flat"),
+    ):
+        assert expected in refused(monkeypatch, capsys, *words)
+    monkeypatch.setenv("POSEKIT_BROWSER", "no-such-browser")
+    assert "'no-such-browser' is no program" in refused(monkeypatch, capsys, result, "-o", picture)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["empty.json"]
