@@ -1,6 +1,6 @@
 """Make the figure of another person, draw random legal postures of it, and validate them.
 
-    python examples/own_figure.py
+python examples/own_figure.py
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Recover every posture behind one view, look at the survivors, and ask why the others are gone.
 
-    python examples/recover_a_view.py
+python examples/recover_a_view.py
 """
 
 import posekit
@@ -9,6 +9,7 @@ view = posekit.builtin_view("seq2")
 recovery = posekit.recover(view, checks=("rigid-parts", "joint-range", "collision"), group=0.05)
 
 frame = recovery.frames[0]
+assert frame.groups is not None  # `group` asked for them
 print(f"{len(frame)} of 8192 postures survive, in {len(set(frame.groups))} groups")
 print(f"joints {frame.joints.shape}, configurations {frame.q.shape}")
 print(f"configuration and posture agree to {frame.fk_distance.max():.1e} m")

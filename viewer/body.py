@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
-from pinocchio.visualize import MeshcatVisualizer
 
 from posekit.cameras import Array
 from posekit.errors import ViewerError
@@ -204,6 +203,9 @@ class _Bodies:
     """The figure in Pinocchio's `MeshcatVisualizer`, which draws into a scene of its own."""
 
     def __init__(self, figure: Figure) -> None:
+        # It loads all that Pinocchio can draw with, for most of a second: pages and plots need none of it.
+        from pinocchio.visualize import MeshcatVisualizer
+
         self.scene = Scene()
         links = figure.model.frames
         self.names = {links[body.parentFrame].name: body.name for body in figure.geometry.geometryObjects}

@@ -117,8 +117,7 @@ class DevTools:
         if not self._end.alive:
             raise ViewerError(f"{self.program}: the browser was closed; open another")
         while data:
-            _, ready, _ = select.select([], [self._write], [], max(deadline - time.monotonic(), 0))
-            if not ready:
+            if not _ready(self._write, select.POLLOUT, deadline):
                 raise self._gone(f"it took nothing for {self.timeout:g} s during {method}")
             try:
                 data = data[os.write(self._write, data[:CHUNK]) :]
@@ -130,8 +129,7 @@ class DevTools:
     def _receive(self, method: str, deadline: float) -> Message:
         pieces = [self._pending]
         while b"\0" not in pieces[-1]:
-            ready, _, _ = select.select([self._read], [], [], max(deadline - time.monotonic(), 0))
-            if not ready:
+            if not _ready(self._read, select.POLLIN, deadline):
                 raise self._gone(f"it gave no answer to {method} within {self.timeout:g} s")
             piece = os.read(self._read, CHUNK)
             if not piece:
@@ -186,6 +184,13 @@ def _high(fd: int) -> int:
     moved = fcntl.fcntl(fd, fcntl.F_DUPFD_CLOEXEC, 10)
     os.close(fd)
     return moved
+
+
+def _ready(fd: int, event: int, deadline: float) -> bool:
+    """Wait until a pipe can be used, or closed at the other end; False where that takes too long."""
+    waiting = select.poll()
+    waiting.register(fd, event)
+    return bool(waiting.poll(max(deadline - time.monotonic(), 0) * 1000))
 
 
 def _finish(pid: int, write: int, read: int, folder: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.options import examples
+from posekit.cli.options import Pictures, examples
 
 EXAMPLES = examples("posekit demo -o demo-results")
 
@@ -16,10 +16,11 @@ def demo(
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")
     ],
+    pictures: Pictures = True,
 ) -> None:
     """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables."""
     from posekit import files, pipeline
 
     files.make_folder(output)
-    for line in pipeline.demo(output):
+    for line in pipeline.demo(output, pictures=pictures):
         typer.echo(line)

@@ -88,5 +88,7 @@ def _warn(
     file: TextIO | None = None,
     line: str | None = None,
 ) -> None:
-    """Print a warning as one line, without the place in the code."""
+    """Print a warning to the user as one line, without the place in the code; others are for developers."""
+    if not issubclass(category, UserWarning):
+        return
     typer.echo(f"posekit: warning: {' '.join(str(message).split())}", err=True)

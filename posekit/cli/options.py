@@ -40,6 +40,9 @@ AngleTolerance = Annotated[
         "--angle-tolerance", min=0.0, metavar="DEGREES", help="How far the direction of a segment may be off."
     ),
 ]
+Pictures = Annotated[
+    bool, typer.Option("--pictures/--no-pictures", help="Draw the results too: plots, pages and scenes.")
+]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random numbers.")]
 Noise = Annotated[
     float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")

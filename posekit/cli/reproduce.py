@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.options import examples
+from posekit.cli.options import Pictures, examples
 from posekit.errors import InputError
 
 PAPERS = ("lee-chen",)
@@ -17,6 +17,7 @@ EXAMPLES = examples("posekit reproduce lee-chen -o tables")
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen.")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the tables.")],
+    pictures: Pictures = True,
 ) -> None:
     """Write a paper's tables, reproduced, beside what it prints."""
     from posekit import files, pipeline
@@ -24,6 +25,6 @@ def reproduce(
     if paper not in PAPERS:
         raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")
     files.make_folder(output)
-    for line in pipeline.reproduce_lee_chen(output):
+    for line in pipeline.reproduce_lee_chen(output, pictures=pictures):
         typer.echo(line)
     typer.echo(f"written: {output / 'lee-chen.md'}, {output / 'lee-chen.json'}")

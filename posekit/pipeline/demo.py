@@ -32,13 +32,15 @@ SEED = 1985
 RANDOM_VIEWS = 20
 
 
-def demo(folder: Path) -> Iterator[str]:
+def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     """Recover the built-in views, validate the survivors, reproduce the paper; yield what to print.
 
     Parameters
     ----------
     folder : Path
         Where views, results, pictures, reports and tables are written; must exist.
+    pictures : bool
+        Whether to draw the results too.
     """
     random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(SEED)))
     jobs = (
@@ -53,7 +55,8 @@ def demo(folder: Path) -> Iterator[str]:
         recovery = recover(view, checks=checks, group=0.05)
         result = result_of(recovery, unit=view.unit, explain=True)
         write_result(folder / f"{name}.result.json", result)
-        yield from illustrate(folder, name, result, view)
+        if pictures:
+            yield from illustrate(folder, name, result, view)
         rows.append((name, *_row(view, recovery)))
         yield f"{name}: {rows[-1][3]} postures in {rows[-1][1]} frames"
     head = (
@@ -76,8 +79,9 @@ def demo(folder: Path) -> Iterator[str]:
     ]
     write_lines(folder / "demo.md", table)
     yield from table[2:]
-    reproduce_lee_chen(folder)
-    yield f"written: {folder}: views, results, reports, pictures (*.png), pages (*.page.html), demo.md, lee-chen.md"
+    reproduce_lee_chen(folder, pictures=pictures)
+    drawn = ", pictures (*.png), pages (*.page.html)" if pictures else ""
+    yield f"written: {folder}: views, results, reports, demo.md, lee-chen.md{drawn}"
 
 
 def _row(view: View, recovery: Recovery) -> tuple[int, int, int, int, str, str]:

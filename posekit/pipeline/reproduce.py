@@ -29,13 +29,15 @@ FIGURES = (
 TABLE = {"seq1": "Table 3 (SEQ1)", "seq2": "Table 4 (SEQ2)"}
 
 
-def reproduce_lee_chen(folder: Path) -> list[str]:
+def reproduce_lee_chen(folder: Path, *, pictures: bool = True) -> list[str]:
     """Write ``lee-chen.md`` and ``lee-chen.json`` into a folder, and the figures: Tables 2-4 and §4.2 beside the print.
 
     Parameters
     ----------
     folder : Path
         Must exist.
+    pictures : bool
+        Whether to draw the figures too.
 
     Returns
     -------
@@ -50,7 +52,7 @@ def reproduce_lee_chen(folder: Path) -> list[str]:
         *_table2_lines(estimates, tables),
         *(line for sequence in found for line in _levels_lines(sequence)),
         *_frame1_lines(found),
-        *FIGURES,
+        *(FIGURES if pictures else ()),
         *_differences_lines(found),
     ]
     document = {
@@ -61,7 +63,8 @@ def reproduce_lee_chen(folder: Path) -> list[str]:
         },
         "sequences": [_plain(sequence) for sequence in found],
     }
-    lines += [f"- {line}" for sequence in found for line in _illustrate(folder, sequence)]
+    if pictures:
+        lines += [f"- {line}" for sequence in found for line in _illustrate(folder, sequence)]
     write_lines(folder / "lee-chen.md", lines)
     write_json(folder / "lee-chen.json", document)
     return lines

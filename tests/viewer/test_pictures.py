@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import stat
 import sys
@@ -59,15 +60,13 @@ def test_sequence_becomes_a_gif_that_moves(subject: Subject, tmp_path: Path) -> 
     assert done == [1] * 5
     with Image.open(film) as gif:
         assert gif.size == (200, 150)
-        assert gif.n_frames == 5
+        assert getattr(gif, "n_frames", 1) == 5
         assert gif.info["duration"] == 100
         pictures = []
         for k in range(5):
             gif.seek(k)
             pictures.append(np.asarray(gif.convert("RGB")).astype(int))
-    assert all(
-        (np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in zip(pictures, pictures[1:], strict=False)
-    )
+    assert all((np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in itertools.pairwise(pictures))
 
 
 def test_turntable_goes_around(subject: Subject, tmp_path: Path) -> None:
@@ -76,7 +75,7 @@ def test_turntable_goes_around(subject: Subject, tmp_path: Path) -> None:
     style = Style(camera=False)
     assert write_picture(film, subject, [subject.frames[0].chosen([0])], style=style, shot=shot) == 4
     with Image.open(film) as gif:
-        assert gif.n_frames == 4
+        assert getattr(gif, "n_frames", 1) == 4
         assert gif.info["duration"] == 20
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import posekit
+from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.files import Postures, Result, View
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
@@ -25,9 +26,13 @@ from posekit.viewer.superposed import superposed_looks
 from posekit.viewer.world import upright_world
 
 
-def capsule_ends(scene: Scene, path: str, half_length: float) -> np.ndarray:
-    T = np.reshape(scene.nodes[path].transform, (4, 4)).T
-    return T[:3, 3] + np.array([[-1.0], [1.0]]) * half_length * T[:3, 2]
+def placement(scene: Scene, path: str) -> Array:
+    return np.array(scene.nodes[path].transform, dtype=np.float64).reshape(4, 4).T
+
+
+def capsule_ends(scene: Scene, path: str, half_length: float) -> Array:
+    T = placement(scene, path)
+    return np.asarray(T[:3, 3] + np.array([[-1.0], [1.0]]) * half_length * T[:3, 2])
 
 
 def test_same_content_gives_same_document() -> None:
@@ -203,10 +208,7 @@ def test_side_by_side_keeps_apart(subject: Subject) -> None:
     shown = subject.frames[0].chosen(range(4))
     world = upright_world(shown.points)
     scene = compose(shown, figure=subject.figure, world=world, style=Style(azimuth=30)).scene
-    necks = [
-        np.reshape(scene.nodes[f"/meshcat/posture-{k}/joints/neck"].transform, (4, 4)).T[:3, 3]
-        for k in range(4)
-    ]
+    necks = np.array([placement(scene, f"/meshcat/posture-{k}/joints/neck")[:3, 3] for k in range(4)])
     gaps = np.linalg.norm(np.diff(necks, axis=0), axis=1)
     assert (gaps > 0.5).all()
     assert not any(path.startswith("/meshcat/camera") for path in scene.nodes)
@@ -237,7 +239,7 @@ def test_impossible_poses_and_looks_are_refused() -> None:
         {"position": [0, np.nan, 1], "target": [0, 0, 1]},
         {"position": [1, 0, 1], "target": [0, 0, 1], "fov": 180},
     ):
-        with pytest.raises(ViewerError, match="expected|move"):
+        with pytest.raises(ViewerError, match=r"expected|move"):
             Eye(**bad)
     with pytest.raises(ViewerError, match="opacity"):
         Look(opacity=0)

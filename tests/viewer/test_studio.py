@@ -109,6 +109,10 @@ def test_view_eye_fits_the_views_image(subject: Subject) -> None:
     np.testing.assert_allclose(large + 0.5, 2 * (small + 0.5), atol=1e-9)
 
 
+def eye_at(position: list[float], target: list[float]) -> Eye:
+    return Eye(position=np.array(position), target=np.array(target))
+
+
 def orange_blue_grey(pixels: Pixels) -> tuple[int, int, int]:
     r, g, b = (pixels[..., k].astype(int) for k in range(3))
     grey = (abs(r - g) < 8) & (abs(g - b) < 8) & (r < 225)
@@ -141,7 +145,7 @@ def test_right_is_on_the_left_of_a_picture_from_the_front(studio: Studio, subjec
 def test_camera_with_its_image_is_drawn(studio: Studio, subject: Subject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
-    eyes = []
+    eyes: list[Eye] = []
     for camera in (True, False):
         made = compose(shown, figure=subject.figure, world=world, style=Style(camera=camera))
         eye = fitted_eye(made.points, world, azimuth=55, elevation=14) if camera else eyes[0]
@@ -156,7 +160,7 @@ def test_camera_with_its_image_is_drawn(studio: Studio, subject: Subject) -> Non
 def test_background_and_supersampling(studio: Studio, subject: Subject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
-    eye = Eye(position=[-3, -2, 1.5], target=[0, 0, 0.8])
+    eye = eye_at([-3, -2, 1.5], [0, 0, 0.8])
     shades = {}
     for background, corner in (("#336699", (51, 102, 153, 255)), ("transparent", (0, 0, 0, 0))):
         style = Style(background=background, camera=False, ground=False)
@@ -172,7 +176,7 @@ def test_flat_pictures_are_detected(studio: Studio, subject: Subject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     made = compose(shown, figure=subject.figure, world=world, style=Style(camera=False, ground=False))
-    away = Eye(position=[-3, 0, 1], target=[-6, 0, 1])
+    away = eye_at([-3, 0, 1], [-6, 0, 1])
     with pytest.raises(ViewerError, match="picture is flat"):
         studio.draw(made.scene, away, size=SIZE)
     grey = np.full((100, 100, 4), 200, dtype=np.uint8)
@@ -184,7 +188,7 @@ def test_flat_pictures_are_detected(studio: Studio, subject: Subject) -> None:
 
 
 def test_impossible_sizes_are_refused(studio: Studio) -> None:
-    eye = Eye(position=[-3, 0, 1], target=[0, 0, 1])
+    eye = eye_at([-3, 0, 1], [0, 0, 1])
     for size, supersample in (((0, 100), 1), ((5000, 100), 2)):
         with pytest.raises(ViewerError, match="supersampling included"):
             studio.draw(Scene(), eye, size=size, supersample=supersample)
@@ -251,7 +255,7 @@ def test_nothing_listens_while_drawing(studio: Studio, subject: Subject) -> None
 def test_browser_that_hangs_is_ended() -> None:
     browser = Browser(timeout=2)
     start = time.monotonic()
-    with pytest.raises(ViewerError, match="no answer to Runtime.evaluate within 2 s"):
+    with pytest.raises(ViewerError, match=r"no answer to Runtime\.evaluate within 2 s"):
         browser.evaluate("for (;;) {}")
     assert time.monotonic() - start < 8
     assert wait_until_gone(browser.pid) == []
