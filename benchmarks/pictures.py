@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 import posekit
-from posekit.viewer.compose import Style, compose
-from posekit.viewer.framing import fitted_eye
+from posekit.viewer.browser.studio import Studio
 from posekit.viewer.pictures import Shot, write_picture
-from posekit.viewer.studio import Studio
-from posekit.viewer.subject import Shown, Subject, subject_of
-from posekit.viewer.world import upright_world
+from posekit.viewer.scene.compose import Style, compose
+from posekit.viewer.scene.framing import fitted_eye
+from posekit.viewer.scene.subject import Shown, Subject, subject_of
+from posekit.viewer.scene.world import upright_world
 
 SIZE = (640, 480)
 PICTURES, STARTS, FRAMES = 40, 3, 100

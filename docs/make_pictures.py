@@ -5,13 +5,8 @@ from pathlib import Path
 
 from posekit.files import make_folder
 from posekit.pipeline import builtin_view, recover, result_of
-from posekit.viewer.compose import Style
-from posekit.viewer.pictures import Shot, write_picture
-from posekit.viewer.plot_figure import save
-from posekit.viewer.plot_image import plot_image
-from posekit.viewer.plot_projections import plot_projections
-from posekit.viewer.plot_tree import plot_tree
-from posekit.viewer.subject import subject_of
+from posekit.viewer import Shot, Style, subject_of, write_picture
+from posekit.viewer.plots import plot_image, plot_projections, plot_tree, save
 
 
 def main(folder: Path) -> None:

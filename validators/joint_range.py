@@ -112,7 +112,8 @@ class Limb:
     """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
 
     A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
-    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be off; beyond `UNSEEN` it is undecided.
+    the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be
+    off; beyond `UNSEEN` it is undecided.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from typing import BinaryIO
 from PIL import Image
 
 from posekit.errors import ViewerError
-from posekit.viewer.studio import Pixels
+from posekit.viewer.browser.studio import Pixels
 
 FFMPEG_TIME = 300.0
 """Seconds that ffmpeg may take after the last picture."""

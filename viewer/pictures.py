@@ -14,17 +14,17 @@ from PIL import Image
 from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.files.writing import replacing, write_text
-from posekit.viewer.browser import TIMEOUT
-from posekit.viewer.compose import Composition, Style, compose, row_count
-from posekit.viewer.eye import Eye, ViewEye
-from posekit.viewer.find_browser import find_browser
-from posekit.viewer.framing import fitted_eye, orbit, view_eye
+from posekit.viewer.browser.browser import TIMEOUT
+from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.studio import Pixels, Studio, check_size
 from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
-from posekit.viewer.scene import Scene
+from posekit.viewer.scene.compose import Composition, Style, compose, row_count
+from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.subject import Shown, Subject
+from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
-from posekit.viewer.studio import Pixels, Studio, check_size
-from posekit.viewer.subject import Shown, Subject
-from posekit.viewer.world import upright_world
 
 MOVING: Final = (".gif", ".mp4")
 FORMATS: Final = (".png", ".html", *MOVING)
@@ -44,7 +44,7 @@ class Shot:
     supersample : int
         How many times larger, in both directions, a picture is drawn before it is scaled down.
     azimuth, elevation : float, optional
-        Degrees, from where one looks: see `posekit.viewer.compose.fitted_eye`.
+        Degrees, from where one looks: see `posekit.viewer.scene.compose.fitted_eye`.
     fov : float
         Vertical field of view, degrees.
     eye : Eye, optional

@@ -10,8 +10,8 @@ from pathlib import Path
 
 import meshcat
 
-from posekit.viewer.eye import Eye
-from posekit.viewer.scene import Json, Scene
+from posekit.viewer.scene.eye import Eye
+from posekit.viewer.scene.scene import Json, Scene
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "

@@ -15,7 +15,7 @@ from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
     from posekit.files import Postures, Result, View
-    from posekit.viewer.subject import Shown, Subject
+    from posekit.viewer.scene.subject import Shown, Subject
 
 EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
@@ -133,10 +133,10 @@ def render(
     """
     import numpy as np
 
-    from posekit.viewer.compose import Style
-    from posekit.viewer.eye import Eye
     from posekit.viewer.pictures import Shot, check_picture, write_picture
-    from posekit.viewer.stage import background_colour
+    from posekit.viewer.scene.compose import Style
+    from posekit.viewer.scene.eye import Eye
+    from posekit.viewer.scene.stage import background_colour
 
     background_colour(background)
     pose = None
@@ -177,7 +177,7 @@ def _write_page(
     output: Path, content: Result | Postures, view: View | None, frame: str, *, title: str
 ) -> None:
     from posekit.files import Postures
-    from posekit.viewer.page import write_page
+    from posekit.viewer.page.page import write_page
 
     frames = _frames(frame, 1 if isinstance(content, Postures) else len(content.frames))
     write_page(output, content, view, title=title, frames=frames)
@@ -189,8 +189,8 @@ def _shown(
 ) -> tuple[Subject, list[Shown]]:
     """Choose what is drawn of a file."""
     from posekit.files import Result
-    from posekit.viewer.branch import one_a_reason, rejected_of
-    from posekit.viewer.subject import subject_of
+    from posekit.viewer.scene.branch import one_a_reason, rejected_of
+    from posekit.viewer.scene.subject import subject_of
 
     subject = subject_of(content, view)
     numbers_of_frames = _frames(frame, len(subject.frames))

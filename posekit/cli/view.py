@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from posekit.cli.given import schema_of
 from posekit.cli.options import about, examples
 from posekit.errors import InputError
 
@@ -46,8 +47,8 @@ def view(
     ] = True,
 ) -> None:
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
-    from posekit.viewer.page import page_html
-    from posekit.viewer.page_server import PageServer
+    from posekit.viewer.page.page import page_html
+    from posekit.viewer.page.server import PageServer
 
     content, behind = _read(given, seen)
     chosen = _frames(frames)
@@ -67,7 +68,7 @@ def _read(path: Path, seen: Path | None) -> tuple[Result | Postures, View | None
     """Read a file of any of the three schemas; a view is recovered first."""
     from posekit import files, pipeline
 
-    name = _schema(path)
+    name = schema_of(path)
     behind = files.read_view(seen) if seen is not None else None
     if name.startswith("posekit.view/"):
         if behind is not None:
@@ -82,19 +83,6 @@ def _read(path: Path, seen: Path | None) -> tuple[Result | Postures, View | None
     if behind is not None:
         raise InputError(f"--view: {path} holds no result; expected one, recovered from that view")
     return files.read_postures(path), None
-
-
-def _schema(path: Path) -> str:
-    """Tell what a file says it is; what is no archive or object is left to the readers' own errors."""
-    from posekit import files
-    from posekit.files.npz import open_npz
-    from posekit.files.result_npz import MAX_PADDED
-
-    if path.suffix.lower() == ".npz":
-        with open_npz(path, limit=MAX_PADDED) as archive:
-            return str(archive.array("schema", "U", ())) if "schema" in archive.names else ""
-    document = files.read_json(path)
-    return str(document.get("schema", "")) if isinstance(document, dict) else ""
 
 
 def _frames(text: str) -> range | None:

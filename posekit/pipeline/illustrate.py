@@ -72,11 +72,7 @@ def _plots(
     printed: Mapping[str, Sequence[Sequence[int]]] | None,
     printed_frames: Sequence[int],
 ) -> None:
-    from posekit.viewer.plot_figure import save
-    from posekit.viewer.plot_image import plot_image
-    from posekit.viewer.plot_levels import plot_levels
-    from posekit.viewer.plot_projections import plot_projections
-    from posekit.viewer.plot_tree import plot_tree
+    from posekit.viewer.plots import plot_image, plot_levels, plot_projections, plot_tree, save
 
     few = range(min(len(result.frames), 5))
     chosen = [result.frames[k] for k in (printed_frames or few)]
@@ -89,8 +85,7 @@ def _plots(
 
 
 def _scene(folder: Path, name: str, result: Result, view: View) -> None:
-    from posekit.viewer.pictures import write_picture
-    from posekit.viewer.subject import subject_of
+    from posekit.viewer import subject_of, write_picture
 
     subject = subject_of(result, view)
     k = next(k for k, frame in enumerate(result.frames) if len(frame.joints))

@@ -10,8 +10,8 @@ import pytest
 import posekit
 from posekit.errors import ViewerError
 from posekit.files import Result, View
-from posekit.viewer.studio import Studio
-from posekit.viewer.subject import Subject, subject_of
+from posekit.viewer.browser.studio import Studio
+from posekit.viewer.scene.subject import Subject, subject_of
 
 
 @pytest.fixture(scope="session")

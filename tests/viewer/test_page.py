@@ -14,10 +14,10 @@ from posekit.errors import InputError, ViewerError
 from posekit.files import Postures
 from posekit.pipeline import builtin_view, recover, result_of
 from posekit.skeleton import JOINTS
-from posekit.viewer.find_browser import find_browser
-from posekit.viewer.page import page_html, write_page
-from posekit.viewer.page_data import page_data
-from posekit.viewer.world import upright_world
+from posekit.viewer.browser.find import find_browser
+from posekit.viewer.page.data import page_data
+from posekit.viewer.page.page import page_html, write_page
+from posekit.viewer.scene.world import upright_world
 
 FLAGS = [
     "--use-gl=angle",

@@ -14,7 +14,7 @@ from posekit.cli import view
 from posekit.errors import InputError, ViewerError
 from posekit.files import Postures, Result, View, write_postures, write_view
 from posekit.pipeline import builtin_view
-from posekit.viewer.page_server import PageServer
+from posekit.viewer.page.server import PageServer
 
 COMMAND = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "

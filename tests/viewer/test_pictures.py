@@ -16,9 +16,9 @@ import posekit
 from posekit.cli.main import main
 from posekit.errors import InputError, ViewerError
 from posekit.files import Postures
-from posekit.viewer.compose import Style
 from posekit.viewer.pictures import Shot, check_picture, write_picture
-from posekit.viewer.subject import Subject, subject_of
+from posekit.viewer.scene.compose import Style
+from posekit.viewer.scene.subject import Subject, subject_of
 
 SMALL = Shot(size=(200, 150), supersample=1)
 FAKE_FFMPEG = """#!{python}

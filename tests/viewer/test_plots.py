@@ -15,13 +15,13 @@ from posekit.errors import InputError, ViewerError
 from posekit.pipeline import builtin_view, recover, result_of
 from posekit.pipeline.printed import MOTION, PHYSICAL
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.viewer.plot_figure import STYLE, save
-from posekit.viewer.plot_image import plot_image
-from posekit.viewer.plot_levels import plot_levels
-from posekit.viewer.plot_projections import letter, plot_projections, side_view
-from posekit.viewer.plot_stick import side, wave
-from posekit.viewer.plot_tree import place, plot_tree
-from posekit.viewer.plot_tree_nodes import pruned_branches, tips
+from posekit.viewer.plots.figure import STYLE, save
+from posekit.viewer.plots.image import plot_image
+from posekit.viewer.plots.levels import plot_levels
+from posekit.viewer.plots.projections import letter, plot_projections, side_view
+from posekit.viewer.plots.stick import side, wave
+from posekit.viewer.plots.tree import place, plot_tree
+from posekit.viewer.plots.tree_nodes import pruned_branches, tips
 
 mpl = pytest.importorskip("matplotlib")
 

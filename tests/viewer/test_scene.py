@@ -13,17 +13,17 @@ from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.files import Postures, Result, View
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.body import Look, add_posture
-from posekit.viewer.branch import lift_branch, one_a_reason, rejected_of
-from posekit.viewer.compose import Style, compose, row_count
-from posekit.viewer.culprit import culprit
-from posekit.viewer.eye import Eye
-from posekit.viewer.framing import fitted_eye, orbit
-from posekit.viewer.scene import Scene
-from posekit.viewer.stage import background_colour
-from posekit.viewer.subject import Subject, subject_of
-from posekit.viewer.superposed import superposed_looks
-from posekit.viewer.world import upright_world
+from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.branch import lift_branch, one_a_reason, rejected_of
+from posekit.viewer.scene.compose import Style, compose, row_count
+from posekit.viewer.scene.culprit import culprit
+from posekit.viewer.scene.eye import Eye
+from posekit.viewer.scene.framing import fitted_eye, orbit
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.stage import background_colour
+from posekit.viewer.scene.subject import Subject, subject_of
+from posekit.viewer.scene.superposed import superposed_looks
+from posekit.viewer.scene.world import upright_world
 
 
 def placement(scene: Scene, path: str) -> Array:

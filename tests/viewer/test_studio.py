@@ -14,19 +14,19 @@ import pytest
 from posekit.cameras import Array, PinholeCamera
 from posekit.errors import ViewerError
 from posekit.skeleton import JOINTS
-from posekit.viewer.body import Look, add_posture
-from posekit.viewer.browser import Browser
-from posekit.viewer.compose import Style, compose
-from posekit.viewer.eye import Eye, ViewEye
-from posekit.viewer.find_browser import find_browser
-from posekit.viewer.framing import fitted_eye, view_eye
-from posekit.viewer.scene import Scene
-from posekit.viewer.sight import Sight
-from posekit.viewer.stage import add_stage
+from posekit.viewer.browser.browser import Browser
+from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.studio import Pixels, Studio, check_drawn
+from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.compose import Style, compose
+from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.framing import fitted_eye, view_eye
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.stage import add_stage
+from posekit.viewer.scene.subject import Subject
+from posekit.viewer.scene.world import World, upright_world
 from posekit.viewer.standalone import standalone_page
-from posekit.viewer.studio import Pixels, Studio, check_drawn
-from posekit.viewer.subject import Subject
-from posekit.viewer.world import World, upright_world
 
 SIZE = (640, 480)
 K = np.array([[1150.0, 0.0, 310.0], [0.0, 1100.0, 250.0], [0.0, 0.0, 1.0]])

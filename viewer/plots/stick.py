@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.skeleton import HIPS, JOINTS, SEGMENTS, SIDES, TORSO, segment_name
-from posekit.viewer.plot_figure import LEFT, RIGHT, TRUNK
+from posekit.viewer.plots.figure import LEFT, RIGHT, TRUNK
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

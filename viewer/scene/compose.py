@@ -12,16 +12,16 @@ from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.figure import Figure
 from posekit.skeleton import JOINT, PARENTS, POINTS
-from posekit.viewer.body import Look, add_posture
-from posekit.viewer.colours import GROUPS
-from posekit.viewer.culprit import Culprit, culprit
-from posekit.viewer.framing import sight_axes
-from posekit.viewer.scene import Scene
-from posekit.viewer.sight import add_sight
-from posekit.viewer.stage import add_mat, add_stage
-from posekit.viewer.subject import Shown
-from posekit.viewer.superposed import superposed_looks
-from posekit.viewer.world import World
+from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.colours import GROUPS
+from posekit.viewer.scene.culprit import Culprit, culprit
+from posekit.viewer.scene.framing import sight_axes
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.sight import add_sight
+from posekit.viewer.scene.stage import add_mat, add_stage
+from posekit.viewer.scene.subject import Shown
+from posekit.viewer.scene.superposed import superposed_looks
+from posekit.viewer.scene.world import World
 
 LAYOUTS: Final = ("side-by-side", "superposed")
 MOST: Final = 200
@@ -47,7 +47,7 @@ class Style:
     look : Look, optional
         Of the bodies; by default translucent.
     background : str
-        See `posekit.viewer.stage.background_colour`.
+        See `posekit.viewer.scene.stage.background_colour`.
     azimuth : float
         Degrees: those side by side stand in rows across the sight of one who looks from there.
     camera, ground : bool

@@ -1,5 +1,5 @@
-// The page's panel: frames, survivors, levels and reasons. DATA comes from viewer/page_data.py; all text that a
-// file gave is set as text, never as HTML. page_scene.js draws what is chosen here.
+// The page's panel: frames, survivors, levels and reasons. DATA comes from data.py; all text that a
+// file gave is set as text, never as HTML. scene.js draws what is chosen here.
 "use strict";
 const page = (() => {
   const state = { frame: 0, survivor: 0, sort: { key: "number", down: false } };
@@ -275,7 +275,7 @@ const page = (() => {
   document.addEventListener("keydown", keys);
   showSettings();
   chooseFrame(0);
-  // Without WebGL meshcat's viewer throws when it is made, and page_scene.js is never reached.
+  // Without WebGL meshcat's viewer throws when it is made, and scene.js is never reached.
   window.addEventListener("error", () => {
     if (state.drawn) return;
     byId("meshcat-pane").replaceChildren(

@@ -11,7 +11,7 @@ from posekit.cameras import Array, Camera
 from posekit.errors import ViewerError
 from posekit.files import Result
 from posekit.skeleton import JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.subject import Shown, Subject
+from posekit.viewer.scene.subject import Shown, Subject
 
 TANGENT = 0.01
 """Metres by which a segment may be too short for its image, where the result does not tell."""

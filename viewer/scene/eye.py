@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from posekit.cameras import Array
 from posekit.errors import ViewerError
-from posekit.viewer.world import World
+from posekit.viewer.scene.world import World
 
 NEAR, FAR = 0.01, 1000.0
 """Metres in front of the camera between which things are drawn."""

@@ -14,10 +14,10 @@ from posekit.errors import ViewerError
 from posekit.figure import Figure, with_head
 from posekit.figure.capsules import Capsule
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
-from posekit.viewer.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
-from posekit.viewer.scene import Scene
-from posekit.viewer.shapes import add_ball, add_tubes, glow, matte, smooth
-from posekit.viewer.world import World
+from posekit.viewer.scene.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.shapes import add_ball, add_tubes, glow, matte, smooth
+from posekit.viewer.scene.world import World
 
 SAME = 1e-6
 """Metres within which forward kinematics must give a posture back for its bodies to be drawn by q."""
@@ -97,7 +97,7 @@ def add_posture(
         The posture's configuration in the camera's frame; it is calculated where it is not given.
     look : Look
     links, joints : sequence of str
-        What to point at (see `posekit.viewer.culprit`): drawn in the alarm's colour, the joints with a halo,
+        What to point at (see `posekit.viewer.scene.culprit`): drawn in the alarm's colour, the joints with a halo,
         the rest of the body faded.
     shift : array (3,), optional
         Moves the body in the world, metres.

@@ -7,10 +7,10 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.errors import ViewerError
-from posekit.viewer.colours import Rgb, rgb
-from posekit.viewer.framing import FLESH
-from posekit.viewer.scene import Json, Scene
-from posekit.viewer.shapes import BALL, glow
+from posekit.viewer.scene.colours import Rgb, rgb
+from posekit.viewer.scene.framing import FLESH
+from posekit.viewer.scene.scene import Json, Scene
+from posekit.viewer.scene.shapes import BALL, glow
 
 BACKGROUNDS: dict[str, Rgb] = {"white": rgb("#ffffff"), "grey": rgb("#e8ebee"), "black": rgb("#101418")}
 

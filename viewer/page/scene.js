@@ -1,5 +1,5 @@
 // The page's scene: the chosen survivor's body is moved, not made again; positions are whole steps of DATA.steps
-// a metre, in a world whose z is up. It runs after meshcat's viewer was made; `page` is page_panel.js.
+// a metre, in a world whose z is up. It runs after meshcat's viewer was made; `page` is panel.js.
 "use strict";
 const scene = (() => {
   const T = MeshCat.THREE;

@@ -12,9 +12,9 @@ from posekit.files.postures import Postures
 from posekit.files.result import Result
 from posekit.files.view import View
 from posekit.files.writing import write_text
-from posekit.viewer.eye import Eye
-from posekit.viewer.page_data import page_data
-from posekit.viewer.scene import Scene
+from posekit.viewer.page.data import page_data
+from posekit.viewer.scene.eye import Eye
+from posekit.viewer.scene.scene import Scene
 from posekit.viewer.standalone import script_json, standalone_page
 
 START = Eye(position=np.array([-2.6, -3.0, 1.7]), target=np.array([0.0, 0.0, 0.85]))
@@ -30,14 +30,14 @@ def page_html(
 ) -> str:
     """Make the page, as text; see `write_page`."""
     data = page_data(given, view, title=title, frames=frames)
-    panel = f"<script>\nconst DATA = {script_json(data)};\n{_file('page_panel.js')}\n</script>"
+    panel = f"<script>\nconst DATA = {script_json(data)};\n{_file('panel.js')}\n</script>"
     return standalone_page(
         Scene(),
         eye=START,
         title=f"{title} - posekit" if title != "posekit" else title,
         style=_file("page.css"),
         body=f"{_file('page.html')}\n{panel}",
-        script=_file("page_scene.js"),
+        script=_file("scene.js"),
     )
 
 
@@ -76,4 +76,4 @@ def write_page(
 
 
 def _file(name: str) -> str:
-    return (resources.files("posekit.viewer") / name).read_text(encoding="utf-8")
+    return (resources.files("posekit.viewer.page") / name).read_text(encoding="utf-8")

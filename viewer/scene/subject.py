@@ -13,7 +13,7 @@ from posekit.errors import FigureError, ViewerError
 from posekit.figure import Figure, load_figure, with_head
 from posekit.files import LeeChenModel, OpenCVModel, Postures, Result, ResultFrame, View
 from posekit.skeleton import JOINTS
-from posekit.viewer.sight import Sight
+from posekit.viewer.scene.sight import Sight
 
 UNIT = 1e-6
 """How far a quaternion's length may be off for forward kinematics to be asked."""

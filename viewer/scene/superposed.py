@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.skeleton import POINTS, TREE_SEGMENTS
-from posekit.viewer.body import Look
-from posekit.viewer.colours import GROUPS, MIDDLE, Rgb
-from posekit.viewer.subject import Shown
+from posekit.viewer.scene.body import Look
+from posekit.viewer.scene.colours import GROUPS, MIDDLE, Rgb
+from posekit.viewer.scene.subject import Shown
 
 STEP = 1e-3
 """Metres: what is nearer than this in every point is drawn once."""

@@ -9,8 +9,8 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.files.result import ResultFrame
-from posekit.viewer.plot_figure import LEFT, MUTED, RIGHT, drawing
-from posekit.viewer.plot_panels import panels
+from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
+from posekit.viewer.plots.panels import panels
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

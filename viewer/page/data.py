@@ -16,9 +16,9 @@ from posekit.files.postures import Postures
 from posekit.files.result import Result, ResultFrame
 from posekit.files.view import View
 from posekit.skeleton import JOINTS, POINTS, SEGMENTS
-from posekit.viewer.colours import GROUPS, SIDES, number, side
-from posekit.viewer.subject import Shown, subject_of
-from posekit.viewer.world import upright_world
+from posekit.viewer.scene.colours import GROUPS, SIDES, number, side
+from posekit.viewer.scene.subject import Shown, subject_of
+from posekit.viewer.scene.world import upright_world
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]

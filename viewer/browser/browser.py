@@ -7,8 +7,8 @@ from types import TracebackType
 from typing import Any
 
 from posekit.errors import ViewerError
-from posekit.viewer.devtools import DevTools
-from posekit.viewer.find_browser import find_browser
+from posekit.viewer.browser.devtools import DevTools
+from posekit.viewer.browser.find import find_browser
 
 TIMEOUT = 60.0
 """Seconds that one step of the browser may take."""
@@ -20,7 +20,7 @@ class Browser:
     Parameters
     ----------
     program : str, optional
-        Its path; default see `posekit.viewer.find_browser`.
+        Its path; default see `posekit.viewer.browser.find`.
     timeout : float
         Seconds that any step may take; after them the browser is ended.
     size : (int, int)

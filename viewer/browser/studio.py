@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from posekit.errors import ViewerError
-from posekit.viewer.browser import TIMEOUT, Browser
-from posekit.viewer.eye import Eye, ViewEye
-from posekit.viewer.scene import Scene
+from posekit.viewer.browser.browser import TIMEOUT, Browser
+from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.scene import Scene
 from posekit.viewer.standalone import meshcat_script, player, script_json
 
 Pixels = NDArray[np.uint8]
@@ -40,7 +40,7 @@ class Studio:
     Parameters
     ----------
     browser : str, optional
-        The program; default see `posekit.viewer.find_browser`.
+        The program; default see `posekit.viewer.browser.find`.
     timeout : float
         Seconds that one picture may take.
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from posekit.files.camera_model import LeeChenModel
 from posekit.files.view import View
-from posekit.viewer.plot_figure import TRUNK, drawing
-from posekit.viewer.plot_panels import panels, same_scale
-from posekit.viewer.plot_stick import add_key, draw_stick
+from posekit.viewer.plots.figure import TRUNK, drawing
+from posekit.viewer.plots.panels import panels, same_scale
+from posekit.viewer.plots.stick import add_key, draw_stick
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 from posekit.errors import ViewerError
 from posekit.files.result import ResultFrame
-from posekit.viewer.plot_figure import MUTED, TRUNK, drawing
-from posekit.viewer.plot_tree_nodes import Tip, pruned_branches, readable_levels, tips
+from posekit.viewer.plots.figure import MUTED, TRUNK, drawing
+from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, tips
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.viewer.colours import Rgb, number
-from posekit.viewer.scene import Json, Scene
+from posekit.viewer.scene.colours import Rgb, number
+from posekit.viewer.scene.scene import Json, Scene
 
 BALL = mg.Sphere(1.0)
 """Every ball is this one, scaled: one geometry for all."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from posekit.cameras import Array, PinholeCamera
 from posekit.skeleton import PARENTS, POINTS
-from posekit.viewer.colours import FRUSTUM, POINT_SIDES, SIDES, rgb
-from posekit.viewer.scene import Scene
-from posekit.viewer.shapes import add_ball, add_sheet, add_tubes, glow
-from posekit.viewer.world import World
+from posekit.viewer.scene.colours import FRUSTUM, POINT_SIDES, SIDES, rgb
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.shapes import add_ball, add_sheet, add_tubes, glow
+from posekit.viewer.scene.world import World
 
 PLANE = rgb("#dfe5ec")
 RAY_RADIUS, EDGE_RADIUS, IMAGE_RADIUS, DOT = 0.0022, 0.004, 0.004, 0.011

@@ -6,9 +6,9 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.errors import ViewerError
-from posekit.viewer.eye import Eye, ViewEye
-from posekit.viewer.sight import Sight
-from posekit.viewer.world import World
+from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.world import World
 
 FLESH = 0.13
 """Metres of body around the outermost joints, to be kept in the picture."""

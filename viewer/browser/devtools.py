@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from posekit.errors import ViewerError
-from posekit.viewer.find_browser import REMEDY
+from posekit.viewer.browser.find import REMEDY
 
 Message = dict[str, Any]
 

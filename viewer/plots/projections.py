@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
 from posekit.skeleton import JOINTS
-from posekit.viewer.plot_figure import drawing
-from posekit.viewer.plot_panels import panels, same_scale
-from posekit.viewer.plot_stick import add_key, draw_stick
+from posekit.viewer.plots.figure import drawing
+from posekit.viewer.plots.panels import panels, same_scale
+from posekit.viewer.plots.stick import add_key, draw_stick
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

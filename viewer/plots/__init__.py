@@ -1,0 +1,7 @@
+"""The paper's figures as matplotlib plots."""
+
+from posekit.viewer.plots.figure import save as save
+from posekit.viewer.plots.image import plot_image as plot_image
+from posekit.viewer.plots.levels import plot_levels as plot_levels
+from posekit.viewer.plots.projections import plot_projections as plot_projections
+from posekit.viewer.plots.tree import plot_tree as plot_tree
