@@ -56,6 +56,7 @@ def validate(
     """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input."""
     from posekit import files, pipeline, validators
 
+    files.check_report_path(output)
     given = files.read_postures(postures)
     validator = validators.Validator(
         urdf,

@@ -12,6 +12,7 @@ from posekit.files.report import Finding as Finding
 from posekit.files.report import Judged as Judged
 from posekit.files.report import PostureReport as PostureReport
 from posekit.files.report import Report as Report
+from posekit.files.report import check_report_path as check_report_path
 from posekit.files.report import make_report as make_report
 from posekit.files.report import read_report as read_report
 from posekit.files.report import write_report as write_report

@@ -17,7 +17,7 @@ from posekit.files.reading import read_json
 from posekit.files.refusal import refusal, shown
 from posekit.files.report_schema import SCHEMA, ReportFile, Verdict
 from posekit.files.validation import validated
-from posekit.files.writing import json_pieces, write_text
+from posekit.files.writing import check_target, json_pieces, write_text
 from posekit.tree.check import Findings
 
 NUMBERS = ("value", "lower", "upper", "margin")
@@ -159,6 +159,12 @@ def make_report(
             for verdict, distance, findings in zip(verdicts, distances, rows, strict=True)
         ),
     )
+
+
+def check_report_path(path: str | Path) -> None:
+    """Refuse a report's name before the work that it is for is done."""
+    suffix(path, ".json")
+    check_target(path)
 
 
 def write_report(path: str | Path, report: Report) -> None:

@@ -8,6 +8,7 @@ from posekit.files.npz import suffix
 from posekit.files.result import Result
 from posekit.files.result_json import read_result_json, write_result_json
 from posekit.files.result_npz import read_result_npz, write_result_npz
+from posekit.files.writing import check_target
 
 
 def read_result(path: str | Path) -> Result:
@@ -37,6 +38,7 @@ def read_result(path: str | Path) -> Result:
 def check_result_path(path: str | Path) -> None:
     """Refuse a result's name before the work that it is for is done."""
     suffix(path, ".json", ".npz")
+    check_target(path)
 
 
 def write_result(path: str | Path, result: Result) -> None:

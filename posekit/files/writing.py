@@ -75,6 +75,11 @@ def _target(path: str | Path) -> Path:
     return target
 
 
+def check_target(path: str | Path) -> None:
+    """Refuse a name that cannot be written: a folder, or one in a folder that is not there."""
+    _target(path)
+
+
 def write_text(path: str | Path, pieces: Iterable[str]) -> None:
     """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all.
 
