@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.cameras import Array
-from posekit.errors import InputError
+from posekit.errors import FigureError, InputError
 from posekit.figure import Figure, load_figure, with_head
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.validators.joint_range import TOLERANCE
@@ -122,6 +123,10 @@ class Validator:
         if isinstance(urdf, Figure):
             self.figure = urdf
         else:
+            if urdf not in BUILT_IN and not Path(urdf).is_file():
+                raise FigureError(
+                    f"--urdf {urdf}: no such file; expected a figure's URDF, or {BUILT_IN[0]} (built in)"
+                )
             self.figure = load_figure(None if urdf in BUILT_IN else urdf)
         self.checks = check_names(checks)
         if not self.checks:

@@ -66,6 +66,17 @@ def about(file: Path) -> Iterator[None]:
         raise type(error)(f"{file}: {error}") from error
 
 
+def distinct(*paths: Path | None) -> None:
+    """Refuse to write over what is read, or two outputs over each other."""
+    named = [path for path in paths if path is not None]
+    places = [path.resolve() for path in named]
+    for k, place in enumerate(places):
+        if place in places[:k]:
+            raise InputError(
+                f"{named[k]}: would be written over another file of this command; choose another name"
+            )
+
+
 def split(text: str) -> tuple[str, ...]:
     """Split a list by commas."""
     return tuple(word.strip() for word in text.split(",") if word.strip())

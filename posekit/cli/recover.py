@@ -15,12 +15,14 @@ from posekit.cli.options import (
     RangesOption,
     Rules,
     about,
+    distinct,
     examples,
     progress,
     rule_numbers,
     signed_length,
     split,
 )
+from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.pipeline import Recovery, Tolerance
@@ -67,7 +69,7 @@ def recover(
         typer.Option(
             "--write-urdf",
             metavar="FILE",
-            help="Also write the person's figure as URDF, for `validate --urdf`.",
+            help="Also write the person's figure: URDF, and SRDF beside it.",
         ),
     ] = None,
     explain: Annotated[
@@ -77,7 +79,12 @@ def recover(
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
     from posekit import files, pipeline, validators
 
+    distinct(view, output, write_urdf)
     files.check_result_path(output)
+    if write_urdf is not None and write_urdf.suffix.lower() != ".urdf":
+        raise InputError(
+            f"--write-urdf {write_urdf}: expected a name that ends in .urdf; its .srdf is put beside it"
+        )
     seen = files.read_view(view)
     table = validators.load_ranges(ranges)
     with progress("recovering", len(seen.time)) as done, about(view):
@@ -95,6 +102,14 @@ def recover(
         recovery.figure.write(write_urdf)
     files.write_result(output, pipeline.result_of(recovery, unit=seen.unit, explain=explain))
     summarize(recovery)
+    empty = sum(not len(frame) for frame in recovery.frames)
+    if empty:
+        typer.echo(
+            f"posekit: warning: {empty} of {len(recovery.frames)} frames have no posture; the table says what rejected "
+            "most; noisy points need more tolerance (--rigid-tolerance, --angle-tolerance, --tangent-tolerance), and "
+            "a noisy head a given root",
+            err=True,
+        )
     typer.echo(f"written: {output}")
 
 

@@ -156,7 +156,9 @@ def render(
         timeout=timeout,
     )
     moving = check_picture(output, shot)
-    arranged = layout or (Layout.SUPERPOSED if moving and not turntable else Layout.SIDE_BY_SIDE)
+    arranged = layout or (
+        Layout.SUPERPOSED if through_view or (moving and not turntable) else Layout.SIDE_BY_SIDE
+    )
     style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
     content, behind = _read(given, seen, explain=rejected)
     if output.suffix.lower() == ".html" and posture == "all" and layout is None and not rejected and not eye:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.options import Noise, OutputView, Seed, examples, numbers
+from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.synthesis import Scene
@@ -133,6 +134,8 @@ def _write(output: Path, scene: Scene, noise: float, seed: int) -> None:
 
     from posekit import files, pipeline
 
+    if output.suffix.lower() != ".json":
+        raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
     files.write_view(output, pipeline.view_of(scene))

@@ -11,6 +11,7 @@ from posekit.pipeline.summary import verdict_lines as verdict_lines
 from posekit.pipeline.tolerance import EXACT as EXACT
 from posekit.pipeline.tolerance import MEASURED as MEASURED
 from posekit.pipeline.tolerance import Tolerance as Tolerance
+from posekit.pipeline.validate import recovered_with as recovered_with
 from posekit.pipeline.validate import validate as validate
 from posekit.pipeline.views import builtin_view as builtin_view
 from posekit.pipeline.views import view_of as view_of

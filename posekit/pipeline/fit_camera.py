@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,9 @@ from posekit.figure import Figure
 from posekit.files import LeeChenModel, OpenCVModel, View
 from posekit.head import HeadPoints, HeadPose, calibrate, solve_pose
 from posekit.skeleton import HEAD, HEAD_POINTS
+
+ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
+"""Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,6 +89,7 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         root[~pose.found] = (
             np.nan
         )  # a given root is of no use where f, which the head would tell, is not known
+    _check_root(np.where(np.isnan(root), np.nan, view.root), view, camera)
     for k in np.flatnonzero(np.isnan(root).any(axis=1)):
         why = (
             pose.reasons[k]
@@ -95,6 +100,39 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
     if n and all(reasons):
         raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or root")
     return CameraFit(camera=camera, root=root, head=head, pose=pose, reasons=reasons)
+
+
+def _check_root(root: Array, view: View, camera: PinholeCamera) -> None:
+    """Refuse given roots that are behind the camera or far from the neck's ray, and warn of those beside it."""
+    given = np.isfinite(root).all(axis=1)
+    if not given.any():
+        return
+    behind = np.flatnonzero(given & (root[:, 2] <= 0))
+    if len(behind):
+        k = int(behind[0])
+        raise InputError(
+            f"frames[{k}].root: {root[k].tolist()} m is behind the camera; expected z > 0: x right, y down, "
+            "z forward"
+        )
+    rays = camera.normalize(view.image[:, 0])
+    rays = np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    along = np.einsum("fi,fi->f", root, rays)
+    beside = np.where(given, np.linalg.norm(root - along[:, None] * rays, axis=1), 0.0)
+    k = int(np.nanargmax(beside))
+    if beside[k] > ROOT_REFUSED:
+        raise InputError(
+            f"frames[{k}].root: {root[k].tolist()} m is {beside[k]:.3g} m beside the ray on which the neck is seen; "
+            "expected the neck, in the view's unit, OpenCV camera frame; correct it, or leave it out where a head "
+            "is seen"
+        )
+    if beside[k] > ROOT_WARNED:
+        warnings.warn(
+            f"frames[{k}].root is {beside[k] * 100:.2g} cm beside the ray on which the neck is seen; "
+            "the postures start from it as it is given",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _recovered_f(pose: HeadPose | None) -> Array:

@@ -19,7 +19,7 @@ from posekit.pipeline.camera_record import camera_records
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
 from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
-from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, make_checks
 from posekit.validators.walking import DEFAULT_RULES
@@ -54,7 +54,8 @@ def recover(
     rules : sequence of int
         Rules of walking, used where ``walking`` is among the checks.
     tolerance : Tolerance, optional
-        By default each frame is first judged as exact; only where no torso fits exactly, as measured.
+        By default each frame is judged as exact where distances inside torso or hips show that it is, else as
+        measured.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration.
     group : float, optional
@@ -100,7 +101,7 @@ def recover(
         chosen = usable[first : first + FRAMES_AT_ONCE]
         batch = grower.grow(chosen, tolerance or EXACT)
         placed |= {int(k): (batch, index) for index, k in enumerate(chosen)}
-        inexact = chosen[_fits_nowhere(batch)] if tolerance is None else chosen[:0]
+        inexact = chosen[~_is_exact(batch)] if tolerance is None else chosen[:0]
         if len(inexact):
             again = grower.grow(inexact, MEASURED)
             placed |= {int(k): (again, index) for index, k in enumerate(inexact)}
@@ -132,6 +133,7 @@ def recover(
         "group": group,
         "figure": person.hash,
         "lengths": dict(person.lengths),
+        "judged": [frame.judged for frame in frames],
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
     return Recovery(figure=person, fit=fit, frames=frames, settings=settings)
@@ -205,16 +207,30 @@ class _Grower:
         )
 
 
-def _fits_nowhere(batch: Batch) -> NDArray[np.bool_]:
-    """Find frames without survivors whose torso and hips fitted in no branch: they are not exact.
+def _is_exact(batch: Batch) -> NDArray[np.bool_]:
+    """Find frames (F,) whose image points are exact: there is evidence that rounding is all that is off.
 
-    Where some branch got as far as having its pelvis or a limb judged, its rigid parts did fit.
+    Four distances inside torso and hips are not used to lift anything. That they come out right to 1e-8 m is no
+    accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible there
+    is no evidence, and a branch that happens to reach its rays must not stand for the truth.
     """
-    judged = np.zeros(batch.leaves.n_frames, dtype=bool)
-    for group in batch.leaves.pruned:
+    leaves = batch.leaves
+    fits = np.ones(len(leaves.code), dtype=bool)
+    seen = np.zeros(len(leaves.code), dtype=bool)
+    nodes = np.arange(len(leaves.code))
+    for segment in RIGID_SEGMENTS:
+        ends = leaves.positions(segment, nodes)
+        length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
+        known = np.isfinite(length)
+        fits &= ~known | (np.abs(length - batch.figure.lengths[segment_name(segment)]) <= EXACT.rigid)
+        seen |= known
+    exact = np.zeros(leaves.n_frames, dtype=bool)
+    exact[leaves.frame[fits & seen]] = True
+    empty = batch.physical[:, -1] == 0
+    for group in leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
-            judged[group.frame] = True
-    return np.asarray(~judged & (batch.physical[:, -1] == 0))
+            exact[group.frame[empty[group.frame]]] = True
+    return exact
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

@@ -14,7 +14,7 @@ from posekit.cameras import Array
 from posekit.figure import Configurations, Figure
 from posekit.grouping import group_postures
 from posekit.pipeline.fit_camera import CameraFit
-from posekit.pipeline.tolerance import Tolerance
+from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
 
@@ -204,6 +204,11 @@ class FrameRecovery:
     def tolerance(self) -> Tolerance | None:
         """The tolerance that this frame was judged with."""
         return self.batch.tolerance if self.batch else None
+
+    @property
+    def judged(self) -> str | None:
+        """``exact``, ``measured``, or ``given`` tolerances; None where nothing was grown."""
+        return {None: None, EXACT: "exact", MEASURED: "measured"}.get(self.tolerance, "given")
 
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""

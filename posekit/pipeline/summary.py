@@ -8,7 +8,6 @@ import numpy as np
 
 from posekit.files import Report
 from posekit.pipeline.recovery import FrameRecovery, Recovery
-from posekit.pipeline.tolerance import EXACT
 
 SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""
@@ -37,9 +36,9 @@ def summary_lines(recovery: Recovery) -> list[str]:
 
 def _frame_line(k: int, frame: FrameRecovery) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
-    judged = "-" if frame.tolerance is None else "exact" if frame.tolerance == EXACT else "measured"
+    judged = frame.judged or "-"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
-    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>9}  {most}"
+    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>9}  {most}"
 
 
 def verdict_lines(report: Report) -> list[str]:

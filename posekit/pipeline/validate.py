@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from posekit.files import Judged, Postures, Report, make_report
+from posekit.figure import Figure, load_figure
+from posekit.files import Judged, Postures, Report, Result, make_report
+from posekit.pipeline.tolerance import EXACT, MEASURED
 from posekit.tree import Findings
 from posekit.validators import Judgement, Validator
 
@@ -36,6 +38,26 @@ def validate(
         judged=judged,
         all_findings=every,
     )
+
+
+def recovered_with(result: Result) -> tuple[Figure, float]:
+    """Return the figure of a result, and the angle tolerance (degrees) that its frames were judged with.
+
+    Both are in its settings; a result without them is taken as the built-in figure's, and exact.
+    """
+    figure, settings = load_figure(), result.settings
+    lengths = settings.get("lengths")
+    if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
+        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
+    judged = settings.get("judged")
+    kinds = set(judged) if isinstance(judged, list) else set()
+    tolerances = [EXACT.angle]
+    if "measured" in kinds:
+        tolerances.append(MEASURED.angle)
+    given = settings.get("tolerance")
+    if "given" in kinds and isinstance(given, dict):
+        tolerances.append(float(given.get("angle", EXACT.angle)))
+    return figure, max(tolerances)
 
 
 def _judged(judgement: Judgement) -> list[Judged]:

@@ -344,8 +344,20 @@ def test_an_image_point_beyond_all_reach_warns_of_nothing_else(run: Run, walk: d
     document = copy(walk)
     document["frames"][0]["image"]["left_elbow"][0] = 1e300
     outcome = run("recover", write(document), "-o", "r.json")
-    assert (outcome.code, outcome.err) == (0, "")
+    assert outcome.code == 0
+    assert outcome.err.startswith("posekit: warning: 1 of 2 frames have no posture")
+    assert outcome.err.count("\n") == 1
     assert "no_solution/left_elbow" in outcome.out
+
+
+def test_inputs_are_not_written_over(run: Run, walk: dict[str, Any]) -> None:
+    name = write(walk)
+    before = Path(name).read_bytes()
+    for arguments in (("recover", name, "-o", name), ("validate", name, "-o", name)):
+        outcome = run(*arguments)
+        assert outcome.code == 2
+        assert "written over" in outcome.err
+    assert Path(name).read_bytes() == before
 
 
 # --- validate -------------------------------------------------------------------------------------------
@@ -421,6 +433,16 @@ def test_postures_with_heads_are_judged_with_them(run: Run) -> None:
     assert run("validate", "p.npz", "-o", "r.json", "--all").code == 0
     found = json.loads(Path("r.json").read_text(encoding="utf-8"))["postures"][0]["findings"]
     assert any(one["where"].startswith("neck.") and one["verdict"] == "valid" for one in found)
+
+
+def test_a_result_is_validated_as_it_was_recovered(run: Run) -> None:
+    """With its own figure, and the tolerance of angles that its frames were judged with."""
+    assert run("synth", "random", "-o", "view.json", "--frames", "10", "--noise", "0.5").code == 0
+    document = json.loads(Path("view.json").read_text(encoding="utf-8"))
+    document["figure"] = {"lengths": {"right_hip-right_knee": 0.385}}
+    Path("view.json").write_text(json.dumps(document), encoding="utf-8")
+    assert run("recover", "view.json", "-o", "result.json").code == 0
+    assert run("validate", "result.json", "-o", "report.json").code == 0
 
 
 # --- reproduce and demo ---------------------------------------------------------------------------------

@@ -662,3 +662,44 @@ def test_the_result_holds_what_the_recovery_does() -> None:
         assert written.levels["physical"] == tuple(frame.levels["physical"].tolist())
     assert result_of(recovery).frames[0].pruned is None
     assert result.settings == recovery.settings
+
+
+# --- what counts as exact, and a root that does not fit -------------------------------------------------
+
+
+def right_arm_alone(image: np.ndarray) -> View:
+    """Return a view of neck, shoulder, elbow and wrist: no distance that would show whether it is exact."""
+    seen = np.full((1, 14, 2), np.nan)
+    seen[0, [0, 1, 6, 8]] = image
+    K = np.array([[1100.0, 0, 640], [0, 1090, 360], [0, 0, 1]])
+    return View(
+        camera=OpenCVModel(K=K, distortion=None, R=None, t=None, size=None),
+        time=np.zeros(1),
+        image=seen,
+        root=np.array([[0.0, -0.5, 3.5]]),
+    )
+
+
+def test_without_a_rigid_distance_nothing_is_judged_as_exact() -> None:
+    """Half a pixel of noise: judged as exact, the nearest survivor would be 38 cm off."""
+    image = np.array([[640.09, 204.02], [575.78, 202.87], [510.04, 211.92], [510.48, 289.7]])
+    frame = recover(right_arm_alone(image)).frames[0]
+    assert frame.judged == "measured"
+    truth = np.array([[-0.431, -0.495, 3.655], [-0.433, -0.236, 3.672]])
+    assert np.linalg.norm(frame.joints[:, [6, 8]] - truth, axis=-1).max(axis=1).min() < 0.02
+
+
+def test_exact_frames_say_so_in_the_settings() -> None:
+    recovery = recover(SEQ1)
+    assert recovery.settings["judged"] == ["exact"] * 5
+
+
+def test_a_root_beside_its_ray_is_warned_of_and_a_wrong_one_refused() -> None:
+    image = np.array([[640.0, 204.286], [575.8, 202.9], [510.0, 211.9], [510.5, 289.7]])
+    view = right_arm_alone(image)
+    with pytest.warns(UserWarning, match=r"frames\[0\].root is 1 cm beside"):
+        recover(change(view, root=view.root + np.array([0.01, 0, 0])))
+    with pytest.raises(InputError, match=r"frames\[0\].root: .* beside the ray"):
+        recover(change(view, root=view.root + np.array([0.3, 0, 0])))
+    with pytest.raises(InputError, match=r"frames\[0\].root: .* behind the camera"):
+        recover(change(view, root=-view.root))

@@ -37,12 +37,12 @@ def rejected_of(result: Result, subject: Subject, frame: int) -> Shown:
     pruned = result.frames[frame].pruned
     if not pruned:
         raise ViewerError(
-            f"frame {frame}: the result lists no pruned branch; recover it with --explain, and there must be some"
+            f"frame {frame + 1}: the result lists no pruned branch; recover it with --explain, and there must be some"
         )
     shown = subject.frames[frame]
     if shown.sight is None or not len(shown):
         raise ViewerError(
-            f"frame {frame}: to place its pruned branches the camera and a survivor are needed; give the view "
+            f"frame {frame + 1}: to place its pruned branches the camera and a survivor are needed; give the view "
             "that it was recovered from (--view)"
         )
     lengths = np.array([subject.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])
