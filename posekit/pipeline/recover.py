@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from importlib.metadata import version
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,9 +125,9 @@ def recover(
         "ranges": table.name,
         "range_limits": {where: list(bounds) for where, bounds in table.limits.items()},
         "rules": list(rules) if "walking" in names else [],
-        "tolerance": "exact, else measured" if tolerance is None else _numbers(tolerance),
-        "exact": _numbers(EXACT),
-        "measured": _numbers(MEASURED),
+        "tolerance": "exact, else measured" if tolerance is None else asdict(tolerance),
+        "exact": asdict(EXACT),
+        "measured": asdict(MEASURED),
         "contact_margin": contact_margin,
         "group": group,
         "figure": person.hash,
@@ -166,7 +165,12 @@ class _Grower:
         return InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=np.array(lengths))
 
     def suite(self, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
-        """Make the checks, with every distance measured where their margins are wanted."""
+        """Return the checks, made once, with every distance measured where their margins are wanted."""
+        if (tolerance, exact) not in self._suites:
+            self._suites[tolerance, exact] = self._make_suite(tolerance, exact)
+        return self._suites[tolerance, exact]
+
+    def _make_suite(self, tolerance: Tolerance, exact: bool) -> list[Check]:
         return make_checks(
             self.figure,
             self.checks,
@@ -180,12 +184,12 @@ class _Grower:
         )
 
     @cached_property
-    def _suites(self) -> dict[Tolerance, list[Check]]:
+    def _suites(self) -> dict[tuple[Tolerance, bool], list[Check]]:
         return {}
 
     def grow(self, frames: NDArray[np.intp], tolerance: Tolerance) -> Batch:
         """Grow the trees of some frames: physical checks on the way, the motion model on the leaves."""
-        suite = self._suites.setdefault(tolerance, self.suite(tolerance))
+        suite = self.suite(tolerance)
         camera = self.fit.frames(frames)
         with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
             leaves = self.tree.grow(
@@ -245,7 +249,3 @@ def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:
                 f"frames[{k}]: the segment {segment} is at least {missing * 100:.3g} cm too short for its image; "
                 "correct its length or its image points, or give a larger --tangent-tolerance"
             )
-
-
-def _numbers(tolerance: Tolerance) -> dict[str, Any]:
-    return asdict(tolerance)
