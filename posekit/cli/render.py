@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.given import schema_of
+from posekit.cli.given import read_given
 from posekit.cli.options import about, examples, numbers, progress, split
 from posekit.errors import InputError, ViewerError
 
@@ -160,7 +160,7 @@ def render(
         Layout.SUPERPOSED if through_view or (moving and not turntable) else Layout.SIDE_BY_SIDE
     )
     style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
-    content, behind = _read(given, seen, explain=rejected)
+    content, behind = read_given(given, seen, explain=rejected)
     if output.suffix.lower() == ".html" and posture == "all" and layout is None and not rejected and not eye:
         with about(given):
             _write_page(output, content, behind, frame, title=given.name)
@@ -206,24 +206,6 @@ def _shown(
             raise InputError("--rejected: postures have no pruned branches; expected a result or a view")
         return subject, [one_a_reason(rejected_of(content, subject, k)) for k in numbers_of_frames]
     return subject, [_chosen(subject.frames[k], posture, k) for k in numbers_of_frames]
-
-
-def _read(path: Path, seen: Path | None, *, explain: bool) -> tuple[Result | Postures, View | None]:
-    from posekit import files, pipeline
-
-    name = schema_of(path)
-    view = files.read_view(seen) if seen is not None else None
-    if name.startswith("posekit.view/"):
-        if view is not None:
-            raise InputError("--view: the file is a view itself; expected a result beside it; leave it out")
-        view = files.read_view(path)
-        recovery = pipeline.recover(view, group=0.05)
-        return pipeline.result_of(recovery, unit=view.unit, explain=explain), view
-    if name.startswith("posekit.result/"):
-        return files.read_result(path), view
-    if view is not None:
-        raise InputError("--view: the file holds no result; expected one, recovered from that view")
-    return files.read_postures(path), None
 
 
 def _chosen(shown: Shown, text: str, frame: int) -> Shown:

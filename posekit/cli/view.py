@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.given import schema_of
+from posekit.cli.given import read_given
 from posekit.cli.options import about, examples
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.files import Postures, Result, View
+    pass
 
 LAST_PORT = 65535
 
@@ -50,7 +50,7 @@ def view(
     from posekit.viewer.page.page import page_html
     from posekit.viewer.page.server import PageServer
 
-    content, behind = _read(given, seen)
+    content, behind = read_given(given, seen)
     chosen = _frames(frames)
     with about(given):
         page = page_html(content, behind, title=given.name, frames=chosen)
@@ -62,27 +62,6 @@ def view(
             server.serve_forever()
         except KeyboardInterrupt:
             typer.echo("stopped")
-
-
-def _read(path: Path, seen: Path | None) -> tuple[Result | Postures, View | None]:
-    """Read a file of any of the three schemas; a view is recovered first."""
-    from posekit import files, pipeline
-
-    name = schema_of(path)
-    behind = files.read_view(seen) if seen is not None else None
-    if name.startswith("posekit.view/"):
-        if behind is not None:
-            raise InputError(
-                f"--view: {path} is a view itself; expected a result beside it; leave the option out"
-            )
-        behind = files.read_view(path)
-        recovery = pipeline.recover(behind, group=0.05)
-        return pipeline.result_of(recovery, unit=behind.unit), behind
-    if name.startswith("posekit.result/"):
-        return files.read_result(path), behind
-    if behind is not None:
-        raise InputError(f"--view: {path} holds no result; expected one, recovered from that view")
-    return files.read_postures(path), None
 
 
 def _frames(text: str) -> range | None:

@@ -10,6 +10,7 @@ import threading
 
 import pytest
 
+from posekit.cli import given as given_files
 from posekit.cli import view
 from posekit.errors import InputError, ViewerError
 from posekit.files import Postures, Result, View, write_postures, write_view
@@ -103,17 +104,17 @@ def test_the_kinds_of_files_are_told_apart(tmp_path):
     joints = builtin_view("seq1").truth
     for name in ("postures.json", "postures.npz"):
         write_postures(tmp_path / name, Postures(joints=joints))
-        given, behind = view._read(tmp_path / name, None)
+        given, behind = given_files.read_given(tmp_path / name, None)
         assert isinstance(given, Postures)
         assert behind is None
     write_view(tmp_path / "view.json", builtin_view("seq1"))
-    given, behind = view._read(tmp_path / "view.json", None)
+    given, behind = given_files.read_given(tmp_path / "view.json", None)
     assert isinstance(given, Result)
     assert isinstance(behind, View)
     assert len(given.frames) == len(behind) == 5
     for name in ("postures.json", "view.json"):
         with pytest.raises(InputError, match="--view"):
-            view._read(tmp_path / name, tmp_path / "view.json")
+            given_files.read_given(tmp_path / name, tmp_path / "view.json")
 
 
 @pytest.mark.parametrize("text", ["0", "3-2", "a", "1-", "-1", "1-2-3", "²"])
