@@ -8,3 +8,4 @@ from posekit.cameras.camera import Array as Array
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift
 from posekit.cameras.pinhole import PinholeCamera as PinholeCamera
+from posekit.cameras.scaled_orthographic import ScaledOrthographicCamera as ScaledOrthographicCamera
