@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import resources
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from posekit.errors import InputError
+from posekit.intake import cut, one_line, parse_toml, read_text
 from posekit.skeleton import DOFS
 
 SCHEMA = "posekit.ranges/1"
@@ -70,26 +70,21 @@ def load_ranges(name: str) -> Ranges:
     if name == "table1":
         text = (resources.files("posekit.urdf") / "ranges" / "table1.toml").read_text(encoding="utf-8")
         return _parse(text, "table1")
-    path = Path(name)
     try:
-        if not path.is_file():
-            raise InputError(
-                f"--ranges {name}: no such table or file; expected urdf, table1 or the path of a TOML file"
+        exists = Path(name).exists()
+    except (OSError, ValueError):
+        exists = False
+    if not name or not exists:
+        raise InputError(
+            one_line(
+                f"--ranges {cut(name)}: no such table or file; expected urdf, table1 or the path of a TOML file"
             )
-        if path.stat().st_size > MAX_BYTES:
-            raise InputError(f"{path}: larger than {MAX_BYTES} bytes; expected a table of joint ranges")
-        return _parse(path.read_text(encoding="utf-8"), str(path))
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: not UTF-8 text; save it as UTF-8") from error
-    except OSError as error:
-        raise InputError(f"--ranges {name}: cannot be read: {error.strerror}") from error
+        )
+    return _parse(read_text(name, limit=MAX_BYTES), name)
 
 
 def _parse(text: str, source: str) -> Ranges:
-    try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # a number of thousands of digits is a plain ValueError
-        raise InputError(f"{source}: not TOML: {error}") from error
+    table = parse_toml(text, source, finite=False)  # each number is named below, in the words of its range
     schema = table.pop("schema", None)
     if schema != SCHEMA:
         raise InputError(f"{source}: schema is {schema!r}; expected {SCHEMA!r} in the first line")

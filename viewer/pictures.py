@@ -19,10 +19,10 @@ from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
 from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
 from posekit.viewer.scene.compose import Composition, Style, compose, row_count
-from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.subject import Shown, Subject
+from posekit.viewer.scene.subject import Shown, Subject, check_one_scale
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
 
@@ -171,9 +171,12 @@ class _Film:
         alone = style.layout == "superposed" or all(len(frame) == 1 for frame in frames)
         self.with_camera = style.camera and alone and not shot.through_view and frames[0].sight is not None
         self.rows = 1 if alone else max(row_count(len(frame)) for frame in frames)
+        if shot.through_view:
+            for frame in frames:
+                check_one_scale(frame)
         style = replace(style, azimuth=self._angles()["azimuth"], camera=self.with_camera)
         self.world = upright_world(
-            np.concatenate([frame.points.reshape(-1, 3) for frame in frames]), subject.R_cam_world
+            np.concatenate([frame.aligned_points.reshape(-1, 3) for frame in frames]), subject.R_cam_world
         )
         stage = None
         if len(frames) > 1:  # the ground is the same in all frames
@@ -192,7 +195,7 @@ class _Film:
         """Return from where a page looks at first: free, whatever was asked."""
         return self.shot.eye or fitted_eye(self._points(self.compositions), self.world, **self._angles())
 
-    def _shots(self) -> Iterator[tuple[Scene, Eye | ViewEye]]:
+    def _shots(self) -> Iterator[tuple[Scene, Eye | CameraEye]]:
         shot = self.shot
         if shot.turntable:
             points = self.compositions[0].points

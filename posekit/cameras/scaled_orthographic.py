@@ -10,7 +10,7 @@ from posekit.cameras.camera import COINCIDENT, Array, Lift
 from posekit.errors import CameraError
 
 ROUNDING = 1e-15
-"""Of a segment's length: at the lower bound of s the segment that sets it must not fail by its last bit."""
+"""Of the coordinates: at the bound of s the segment that sets it must not fail, nor split in two, by its last bits."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,12 +72,14 @@ class ScaledOrthographicCamera:
         """
         place = self.unproject(pixel)
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
-        half = np.sqrt(np.maximum((length - apart) * (length + apart), 0.0))
-        tangent = half <= COINCIDENT
-        half = np.where(tangent, 0.0, half)
+        lost = ROUNDING * (length + np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1))
+        squared = np.maximum((length - apart) * (length + apart), 0.0)
+        # Lengths may be relative, hence large: what is coincident grows with them.
+        tangent = squared <= (COINCIDENT * np.maximum(length, 1.0)) ** 2 + 2 * length * lost
+        half = np.where(tangent, 0.0, np.sqrt(squared))
         depth = start[..., 2, None] + np.stack([-half, half], axis=-1)
         excess = apart - length
-        reachable = excess <= max(tolerance, 0.0) + ROUNDING * length
+        reachable = excess <= max(tolerance, 0.0) + lost
         valid = np.stack([reachable, reachable & ~tangent], axis=-1)
         points = np.concatenate(
             [np.broadcast_to(place[..., None, :], (*depth.shape, 2)), depth[..., None]], axis=-1

@@ -72,6 +72,39 @@ def recover(
             help="Also write the person's figure: URDF, and SRDF beside it.",
         ),
     ] = None,
+    scale: Annotated[
+        str,
+        typer.Option(
+            "--scale",
+            metavar="HOW",
+            help="Uncalibrated views: min, VALUE (pixels a unit), stature:PX, or constraints: closure, coplanar, "
+            "perpendicular, collinear, with weights if wanted (closure:1,coplanar:0.5). Default: the view's, else min.",
+        ),
+    ] = "",
+    proportions: Annotated[
+        str,
+        typer.Option(
+            "--proportions",
+            metavar="NAME",
+            help="Uncalibrated views: relative lengths of the figure, or of taylor (12 points, no neck, no pelvis).",
+        ),
+    ] = "figure",
+    nearer: Annotated[
+        Path | None,
+        typer.Option(
+            "--nearer",
+            metavar="FILE",
+            help="Which end of each segment is nearer, given by hand: JSON or TOML.",
+        ),
+    ] = None,
+    linkage: Annotated[
+        str,
+        typer.Option(
+            "--linkage",
+            metavar="FILE|URDF|NAME",
+            help="Recover another articulated object from an uncalibrated view.",
+        ),
+    ] = "",
     explain: Annotated[
         bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
     ] = False,
@@ -87,6 +120,7 @@ def recover(
         )
     seen = files.read_view(view)
     table = validators.load_ranges(ranges)
+    how = pipeline.parse_scale(scale, per_unit=files.PER_METRE[seen.unit]) if scale else None
     with progress("recovering", len(seen.time)) as done, about(view):
         recovery = pipeline.recover(
             seen,
@@ -96,6 +130,9 @@ def recover(
             tolerance=_tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
             contact_margin=signed_length(contact_margin, "--contact-margin"),
             group=files.parse_length(group, name="--group") if group else None,
+            scale=how,
+            proportions=proportions,
+            nearer=None if nearer is None else files.read_nearer(nearer),
             progress=done,
         )
     if write_urdf is not None:

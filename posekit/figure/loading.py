@@ -7,8 +7,8 @@ from importlib import resources
 from pathlib import Path
 
 from posekit.figure.figure import Figure
-from posekit.figure.second_reader import compare_readers
-from posekit.figure.urdf import read_text
+from posekit.figure.urdf import as_figure_error, read_text
+from posekit.robot.second_reader import compare_readers
 
 
 @lru_cache(maxsize=1)
@@ -42,5 +42,6 @@ def load_figure(path: str | Path | None = None) -> Figure:
         srdf=read_text(srdf) if srdf.exists() else _built_in().srdf,
         source=str(path),
     )
-    compare_readers(figure.urdf, figure.model, figure.source)
+    with as_figure_error():
+        compare_readers(figure.urdf, figure.model, figure.source)
     return figure

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -22,6 +23,18 @@ University, as reprinted in Winter, "Biomechanics and Motor Control of Human Mov
 
 SHORTEST, TALLEST = 0.4, 2.8
 """Metres: beyond the statures ever recorded a number is more likely in another unit."""
+
+
+def stature_from_lengths(lengths: Mapping[str, float]) -> float:
+    """Estimate a person's stature (m) from the limbs, by the same fractions: the total length over its share."""
+    share = {
+        ("shoulder", "elbow"): UPPER_ARM,
+        ("elbow", "wrist"): FOREARM,
+        ("hip", "knee"): THIGH,
+        ("knee", "ankle"): SHANK,
+    }
+    total = sum(lengths[f"{side}_{a}-{side}_{b}"] for side in SIDES for a, b in share)
+    return total / (2 * sum(share.values()))
 
 
 def lengths_from_stature(stature: float, reference: dict[str, float]) -> dict[str, float]:

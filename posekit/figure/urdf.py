@@ -3,26 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from xml.etree import ElementTree
 
-import defusedxml
-import defusedxml.ElementTree
 import numpy as np
 
 from posekit.cameras import Array
-from posekit.errors import FigureError
+from posekit.errors import FigureError, InputError
 from posekit.figure.capsules import Capsule
 from posekit.figure.lengths import hips_points, torso_points
+from posekit.intake import parse_xml
+from posekit.robot.urdf import check_robot, read_urdf
 from posekit.skeleton import HEAD_POINTS, SIDES
-
-MAX_BYTES = 10_000_000
-MAX_LINKS = 1000
-"""Far above the figure's own 40; Pinocchio's parser overflows the stack on chains some 5000 links deep."""
-
-NUMBERS = {"xyz": 3, "rpy": 3, "radius": 1, "length": 1, "lower": 1, "upper": 1}
-"""How many numbers each attribute holds."""
 
 LIMB_SEGMENTS = (
     ("upper_arm", "elbow_flexion", "shoulder", "elbow"),
@@ -35,12 +29,8 @@ LIMB_SEGMENTS = (
 
 def read_text(path: Path) -> str:
     """Read a URDF or SRDF file as text, with a limit on its size."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise FigureError(f"{path}: larger than {MAX_BYTES} bytes; this is not a figure's URDF")
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise FigureError(f"{path}: cannot be read as UTF-8 text: {error}") from error
+    with as_figure_error():
+        return read_urdf(path)
 
 
 def write_texts(path: Path, urdf: str, srdf: str) -> None:
@@ -58,79 +48,32 @@ def write_texts(path: Path, urdf: str, srdf: str) -> None:
 
 
 def parse(text: str, source: str) -> ElementTree.Element:
-    """Parse XML with entities and DOCTYPE refused, every number finite, limits in order.
+    """Parse the figure's URDF or SRDF: what is checked of any robot's, and no meshes.
 
     Raises
     ------
     FigureError
         With the place that is wrong. Pinocchio would accept or silently drop most of these.
     """
-    try:
-        robot = defusedxml.ElementTree.fromstring(text, forbid_dtd=True)
-    except ElementTree.ParseError as error:
-        raise FigureError(f"{source}: not well-formed XML: {error}") from error
-    except defusedxml.DefusedXmlException as error:
-        raise FigureError(f"{source}: DOCTYPE and entities are refused; remove them") from error
-    if robot.tag != "robot":
-        raise FigureError(f"{source}: the root element is <{robot.tag}>; expected <robot>")
-    links = len(robot.findall("link"))
-    if links > MAX_LINKS:
-        raise FigureError(f"{source}: {links} links; expected at most {MAX_LINKS}")
-    for element in robot.iter():
-        for attribute, count in NUMBERS.items():
-            if attribute in element.attrib:
-                _finite(element.attrib[attribute], count, f"{source}: <{element.tag} {attribute}=…>")
+    with as_figure_error():
+        robot = parse_xml(text, source)
+        if robot.tag == "robot" and robot.find("link") is None:
+            return robot  # an SRDF has none
+        check_robot(robot, source)
     if robot.find(".//collision//mesh") is not None:
         raise FigureError(
             f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)"
         )
-    if robot.find("link") is not None:  # an SRDF has none
-        _check_tree(robot, source)
-    for joint in robot.findall("joint"):
-        limit = joint.find("limit")
-        if limit is not None and float(limit.get("lower", 0)) > float(limit.get("upper", 0)):
-            raise FigureError(
-                f"{source}: joint {joint.get('name')!r} has lower limit {limit.get('lower')} above its upper "
-                f"{limit.get('upper')}; swap them"
-            )
     return robot
 
 
-def _check_tree(robot: ElementTree.Element, source: str) -> None:
-    """Refuse links and joints that are not one tree: Pinocchio says so on stderr, or overflows its stack."""
-    links = [link.get("name", "") for link in robot.findall("link")]
-    parent_of: dict[str, str] = {}
-    for joint in robot.findall("joint"):
-        ends = [
-            element.get("link", "") for tag in ("parent", "child") if (element := joint.find(tag)) is not None
-        ]
-        unknown = [link for link in ends if link not in links]
-        if len(ends) != 2 or unknown:
-            raise FigureError(
-                f"{source}: joint {joint.get('name')!r} joins {' and '.join(map(repr, ends)) or 'nothing'}; "
-                f"expected two links of this file; unknown: {', '.join(unknown) or 'none'}"
-            )
-        parent, child = ends
-        if child in parent_of:
-            raise FigureError(f"{source}: link {child!r} hangs on two joints; expected a tree")
-        parent_of[child] = parent
-    names = [joint.get("name", "") for joint in robot.findall("joint")]
-    for kind, given in (("link", links), ("joint", names)):
-        twice = sorted({name for name in given if given.count(name) > 1})
-        if twice:
-            raise FigureError(f"{source}: {kind} {twice[0]!r} is there twice; give each its own name")
-    roots = [link for link in links if link not in parent_of]
-    if len(roots) != 1:
-        raise FigureError(
-            f"{source}: {len(roots)} links hang on no joint ({', '.join(roots[:5]) or 'a cycle'}); expected one root"
-        )
-    for link in links:
-        seen = {link}
-        while link in parent_of:
-            link = parent_of[link]  # noqa: PLW2901
-            if link in seen:
-                raise FigureError(f"{source}: link {link!r} hangs on itself; remove the cycle")
-            seen.add(link)
+@contextmanager
+def as_figure_error() -> Iterator[None]:
+    """Call what is wrong with any robot's file an error of the figure."""
+    try:
+        yield
+    except InputError as error:
+        raise FigureError(str(error)) from error
 
 
 def rewrite(
@@ -223,12 +166,3 @@ def _find(element: ElementTree.Element, path: str) -> ElementTree.Element:
 
 def _numbers(values: Array) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
-
-
-def _finite(text: str, count: int, where: str) -> None:
-    try:
-        numbers = [float(word) for word in text.split()]
-    except ValueError as error:
-        raise FigureError(f"{where}: {text!r} is not a number") from error
-    if len(numbers) != count or not all(math.isfinite(number) for number in numbers):
-        raise FigureError(f"{where}: {text!r}; expected {count} finite number{'s' if count > 1 else ''}")

@@ -4,6 +4,9 @@ from posekit.files.camera_model import CameraModel as CameraModel
 from posekit.files.camera_model import LeeChenModel as LeeChenModel
 from posekit.files.camera_model import OpenCVModel as OpenCVModel
 from posekit.files.camera_model import ScaledOrthographicModel as ScaledOrthographicModel
+from posekit.files.family import Family as Family
+from posekit.files.inferred import Inferred as Inferred
+from posekit.files.nearer import read_nearer as read_nearer
 from posekit.files.postures import Postures as Postures
 from posekit.files.postures import read_postures as read_postures
 from posekit.files.postures import write_postures as write_postures
@@ -24,6 +27,7 @@ from posekit.files.result_file import write_result as write_result
 from posekit.files.schemas import SCHEMAS as SCHEMAS
 from posekit.files.schemas import schema as schema
 from posekit.files.schemas import schema_text as schema_text
+from posekit.files.units import PER_METRE as PER_METRE
 from posekit.files.units import Unit as Unit
 from posekit.files.units import parse_length as parse_length
 from posekit.files.view import View as View

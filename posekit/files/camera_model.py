@@ -86,13 +86,17 @@ class ScaledOrthographicModel:
     ----------
     scale : float or None
         s, pixels a metre (files give pixels a `unit`); None where it is not known.
+    aspect : float
+        Width of a pixel over its height; s counts in v.
     """
 
     scale: float | None
+    aspect: float = 1.0
 
     def __post_init__(self) -> None:
         if self.scale is not None:
             check_positive("scale", self.scale)
+        check_positive("aspect", self.aspect)
 
 
 CameraModel = LeeChenModel | OpenCVModel | ScaledOrthographicModel

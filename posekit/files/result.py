@@ -9,6 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.files.family import Family
+from posekit.files.inferred import Inferred
 from posekit.files.refusal import refusal
 from posekit.files.units import Unit
 from posekit.skeleton import JOINTS
@@ -51,6 +53,12 @@ class ResultFrame:
         Pruned branches by the finding that killed them.
     pruned : sequence of mappings, optional
         Detail on each pruned branch, of plain values.
+    family : Family, optional
+        The scales that an uncalibrated frame can have.
+    scales : array (N,), optional
+        The scale that each survivor of such a frame was recovered at, pixels a metre.
+    inferred : sequence of N mappings, optional
+        By survivor, then by joint that was not seen: what is known of its position (`posekit.files.Inferred`).
     """
 
     time: float
@@ -65,9 +73,16 @@ class ResultFrame:
     length_residual: Array
     rejected: Mapping[str, int]
     pruned: Sequence[Mapping[str, Any]] | None = None
+    family: Family | None = None
+    scales: Array | None = None
+    inferred: Sequence[Mapping[str, Inferred]] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.joints)
+        if self.scales is not None:
+            self._set("scales", self.scales, (count,))
+        if self.inferred is not None and len(self.inferred) != count:
+            raise _refused("inferred", f"{len(self.inferred)} entries", f"{count}, one a posture")
         self._set("joints", self.joints, (count, len(JOINTS), 3))
         self._set("q", self.q, (count, np.shape(self.q)[-1]))
         self._set("fk_distance", self.fk_distance, (count,))

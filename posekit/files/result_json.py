@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.files.family import Family
+from posekit.files.inferred import Inferred
 from posekit.files.reading import read_json
 from posekit.files.refusal import refusal
 from posekit.files.result import Result, ResultFrame
-from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields
-from posekit.files.units import Unit, from_metres, to_metres
+from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
+from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.writing import json_pieces, write_text
 
@@ -34,13 +36,14 @@ def result_of(document: object, path: str | Path) -> Result:
     postures = [posture for frame in file.frames for posture in frame.postures]
     margins = list(dict.fromkeys(name for posture in postures for name in posture.margins))
     grouped = {posture.group is not None for posture in postures}
+    inferred = any(posture.inferred is not None for posture in postures)
     if len(grouped) > 1:
         raise refusal(path, "frames", "postures with and without a group", "all or none", "group all or none")
     return Result(
         unit=file.unit,
         configuration_names=file.configuration_names,
         settings=file.settings,
-        frames=[_frame(frame, file.unit, nq, margins, True in grouped) for frame in file.frames],
+        frames=[_frame(frame, file.unit, nq, margins, True in grouped, inferred) for frame in file.frames],
     )
 
 
@@ -75,6 +78,12 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
             columns["margins"] = [{} for _ in frame.branches]
         columns["fk_distance"] = _nullable(from_metres(frame.fk_distance, unit))
         columns["length_residual"] = _nullable(from_metres(frame.length_residual, unit))
+        if frame.scales is not None:
+            columns["scale"] = _nullable(frame.scales / PER_METRE[unit])
+        if frame.inferred is not None:
+            columns["inferred"] = [
+                {name: one.fields(unit) for name, one in joints.items()} for joints in frame.inferred
+            ]
         fields: dict[str, Any] = {
             "time": float(frame.time),
             "camera": {
@@ -87,6 +96,8 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
             "postures": [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)],
             "rejected": dict(frame.rejected),
         }
+        if frame.family is not None:
+            fields["family"] = frame.family.fields(unit)
         if frame.pruned is not None:
             fields["pruned"] = [dict(entry) for entry in frame.pruned]
         yield fields
@@ -123,7 +134,9 @@ def _check_frame(path: str | Path, where: str, frame: ResultFrameFields, nq: int
             )
 
 
-def _frame(frame: ResultFrameFields, unit: Unit, nq: int, margins: list[str], grouped: bool) -> ResultFrame:
+def _frame(
+    frame: ResultFrameFields, unit: Unit, nq: int, margins: list[str], grouped: bool, inferred: bool
+) -> ResultFrame:
     postures, camera = frame.postures, frame.camera
     count = len(postures)
     residual = camera.residual
@@ -150,4 +163,16 @@ def _frame(frame: ResultFrameFields, unit: Unit, nq: int, margins: list[str], gr
         length_residual=to_metres([posture.length_residual for posture in postures], unit),
         rejected=frame.rejected,
         pruned=frame.pruned,
+        family=None if frame.family is None else Family.of(frame.family.model_dump(), unit),
+        scales=_scales(postures, unit) if frame.family is not None else None,
+        inferred=[_inferred(posture, unit) for posture in postures] if inferred else None,
     )
+
+
+def _scales(postures: list[ResultPosture], unit: Unit) -> Array:
+    return np.array([posture.scale for posture in postures], dtype=np.float64) * PER_METRE[unit]
+
+
+def _inferred(posture: ResultPosture, unit: Unit) -> dict[str, Inferred]:
+    joints = posture.inferred or {}
+    return {name: Inferred.of(one.model_dump(), unit) for name, one in joints.items()}

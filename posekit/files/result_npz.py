@@ -6,7 +6,8 @@ there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names`
 ``levels/physical``, ``levels/motion`` (F, L); ``joints`` (F, N, 14, 3), ``fk_distance`` and
 ``length_residual`` (F, N) in ``unit``; ``q`` (F, N, nq) in metres and radians; ``branches`` (F, N);
 ``groups`` (F, N); ``margins/<name>`` (F, N); ``rejected/names`` (R,), ``rejected/counts`` (F, R). Padding and
-what is not known are NaN, -1 or an empty text.
+what is not known are NaN, -1 or an empty text. Uncalibrated: ``scales`` (F, N) and ``families`` (JSON text); with
+joints that were not seen: ``inferred`` (JSON text).
 """
 
 from __future__ import annotations
@@ -18,13 +19,16 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
+from posekit.files.family import Family
+from posekit.files.inferred import Inferred
 from posekit.files.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.files.reading import parse_json
 from posekit.files.refusal import refusal, shown
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
-from posekit.files.result_schema import SCHEMA
-from posekit.files.units import UNITS, Unit, from_metres, to_metres
+from posekit.files.result_schema import SCHEMA, ResultDetails
+from posekit.files.units import PER_METRE, UNITS, Unit, from_metres, to_metres
 from posekit.files.writing import replacing
 from posekit.skeleton import JOINTS
 
@@ -33,7 +37,7 @@ Array = NDArray[Any]
 MAX_PADDED: Final = 16_000_000_000
 """Bytes that a result may declare with its padding, which is passed over and never held."""
 _MARGIN = "margins/"
-_PADDED = ("joints", "q", "branches", "groups", "fk_distance", "length_residual", _MARGIN)
+_PADDED = ("joints", "q", "branches", "groups", "fk_distance", "length_residual", "scales", _MARGIN)
 
 
 def write_result_npz(path: str | Path, result: Result) -> None:
@@ -65,6 +69,23 @@ def write_result_npz(path: str | Path, result: Result) -> None:
             None if frame.pruned is None else [dict(entry) for entry in frame.pruned] for frame in frames
         ]
         arrays["pruned"] = np.array(json.dumps(pruned, allow_nan=False))
+    if any(frame.family is not None for frame in frames):
+        families = [None if frame.family is None else frame.family.fields(unit) for frame in frames]
+        arrays["families"] = np.array(json.dumps(families, allow_nan=False))
+        unknown = [np.full(len(frame.joints), np.nan) for frame in frames]
+        scales = [
+            missing if frame.scales is None else frame.scales / PER_METRE[unit]
+            for frame, missing in zip(frames, unknown, strict=True)
+        ]
+        arrays["scales"] = Ragged(rows=scales, fill=np.nan)
+    if any(frame.inferred is not None for frame in frames):
+        inferred = [
+            None
+            if frame.inferred is None
+            else [{name: one.fields(unit) for name, one in joints.items()} for joints in frame.inferred]
+            for frame in frames
+        ]
+        arrays["inferred"] = np.array(json.dumps(inferred, allow_nan=False))
     with replacing(path) as file:
         write_npz(file, arrays)
 
@@ -107,6 +128,8 @@ def result_in(archive: Archive) -> Result:
     levels = _levels(archive, len(time))
     rejected = _rejected(archive, len(time))
     pruned = _json(archive, "pruned") if "pruned" in archive.names else [None] * len(time)
+    families, inferred = _details(archive, count, unit)
+    scales = _ragged_floats(archive, "scales", count, ()) if families is not None else None
     settings = _json(archive, "settings")
     if not isinstance(settings, dict):
         raise refusal(path, "settings", shown(settings), "an object", "write the file again")
@@ -130,6 +153,11 @@ def result_in(archive: Archive) -> Result:
                 length_residual=rows["length_residual"][index],
                 rejected=rejected[index],
                 pruned=pruned[index],
+                family=None if families is None else families[index],
+                scales=None
+                if scales is None or families is None or families[index] is None
+                else scales[index] * PER_METRE[unit],
+                inferred=None if inferred is None else inferred[index],
             )
             for index in range(len(time))
         ],
@@ -168,6 +196,41 @@ def _expect(archive: Archive, name: str, accepted: Sequence[str]) -> str:
 def _json(archive: Archive, name: str) -> Any:
     text = str(archive.array(name, "U", ()))
     return parse_json(f"{archive.path}: {name}", text.encode("utf-8", "surrogatepass"))
+
+
+def _details(
+    archive: Archive, count: Array, unit: Unit
+) -> tuple[list[Family | None] | None, list[list[dict[str, Inferred]] | None] | None]:
+    """Read families and inferred joints, which are kept as JSON text."""
+    given = {name: _json(archive, name) for name in ("families", "inferred") if name in archive.names}
+    try:
+        details = ResultDetails.model_validate(given)
+    except ValidationError as error:
+        where = error.errors(include_url=False)[0]["loc"]
+        raise refusal(
+            archive.path, str(where[0]), shown(where), "what posekit writes", "write the file again"
+        ) from None
+    families, inferred = details.families, details.inferred
+    for name, entries in (("families", families), ("inferred", inferred)):
+        if entries is not None and len(entries) != len(count):
+            raise refusal(
+                archive.path, name, f"{len(entries)} entries", f"{len(count)}, one a frame", "write it again"
+            )
+    return (
+        None
+        if families is None
+        else [None if family is None else Family.of(family.model_dump(), unit) for family in families],
+        None
+        if inferred is None
+        else [
+            None
+            if rows is None
+            else [
+                {name: Inferred.of(one.model_dump(), unit) for name, one in joints.items()} for joints in rows
+            ]
+            for rows in inferred
+        ],
+    )
 
 
 def _known(groups: NDArray[np.int64] | None) -> NDArray[np.int64]:

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, FailFast, Field
 
 from posekit.files.refusal import shown
 from posekit.files.units import Unit
-from posekit.files.validation import FEW, FileModel, refuse
+from posekit.files.validation import FEW, FileModel, named, refuse
 from posekit.skeleton import JOINTS
 
 SCHEMA = "posekit.result/1"
@@ -58,6 +58,18 @@ class ResultLevels(FileModel):
     motion: Annotated[list[Count], Field(max_length=1000), FailFast()]
 
 
+class ResultInferred(FileModel):
+    """What is known of the position of a joint that was not seen."""
+
+    kind: str = Field(description="completed, circle, region or interval: what the set of positions is.")
+    lower: Row = Field(description="The least x, y, z of the set, in `unit`.")
+    upper: Row = Field(description="The greatest x, y, z of the set, in `unit`.")
+    radius: float = Field(
+        description="From the posture's joint to the farthest feasible position, in `unit`."
+    )
+    fraction: float = Field(description="How much of the circle or sphere is feasible.")
+
+
 class ResultPosture(FileModel):
     """One survivor."""
 
@@ -76,6 +88,41 @@ class ResultPosture(FileModel):
     )
     fk_distance: Maybe = Field(description="From the joints to the forward kinematics of q, in `unit`.")
     length_residual: Maybe = Field(description="Length lost where a ray is tangent, in `unit`.")
+    scale: Maybe = Field(default=None, description="Uncalibrated: pixels a `unit` that it was recovered at.")
+    inferred: Annotated[dict[str, ResultInferred], named(JOINTS, "joint")] | None = Field(
+        default=None,
+        description="Joints that were not seen; those of `joints` are in the middle of their sets.",
+    )
+
+
+class ResultMinimum(FileModel):
+    """One local minimum of the constraints' residual."""
+
+    s: float
+    residual: float
+
+
+class ResultCurve(FileModel):
+    """The constraints' residual against the scale, the least over all flips (Taylor 2000, Figs. 7b and 8b)."""
+
+    s: Annotated[list[float], Field(max_length=100_000), FailFast()]
+    residual: Annotated[list[float], Field(max_length=100_000), FailFast()]
+
+
+class ResultFamily(FileModel):
+    """The scales that an uncalibrated frame can have (Taylor 2000, section 2)."""
+
+    how: str = Field(description="min, view, value, stature, or the constraints that fixed the scale.")
+    bound: float = Field(description="The least scale that the lengths allow, pixels a `unit`.")
+    segment: str = Field(description="The segment that sets the bound.")
+    chosen: Annotated[list[float], Field(max_length=100_000), FailFast()] = Field(
+        description="The scales that postures were recovered at, pixels a `unit`."
+    )
+    minima: Annotated[list[ResultMinimum], Field(max_length=100_000), FailFast()] = Field(
+        description="All local minima of the constraints' residual, best first."
+    )
+    curve: ResultCurve
+    mirrored: Count = Field(description="How many survivors have their mirror image among the survivors.")
 
 
 class ResultFrameFields(FileModel):
@@ -86,9 +133,17 @@ class ResultFrameFields(FileModel):
     levels: ResultLevels
     postures: Annotated[list[ResultPosture], FailFast()]
     rejected: Annotated[dict[str, Count], FEW] = Field(description="Pruned branches, by what killed them.")
+    family: ResultFamily | None = Field(default=None, description="Uncalibrated: the scales it can have.")
     pruned: Annotated[list[Any], AfterValidator(_objects)] | None = Field(
         default=None, description="Detail on pruned branches, an object each."
     )
+
+
+class ResultDetails(FileModel):
+    """What an NPZ keeps as JSON text: the families of its frames, and what was inferred in their postures."""
+
+    families: list[ResultFamily | None] | None = None
+    inferred: list[list[dict[str, ResultInferred]] | None] | None = None
 
 
 class ResultFile(FileModel):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
+from posekit.files import nearer as nearer_schema
 from posekit.files import postures_schema, report_schema, result_schema, view_schema
 from posekit.files.refusal import nearest, refusal, shown
 from posekit.files.validation import FileModel
@@ -14,6 +15,7 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
     result_schema.SCHEMA: result_schema.ResultFile,
     postures_schema.SCHEMA: postures_schema.PosturesFile,
     report_schema.SCHEMA: report_schema.ReportFile,
+    nearer_schema.SCHEMA: nearer_schema.NearerFile,
 }
 SCHEMAS: Final = tuple(_MODELS)
 """The names of the schemas, each with its version: ``posekit.view/1``."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.files.camera_model import CameraModel
+from posekit.files.camera_model import CameraModel, ScaledOrthographicModel
 from posekit.files.refusal import nearest, refusal, shown
 from posekit.files.units import Unit
 from posekit.files.view_schema import HEAD_NAMES
@@ -33,7 +33,8 @@ class View:
         Seconds.
     image : array (F, 14, 2)
         Joints as seen, in tree order. OpenCV's convention, y down, always: pixels, or metres on the image
-        plane where the camera is Lee & Chen's. The neck is seen in every frame.
+        plane where the camera is Lee & Chen's. The neck is seen in every frame, unless the camera is scaled
+        orthographic.
     head_image : array (F, 5, 2), optional
         Head points as seen, in the order of `posekit.skeleton.HEAD_POINTS`.
     root : array (F, 3), optional
@@ -93,7 +94,7 @@ class View:
         if np.isnan(self.time).any():
             raise refusal("view", "time", "NaN", "a time for every frame", "number the frames if need be")
         unseen = np.isnan(self.image[:, 0, 0])
-        if unseen.any():
+        if unseen.any() and not isinstance(self.camera, ScaledOrthographicModel):
             where = f"image[{int(np.argmax(unseen))}, 0]"
             raise refusal("view", where, "NaN", "the neck in every frame", "drop frames without it")
         self._check_figure()

@@ -145,16 +145,20 @@ def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera, 
             size=None if camera.size is None else (camera.size[0], camera.size[1]),
         )
     scale = camera.scale
-    return ScaledOrthographicModel(scale=None if scale is None else scale * PER_METRE[unit])
+    return ScaledOrthographicModel(
+        scale=None if scale is None else scale * PER_METRE[unit], aspect=camera.aspect
+    )
 
 
 def _camera_fields(camera: CameraModel, unit: Unit) -> dict[str, Any]:
+    fields: dict[str, Any]
     if isinstance(camera, LeeChenModel):
         return {"model": "lee-chen", "f": None if camera.f is None else float(from_metres(camera.f, unit))}
     if isinstance(camera, ScaledOrthographicModel):
         scale = camera.scale
-        return {"model": "scaled-orthographic", "scale": None if scale is None else scale / PER_METRE[unit]}
-    fields: dict[str, Any] = {"model": "opencv", "K": camera.K.tolist()}
+        fields = {"model": "scaled-orthographic", "scale": None if scale is None else scale / PER_METRE[unit]}
+        return fields if camera.aspect == 1 else {**fields, "aspect": camera.aspect}
+    fields = {"model": "opencv", "K": camera.K.tolist()}
     if camera.distortion is not None:
         fields["distortion"] = camera.distortion.tolist()
     if camera.R is not None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import AfterValidator, FailFast, Field
+from pydantic import FailFast, Field, model_validator
 
 from posekit.files.camera_model import check_intrinsics, check_rotation
 from posekit.files.units import Unit
@@ -14,17 +14,6 @@ from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
 
 SCHEMA = "posekit.view/1"
 HEAD_NAMES = ("neck", *HEAD_POINTS)
-
-
-def _neck_is_seen(image: dict[str, Any]) -> dict[str, Any]:
-    if "neck" not in image:
-        refuse(
-            "the neck in every frame: the tree grows from it",
-            "add it or drop the frame",
-            at="neck",
-            got="nothing",
-        )
-    return image
 
 
 def _keys(names: tuple[str, ...], **more: Any) -> Any:
@@ -38,9 +27,7 @@ Matrix3 = Annotated[list[Point3], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
 Pixels = Annotated[int, Field(gt=0, le=10**6)]
 
-Image = Annotated[
-    dict[str, Point2], named(JOINTS, "joint"), AfterValidator(_neck_is_seen), _keys(JOINTS, required=["neck"])
-]
+Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]
@@ -78,6 +65,9 @@ class ScaledOrthographicCamera(FileModel):
 
     model: Literal["scaled-orthographic"]
     scale: Positive | None = Field(description="Pixels a `unit` of length; null where it is not known.")
+    aspect: Positive = Field(
+        default=1.0, description="Width of a pixel over its height, where it is not square."
+    )
 
 
 class FigureFields(FileModel):
@@ -94,7 +84,10 @@ class FrameFields(FileModel):
     """One picture."""
 
     time: float = Field(description="Seconds.")
-    image: Image = Field(description="Where each joint is seen; one that is not seen is left out.")
+    image: Image = Field(
+        description="Where each joint is seen; one that is not seen is left out. The neck is seen in every frame, "
+        "unless the camera is scaled-orthographic."
+    )
     head_image: HeadImage | None = Field(default=None, description="Where each point of the head is seen.")
     root: Point3 | None = Field(default=None, description="The neck, OpenCV camera frame, in `unit`.")
     truth: Joints | None = Field(default=None, description="Joints, OpenCV camera frame, in `unit`.")
@@ -128,3 +121,16 @@ class ViewFile(FileModel):
     camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera = Field(discriminator="model")
     figure: FigureFields | None = None
     frames: Annotated[list[FrameFields], Field(min_length=1), FailFast()]
+
+    @model_validator(mode="after")
+    def _neck_is_seen(self) -> ViewFile:
+        if not isinstance(self.camera, ScaledOrthographicCamera):
+            for k, frame in enumerate(self.frames):
+                if "neck" not in frame.image:
+                    refuse(
+                        "the neck in every frame: the tree grows from it",
+                        "add it or drop the frame",
+                        at=f"frames[{k}].image.neck",
+                        got="nothing",
+                    )
+        return self

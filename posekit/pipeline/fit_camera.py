@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, PinholeCamera, lee_chen
+from posekit.cameras import Array, Camera, PinholeCamera, ScaledOrthographicCamera, lee_chen
 from posekit.errors import HeadError, InputError
 from posekit.figure import Figure
-from posekit.files import LeeChenModel, OpenCVModel, View
+from posekit.files import Family, LeeChenModel, OpenCVModel, View
 from posekit.head import HeadPoints, HeadPose, calibrate, solve_pose
 from posekit.skeleton import HEAD, HEAD_POINTS
 
@@ -21,29 +21,42 @@ ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class CameraFit:
-    """The camera of F frames, and where it sees neck and head.
+    """The camera of F frames, and where it sees the root and the head, in H hypotheses.
+
+    A calibrated frame is one hypothesis, an uncalibrated one as many as scales were taken for it.
 
     Parameters
     ----------
-    camera : PinholeCamera
-    root : array (F, 3)
-        The neck, camera frame, metres; NaN where it is not known.
-    head : array (F, 5, 3)
+    camera : PinholeCamera or ScaledOrthographicCamera
+        Its first axis, where it has one, counts hypotheses.
+    frame : int array (H,)
+        The frame of each hypothesis, in order.
+    root : array (H, 3)
+        The tree's root, camera frame, metres; NaN where it is not known.
+    head : array (H, 5, 3)
         The head's points; NaN where the head was not seen.
     pose : HeadPose or None
         The recovered head, where there was one to see.
     reasons : list of str
-        For each frame why its neck is not known, or an empty text.
+        For each frame why its root is not known, or an empty text.
+    families : list of Family, optional
+        For each uncalibrated frame the scales that it can have; None where the reason says why.
     """
 
-    camera: PinholeCamera
+    camera: PinholeCamera | ScaledOrthographicCamera
+    frame: NDArray[np.intp]
     root: Array
     head: Array
     pose: HeadPose | None
     reasons: list[str]
+    families: list[Family | None] | None = None
 
-    def frames(self, part: NDArray[np.intp]) -> PinholeCamera:
-        """Return the camera of some frames."""
+    def cameras(self, part: NDArray[np.intp]) -> Camera:
+        """Return the camera of some hypotheses."""
+        if isinstance(self.camera, ScaledOrthographicCamera):
+            return ScaledOrthographicCamera(
+                scale=np.asarray(self.camera.scale)[part], aspect=self.camera.aspect
+            )
         K = self.camera.K
         return self.camera if K.ndim == 2 else PinholeCamera(K=K[part], distortion=self.camera.distortion)
 
@@ -74,9 +87,7 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         camera = PinholeCamera(K=model.K, distortion=model.distortion)
         pose = solve_pose(head_points, image, camera) if seen.any() else None
     else:
-        raise InputError(
-            "camera.model is scaled-orthographic; recover takes lee-chen and opencv cameras; give K"
-        )
+        raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
     root = view.root.copy()
     head = np.full((n, len(HEAD), 3), np.nan)
     reasons = [""] * n
@@ -99,7 +110,7 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
         reasons[k] = f"frames[{k}]: {why}"
     if n and all(reasons):
         raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or root")
-    return CameraFit(camera=camera, root=root, head=head, pose=pose, reasons=reasons)
+    return CameraFit(camera=camera, frame=np.arange(n), root=root, head=head, pose=pose, reasons=reasons)
 
 
 def _check_root(root: Array, view: View, camera: PinholeCamera) -> None:

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
-from posekit.files import View
+from posekit.figure import Figure, load_figure, stature_from_lengths
+from posekit.files import ScaledOrthographicModel, View
+from posekit.pipeline.body import Body, FigureBody, Judges
 from posekit.pipeline.camera_record import camera_records
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
+from posekit.pipeline.fit_scale import fit_scale
+from posekit.pipeline.grower import Grower
+from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
+from posekit.pipeline.scale import Scale
+from posekit.pipeline.taylor.body import TaylorBody
 from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
-from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree
-from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, make_checks
+from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
 from posekit.validators.walking import DEFAULT_RULES
+
+Proportions = Literal["figure", "taylor"]
 
 FRAMES_AT_ONCE = 250
 """Frames grown together: enough to spread NumPy's overhead, few enough to stay in the cache."""
@@ -37,6 +43,9 @@ def recover(
     tolerance: Tolerance | None = None,
     contact_margin: float = 0.0,
     group: float | None = None,
+    scale: Scale | None = None,
+    proportions: str = "figure",
+    nearer: Sequence[Mapping[str, str]] | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
@@ -59,6 +68,14 @@ def recover(
         Metres that bodies must keep from each other; negative allows penetration.
     group : float, optional
         Metres within which similar survivors are grouped.
+    scale : Scale, optional
+        How the scale of an uncalibrated view is found: by default the view's own, or the least that the lengths
+        allow.
+    proportions : {"figure", "taylor"}
+        Whose relative lengths an uncalibrated view is lifted with: the figure's, or Taylor's Table 1 (12 points, no
+        neck and pelvis).
+    nearer : sequence of mapping, optional
+        Flips given by hand: segment to the name of its nearer end, one mapping for all frames or one a frame.
     progress : callable, optional
         Called with the number of frames done since the last call.
 
@@ -82,30 +99,24 @@ def recover(
     if group is not None and not (math.isfinite(group) and group >= 0):
         raise InputError(f"--group: {group!r} m; expected zero or a positive length")
     table = load_ranges(ranges) if isinstance(ranges, str) else ranges
-    person = person_of(view, figure or load_figure())
-    fit = fit_camera(view, person)
+    body = body_of(view, figure or load_figure(), proportions)
+    judges = Judges(checks=names, ranges=table, rules=tuple(rules), contact_margin=contact_margin)
+    fit = _fit(view, body, scale, tolerance)
     records = camera_records(view, fit)
-    grower = _Grower(
-        view=view,
-        fit=fit,
-        figure=person,
-        checks=names,
-        ranges=table,
-        rules=tuple(rules),
-        contact_margin=contact_margin,
-    )
-    placed: dict[int, tuple[Batch | None, int]] = {}
-    usable = np.flatnonzero([not reason for reason in fit.reasons])
-    for first in range(0, len(usable), FRAMES_AT_ONCE):
-        chosen = usable[first : first + FRAMES_AT_ONCE]
-        batch = grower.grow(chosen, tolerance or EXACT)
-        placed |= {int(k): (batch, index) for index, k in enumerate(chosen)}
-        inexact = chosen[~_is_exact(batch)] if tolerance is None else chosen[:0]
-        if len(inexact):
-            again = grower.grow(inexact, MEASURED)
-            placed |= {int(k): (again, index) for index, k in enumerate(inexact)}
+    hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
+    grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand)
+    placed: dict[int, tuple[Batch, int]] = {}
+    for part in _parts(fit):
+        batch = grower.grow(part, tolerance or EXACT)
+        _place(placed, batch, fit.frame[part])
+        if tolerance is None:
+            exact = set(fit.frame[part[batch.exact]].tolist())
+            inexact = part[[k not in exact for k in fit.frame[part].tolist()]]
+            if len(inexact):
+                _place(placed, grower.grow(inexact, MEASURED), fit.frame[inexact])
         if progress is not None:
-            progress(len(chosen))
+            progress(len(np.unique(fit.frame[part])))
+    hypotheses = np.bincount(fit.frame, minlength=len(view.time))
     frames = []
     for k, time in enumerate(view.time.tolist()):
         grown, index = placed.get(k, (None, 0))
@@ -114,6 +125,8 @@ def recover(
                 time=time,
                 batch=grown,
                 index=index,
+                hypotheses=int(hypotheses[k]),
+                family=None if fit.families is None else fit.families[k],
                 reason=fit.reasons[k],
                 group_within=group,
                 camera=records[k],
@@ -130,12 +143,12 @@ def recover(
         "measured": asdict(MEASURED),
         "contact_margin": contact_margin,
         "group": group,
-        "figure": person.hash,
-        "lengths": dict(person.lengths),
+        "figure": body.figure.hash,
+        "lengths": dict(body.figure.lengths),
         "judged": [frame.judged for frame in frames],
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
-    return Recovery(figure=person, fit=fit, frames=frames, settings=settings)
+    return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings)
 
 
 def person_of(view: View, figure: Figure) -> Figure:
@@ -147,94 +160,48 @@ def person_of(view: View, figure: Figure) -> Figure:
     return figure
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Grower:
-    """Grows trees over some frames of one view with one tolerance."""
-
-    view: View
-    fit: CameraFit
-    figure: Figure
-    checks: tuple[str, ...]
-    ranges: Ranges
-    rules: tuple[int, ...]
-    contact_margin: float
-
-    @cached_property
-    def tree(self) -> InterpretationTree:
-        lengths = [0.0, *(self.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)]
-        return InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=np.array(lengths))
-
-    def suite(self, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
-        """Return the checks, made once, with every distance measured where their margins are wanted."""
-        if (tolerance, exact) not in self._suites:
-            self._suites[tolerance, exact] = self._make_suite(tolerance, exact)
-        return self._suites[tolerance, exact]
-
-    def _make_suite(self, tolerance: Tolerance, exact: bool) -> list[Check]:
-        return make_checks(
-            self.figure,
-            self.checks,
-            ranges=self.ranges,
-            rigid_tolerance=tolerance.rigid,
-            rigid_mode="placement" if tolerance.placement else "distances",
-            angle_tolerance=tolerance.angle,
-            rules=self.rules,
-            contact_margin=self.contact_margin,
-            exact=exact,
-        )
-
-    @cached_property
-    def _suites(self) -> dict[tuple[Tolerance, bool], list[Check]]:
-        return {}
-
-    def grow(self, frames: NDArray[np.intp], tolerance: Tolerance) -> Batch:
-        """Grow the trees of some frames: physical checks on the way, the motion model on the leaves."""
-        suite = self.suite(tolerance)
-        camera = self.fit.frames(frames)
-        with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
-            leaves = self.tree.grow(
-                camera,
-                self.fit.root[frames],
-                self.view.image[frames],
-                [check for check in suite if check.name != "walking"],
-                given=self.fit.head[frames],
-                tolerance=tolerance.tangent,
+def body_of(view: View, figure: Figure, proportions: str) -> Body:
+    """Choose what the view's points are lifted into."""
+    if proportions == "figure":
+        person = person_of(view, figure)
+        return FigureBody(figure=person, stature=view.stature or stature_from_lengths(person.lengths))
+    if proportions == "taylor":
+        if not isinstance(view.camera, ScaledOrthographicModel):
+            raise InputError(
+                "--proportions: taylor is for uncalibrated views (scaled-orthographic); leave the option out"
             )
-        physical = leaves.counts()
-        leaves = self.tree.prune(leaves, [check for check in suite if check.name == "walking"])
-        return Batch(
-            leaves=leaves,
-            physical=physical,
-            checks=self.suite(tolerance, exact=True),
-            figure=self.figure,
-            tolerance=tolerance,
-        )
+        return TaylorBody.of(view.stature or stature_from_lengths(person_of(view, figure).lengths), figure)
+    raise InputError(f"--proportions: {proportions!r}; expected {' or '.join(get_args(Proportions))}")
 
 
-def _is_exact(batch: Batch) -> NDArray[np.bool_]:
-    """Find frames (F,) whose image points are exact: there is evidence that rounding is all that is off.
+def _fit(view: View, body: Body, scale: Scale | None, tolerance: Tolerance | None) -> CameraFit:
+    if isinstance(view.camera, ScaledOrthographicModel):
+        return fit_scale(view, body, scale, tolerance)
+    if scale is not None:
+        raise InputError("--scale: the view's camera is calibrated; leave the option out")
+    return fit_camera(view, body.figure)
 
-    Four distances inside torso and hips are not used to lift anything. That they come out right to 1e-8 m is no
-    accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible there
-    is no evidence, and a branch that happens to reach its rays must not stand for the truth.
-    """
-    leaves = batch.leaves
-    fits = np.ones(len(leaves.code), dtype=bool)
-    seen = np.zeros(len(leaves.code), dtype=bool)
-    nodes = np.arange(len(leaves.code))
-    for segment in RIGID_SEGMENTS:
-        ends = leaves.positions(segment, nodes)
-        length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
-        known = np.isfinite(length)
-        fits &= ~known | (np.abs(length - batch.figure.lengths[segment_name(segment)]) <= EXACT.rigid)
-        seen |= known
-    exact = np.zeros(leaves.n_frames, dtype=bool)
-    exact[leaves.frame[fits & seen]] = True
-    empty = batch.physical[:, -1] == 0
-    for group in leaves.pruned:
-        if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
-            exact[group.frame[empty[group.frame]]] = True
-    return exact
+
+def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
+    """Yield hypotheses that are grown together: whole frames, whose root is known."""
+    usable = np.flatnonzero([not fit.reasons[k] for k in fit.frame])
+    if not len(usable):
+        return
+    frames = fit.frame[usable]
+    first = np.flatnonzero(np.diff(frames, prepend=-1))
+    start = 0
+    for k in range(1, len(first) + 1):
+        end = int(first[k]) if k < len(first) else len(usable)
+        following = int(first[k + 1]) if k + 1 < len(first) else len(usable)
+        if k == len(first) or following - start > FRAMES_AT_ONCE:
+            yield usable[start:end]
+            start = end
+
+
+def _place(placed: dict[int, tuple[Batch, int]], batch: Batch, frames: NDArray[np.intp]) -> None:
+    """Note for each frame of a batch where its first hypothesis is."""
+    for index in np.flatnonzero(np.diff(frames, prepend=-1)):
+        placed[int(frames[index])] = (batch, int(index))
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

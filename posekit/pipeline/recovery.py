@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,9 +13,12 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure import Configurations, Figure
+from posekit.files import Family, Inferred
 from posekit.grouping import group_postures
+from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
+from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
 
@@ -30,27 +34,30 @@ class Batch:
     physical : int array (F, 14)
         Survivors by level before the motion model.
     checks : sequence of Check
-        The checks that judged them, for margins.
-    figure : Figure
+        The checks that judged them, every distance measured, for margins.
+    body : Body
+        What the trees are of.
     tolerance : Tolerance
+    exact : bool array (F,)
+        Where there is evidence that the image points are exact.
     """
 
     leaves: Leaves
     physical: NDArray[np.int64]
     checks: Sequence[Check]
-    figure: Figure
+    body: Body
     tolerance: Tolerance
+    exact: NDArray[np.bool_]
 
     @cached_property
     def points(self) -> Array:
         """All survivors with their heads (N, 19, 3), camera frame, metres."""
-        leaves = self.leaves
-        return np.concatenate([leaves.postures(), leaves.given[leaves.frame]], axis=1)
+        return self.body.points(self.leaves)
 
     @cached_property
     def configurations(self) -> Configurations:
         """The configurations of all survivors."""
-        return self.figure.configurations(self.points)
+        return self.body.figure.configurations(self.points)
 
     @cached_property
     def margins(self) -> dict[str, Array]:
@@ -61,6 +68,18 @@ class Batch:
     def units(self) -> dict[str, str]:
         """The unit of each validator's margins."""
         return {check.name: check.unit for check in self.checks}
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """Survivors (N,) whose mirror image survives too: the same picture with near and far exchanged throughout."""
+        leaves = self.leaves
+        depths = leaves.postures()[..., 2]
+        parents = np.array(leaves.parents[1:])
+        turns = np.sign(np.round(depths[:, 1:] - depths[:, parents], 9))
+        powers = 3 ** np.arange(len(parents), dtype=np.int64)
+        own, other = (np.nan_to_num(side * turns).astype(np.int64) @ powers for side in (1, -1))
+        span = np.int64(3) ** len(parents)
+        return np.isin(leaves.frame * (2 * span) + other, leaves.frame * (2 * span) + own)
 
     @cached_property
     def motion(self) -> NDArray[np.int64]:
@@ -119,7 +138,11 @@ class FrameRecovery:
     batch : Batch or None
         None where the neck could not be found: nothing was grown.
     index : int
-        The frame's place in its batch.
+        The place in its batch of the frame's first hypothesis.
+    hypotheses : int
+        How many there are: one, or for an uncalibrated frame as many as scales were taken.
+    family : Family, optional
+        The scales that an uncalibrated frame can have.
     reason : str
         Why nothing was grown.
     group_within : float or None
@@ -129,6 +152,8 @@ class FrameRecovery:
     time: float
     batch: Batch | None
     index: int
+    hypotheses: int = 1
+    family: Family | None = None
     reason: str = ""
     group_within: float | None = None
     camera: Mapping[str, Any] = field(default_factory=dict)
@@ -137,7 +162,8 @@ class FrameRecovery:
     def _rows(self) -> slice:
         if self.batch is None:
             return slice(0, 0)
-        return slice(int(self.batch.offsets[self.index]), int(self.batch.offsets[self.index + 1]))
+        offsets = self.batch.offsets
+        return slice(int(offsets[self.index]), int(offsets[self.index + self.hypotheses]))
 
     def __len__(self) -> int:
         """Count the survivors."""
@@ -152,6 +178,32 @@ class FrameRecovery:
     def head(self) -> Array:
         """The head's points (5, 3), camera frame, metres; NaN where it was not seen."""
         return self.batch.leaves.given[self.index] if self.batch else np.full((5, 3), np.nan)
+
+    @property
+    def scales(self) -> Array | None:
+        """The scale of each survivor (N,), pixels a metre; None where the camera is calibrated."""
+        if self.family is None or self.batch is None:
+            return None if self.family is None else np.empty(0)
+        return np.asarray(self.family.chosen[self.batch.leaves.frame[self._rows] - self.index])
+
+    @property
+    def mirrored(self) -> int:
+        """How many survivors have their mirror image among the survivors."""
+        return 0 if self.batch is None else int(self.batch.mirrored[self._rows].sum())
+
+    @property
+    def inferred(self) -> list[dict[str, Inferred]] | None:
+        """What is known of joints that were not seen, by survivor; None where all were."""
+        if self.batch is None or not self.batch.body.inferred:
+            return None
+        columns = [JOINT[name] for name in self.batch.body.inferred]
+        return [
+            {
+                name: Inferred(kind="completed", lower=joints[column], upper=joints[column], radius=0.0)
+                for name, column in zip(self.batch.body.inferred, columns, strict=True)
+            }
+            for joints in self.joints
+        ]
 
     @property
     def q(self) -> Array:
@@ -189,16 +241,30 @@ class FrameRecovery:
         return None if self.group_within is None else group_postures(self.joints, self.group_within)
 
     @property
+    def level_names(self) -> tuple[str, ...]:
+        """The joints of the tree, a level each."""
+        return JOINTS if self.batch is None else self.batch.leaves.joints
+
+    @property
     def levels(self) -> dict[str, NDArray[np.int64]]:
         """Survivors by level after the ``physical`` checks and after the ``motion`` model (§4.1.B)."""
         if self.batch is None:
             return {name: np.zeros(14, dtype=np.int64) for name in ("physical", "motion")}
-        return {"physical": self.batch.physical[self.index], "motion": self.batch.motion[self.index]}
+        part = slice(self.index, self.index + self.hypotheses)
+        return {
+            "physical": self.batch.physical[part].sum(axis=0),
+            "motion": self.batch.motion[part].sum(axis=0),
+        }
 
     @property
     def rejected(self) -> dict[str, int]:
-        """Leaves of the full tree lost to each reason; with the survivors they make 8192."""
-        return self.batch.rejected[self.index] if self.batch else {f"root/{self.reason}": 8192}
+        """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
+        if self.batch is None:
+            return {f"root/{self.reason}": 8192}
+        lost: Counter[str] = Counter()
+        for one in self.batch.rejected[self.index : self.index + self.hypotheses]:
+            lost.update(one)
+        return dict(lost)
 
     @property
     def tolerance(self) -> Tolerance | None:
@@ -215,7 +281,7 @@ class FrameRecovery:
         if self.batch is None:
             return None
         leaves = self.batch.leaves
-        found = leaves.candidates.too_short(self.index)
+        found = leaves.candidates.too_short(self.index) if self.hypotheses == 1 else None
         return (
             None
             if found is None
@@ -238,7 +304,9 @@ class FrameRecovery:
                 unit=group.unit,
             )
             for group in leaves.pruned
-            for k in np.flatnonzero(group.frame == self.index)
+            for k in np.flatnonzero(
+                (group.frame >= self.index) & (group.frame < self.index + self.hypotheses)
+            )
         ]
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 
 from posekit.files import Result, ResultFrame
 from posekit.files.units import Unit
 from posekit.pipeline.recovery import FrameRecovery, Recovery
-from posekit.skeleton import JOINTS
 
 
 def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) -> Result:
@@ -38,7 +37,10 @@ def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> 
     return ResultFrame(
         time=frame.time,
         camera=frame.camera,
-        levels={"joint": JOINTS, **{name: counts.tolist() for name, counts in frame.levels.items()}},
+        levels={
+            "joint": frame.level_names,
+            **{name: counts.tolist() for name, counts in frame.levels.items()},
+        },
         joints=frame.joints,
         q=frame.q.reshape(-1, nq),
         branches=frame.branches,
@@ -51,6 +53,9 @@ def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> 
         length_residual=frame.length_residual,
         rejected=frame.rejected,
         pruned=[_plain(asdict(branch)) for branch in frame.pruned()] if explain else None,
+        family=None if frame.family is None else replace(frame.family, mirrored=frame.mirrored),
+        scales=frame.scales,
+        inferred=frame.inferred,
     )
 
 

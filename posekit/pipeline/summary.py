@@ -31,7 +31,23 @@ def summary_lines(recovery: Recovery) -> list[str]:
         f"{sum(counts)} postures in {len(counts)} frames: median {np.median(counts):g}, most {max(counts)}, "
         f"none in {counts.count(0)}"
     )
-    return lines
+    return lines + _scale_lines(recovery)
+
+
+def _scale_lines(recovery: Recovery) -> list[str]:
+    """Describe the scales of an uncalibrated view, and where its mirror images could not be told apart."""
+    families = [frame.family for frame in recovery.frames if frame.family is not None and len(frame)]
+    if not families:
+        return []
+    s = np.concatenate([family.chosen for family in families])
+    segment, count = Counter(family.segment for family in families).most_common(1)[0]
+    mirrored = sum(frame.mirrored > 0 for frame in recovery.frames)
+    return [
+        f"scale by {families[0].how}: {s.min():.6g} to {s.max():.6g} pixels a metre; the bound is set by {segment} in "
+        f"{count} of {len(families)} frames",
+        f"mirror images told apart in {len(families) - mirrored} of {len(families)} frames"
+        + (f"; in {mirrored} a posture and its mirror image both survive" if mirrored else ""),
+    ]
 
 
 def _frame_line(k: int, frame: FrameRecovery) -> str:

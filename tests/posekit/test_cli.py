@@ -552,10 +552,6 @@ BAD_VIEWS: dict[str, tuple[Callable[[dict[str, Any]], Any], tuple[str, ...]]] = 
         ),
     ),
     "nesting bomb": (lambda _: "[" * 100_000, ("view.json: got 100,000 nested levels", "at most 64")),
-    "scaled orthographic": (
-        lambda d: edited(d, "camera", value={"model": "scaled-orthographic", "scale": None}),
-        ("view.json: camera.model is scaled-orthographic", "recover takes lee-chen and opencv"),
-    ),
     "unknown camera": (
         lambda d: edited(d, "camera", value={"model": "fisheye"}),
         ("view.json: camera", "lee-chen"),
@@ -814,3 +810,25 @@ def test_a_length_may_have_a_sign() -> None:
 def test_examples_are_laid_out_for_click() -> None:
     assert examples("posekit demo") == "\b\nExample:\n  posekit demo"
     assert examples("a", "b") == "\b\nExamples:\n  a\n  b"
+
+
+def test_an_uncalibrated_view_by_scale_and_flips(run: Run, tmp_path: Path) -> None:
+    joints = load_figure().neutral_points[:14] @ [[0.6, 0, 0.8], [-0.8, 0, 0.6], [0, -1, 0]]
+    camera = ScaledOrthographicModel(scale=None)
+    write_view("view.json", View(camera=camera, time=np.zeros(1), image=400 * joints[None, :, :2], unit="cm"))
+    near = {
+        segment_name((a, b)): JOINTS[a if joints[a, 2] < joints[b, 2] else b]
+        for a, b in TREE_SEGMENTS
+        if abs(joints[a, 2] - joints[b, 2]) > 0.01
+    }
+    Path("near.json").write_text(json.dumps({"schema": "posekit.nearer/1", "frames": [near]}), encoding="utf-8")
+    done = run("recover", "view.json", "-o", "out.json", "--scale", "4.0", "--nearer", "near.json")
+    assert done.code == 0, done.err
+    assert "scale by value: 400 to 400 pixels a metre" in done.out
+    frame = files.read_result("out.json").frames[0]
+    np.testing.assert_allclose(frame.joints[0], joints, atol=1e-6)
+    failed = run("recover", "view.json", "-o", "no.json", "--scale", "1")
+    assert failed.code == 2
+    assert failed.err.startswith("posekit: error: view.json: frames[0]: --scale: 1 pixels a cm is below ")
+    assert failed.err.count("\n") == 1
+    assert not Path("no.json").exists()

@@ -661,10 +661,10 @@ class TestRefusals:
         binary.write_bytes(b"\xff\xfe\x00")
         huge.write_bytes(b" " * 10_000_001)
         for path, match in (
-            (tmp_path / "none.urdf", "cannot be read"),
-            (tmp_path, "cannot be read"),
-            (binary, "cannot be read as UTF-8"),
-            (huge, "larger than"),
+            (tmp_path / "none.urdf", "No such file"),
+            (tmp_path, "a directory; expected a file"),
+            (binary, "byte 0: got 0xff; expected text in UTF-8"),
+            (huge, "10.0 MB; expected at most 10 MB"),
         ):
             with pytest.raises(FigureError, match=match) as error:
                 load_figure(path)

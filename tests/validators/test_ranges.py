@@ -82,7 +82,8 @@ def test_equal_bounds_are_a_range(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "no schema": ("", "schema is None; expected 'posekit.ranges/1'"),
+    "nothing": ("", "an empty file; expected a file with content"),
+    "no schema": ("# nothing", "schema is None; expected 'posekit.ranges/1'"),
     "another schema": (
         'schema = "posekit.ranges/9"',
         "schema is 'posekit.ranges/9'; expected 'posekit.ranges/1'",
@@ -91,8 +92,10 @@ WRONG = {
     "another kind": (f'schema = "{SCHEMA}"\nkind = "euler"', "kind is 'euler'"),
     "no TOML": (HEAD + "[neck\n", "not TOML"),
     "a key twice": (HEAD + "[neck]\nflexion = [0, 1]\nflexion = [0, 1]\n", "not TOML"),
-    "a control character": (HEAD + "a = \0", "not TOML"),
-    "deep nesting": (HEAD + "a = " + "[" * 50_000, "not TOML"),
+    "a control character": (HEAD + "a = \x01", "not TOML"),
+    "a NUL": (HEAD + "a = \0", "a NUL character; expected text in UTF-8"),
+    "deep nesting": (HEAD + "a = " + "[" * 50_000, "expected at most 16 levels"),
+    "a key of many parts": (HEAD + "a." * 30 + "a = 1", "a key of 31 parts; expected at most 16 levels"),
     "a number of 5000 digits": (HEAD + f"[neck]\nflexion = [0, 1{'0' * 5000}]\n", "not TOML"),
     "a number of 400 digits": (
         HEAD + f"[neck]\nflexion = [0, 1{'0' * 400}]\n",
@@ -137,7 +140,12 @@ def test_a_file_with(tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "match"), [(b"\xff\xfe", "not UTF-8 text"), (b" " * 1_000_001, "larger than 1000000 bytes")]
+    ("content", "match"),
+    [
+        (b"\xff\xfe", "expected text in UTF-8"),
+        (HEAD.encode("utf-16"), "expected text in UTF-8"),
+        (b" " * 1_000_001, "1.0 MB; expected at most 1 MB"),
+    ],
 )
 def test_a_file_that_is_no_text(tmp_path: Path, content: bytes, match: str) -> None:
     with pytest.raises(InputError, match=match):
@@ -152,5 +160,5 @@ def test_a_name_that_is_none(name: str) -> None:
 
 
 def test_a_folder_is_no_table(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no such table or file; expected urdf, table1 or"):
+    with pytest.raises(InputError, match="got a directory; expected a file"):
         load_ranges(str(tmp_path))

@@ -12,7 +12,7 @@ from PIL import Image
 
 from posekit.errors import ViewerError
 from posekit.viewer.browser.browser import TIMEOUT, Browser
-from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.standalone import meshcat_script, player, script_json
 
@@ -80,14 +80,14 @@ class Studio:
         return self._browser.pid
 
     def draw(
-        self, scene: Scene, eye: Eye | ViewEye, *, size: tuple[int, int] = (1280, 720), supersample: int = 2
+        self, scene: Scene, eye: Eye | CameraEye, *, size: tuple[int, int] = (1280, 720), supersample: int = 2
     ) -> Pixels:
         """Draw a scene.
 
         Parameters
         ----------
         scene : Scene
-        eye : Eye or ViewEye
+        eye : Eye, ViewEye or ParallelEye
             Where it is looked at from.
         size : (int, int)
             Width and height, pixels.
@@ -108,7 +108,7 @@ class Studio:
         check_drawn(pixels)
         return pixels
 
-    def _shoot(self, scene: Scene, eye: Eye | ViewEye, size: tuple[int, int], supersample: int) -> Pixels:
+    def _shoot(self, scene: Scene, eye: Eye | CameraEye, size: tuple[int, int], supersample: int) -> Pixels:
         width, height = size
         check_size(size, supersample)
         world, projection = eye.matrices(width, height)

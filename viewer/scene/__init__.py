@@ -5,6 +5,7 @@ from posekit.viewer.scene.body import add_posture as add_posture
 from posekit.viewer.scene.compose import Style as Style
 from posekit.viewer.scene.compose import compose as compose
 from posekit.viewer.scene.eye import Eye as Eye
+from posekit.viewer.scene.eye import ParallelEye as ParallelEye
 from posekit.viewer.scene.eye import ViewEye as ViewEye
 from posekit.viewer.scene.scene import Scene as Scene
 from posekit.viewer.scene.subject import Shown as Shown

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -13,8 +13,10 @@ from posekit.cameras import Array
 from posekit.errors import ViewerError
 from posekit.figure import Figure, with_head
 from posekit.figure.capsules import Capsule
+from posekit.files import Inferred
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
+from posekit.viewer.scene.region import add_region
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.shapes import add_ball, add_tubes, glow, matte, smooth
 from posekit.viewer.scene.world import World
@@ -30,6 +32,9 @@ HEAD_OPACITY = 0.45
 
 FADED = 0.25
 """Opacity of the rest of a body, where something in it is to be pointed at."""
+
+HOLLOW = 0.35
+"""Opacity of joints that were not seen, and of bones that end in one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +79,12 @@ def add_posture(
     look: Look = TRANSLUCENT,
     links: tuple[str, ...] = (),
     joints: tuple[str, ...] = (),
+    inferred: Mapping[str, Inferred] | None = None,
     shift: Array | None = None,
 ) -> None:
     """Draw one posture below ``/meshcat/NAME``: ``bodies/LINK``, ``joints/JOINT``, ``head/POINT``, ``bones``.
+
+    Joints that were not seen are translucent, with the box of all their positions below ``regions/JOINT``.
 
     The capsules are those that Pinocchio's `MeshcatVisualizer` shows at q. Where q does not give the posture
     back to 1 µm (a measured or a rejected one) they are laid along the posture's own segments, which is what
@@ -99,6 +107,8 @@ def add_posture(
     links, joints : sequence of str
         What to point at (see `posekit.viewer.scene.culprit`): drawn in the alarm's colour, the joints with a halo,
         the rest of the body faded.
+    inferred : mapping of str to Inferred, optional
+        The joints that were not seen, and where they can be.
     shift : array (3,), optional
         Moves the body in the world, metres.
 
@@ -113,13 +123,18 @@ def add_posture(
     shift = np.zeros(3) if shift is None else shift
     placed = world.place(points) + shift
     scene.transform(f"/meshcat/{name}", np.eye(4))
+    inferred = inferred or {}
+    guessed = {index for index, point in enumerate(POINTS) if point in inferred}
     pointed = bool(links or joints)
     opacity = min(look.opacity, FADED) if pointed else look.opacity
     if look.bodies:
         colours = {
             capsule: (*ALARM, 1.0)
             if capsule.link in links
-            else (*look.body.get(capsule.link, SIDES[side(capsule.link)]), _opacity(capsule.link, opacity))
+            else (
+                *look.body.get(capsule.link, SIDES[side(capsule.link)]),
+                min(_opacity(capsule.link, opacity), FADED if guessed & set(capsule.points) else 1.0),
+            )
             for capsule in figure.capsules
             if capsule.link not in look.without
         }
@@ -130,24 +145,44 @@ def add_posture(
         for index, point in enumerate(POINTS):
             if point in look.without:
                 continue
+            opacity = HOLLOW if index in guessed else 1.0
             in_head = index in HEAD
-            _add_joint(scene, name, point, placed[index], in_head=in_head, alarm=point in joints)
+            _add_joint(
+                scene, name, point, placed[index], in_head=in_head, alarm=point in joints, opacity=opacity
+            )
+            if point in inferred:
+                path, colour = f"{name}/regions/{point}", SIDES[side(point)]
+                add_region(scene, path, inferred[point], world=world, shift=shift, colour=colour)
     if look.bones:
-        drawn_bones = [pair for pair in TREE_SEGMENTS if f"bone-{POINTS[pair[1]]}" not in look.without]
-        pairs = np.array(drawn_bones, dtype=np.intp).reshape(-1, 2)
-        shades = np.array([SIDES[POINT_SIDES[child]] for _, child in drawn_bones]).reshape(-1, 3)
-        starts, ends = placed[pairs[:, 0]], placed[pairs[:, 1]]
-        add_tubes(scene, f"{name}/bones", starts, ends, shades, radius=BONE_RADIUS)
+        for hollow in (False, True):
+            chosen = [
+                pair
+                for pair in TREE_SEGMENTS
+                if f"bone-{POINTS[pair[1]]}" not in look.without and bool(guessed & set(pair)) is hollow
+            ]
+            _add_bones(scene, f"{name}/bones{'-inferred' if hollow else ''}", placed, chosen, hollow=hollow)
 
 
-def _add_joint(scene: Scene, name: str, point: str, middle: Array, *, in_head: bool, alarm: bool) -> None:
+def _add_bones(
+    scene: Scene, path: str, placed: Array, chosen: Sequence[tuple[int, int]], *, hollow: bool
+) -> None:
+    pairs = np.array(chosen, dtype=np.intp).reshape(-1, 2)
+    shades = np.array([SIDES[POINT_SIDES[child]] for _, child in chosen]).reshape(-1, 3)
+    starts, ends = placed[pairs[:, 0]], placed[pairs[:, 1]]
+    opacity = HOLLOW if hollow else 1.0
+    add_tubes(scene, path, starts, ends, shades, radius=BONE_RADIUS, opacity=opacity)
+
+
+def _add_joint(
+    scene: Scene, name: str, point: str, middle: Array, *, in_head: bool, alarm: bool, opacity: float = 1.0
+) -> None:
     if not np.isfinite(middle).all():
         return
     colour = ALARM if alarm else SIDES[side(point)]
     if in_head:
         add_ball(scene, f"{name}/head/{point}", middle, HEAD_POINT_RADIUS, matte(colour))
         return
-    add_ball(scene, f"{name}/joints/{point}", middle, JOINT_RADIUS, matte(colour))
+    add_ball(scene, f"{name}/joints/{point}", middle, JOINT_RADIUS, matte(colour, opacity))
     if alarm:
         add_ball(scene, f"{name}/halos/{point}", middle, HALO * JOINT_RADIUS, glow(ALARM, 0.35))
 

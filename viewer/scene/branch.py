@@ -45,6 +45,17 @@ def rejected_of(result: Result, subject: Subject, frame: int) -> Shown:
             f"frame {frame + 1}: to place its pruned branches the camera and a survivor are needed; give the view "
             "that it was recovered from (--view)"
         )
+    recovered = result.frames[frame]
+    if recovered.family is not None and len(recovered.family.chosen) > 1:
+        raise ViewerError(
+            f"frame {frame + 1}: it was recovered at {len(recovered.family.chosen)} scales, and its pruned branches do "
+            "not say at which; recover it at one, with --scale VALUE"
+        )
+    if tuple(recovered.levels["joint"]) != JOINTS:
+        raise ViewerError(
+            f"frame {frame + 1}: its tree is not of the figure's joints, so its pruned branches cannot be placed; "
+            "recover it with --proportions figure"
+        )
     lengths = np.array([subject.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])
     image = shown.sight.image[: len(JOINTS)]
     points = np.tile(shown.points[0], (len(pruned), 1, 1))  # root and head are the same in all branches

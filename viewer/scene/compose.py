@@ -110,10 +110,12 @@ def compose(
         )
     scene = Scene()
     apart = style.layout == "side-by-side" and len(known) > 1
-    placed = world.place(shown.points[known])
-    shifts = _shifts(placed, world, style.azimuth) if apart else np.zeros((len(known), 3))
+    drawn_ones = shown.chosen(known)
+    shifts = drawn_ones.alignment @ world.R_world_cam.T
+    if apart:
+        shifts = shifts + _shifts(world.place(drawn_ones.aligned_points), world, style.azimuth)
     together = len(known) > 1 and not apart and style.look is None
-    looks = superposed_looks(shown.chosen(known), figure) if together else [style.look or Look()] * len(known)
+    looks = superposed_looks(drawn_ones, figure) if together else [style.look or Look()] * len(known)
     drawn = []
     for k, shift, look in zip(known, shifts, looks, strict=True):
         points = shown.points[k]
@@ -128,6 +130,7 @@ def compose(
             look=look,
             links=found.links,
             joints=found.joints,
+            inferred=shown.inferred[k] if shown.inferred else None,
             shift=shift,
         )
         drawn.append(world.place(points) + shift)
@@ -136,11 +139,10 @@ def compose(
             drawn.append(mat)
     bodies = np.concatenate(drawn)
     points = bodies
-    if style.camera and shown.sight is not None and not apart:
-        add_sight(scene, shown.sight, world=world, points=shown.points[known])
-        apex = world.place(np.zeros((1, 3)))
-        if np.nanmin(np.linalg.norm(bodies - apex, axis=1)) < NEAR_CAMERA:
-            points = np.concatenate([bodies, apex])
+    if style.camera and drawn_ones.sight is not None and not apart:
+        camera = add_sight(scene, drawn_ones.sight, world=world, points=drawn_ones.points)
+        if np.nanmin(np.linalg.norm(bodies[:, None] - camera, axis=-1)) < NEAR_CAMERA:
+            points = np.concatenate([bodies, camera])
     add_stage(scene, points if stage is None else stage, background=style.background, ground=style.ground)
     return Composition(scene=scene, points=points)
 

@@ -15,6 +15,9 @@ from posekit.viewer.scene.world import World
 NEAR, FAR = 0.01, 1000.0
 """Metres in front of the camera between which things are drawn."""
 
+REACH = 100.0
+"""Metres before and behind the origin between which things are drawn where depth is relative."""
+
 FACING: Array = np.diag([1.0, -1.0, -1.0])
 """From OpenCV's camera axes (y down, z forward) to OpenGL's (y up, z backward), and back."""
 
@@ -97,6 +100,40 @@ class ViewEye:
         K = np.array(self.K, dtype=np.float64)
         K[:2, 2] += 0.5  # to the picture's corner from the middle of its first pixel
         return pose, clip_matrix(K, width, height)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParallelEye:
+    r"""The camera of an uncalibrated view: :math:`u = a\,x + c_u`, :math:`v = b\,y + c_v`, whatever the depth.
+
+    Parameters
+    ----------
+    scale : array (2,)
+        a and b, pixels of the picture a metre.
+    centre : array (2,)
+        Where the origin of the camera's frame is seen, in pixels of the picture, whose first pixel is centred on
+        (0, 0).
+    world : World
+    """
+
+    scale: Array
+    centre: Array
+    world: World
+
+    def matrices(self, width: int, height: int) -> tuple[Array, Array]:
+        """Return the pose in the world and the clip matrix, (4, 4) both."""
+        pose = self.world.T_world_cam
+        pose[:3, :3] = pose[:3, :3] @ FACING
+        (a, b), (u, v) = np.asarray(self.scale), np.asarray(self.centre) + 0.5
+        clip = np.zeros((4, 4))
+        clip[0, [0, 3]] = 2 * a / width, 2 * u / width - 1
+        clip[1, [1, 3]] = 2 * b / height, 1 - 2 * v / height
+        clip[2, 2], clip[3, 3] = -1 / REACH, 1.0
+        return pose, clip
+
+
+CameraEye = ViewEye | ParallelEye
+"""The camera of a view, whichever it is."""
 
 
 def clip_matrix(K: ArrayLike, width: int, height: int) -> Array:

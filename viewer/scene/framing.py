@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import ViewerError
-from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.eye import CameraEye, Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.sight import Sight
 from posekit.viewer.scene.world import World
 
@@ -69,7 +69,7 @@ def orbit(
     return [Eye(position=target + distance * axes[2], target=target, fov=fov) for axes in turns]
 
 
-def view_eye(sight: Sight | None, world: World, size: tuple[int, int]) -> ViewEye:
+def view_eye(sight: Sight | None, world: World, size: tuple[int, int]) -> CameraEye:
     """Look through the view's own camera: its image, as large as fits, in the middle of the picture.
 
     Parameters
@@ -92,8 +92,12 @@ def view_eye(sight: Sight | None, world: World, size: tuple[int, int]) -> ViewEy
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = float((np.array(size) / (high - low)).min())
     shift = np.array(size) / 2 - 0.5 - scale * (low + high) / 2
+    camera = sight.camera
+    if isinstance(camera, ScaledOrthographicCamera):
+        per_metre = float(camera.scale) / np.array([camera.aspect, 1.0])
+        return ParallelEye(scale=scale * per_metre, centre=shift, world=world)
     fit = np.array([[scale, 0.0, shift[0]], [0.0, scale, shift[1]], [0.0, 0.0, 1.0]])
-    return ViewEye(K=fit @ sight.camera.K, world=world)
+    return ViewEye(K=fit @ camera.K, world=world)
 
 
 def _axes(world: World, azimuth: float, elevation: float) -> Array:

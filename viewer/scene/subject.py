@@ -2,21 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, PinholeCamera, lee_chen
+from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera, lee_chen
 from posekit.errors import FigureError, ViewerError
 from posekit.figure import Figure, load_figure, with_head
-from posekit.files import LeeChenModel, OpenCVModel, Postures, Result, ResultFrame, View
-from posekit.skeleton import JOINTS
+from posekit.files import (
+    Inferred,
+    LeeChenModel,
+    OpenCVModel,
+    Postures,
+    Result,
+    ResultFrame,
+    ScaledOrthographicModel,
+    View,
+)
+from posekit.skeleton import JOINT, JOINTS
 from posekit.viewer.scene.sight import Sight
 
 UNIT = 1e-6
 """How far a quaternion's length may be off for forward kinematics to be asked."""
+
+ON_RAY = 1e-6
+"""Metres across the image within which all positions of a joint are one image point."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,7 +45,11 @@ class Shown:
     reasons : sequence of N str
         Why each was rejected; empty texts for those that were not.
     sight : Sight, optional
-        What the camera sees in this frame.
+        What the camera sees in this frame; of an uncalibrated one, at the first posture's scale.
+    scales : array (N,), optional
+        The scale of each posture behind an uncalibrated view, pixels a metre.
+    inferred : sequence of N mappings
+        By joint that was not seen, where it can be; empty where all were seen.
     time : float
         Seconds.
     """
@@ -43,21 +59,46 @@ class Shown:
     groups: NDArray[np.int64] | None = None
     reasons: Sequence[str] = ()
     sight: Sight | None = None
+    scales: Array | None = None
+    inferred: Sequence[Mapping[str, Inferred]] = ()
     time: float = 0.0
 
     def __len__(self) -> int:
         """Count the postures."""
         return len(self.points)
 
+    @property
+    def alignment(self) -> Array:
+        """Moves (N, 3), camera frame, metres, that bring postures of several scales to one place.
+
+        An uncalibrated image says where a body is for each scale, as far from the image's corner as the scale
+        is small. That corner means nothing: postures keep the place of the first, by the middle of their image.
+        """
+        moves = np.zeros((len(self), 3))
+        if self.scales is not None and self.sight is not None and len(self):
+            moves[:, :2] = self.sight.middle * (1 / self.scales[0] - 1 / self.scales[:, None])
+        return moves
+
+    @property
+    def aligned_points(self) -> Array:
+        """The points (N, 19, 3) where they are drawn, camera frame, metres."""
+        return np.asarray(self.points + self.alignment[:, None])
+
     def chosen(self, rows: Sequence[int]) -> Shown:
         """Return the frame with some of its postures."""
         index = np.array(rows, dtype=np.intp)
+        sight, scales = self.sight, None if self.scales is None else self.scales[index]
+        if sight is not None and scales is not None and len(scales):
+            sight = sight.rescaled(float(scales[0]))
         return replace(
             self,
             points=self.points[index],
             q=None if self.q is None else self.q[index],
             groups=None if self.groups is None else self.groups[index],
             reasons=[self.reasons[row] for row in rows] if self.reasons else (),
+            sight=sight,
+            scales=scales,
+            inferred=[self.inferred[row] for row in rows] if self.inferred else (),
         )
 
 
@@ -80,7 +121,7 @@ class Subject:
     def points(self, frames: Sequence[int] | None = None) -> Array:
         """Return all points of some frames (M, 3)."""
         chosen = self.frames if frames is None else [self.frames[k] for k in frames]
-        return np.concatenate([frame.points.reshape(-1, 3) for frame in chosen])
+        return np.concatenate([frame.aligned_points.reshape(-1, 3) for frame in chosen])
 
 
 def subject_of(given: Result | Postures | View, view: View | None = None) -> Subject:
@@ -96,7 +137,7 @@ def subject_of(given: Result | Postures | View, view: View | None = None) -> Sub
     Raises
     ------
     ViewerError
-        Where there is no posture, or the view has other frames than the result.
+        Where there is no posture, or the view has other frames or another camera than the result.
     """
     if isinstance(given, View):
         return _of_view(given)
@@ -109,6 +150,8 @@ def subject_of(given: Result | Postures | View, view: View | None = None) -> Sub
                 f"the view has {len(view)} frames, the result {len(given.frames)}; give the view that it was "
                 "recovered from"
             )
+        if view is not None:
+            _check_camera(given, view)
         figure = _figure_of(given)
         frames = [_of_frame(frame, figure, view, k) for k, frame in enumerate(given.frames)]
     if not any(len(frame) for frame in frames):
@@ -138,19 +181,63 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
         q=q,
         groups=frame.groups,
         sight=_sight(frame, view, index),
+        scales=frame.scales,
+        inferred=frame.inferred or (),
         time=frame.time,
     )
 
 
 def _sight(frame: ResultFrame, view: View | None, index: int) -> Sight | None:
     f = frame.camera["f"]
+    scale = float(frame.scales[0]) if frame.scales is not None and len(frame.scales) else None
     if view is not None:
         image = np.concatenate([view.image[index], view.head_image[index]])
-        return _view_sight(view, image, f)
+        return _view_sight(view, image, f, scale)
+    if scale is not None:
+        uncalibrated = ScaledOrthographicCamera(scale=scale)
+        image = uncalibrated.project(frame.joints[:1])[0]
+        image[[JOINT[name] for name in hidden(frame)]] = np.nan
+        return Sight(camera=uncalibrated, image=image)
     if f is None or len(frame.joints) == 0:
         return None
     camera = lee_chen.pinhole(f)
     return Sight(camera=camera, image=camera.project(frame.joints[:1])[0])  # all survivors have one image
+
+
+def check_one_scale(shown: Shown) -> None:
+    """Refuse to look through the view's camera at postures of several scales: one picture shows those of one.
+
+    Raises
+    ------
+    ViewerError
+        Where there are several; it names some postures of one scale.
+    """
+    if shown.scales is None or len(np.unique(shown.scales)) < 2:
+        return
+    same = np.flatnonzero(shown.scales == shown.scales[0])[:9] + 1
+    raise ViewerError(
+        f"the postures at {shown.time:g} s have {len(np.unique(shown.scales))} scales; expected one to look through "
+        f"the view's camera; choose some of one scale, as --posture {','.join(map(str, same.tolist()))}"
+    )
+
+
+def hidden(frame: ResultFrame) -> list[str]:
+    """Name the joints of which the image shows nothing: those that are inferred, and not along a ray alone."""
+    found: dict[str, bool] = {}
+    for joints in frame.inferred or ():
+        for name, one in joints.items():
+            on_ray = bool((one.upper - one.lower)[:2].max() < ON_RAY < one.upper[2] - one.lower[2])
+            found[name] = found.get(name, True) and not on_ray
+    return [name for name in JOINTS if found.get(name)]
+
+
+def _check_camera(result: Result, view: View) -> None:
+    uncalibrated = any(frame.family is not None for frame in result.frames)
+    if uncalibrated != isinstance(view.camera, ScaledOrthographicModel):
+        was, other = ("an uncalibrated", "calibrated") if uncalibrated else ("a calibrated", "uncalibrated")
+        raise ViewerError(
+            f"the result is of {was} picture, the view's camera is {other}; give the view that it was recovered from"
+        )
 
 
 def _of_view(view: View) -> Subject:
@@ -164,7 +251,7 @@ def _of_view(view: View) -> Subject:
         frames.append(
             Shown(
                 points=points[k : k + 1] if known else points[:0],
-                sight=_view_sight(view, image, None),
+                sight=_view_sight(view, image, None, _scale_of(points[k, : len(JOINTS)], view, k)),
                 time=float(view.time[k]),
             )
         )
@@ -178,7 +265,22 @@ def _of_view(view: View) -> Subject:
     return Subject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
 
 
-def _view_sight(view: View, image: Array, f: float | None) -> Sight | None:
+def _scale_of(truth: Array, view: View, index: int) -> float | None:
+    """Measure the scale of an uncalibrated view whose truth is known: its image by its truth, least squares."""
+    model = view.camera
+    if not isinstance(model, ScaledOrthographicModel) or model.scale is not None:
+        return None
+    image = view.image[index] * [model.aspect, 1.0]
+    both = np.isfinite(truth).all(axis=1) & np.isfinite(image).all(axis=1)
+    if both.sum() < 2:
+        return None
+    seen, flat = (values[both] - values[both].mean(axis=0) for values in (image, truth[:, :2]))
+    extent = float((flat * flat).sum())
+    scale = float((seen * flat).sum()) / extent if extent > 0 else 0.0
+    return scale if np.isfinite(scale) and scale > 0 else None
+
+
+def _view_sight(view: View, image: Array, f: float | None, scale: float | None) -> Sight | None:
     model = view.camera
     if isinstance(model, OpenCVModel):
         return Sight(
@@ -187,7 +289,10 @@ def _view_sight(view: View, image: Array, f: float | None) -> Sight | None:
     if isinstance(model, LeeChenModel):
         f = model.f if f is None else f
         return None if f is None else Sight(camera=lee_chen.pinhole(f), image=image)
-    return None
+    scale = model.scale if scale is None else scale
+    if scale is None or not np.isfinite(image).all(axis=1).any():
+        return None
+    return Sight(camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect), image=image)
 
 
 def _figure_of(result: Result) -> Figure:

@@ -37,12 +37,12 @@ def superposed_looks(shown: Shown, figure: Figure) -> list[Look]:
     -------
     list of N Look
     """
-    count = len(shown)
+    count, placed = len(shown), shown.aligned_points
     groups = None if shown.groups is None or len(set(shown.groups.tolist())) < 2 else shown.groups
     without: list[set[str]] = [set() for _ in range(count)]
     colours: list[dict[str, Rgb]] = [{} for _ in range(count)]
     for name, points in _parts(figure):
-        first = _first(shown.points[:, list(points)])
+        first = _first(placed[:, list(points)])
         for k in np.flatnonzero(first != np.arange(count)):
             without[k].add(name)
         if groups is not None:

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.files import read_json
-from posekit.files.reading import MAX_BYTES, MAX_DEPTH, _nesting, parse_json
+from posekit.intake import parse_json, read_json
+from posekit.intake.json_file import MAX_BYTES, MAX_DEPTH, nesting
 
 numbers = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**20), 10**20)
 documents = st.recursive(
@@ -48,7 +48,7 @@ def depth_of(document) -> int:
 
 @given(documents)
 def test_nesting_is_counted_as_a_walk_counts_it(document):
-    assert _nesting(json.dumps(document).encode())[0] == depth_of(document)
+    assert nesting(json.dumps(document).encode())[0] == depth_of(document)
 
 
 @given(st.binary(max_size=60) | st.text('[]{}":,\\ 01eE+-.naNIf', max_size=60).map(str.encode))

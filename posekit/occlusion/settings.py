@@ -1,0 +1,55 @@
+"""How finely hidden joints are sampled."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from posekit.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sampling:
+    """Numbers of samples; more are finer and slower.
+
+    Parameters
+    ----------
+    sphere : int
+        Positions of one hidden joint about its parent: 400 are 10 degrees apart.
+    ends : int
+        Positions of a limb's end about each position of its middle, where both are hidden.
+    circle : int
+        Turns of a rigid part about two known points: 120 are 3 degrees apart.
+    rotations : int
+        Turns of a rigid part about one known point: 6000 are 14 degrees apart.
+    hosts : int
+        Of those, how many limbs are placed on, at most.
+    rounds : int
+        Steps in which the ends of the boxes are sought between the samples, each 0.7 of the last.
+
+    Raises
+    ------
+    InputError
+        Where a number is too small to say anything.
+    """
+
+    sphere: int = 400
+    ends: int = 24
+    circle: int = 120
+    rotations: int = 6000
+    hosts: int = 120
+    rounds: int = 12
+
+    def __post_init__(self) -> None:
+        for name, least in (
+            ("sphere", 32),
+            ("ends", 8),
+            ("circle", 24),
+            ("rotations", 256),
+            ("hosts", 8),
+            ("rounds", 0),
+        ):
+            value = getattr(self, name)
+            if not isinstance(value, int) or value < least:
+                raise InputError(
+                    f"the sampling's {name} is {value!r}; expected a whole number, at least {least}"
+                )

@@ -1,0 +1,140 @@
+"""Placing the rigid parts: the figure's own torso and hips, laid onto the points of them that are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.figure import Figure
+from posekit.figure.frames import fit_rotation, unit
+from posekit.occlusion.asking import Index, Rows, ask
+from posekit.occlusion.closure import closing_angles
+from posekit.occlusion.hosts import Hosts, Turn
+from posekit.occlusion.lattices import circle, onto, rotation_spacing, rotations, turned
+from posekit.occlusion.plan import HIP_JOINTS, TORSO_JOINTS, Plan, State
+from posekit.occlusion.rays import Rays
+from posekit.occlusion.settings import Sampling
+
+MISFIT = 1e-6
+"""Metres by which known points may miss the figure's rigid part and their placement still be sure."""
+
+FEWER = 6
+"""By how much the hips are turned in coarser steps where the torso turns as well."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrunkPlacer:
+    """Places the unknown joints of torso and hips.
+
+    Parameters
+    ----------
+    plan : Plan
+    figure : Figure
+    rays : Rays
+    frame : int array (C,)
+        The frame of each core: which row of the rays.
+    tolerance : float
+        Metres by which a segment may be too short for its image.
+    sampling : Sampling
+    """
+
+    plan: Plan
+    figure: Figure
+    rays: Rays
+    frame: Index
+    tolerance: float
+    sampling: Sampling
+
+    def place(self, points: Array) -> Hosts:
+        """Place them in every way that the rigid parts allow, on cores (C, P, 3); evenly where they turn."""
+        hosts = Hosts.of(points)
+        pelvis, *hips = HIP_JOINTS
+        if any(self.plan.states[joint] for joint in TORSO_JOINTS):
+            hosts = self._turned(hosts, TORSO_JOINTS)
+            alive, _ = ask(self.plan.torso_own, Rows.of(hosts.points))
+            # Where only the torso turns, a near miss may be looked at more closely; otherwise it is gone.
+            hosts = hosts if self._torso_alone() else hosts.take(alive)
+        for joint in hips:
+            if self.plan.states[joint] == State.SEEN:
+                hosts = self._lifted(hosts, pelvis, joint)
+        if any(self.plan.states[joint] == State.HIDDEN for joint in hips):
+            hosts = self._turned(hosts, HIP_JOINTS)
+        return hosts
+
+    def _torso_alone(self) -> bool:
+        return all(self.plan.states[joint] == State.EXACT for joint in HIP_JOINTS)
+
+    def _turned(self, hosts: Hosts, joints: tuple[int, ...]) -> Hosts:
+        """Lay a rigid part on: nothing is free with two points beside the pivot, an angle with one, else all."""
+        pivot = joints[0]
+        states = self.plan.states
+        known = [k for k, joint in enumerate(joints) if k and states[joint] != State.HIDDEN]
+        free = [k for k, joint in enumerate(joints) if k and states[joint] == State.HIDDEN]
+        body = self.figure.neutral_points[list(joints)] - self.figure.neutral_points[pivot]
+        turn = Turn(
+            pivot=pivot,
+            about=joints[known[0]] if known else None,
+            free=tuple(joints[k] for k in free),
+            body=body[free],
+        )
+        seen = hosts.points[:, [joints[k] for k in known]] - hosts.points[:, pivot, None]
+        if len(known) >= 2:
+            R = fit_rotation(body[known], seen)
+            misfit = np.linalg.norm(np.einsum("nij,pj->npi", R, body[known]) - seen, axis=-1).max(axis=1)
+            return replace(hosts.filled(R, turn), sure=hosts.sure & (misfit <= MISFIT))
+        loose = bool((hosts.spacing > 0.0).any())
+        if known:
+            n = self.sampling.circle // FEWER if loose else self.sampling.circle
+            axis = unit(seen[:, 0])
+            first = onto(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
+            row = np.repeat(np.arange(len(hosts)), n)
+            R = turned(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
+            spacing = 2.0 * np.pi / n
+        else:
+            every = rotations(self.sampling.rotations // FEWER if loose else self.sampling.rotations)
+            row = np.repeat(np.arange(len(hosts)), len(every))
+            R = np.tile(every, (len(hosts), 1, 1))
+            spacing = float(rotation_spacing(len(every)))
+        placed = hosts.take(row).filled(R, turn)
+        if known and HIP_JOINTS[0] in turn.free and [states[j] for j in HIP_JOINTS[1:]] == [State.SEEN] * 2:
+            # The hips' line has one length: nothing that is sampled meets it, so its angles are found.
+            pelvis = np.einsum("nij,j->ni", first, body[joints.index(HIP_JOINTS[0])])
+            which, angle = closing_angles(
+                self.figure,
+                self.rays,
+                self.frame[hosts.core],
+                hosts.points[:, pivot],
+                axis,
+                pelvis,
+                self.sampling.circle,
+            )
+            R = turned(axis[which], angle) @ first[which]
+            placed = placed.and_(hosts.take(which).uneven().filled(R, turn))
+        return replace(
+            placed,
+            tried=np.bincount(placed.core[placed.even], minlength=len(hosts.tried)).astype(np.float64),
+            spacing=np.maximum(hosts.spacing, spacing),
+            sure=np.zeros(len(hosts.sure), dtype=bool),
+            turn=turn if not loose and self._last(joints) else None,
+        )
+
+    def _last(self, joints: tuple[int, ...]) -> bool:
+        """Whether nothing of the trunk hangs on the part that is turned."""
+        return joints == HIP_JOINTS or self._torso_alone()
+
+    def _lifted(self, hosts: Hosts, pelvis: int, joint: int) -> Hosts:
+        """Lift a hip that is seen from the pelvis."""
+        offset = self.figure.neutral_points[joint] - self.figure.neutral_points[pelvis]
+        lift = self.rays.lift(
+            joint,
+            self.frame[hosts.core],
+            hosts.points[:, pelvis],
+            float(np.linalg.norm(offset)),
+            self.tolerance,
+        )
+        row, branch = np.nonzero(lift.valid)
+        placed = hosts.take(row)
+        placed.points[:, joint] = lift.points[row, branch]
+        return replace(placed, tried=np.bincount(placed.core, minlength=len(hosts.tried)).astype(np.float64))

@@ -1,0 +1,106 @@
+"""Trees of some frames of one view, grown together with one tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.files import View
+from posekit.pipeline.body import Body, Judges
+from posekit.pipeline.fit_camera import CameraFit
+from posekit.pipeline.nearer import Nearer
+from posekit.pipeline.recovery import Batch
+from posekit.pipeline.tolerance import EXACT, Tolerance
+from posekit.skeleton import JOINT
+from posekit.tree import Check, Leaves
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grower:
+    """Grows trees over hypotheses of a view: its frames, or its frames at several scales.
+
+    Parameters
+    ----------
+    view : View
+    fit : CameraFit
+    body : Body
+    judges : Judges
+    nearer : Nearer, optional
+        Flips given by hand.
+    """
+
+    view: View
+    fit: CameraFit
+    body: Body
+    judges: Judges
+    nearer: Nearer | None = None
+
+    def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
+        """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
+        suite, measured = self._suites_of(tolerance)
+        image = self.body.image(self.view.image[self.fit.frame[chosen]])
+        tree = self.body.tree
+        with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
+            leaves = tree.grow(
+                self.fit.cameras(chosen),
+                self.fit.root[chosen],
+                image,
+                [check for check in suite if check.name != "walking"],
+                given=self.fit.head[chosen],
+                tolerance=tolerance.tangent,
+            )
+        physical = leaves.counts()
+        exact = is_exact(leaves, physical, self.body)
+        if self.nearer is not None:
+            leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
+            physical = leaves.counts()
+        leaves = tree.prune(leaves, [check for check in suite if check.name == "walking"])
+        return Batch(
+            leaves=leaves,
+            physical=physical,
+            checks=measured,
+            body=self.body,
+            tolerance=tolerance,
+            exact=exact,
+        )
+
+    def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
+        """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
+        if tolerance not in self._suites:
+            exact = self.judges.suite(self.body.figure, tolerance, exact=True)
+            self._suites[tolerance] = (self.body.checks(self.judges, tolerance), exact)
+        return self._suites[tolerance]
+
+    @cached_property
+    def _suites(self) -> dict[Tolerance, tuple[Sequence[Check], Sequence[Check]]]:
+        return {}
+
+
+def is_exact(leaves: Leaves, physical: NDArray[np.int64], body: Body) -> NDArray[np.bool_]:
+    """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
+
+    Some distances are not used to lift anything: four inside torso and hips. That they come out right to 1e-8 m
+    is no accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible
+    there is no evidence, and a branch that happens to reach its rays must not stand for the truth.
+    """
+    if not body.evidence:
+        return np.zeros(leaves.n_frames, dtype=bool)
+    fits = np.ones(len(leaves.code), dtype=bool)
+    seen = np.zeros(len(leaves.code), dtype=bool)
+    points = body.points(leaves)
+    for segment, length in body.evidence:
+        known_length = np.linalg.norm(points[:, segment[0]] - points[:, segment[1]], axis=-1)
+        known = np.isfinite(known_length)
+        fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
+        seen |= known
+    exact = np.zeros(leaves.n_frames, dtype=bool)
+    exact[leaves.frame[fits & seen]] = True
+    empty = physical[:, -1] == 0
+    for group in leaves.pruned:
+        if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
+            exact[group.frame[empty[group.frame]]] = True
+    return exact

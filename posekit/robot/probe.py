@@ -1,0 +1,73 @@
+"""The child process that loads a robot first: what crashes here, crashes nothing else.
+
+It is started by `posekit.robot.untrusted` with a request on its standard input, sets its own limits, does
+everything native that its parent will do, and answers on what was its standard output.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pinocchio as pin
+
+from posekit.errors import PosekitError
+from posekit.robot.pairs import neutral_inside_limits
+from posekit.robot.robot import Robot
+from posekit.robot.second_reader import compare_readers
+
+
+def main() -> None:
+    """Read the request, load the robot within the limits, and answer."""
+    answers = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (1, 2):
+        os.dup2(nowhere, stream)  # native libraries print what they please
+    request = json.load(sys.stdin)
+    _set_limits(request["memory"], request["cpu"])
+    answer: dict[str, Any] = {"ok": True}
+    try:
+        settings = request["robot"]
+        settings["package_dirs"] = tuple(map(Path, settings["package_dirs"]))
+        answer["compared"] = exercise(Robot(**settings), compare=request["compare"])
+    except PosekitError as error:
+        answer = {"error": str(error)}
+    except MemoryError:
+        answer = {"memory": True}
+    os.write(answers, json.dumps(answer).encode())
+
+
+def exercise(robot: Robot, *, compare: bool) -> bool:
+    """Do with a robot what is native in using it: forward kinematics, one collision query, the second reader."""
+    model, data = robot.model, robot.model.createData()
+    q = neutral_inside_limits(model)
+    pin.framesForwardKinematics(model, data, q)
+    if robot.geometry is not None:
+        geometry_data = robot.geometry.createData()
+        pin.computeCollisions(model, data, robot.geometry, geometry_data, q, False)
+    return compare and compare_readers(robot.urdf, model, robot.source, must_read=False)
+
+
+def _set_limits(memory: int, cpu: int) -> None:
+    """Bound memory (bytes) and processor time (s), write no file and leave no core dump."""
+    import resource
+
+    bounds: dict[int, Any] = {
+        resource.RLIMIT_AS: memory,
+        resource.RLIMIT_CPU: cpu,
+        resource.RLIMIT_FSIZE: 0,
+        resource.RLIMIT_CORE: 0,
+    }
+    for kind, bound in bounds.items():
+        with suppress(
+            ValueError, OSError
+        ):  # a lower one is set already, or the system knows none of this kind
+            resource.setrlimit(kind, (bound, bound))
+
+
+if __name__ == "__main__":
+    main()

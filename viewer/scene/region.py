@@ -1,0 +1,57 @@
+"""Where a joint that was not seen can be: the box around all its positions."""
+
+from __future__ import annotations
+
+import meshcat.geometry as mg
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.files import Inferred
+from posekit.viewer.scene.colours import Rgb
+from posekit.viewer.scene.scene import Scene
+from posekit.viewer.scene.shapes import add_tubes, glow
+from posekit.viewer.scene.world import World
+
+UNIT_BOX = mg.Box([1.0, 1.0, 1.0])
+
+THINNEST = 0.003
+"""Metres that a box is wide at least, half of it on each side: an interval of depth would not be seen."""
+
+POINT = 1e-4
+"""Metres: a joint whose positions are no farther apart has one."""
+
+FACES, EDGES, EDGE_RADIUS = 0.16, 0.8, 0.0025
+"""Opacity of the box's faces and of its edges, and their radius, metres."""
+
+
+def add_region(
+    scene: Scene, path: str, inferred: Inferred, *, world: World, shift: Array, colour: Rgb
+) -> None:
+    """Draw the box that holds all positions of a joint: ``PATH/faces`` and ``PATH/edges``; nothing of a single point.
+
+    Parameters
+    ----------
+    scene : Scene
+    path : str
+        Below ``/meshcat``.
+    inferred : Inferred
+        Its box lies along the camera's axes.
+    world : World
+    shift : array (3,)
+        Moves the box in the world, metres.
+    colour : (r, g, b)
+    """
+    if np.max(inferred.upper - inferred.lower) < POINT:
+        return
+    middle = world.place((inferred.upper + inferred.lower) / 2) + shift
+    half = np.maximum((inferred.upper - inferred.lower) / 2, THINNEST / 2)
+    box = np.eye(4)
+    box[:3, :3], box[:3, 3] = world.R_world_cam * (2 * half), middle
+    scene.meshcat[f"{path}/faces"].set_object(mg.Mesh(UNIT_BOX, glow(colour, FACES)))
+    scene.transform(f"/meshcat/{path}/faces", box)
+    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+    corners = middle + (signs * half) @ world.R_world_cam.T
+    pairs = [(a, b) for a in range(8) for b in range(a) if np.count_nonzero(signs[a] - signs[b]) == 1]
+    starts, ends = (corners[[pair[k] for pair in pairs]] for k in (0, 1))
+    colours = np.tile(np.array(colour), (len(pairs), 1))
+    add_tubes(scene, f"{path}/edges", starts, ends, colours, radius=EDGE_RADIUS, opacity=EDGES)
