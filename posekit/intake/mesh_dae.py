@@ -7,12 +7,14 @@ from typing import Final
 from xml.etree import ElementTree
 
 from posekit.errors import InputError
-from posekit.intake.mesh_numbers import MAX_TRIANGLES, finite_numbers, whole_numbers
+from posekit.intake.mesh_numbers import MAX_POLYGON, finite_numbers, whole_numbers
 from posekit.intake.refusal import cut, refusal
 from posekit.intake.text_file import decode
 from posekit.intake.xml_file import parse_xml
 
 _MAX_COUNT: Final = 10_000_000
+_MAX_ELEMENTS: Final = 1_000_000
+"""A polygon may be an element of its own."""
 _MAX_NESTED: Final = 32
 """Nodes of the library that place other nodes: with so few, at most 3**(32/3) copies can come of them."""
 _COUNTS: Final = ("count", "stride", "offset")
@@ -23,7 +25,7 @@ _FACES: Final = frozenset(("triangles", "polylist", "polygons", "trifans", "tris
 
 def count_dae(path: Path, data: bytes) -> int:
     """Look through a COLLADA file and count its faces."""
-    root = parse_xml(decode(path, data), path, max_elements=MAX_TRIANGLES)
+    root = parse_xml(decode(path, data), path, max_elements=_MAX_ELEMENTS)
     if _name(root) != "COLLADA":
         raise refusal(path, "", f"the root element <{cut(_name(root))}>", "<COLLADA>", "export it again")
     faces = 0
@@ -39,7 +41,10 @@ def count_dae(path: Path, data: bytes) -> int:
                 got, expected = f"count={element.get('count')}", f"{len(words):,}, the numbers in it"
                 raise refusal(path, f"<{name}>", got, expected, "export the mesh again")
         elif name in _INDICES:
-            whole_numbers(path, f"<{name}>", words)
+            indices = whole_numbers(path, f"<{name}>", words)
+            if name == "vcount" and indices.max(initial=0) > MAX_POLYGON:
+                got, expected = f"a face of {indices.max():,} corners", f"at most {MAX_POLYGON}"
+                raise refusal(path, "<vcount>", got, expected, "triangulate it")
         elif name in _FACES:
             faces += _faces(path, element)
     nested = [

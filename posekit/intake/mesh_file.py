@@ -41,7 +41,7 @@ def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> int:
     Returns
     -------
     int
-        How many faces it declares, at most 1e6.
+        How many faces it declares, at most 5e5.
 
     Raises
     ------

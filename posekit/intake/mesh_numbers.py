@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from posekit.intake.refusal import cut, one_line, refusal
 
-MAX_TRIANGLES: Final = 1_000_000
-"""Faces of one mesh: a tree of boxes over so many takes about a gigabyte."""
+MAX_TRIANGLES: Final = 500_000
+"""Faces of one mesh: a tree of boxes over so many takes seconds; published robots have at most 350,000."""
+MAX_POLYGON: Final = 1000
+"""Corners of one face: to triangulate it takes the square of their number."""
 LARGEST: Final = 1e6
 """Coordinates beyond this, in whatever unit, describe no body part; 1e39 is infinite as float32."""
 

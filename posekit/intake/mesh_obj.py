@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.intake.mesh_numbers import finite_numbers, whole_numbers
+from posekit.intake.mesh_numbers import MAX_POLYGON, finite_numbers, whole_numbers
 from posekit.intake.refusal import refusal, shown
 
 _MAX_CORNERS: Final = 5_000_000
@@ -39,6 +39,11 @@ def count_obj(path: Path, data: bytes) -> int:
             coordinates += rest
             vertices += word == b"v"
         elif word == b"f":
+            if len(rest) > MAX_POLYGON:
+                expected = f"at most {MAX_POLYGON}"
+                raise refusal(
+                    path, f"line {number}", f"a face of {len(rest):,} corners", expected, "triangulate it"
+                )
             corners += [corner.partition(b"/")[0] for corner in rest]
             faces += max(1, len(rest) - 2)
         elif word == b"mtllib":

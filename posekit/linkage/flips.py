@@ -48,6 +48,20 @@ class FlipCodes:
             signs[:, segment] = 1.0 - 2.0 * ((codes >> bit) & 1)
         return signs
 
+    def regardless(self, codes: Codes, segments: Sequence[int]) -> Codes:
+        """Return for each code the least of those that differ from it only in the flips of some segments."""
+        pivots: dict[int, int] = {}  # highest bit to mask, each mask reduced by those before it
+        for segment in segments:
+            mask = self.masks[segment]
+            for bit in sorted(pivots, reverse=True):
+                mask = min(mask, mask ^ pivots[bit])
+            if mask:
+                pivots[mask.bit_length() - 1] = mask
+        least = codes.copy()
+        for bit in sorted(pivots, reverse=True):
+            least = np.minimum(least, least ^ pivots[bit])
+        return least
+
 
 def number_flips(
     k: int, blocks: Sequence[Sequence[int]], given: Array, avoid: NDArray[np.bool_]

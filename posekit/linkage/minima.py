@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.linkage.bound_angle import grid
 from posekit.linkage.constraints import Constraints
 from posekit.linkage.family import Flips
 
@@ -57,7 +59,7 @@ class Minima:
     def __len__(self) -> int:
         return len(self.s)
 
-    def curve(self, number: int, s: Array | None = None) -> Array:
+    def curve(self, number: int | np.integer[Any], s: Array | None = None) -> Array:
         """Return the residual of one minimum's own flips over the scale: Taylor's Figs. 7b and 8b.
 
         Parameters
@@ -67,11 +69,15 @@ class Minima:
         s : array (G,), optional
             Scales, at or above the bound; by default `curve_s`.
         """
-        family = self.constraints.family
-        scales = self.curve_s if s is None else np.asarray(s, dtype=np.float64)
-        family.foreshortening(scales)  # refuses scales below the bound
+        if s is None:
+            psi = grid()
+        else:
+            family = self.constraints.family
+            scales = np.asarray(s, dtype=np.float64)
+            family.foreshortening(scales)  # refuses scales below the bound
+            least = family.minimum_scale
+            psi = np.arctan2(np.sqrt(np.maximum((scales - least) * (scales + least), 0.0)), least)
         signs = self.flips[number, self.constraints.segments].astype(np.float64)
         signs[signs == 0] = 1.0
-        psi = np.arccos(np.clip(family.minimum_scale / scales, 0.0, 1.0))
         residual, _ = self.constraints.evaluate(signs, psi)
         return residual

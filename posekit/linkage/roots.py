@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 
-STEPS = 100
-"""More than bisection alone would need; ten are usual."""
+STEPS = 240
+"""Of which every fourth halves the bracket: enough for any, where ten are usual."""
 
 Function = Callable[[Array, NDArray[np.intp]], Array]
 
@@ -37,7 +37,7 @@ def find_roots(function: Function, a: Array, b: Array) -> Array:
     active = (f1 != 0) & (f2 != 0) & (np.sign(f1) != np.sign(f2))
     rows = rows[active]
     x1, x2, x3, f1, f2, f3, t = (values[active] for values in (x1, x2, x3, f1, f2, f3, t))
-    for _ in range(STEPS):
+    for step in range(STEPS):
         if len(rows) == 0:
             break
         x = x1 + t * (x2 - x1)
@@ -55,7 +55,7 @@ def find_roots(function: Function, a: Array, b: Array) -> Array:
         x1, x2, x3, f1, f2, f3, smallest, width = (
             values[active] for values in (x1, x2, x3, f1, f2, f3, smallest, width)
         )
-        t = _next(x1, x2, x3, f1, f2, f3)
+        t = _next(x1, x2, x3, f1, f2, f3) if step % 4 < 3 else np.full(len(rows), 0.5)
         least = np.minimum(0.5 * smallest / width, 0.5)
         t = np.clip(t, least, 1 - least)
     return best

@@ -19,8 +19,12 @@ from posekit.linkage.flips import Codes
 CHUNK = 1 << 20
 """Residuals that are evaluated at once."""
 
-FLAT = 1e-22
-"""A residual that is nowhere above it is zero but for rounding."""
+FLAT = 1e-23
+"""A residual that is nowhere above it is zero but for rounding.
+
+It is weighed by the squared sine and cosine of the angle: near the bound what rounding leaves of a foreshortening grows
+as one over the sine, and far from it points on a line of sight hardly tell their plane.
+"""
 
 FINER = 16
 """Into how many cells one is cut in which a minimum may be hidden."""
@@ -92,7 +96,7 @@ def _any(constraints: Constraints, psi: Array) -> Iterator[Scan]:
     for start in range(0, n, step):
         codes = np.arange(start, min(start + step, n), dtype=np.int64)
         value, slope = constraints.evaluate(constraints.flips.signs(codes)[:, None, :], psi)
-        flat = value.max(axis=1) <= FLAT
+        flat = (value * (np.sin(psi) * np.cos(psi)) ** 2).max(axis=1) <= FLAT
         row, cell = np.nonzero((slope[:, :-1] < 0) & (slope[:, 1:] >= 0) & ~flat[:, None])
         turning = Brackets(codes[row], psi[cell], psi[cell + 1])
         row, cell = np.nonzero(_suspicious(value, slope, psi) & ~flat[:, None])
@@ -157,7 +161,7 @@ def _sums(terms: Array, bits: list[int]) -> Array:
 def _crossings(codes: Codes, gap: Array, change: Array, psi: Array) -> Scan:
     """Find where gaps (K, G) change sign, and where they come nearest to zero without."""
     size = np.abs(gap)
-    flat = size.max(axis=1) <= FLAT**0.5
+    flat = (size * np.sin(psi) * np.cos(psi)).max(axis=1) <= FLAT**0.5
     positive, rising = gap > 0, change > 0
     crossing = positive[:, :-1] != positive[:, 1:]
     crossing[flat] = False

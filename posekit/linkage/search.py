@@ -11,7 +11,7 @@ from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.linkage.bound_angle import grid
 from posekit.linkage.constraints import Constraints, put_together
-from posekit.linkage.family import Family, Flips
+from posekit.linkage.family import Family
 from posekit.linkage.flips import Codes
 from posekit.linkage.minima import Minima
 from posekit.linkage.roots import find_roots
@@ -137,12 +137,10 @@ def _at_bound(constraints: Constraints, first: float, flat: Codes) -> tuple[Code
         level = np.abs(slope) <= LEVEL
         grows[part] = (slope > LEVEL) | (level & (later_slope > 0) & (later > value))
     grows[flat] = False
-    # All that differ only in what has vanished are one: mask by mask, the least of each such set stands for it.
-    first_of = codes.copy()
     for mask in {flips.masks[column] for column in constraints.bounding}:
         grows &= grows[codes ^ mask]
-        first_of = np.minimum(first_of, first_of[codes ^ mask])
-    kept = codes[grows & (first_of == codes)]
+    # All that differ only in what has vanished are one.
+    kept = codes[grows & (flips.regardless(codes, constraints.bounding) == codes)]
     return kept, np.zeros(len(kept))
 
 
@@ -211,7 +209,8 @@ def _collect(
     vanished = constraints.segments[list(constraints.bounding)]
     flips[np.ix_(np.flatnonzero(at_bound), vanished)] = 0
     s = family.minimum_scale / np.cos(np.where(at_bound, 0.0, psi))
-    kept = _distinct(flips, psi, at_bound)
+    one = np.where(at_bound, constraints.flips.regardless(codes, constraints.bounding), codes)
+    kept = _distinct(one, psi, at_bound)
     exact = np.where(residual <= EXACT, 0.0, residual)
     order = kept[np.lexsort((s[kept], exact[kept]))]
     flat_flips = np.zeros((len(flat), len(family.linkage.segments)), dtype=np.int8)
@@ -230,13 +229,10 @@ def _collect(
     )
 
 
-def _distinct(flips: Flips, psi: Array, at_bound: NDArray[np.bool_]) -> Rows:
+def _distinct(codes: Codes, psi: Array, at_bound: NDArray[np.bool_]) -> Rows:
     """Return the places of minima that differ in their flips or, by more than rounding, in their angle."""
-    if len(psi) == 0:
-        return np.empty(0, dtype=np.intp)
-    _, kind = np.unique(flips, axis=0, return_inverse=True)
     place = np.where(at_bound, 0.0, psi)
-    order = np.lexsort((place, kind.reshape(-1)))
+    order = np.lexsort((place, at_bound, codes))
     new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(kind.reshape(-1)[order]) != 0) | (np.diff(place[order]) > SAME)
+    new[1:] = (np.diff(codes[order]) != 0) | (np.diff(at_bound[order]) != 0) | (np.diff(place[order]) > SAME)
     return order[new]

@@ -9,7 +9,7 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.figure.frames import cross
-from posekit.occlusion.asking import Index
+from posekit.occlusion.asking import Index, Mask
 from posekit.occlusion.lattices import circle
 from posekit.occlusion.rays import Rays
 from posekit.skeleton import HIPS, JOINT, segment_name
@@ -72,13 +72,19 @@ def closing_angles(
     first = np.flatnonzero((which[1:] == which[:-1]) & (np.maximum(slack[1:], slack[:-1]) >= 0.0))
     lower, upper = angle[first].copy(), angle[first + 1].copy()
     which = which[first]
+    bracket = which.copy()
+
+    def within(at: Array) -> Mask:
+        return np.asarray(gap(bracket, at)[1] >= 0.0)
+
     # Where one end is out of reach, draw it in to the edge of reach.
-    lower = _edge(lambda a: gap(which, a)[1] >= 0.0, upper, lower, slack[first] < 0.0)
-    upper = _edge(lambda a: gap(which, a)[1] >= 0.0, lower, upper, slack[first + 1] < 0.0)
+    lower = _edge(within, upper, lower, slack[first] < 0.0)
+    upper = _edge(within, lower, upper, slack[first + 1] < 0.0)
     # Sixteen parts where |g| may have a minimum within: between two of the same sign, not far from zero.
     near = np.abs(np.concatenate([value[first], value[first + 1]], axis=1)).min(axis=1) < 4.0 * step
     part = np.where(near, 16, 1)
-    which, low, width = (np.repeat(a, part) for a in (which, lower, (upper - lower) / part))
+    which = np.repeat(which, part)
+    low, width = np.repeat(lower, part), np.repeat((upper - lower) / part, part)
     low = low + width * (np.arange(len(low)) - np.repeat(np.cumsum(part) - part, part))
     g_low, g_high = gap(which, low)[0], gap(which, low + width)[0]
     row, choice = np.nonzero((g_low <= 0.0) != (g_high <= 0.0))
@@ -91,7 +97,7 @@ def closing_angles(
     return which, (low + high) / 2.0
 
 
-def _edge(inside: Callable[[Array], Array], good: Array, bad: Array, wanted: Array) -> Array:
+def _edge(inside: Callable[[Array], Mask], good: Array, bad: Array, wanted: Mask) -> Array:
     """Move ends that are out of reach to the last angle within, in all rows where that is wanted."""
     good, end = good.copy(), bad.copy()
     for _ in range(HALVINGS):

@@ -91,6 +91,9 @@ class Completion:
         `Outcome`.
     blamed : int array (N,)
         The joint for which no position was found; -1 where none is to blame.
+    miss : array (N,)
+        Where no place of the trunk was found: how far the nearest one that was looked at breaks a check, radians (a
+        metre counts as 1 / 0.3); else 0.
     kind : int array (N, 14)
         `Kind`, as the pattern of seen and hidden joints gives it.
     lower, upper : array (N, 14, 3)
@@ -102,6 +105,7 @@ class Completion:
     postures: Array
     outcome: NDArray[np.int8]
     blamed: NDArray[np.int8]
+    miss: Array
     kind: NDArray[np.int8]
     lower: Array
     upper: Array
@@ -119,6 +123,7 @@ class Completion:
             postures=postures.copy(),
             outcome=np.zeros(n, dtype=np.int8),
             blamed=np.full(n, -1, dtype=np.int8),
+            miss=np.zeros(n),
             kind=np.zeros((n, joints), dtype=np.int8),
             lower=postures.copy(),
             upper=postures.copy(),

@@ -64,6 +64,8 @@ class Hosts:
         Radians between neighbours, or 0 where there is a finite number of places.
     sure : bool array (C,)
         Whether what is not here is proven impossible.
+    miss : array (C,)
+        How far the best place looked at is from being feasible, radians; 0 where one is.
     turn : Turn or None
         What the places differ by, where it is one turn.
     """
@@ -75,6 +77,7 @@ class Hosts:
     tried: Array
     spacing: Array
     sure: Mask
+    miss: Array
     turn: Turn | None = None
 
     @staticmethod
@@ -89,6 +92,7 @@ class Hosts:
             tried=np.ones(n),
             spacing=np.zeros(n),
             sure=np.ones(n, dtype=bool),
+            miss=np.zeros(n),
         )
 
     def __len__(self) -> int:
@@ -97,7 +101,9 @@ class Hosts:
 
     def take(self, rows: Index | Mask) -> Hosts:
         """Take some places."""
-        return replace(self, core=self.core[rows], points=self.points[rows], R=self.R[rows], even=self.even[rows])
+        return replace(
+            self, core=self.core[rows], points=self.points[rows], R=self.R[rows], even=self.even[rows]
+        )
 
     def and_(self, other: Hosts) -> Hosts:
         """Add places of the same cores."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,8 +16,9 @@ from posekit.occlusion.placed import Placed
 from posekit.occlusion.plan import Limb, Plan, State
 from posekit.occlusion.rays import Rays
 from posekit.occlusion.settings import Sampling
+from posekit.tree import Check
 
-BANDS, SECTORS = 4, 8
+BANDS, SECTORS = 8, 12
 """Cells of a lattice, in each of which the nearest miss is looked at more closely."""
 
 NEAR_MISS = 3.0
@@ -82,7 +84,10 @@ class LimbPlacer:
         _, lower, upper = self._zones()
         middle = sphere_spacing(n_middle, np.clip((upper - lower) / 2.0, 0.0, 1.0))
         hidden = [state == State.HIDDEN for state in self.states]
-        return np.asarray(np.where(hidden[0], middle, 0.0) + np.where(hidden[1], sphere_spacing(n_end), 0.0))
+        return np.asarray(
+            np.where(hidden[0], middle, np.zeros(len(self.hosts)))
+            + np.where(hidden[1], sphere_spacing(n_end), 0.0)
+        )
 
     def too_short(self) -> Array:
         """Return by how much (m) the limb is at least too short for its image on each host (H,); below 0 it is not."""
@@ -113,7 +118,7 @@ class LimbPlacer:
         # Without any lift that reaches, at least one segment is too short: by more than the limb is.
         reached = np.isfinite(nearest)
         nearest[~reached] = np.maximum(short, self._gap() / ARM)[~reached]
-        return np.maximum(short, nearest)
+        return np.asarray(np.maximum(short, nearest))
 
     def part(self) -> Array:
         """Return the part (H,) of the whole sphere on which a hidden joint was sampled."""
@@ -130,14 +135,13 @@ class LimbPlacer:
         passed, end_miss = self._ask(ends, self.plan.end_own[self.limb])
         placed = ends.take(passed)
         if self.states == (State.HIDDEN, State.SEEN):
-            _, height = self.rays.foot(self.limb.end, self.frame[every.host], every.middle)
-            beyond = (height - self.lengths[1]) / ARM
-            least = np.where(beyond > 0.0, beyond, np.inf)
-            least[parent] = np.inf
-            np.minimum.at(least, parent, end_miss)
-            miss = miss.copy()
-            miss[alive] = least
-            found = self._closer(rows, miss, n_middle)
+            # Near and far are two sets: each middle is looked at twice, also where it has no end.
+            twice = np.tile(np.arange(len(rows.host)), 2)
+            both = rows.take(twice)
+            both.branch[:, 1] = np.repeat([0, 1], len(rows.host))
+            least = np.tile(np.where(alive, self._beyond(rows), miss), 2)
+            least[ends.branch[:, 1] * len(rows.host) + np.flatnonzero(alive)[parent]] = end_miss
+            found = self._closer(both.with_seed(both.seed + n_middle * both.branch[:, 1]), least, n_middle)
         elif self.states[1] == State.HIDDEN and self.states[0] != State.HIDDEN:
             found = self._closer(ends, end_miss, n_end)
         else:
@@ -166,22 +170,29 @@ class LimbPlacer:
             lift = self.rays.lift(
                 self.limb.end, self.frame[rows.host], middle, self.lengths[1], self.tolerance
             )
-            pick = np.arange(len(middle)), rows.branch[:, 1].astype(np.intp)
+            pick = np.arange(len(middle)), rows.branch[:, 1]
             end = np.where(lift.valid[pick][:, None], lift.points[pick], np.nan)
             excess = np.maximum(lift.excess, 0.0)
         return Placed(
             host=rows.host, middle=middle, end=end, branch=rows.branch, excess=excess, seed=rows.seed
         )
 
+    def _beyond(self, rows: Placed) -> Array:
+        """Return how far the middles of rows are from reaching the end's ray (S,), radians; above 0."""
+        _, height = self.rays.foot(self.limb.end, self.frame[rows.host], rows.middle)
+        beyond = np.where(height > self.lengths[1], (height - self.lengths[1]) / ARM, np.inf)
+        return np.asarray(beyond)
+
     def _gap(self) -> Array:
-        """Return by how much (m) the better middle of each host (H,) misses the ray of a lifted end."""
+        """Return by how much (m) a limb that is seen misses its rays on each host (H,), where no lift reaches both."""
         base = self.hosts.points[:, self.limb.base]
         lift = self.rays.lift(self.limb.middle, self.frame, base, self.lengths[0], self.tolerance)
         gap = np.full(len(base), np.inf)
         for branch in range(2):
             _, height = self.rays.foot(self.limb.end, self.frame, lift.points[:, branch])
             gap = np.fmin(gap, np.where(lift.valid[:, branch], height - self.lengths[1], np.inf))
-        return gap
+        gap = np.where(lift.valid.any(axis=1), gap, np.nan_to_num(lift.excess, nan=np.inf))
+        return np.asarray(np.maximum(gap, np.finfo(np.float64).tiny))
 
     def _middles(self, n: int) -> Placed:
         """Return every middle that is tried; ends NaN."""
@@ -194,16 +205,16 @@ class LimbPlacer:
             d = np.einsum("hij,hnj->hni", basis(axis[reached]), local).reshape(-1, 3)
             host, seed = np.repeat(reached, n), np.tile(np.arange(n), len(reached))
             middle, excess = base[host] + self.lengths[0] * d, np.zeros(len(host))
-            near = np.zeros(len(host), dtype=np.int8)
+            near = np.zeros(len(host), dtype=np.intp)
         elif state == State.SEEN:
             lift = self.rays.lift(self.limb.middle, self.frame, base, self.lengths[0], self.tolerance)
             host, branch = np.nonzero(lift.valid)
             middle, excess = lift.points[host, branch], np.maximum(lift.excess[host], 0.0)
-            seed, near = branch, branch.astype(np.int8)
+            seed, near = branch, branch
         else:
             host = np.arange(len(base))
             middle, excess = self.hosts.points[:, self.limb.middle], np.zeros(len(base))
-            seed, near = np.zeros(len(base), dtype=np.intp), np.zeros(len(base), dtype=np.int8)
+            seed, near = np.zeros(len(base), dtype=np.intp), np.zeros(len(base), dtype=np.intp)
         return Placed(
             host=host,
             middle=middle,
@@ -232,7 +243,7 @@ class LimbPlacer:
             end, far = rows.middle[parent] + self.lengths[1] * f, np.zeros(len(parent), dtype=np.intp)
             seed = rows.seed[parent] if self.states[0] == State.HIDDEN else rows.seed[parent] * n + k
             excess = rows.excess[parent]
-        branch = np.stack([rows.branch[parent, 0], far.astype(np.int8)], axis=1)
+        branch = np.stack([rows.branch[parent, 0], far], axis=1)
         placed = Placed(
             host=rows.host[parent],
             middle=rows.middle[parent],
@@ -248,7 +259,7 @@ class LimbPlacer:
 
         In each cell of the lattice without a feasible sample the nearest miss goes downhill by its violation.
         """
-        spacing = np.broadcast_to(self.spacing(), (len(self.hosts),))[rows.host]
+        spacing = self.spacing()[rows.host]
         k, lattice = rows.seed % n, rows.seed // n
         sector = np.mod(k * GOLDEN_ANGLE / (2.0 * np.pi), 1.0) * SECTORS
         cell = (lattice * BANDS + k * BANDS // n) * SECTORS + sector.astype(np.intp)
@@ -265,10 +276,10 @@ class LimbPlacer:
             angle = 2.0 * np.pi * (np.tile(np.arange(AROUND), len(here.host)) + descent / DESCENTS) / AROUND
             by = step[each, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
             swung = self.moved(here.take(each), np.tile(by, 2))
-            if self.states[1] == State.SEEN:
-                swung, parent = self._ends(swung, 0)
-                each = each[parent]
             alive, violation = self._ask(swung, checks)
+            reached = np.isfinite(swung.end).all(axis=1)
+            violation = np.where(reached, violation, self._beyond(swung))
+            alive &= reached
             found.append(swung.take(alive))
             order = np.lexsort((violation, each))
             first = np.ones(len(order), dtype=bool)
@@ -282,7 +293,7 @@ class LimbPlacer:
             together = together.and_(more)
         return together.with_seed(np.full(len(together.host), -1))
 
-    def _ask(self, rows: Placed, checks: list) -> tuple[Mask, Array]:  # type: ignore[type-arg]
+    def _ask(self, rows: Placed, checks: Sequence[Check]) -> tuple[Mask, Array]:
         return ask(checks, self.columns(rows))
 
     def columns(self, rows: Placed) -> Rows:

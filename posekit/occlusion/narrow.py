@@ -37,57 +37,72 @@ def survey(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Array:
 def narrowed(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Hosts:
     """Keep what is feasible, with the neighbourhoods of feasible samples and of near misses split more finely."""
     miss = survey(plan, hosts, placer)
-    if hosts.turn is None:
-        return hosts.take(miss == 0.0)
     cores = len(hosts.tried)
+    least = np.full(cores, np.inf)
+    np.minimum.at(least, hosts.core, miss)
+    if hosts.turn is None:
+        return replace(hosts.take(miss == 0.0), miss=least)
     proven = np.ones(cores, dtype=bool)
     proven[hosts.core[~_proven(plan, hosts, placer)]] = False
     spacing = hosts.spacing[hosts.core]
-    at = _nearest(hosts.core, np.where(miss < NEAR_MISS * spacing, miss, np.inf), MOST)
+    near = (miss < NEAR_MISS * spacing) | _edges_and_dips(hosts, miss)[0]
+    at = _nearest(hosts.core, np.where(near, np.minimum(miss, np.pi), np.inf), MOST)
     looked, parent = hosts.children(at, spacing[at])
     miss, width = survey(plan, looked, placer), spacing[at][parent] * hosts.turn.finer
+    np.minimum.at(least, looked.core, miss)
     found = looked.take(miss == 0.0)
     for _ in range(DEEPER):
+        edge, dip = _edges_and_dips(looked, miss)
         empty = np.bincount(found.core, minlength=cores) == 0
-        edges = np.where(_on_edge(looked, miss), 0.0, np.inf)
+        dip |= empty[looked.core] & (miss > 0.0)
         at = np.union1d(
-            _nearest(looked.core, np.where(empty[looked.core], miss, np.inf), BEST),
-            _nearest(looked.core, edges, MOST),
+            _nearest(
+                looked.core,
+                np.where(dip & (miss < NEAR_MISS * hosts.spacing[looked.core]), miss, np.inf),
+                BEST,
+            ),
+            _nearest(looked.core, np.where(edge, 0.0, np.inf), MOST),
         )
         if not len(at):
             break
         looked, parent = looked.uneven().children(at, width[at])
         miss, width = survey(plan, looked, placer), width[at][parent] * hosts.turn.finer
+        np.minimum.at(least, looked.core, miss)
         found = found.and_(looked.take(miss == 0.0))
     return replace(
         found,
         tried=hosts.tried * CHILDREN,
         spacing=hosts.spacing * hosts.turn.finer,
         sure=proven,
+        miss=least,
     )
 
 
-def _on_edge(hosts: Hosts, miss: Array) -> Mask:
-    """Find places of a circle between which and the next one feasibility changes: both, rows being in order."""
-    edge = np.zeros(len(hosts), dtype=bool)
+def _edges_and_dips(hosts: Hosts, miss: Array) -> tuple[Mask, Mask]:
+    """Find, on circles whose rows are in order, the ends of feasible arcs and the least misses between them."""
+    edge, dip = np.zeros(len(hosts), dtype=bool), np.zeros(len(hosts), dtype=bool)
     if hosts.turn is not None and hosts.turn.about is not None:
-        changes = ((miss[1:] == 0.0) != (miss[:-1] == 0.0)) & (hosts.core[1:] == hosts.core[:-1])
+        same = hosts.core[1:] == hosts.core[:-1]
+        changes = ((miss[1:] == 0.0) != (miss[:-1] == 0.0)) & same
         edge[1:] |= changes
         edge[:-1] |= changes
-    return edge
+        dip[:] = miss > 0.0
+        dip[1:] &= ~same | (miss[1:] <= miss[:-1])
+        dip[:-1] &= ~same | (miss[:-1] <= miss[1:])
+    return edge, dip
 
 
 def thinned(hosts: Hosts, most: int) -> Hosts:
-    """Keep at most so many places a core, evenly."""
-    some = np.bincount(hosts.core[hosts.even], minlength=len(hosts.tried)) > 0
-    hosts = hosts.take(hosts.even | ~some[hosts.core])
-    count = np.bincount(hosts.core, minlength=len(hosts.tried))
-    rank = np.arange(len(hosts)) - (np.cumsum(count) - count)[hosts.core]
+    """Keep at most so many even places a core, evenly, and those found by a closer look: the ends of arcs."""
+    count = np.bincount(hosts.core[hosts.even], minlength=len(hosts.tried))
+    before: Index = np.cumsum(hosts.even) - hosts.even
+    rank: Index = before - before[np.searchsorted(hosts.core, hosts.core)]
     many = np.maximum(count, 1)[hosts.core]
-    kept = hosts.take(np.asarray((many <= most) | ((rank + 1) * most // many > rank * most // many)))
+    step = (many <= most) | ((rank + 1) * most // many > rank * most // many)
     # Each then stands for so much more of the circle or of the rotations.
     fewer = np.maximum(count / most, 1.0)
     power = 1.0 if hosts.turn is not None and hosts.turn.about is not None else 1.0 / 3.0
+    kept = hosts.take(np.asarray(step | ~hosts.even))
     return replace(kept, tried=kept.tried / fewer, spacing=kept.spacing * fewer**power)
 
 

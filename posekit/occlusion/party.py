@@ -29,8 +29,8 @@ from posekit.skeleton import PARENTS, segment_name
 HOSTS_TRIED = 8
 """Places of the trunk on which limbs are sought that pass together, the middle one first."""
 
-ATTAINED = 0.01
-"""Of a step on the lattice: how near the ends of a box are found (measured: see the documentation)."""
+ATTAINED, ATTAINED_IN_CROWD = 0.01, 0.1
+"""Of a step on the lattice: how near the ends of a box are found on one host, and on many (measured: see docs)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -195,8 +195,9 @@ class Party:
         for joint in self.plan.trunk:
             self._describe_trunk(done, part, joint, middle[:, joint])
         for way in self.sets:
+            ends = self._ends(way, middle)
             for joint in self.plan.free(way.limb):
-                self._describe_limb(done, part, way, joint, middle[:, joint])
+                self._describe_limb(done, part, way, joint, ends[int(joint == way.limb.end)])
         lone = (done.kind[part] == Kind.DEPTH_INTERVAL) & (done.lower[part] == done.upper[part]).all(axis=-1)
         done.kind[part] = np.where(lone, Kind.POINT, done.kind[part])
         done.fraction[part] = np.where(lone, 1.0, done.fraction[part])
@@ -283,7 +284,7 @@ class Party:
         The mean square distance to all others is that to their mean plus a constant, so the least is the medoid.
         Placements found by a closer look, or drawn out by the tolerance, are not counted as long as there are others.
         """
-        even = way.rows.seed >= 0
+        even = (way.rows.seed >= 0) & self.hosts.even[way.rows.host]
         cost = np.zeros(len(way.survivor))
         for joint in self.plan.free(way.limb):
             position = way.position(joint)
@@ -311,6 +312,7 @@ class Party:
             sure |= proven
             blamed = np.where(none & (blamed < 0), first, blamed)
         blamed = np.where(blamed < 0, self.plan.unknown[0], blamed)
+        done.miss[part] = np.where(without, self.hosts.miss[self.core], 0.0)
         done.blamed[part] = np.where(found, -1, blamed)
         done.outcome[part[sure & ~found]] = Outcome.IMPOSSIBLE
 
@@ -337,30 +339,37 @@ class Party:
         done.samples[part, joint] = count
         done.fraction[part, joint] = np.where(spacing > 0.0, np.minimum(fraction, 1.0), 1.0)
         done.spacing[part, joint] = spacing
-        done.accuracy[part, joint] = spacing * length
+        done.accuracy[part, joint] = self._unsettled() * length
 
-    def _describe_limb(self, done: Completion, part: Index, way: Way, joint: int, middle: Array) -> None:
+    def _ends(self, way: Way, middle: Array) -> Array:
+        """Return the ends of the boxes and the radii (2, N, 7) of a limb's joints: see `seek_ends`."""
+        n, who = len(self), way.survivor
+        if self.plan.hidden(way.limb):
+            representatives = [middle[:, joint] for joint in way.limb.free]
+            return seek_ends(
+                way.placer,
+                who,
+                way.rows,
+                n,
+                representatives,
+                lambda survivor, tried: self._passes(way.placer, survivor, tried),
+                way.placer.spacing()[way.rows.host],
+            )
+        ends = np.empty((2, n, 7))
+        for k, joint in enumerate(way.limb.free):
+            position = way.position(joint)
+            lower, upper = box(who, n, position)
+            _, radius = largest(who, n, np.linalg.norm(position - middle[who, joint], axis=1))
+            ends[k] = np.concatenate([-lower, upper, radius[:, None]], axis=1)
+        return ends
+
+    def _describe_limb(self, done: Completion, part: Index, way: Way, joint: int, ends: Array) -> None:
         """Describe where a joint of a limb can be."""
         n, placer, rows, who = len(self), way.placer, way.rows, way.survivor
-        position = way.position(joint)
-        sampled = self.plan.hidden(way.limb)
-        lattice = np.broadcast_to(placer.spacing(), (len(self.hosts),))[rows.host]
-        if sampled and len(who):
-            ends = seek_ends(
-                placer,
-                who,
-                rows,
-                n,
-                int(joint == way.limb.end),
-                middle,
-                lambda survivor, tried: self._passes(placer, survivor, tried),
-                lattice,
-            )
-            done.lower[part, joint], done.upper[part, joint], done.radius[part, joint] = ends
-        else:
-            done.lower[part, joint], done.upper[part, joint] = box(who, n, position)
-            _, radius = largest(who, n, np.linalg.norm(position - middle[who], axis=1))
-            done.radius[part, joint] = np.where(np.isfinite(radius), radius, np.nan)
+        ends = np.where(np.isfinite(ends), ends, np.nan)
+        done.lower[part, joint], done.upper[part, joint] = -ends[:, :3], ends[:, 3:6]
+        done.radius[part, joint] = ends[:, 6]
+        lattice = placer.spacing()[rows.host]
         done.samples[part, joint] = np.bincount(who, minlength=n)
         done.fraction[part, joint] = self._fraction(done, part, way, joint)
         trunk = self.hosts.spacing[self.core]
@@ -368,14 +377,21 @@ class Party:
         spacing[who] = lattice
         done.spacing[part, joint] = spacing + trunk
         lever = self._length(way.limb.middle) + (self._length(way.limb.end) if joint == way.limb.end else 0.0)
-        done.accuracy[part, joint] = spacing * ATTAINED * lever + trunk * (
+        crowd = np.bincount(self.hosts.core, minlength=len(self.core_frame))[self.core] > 1
+        attained = np.where(crowd, ATTAINED_IN_CROWD, ATTAINED)
+        done.accuracy[part, joint] = spacing * attained * lever + trunk * (
             lever + self._length(way.limb.base)
         )
+
+    def _unsettled(self) -> Array:
+        """Return how far the trunk may turn on beyond what was found (N,), radians: rotations have corners."""
+        turn = self.hosts.turn
+        return self.hosts.spacing[self.core] * (2.0 if turn is None or turn.about is None else 1.0)
 
     def _passes(self, placer: LimbPlacer, survivor: Index, rows: Placed) -> Mask:
         limb = placer.limb
         checks = [*self.plan.limb_cross[limb], *self.plan.middle_own[limb], *self.plan.end_own[limb]]
-        finite = np.isfinite(rows.end).all(axis=1)
+        finite: Mask = np.asarray(np.isfinite(rows.end).all(axis=1))
         passed = finite.copy()
         passed[finite], _ = ask(checks, self._limb_columns(placer, survivor[finite], rows.take(finite)))
         return passed
@@ -390,15 +406,16 @@ class Party:
             base = way.limb.base
             return np.asarray(np.minimum(length / self._depths(joint, reach, base), 1.0))
         n_middle, n_end = way.placer.per_host()
-        hosts = np.maximum((self.allowed).sum(axis=1), 1)
-        label = np.where(rows.seed >= 0, rows.host * (n_middle * max(n_end, 1) * 2) + rows.seed, -1)
+        hosts = np.maximum((self.allowed & self.hosts.even).sum(axis=1), 1)
+        even = (rows.seed >= 0) & self.hosts.even[rows.host]
+        label = np.where(even, rows.host * (n_middle * max(n_end, 1) * 2) + rows.seed, -1)
         if joint == way.limb.middle or self.plan.states[way.limb.middle] != State.HIDDEN:
             tried = n_middle if joint == way.limb.middle else n_end
             lattices = 1 if self.plan.states[way.limb.middle] != State.SEEN else 2
             part_of = np.zeros(n)
             part_of[who] = way.placer.part()[rows.host]
             return np.asarray(distinct(who, n, label) / (tried * hosts * lattices) * part_of)
-        return np.asarray(np.bincount(who, minlength=n) / (n_middle * n_end * hosts))
+        return np.asarray(np.bincount(who[even], minlength=n) / (n_middle * n_end * hosts))
 
     def _depths(self, joint: int, reach: float, base: int | None = None) -> Array:
         """Return how long the part of a seen joint's ray is (N,) that lengths alone allow, metres."""

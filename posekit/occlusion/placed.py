@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.occlusion.asking import Index, Mask
@@ -32,7 +31,7 @@ class Placed:
     host: Index
     middle: Array
     end: Array
-    branch: NDArray[np.int8]
+    branch: Index
     excess: Array
     seed: Index
 
@@ -46,6 +45,13 @@ class Placed:
             **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in FIELDS}
         )
         return both.take(np.argsort(both.host, kind="stable"))
+
+    def replaced(self, rows: Index, by: Placed) -> Placed:
+        """Put others in the place of some."""
+        merged = {name: getattr(self, name).copy() for name in FIELDS}
+        for name, values in merged.items():
+            values[rows] = getattr(by, name)
+        return Placed(**merged)
 
     def with_seed(self, seed: Index) -> Placed:
         """Name other samples that they belong to."""

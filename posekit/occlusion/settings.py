@@ -24,7 +24,7 @@ class Sampling:
     hosts : int
         Of those, how many limbs are placed on, at most.
     rounds : int
-        Steps in which the ends of the boxes are sought between the samples, each 0.7 of the last.
+        Steps in which the ends of the boxes are sought between the samples.
 
     Raises
     ------
@@ -37,7 +37,7 @@ class Sampling:
     circle: int = 120
     rotations: int = 6000
     hosts: int = 120
-    rounds: int = 12
+    rounds: int = 16
 
     def __post_init__(self) -> None:
         for name, least in (

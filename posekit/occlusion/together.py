@@ -73,11 +73,8 @@ def choose(
             passed, _ = ask([check], Rows.of(base, open_[grid[0]]).with_(columns))
             spread = [len(open_), *(tried if limb in which else 1 for limb in range(m))]
             allowed &= passed.reshape(spread)
-        cost = sum(
-            (np.arange(tried) ** 2).reshape([tried if axis == limb else 1 for axis in range(m)])
-            for limb in range(m)
-        )
-        total = np.where(allowed, np.asarray(cost)[None], np.iinfo(np.int64).max).reshape(len(open_), -1)
+        rank = np.indices((tried,) * m)
+        total = np.where(allowed, (rank**2).sum(axis=0), np.iinfo(np.int64).max).reshape(len(open_), -1)
         best = total.argmin(axis=1)
         ok = np.flatnonzero(allowed.reshape(len(open_), -1)[np.arange(len(open_)), best])
         places = np.unravel_index(best[ok], (tried,) * m)

@@ -12,6 +12,7 @@ from posekit.pipeline.summary import summary_lines as summary_lines
 from posekit.pipeline.summary import verdict_lines as verdict_lines
 from posekit.pipeline.tolerance import EXACT as EXACT
 from posekit.pipeline.tolerance import MEASURED as MEASURED
+from posekit.pipeline.tolerance import PHOTOGRAPH as PHOTOGRAPH
 from posekit.pipeline.tolerance import Tolerance as Tolerance
 from posekit.pipeline.validate import recovered_with as recovered_with
 from posekit.pipeline.validate import validate as validate

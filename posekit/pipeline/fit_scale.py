@@ -12,7 +12,7 @@ from posekit.linkage import Minima, search
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.scale import Scale
-from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
+from posekit.pipeline.tolerance import EXACT, PHOTOGRAPH, Tolerance
 from posekit.skeleton import HEAD, JOINT
 
 ROUNDING = 1e-9
@@ -122,7 +122,7 @@ def _family(
 
 def _near_enough(found: Minima, tolerance: Tolerance | None) -> Array:
     """Choose among the minima: those without a residual, else those within the tolerance, else the best."""
-    rigid = (MEASURED if tolerance is None else tolerance).rigid
+    rigid = (PHOTOGRAPH if tolerance is None else tolerance).rigid
     unit = float(found.constraints.family.linkage.lengths.mean())
     residual = found.residual
     best = float(residual[0])
@@ -134,4 +134,4 @@ def _allowed(how: str, tolerance: Tolerance | None) -> float:
     """Return by how much (m) a segment may be too short: nothing at a scale that was given as exact."""
     if tolerance is not None:
         return tolerance.tangent
-    return EXACT.tangent if how == "value" else MEASURED.tangent
+    return EXACT.tangent if how == "value" else PHOTOGRAPH.tangent

@@ -23,7 +23,7 @@ from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
 from posekit.pipeline.scale import Scale
 from posekit.pipeline.taylor.body import TaylorBody
-from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
+from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
 from posekit.validators.walking import DEFAULT_RULES
 
@@ -63,7 +63,7 @@ def recover(
         Rules of walking, used where ``walking`` is among the checks.
     tolerance : Tolerance, optional
         By default each frame is judged as exact where distances inside torso or hips show that it is, else as
-        measured.
+        measured, or as a photograph where the view is uncalibrated.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration.
     group : float, optional
@@ -105,6 +105,7 @@ def recover(
     records = camera_records(view, fit)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
     grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand)
+    inexact_tolerance = MEASURED if fit.families is None else PHOTOGRAPH
     placed: dict[int, tuple[Batch, int]] = {}
     for part in _parts(fit):
         batch = grower.grow(part, tolerance or EXACT)
@@ -113,7 +114,7 @@ def recover(
             exact = set(fit.frame[part[batch.exact]].tolist())
             inexact = part[[k not in exact for k in fit.frame[part].tolist()]]
             if len(inexact):
-                _place(placed, grower.grow(inexact, MEASURED), fit.frame[inexact])
+                _place(placed, grower.grow(inexact, inexact_tolerance), fit.frame[inexact])
         if progress is not None:
             progress(len(np.unique(fit.frame[part])))
     hypotheses = np.bincount(fit.frame, minlength=len(view.time))
@@ -141,6 +142,7 @@ def recover(
         "tolerance": "exact, else measured" if tolerance is None else asdict(tolerance),
         "exact": asdict(EXACT),
         "measured": asdict(MEASURED),
+        "photograph": asdict(PHOTOGRAPH),
         "contact_margin": contact_margin,
         "group": group,
         "figure": body.figure.hash,

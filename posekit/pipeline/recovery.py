@@ -17,7 +17,7 @@ from posekit.files import Family, Inferred
 from posekit.grouping import group_postures
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
-from posekit.pipeline.tolerance import EXACT, MEASURED, Tolerance
+from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
@@ -273,8 +273,9 @@ class FrameRecovery:
 
     @property
     def judged(self) -> str | None:
-        """``exact``, ``measured``, or ``given`` tolerances; None where nothing was grown."""
-        return {None: None, EXACT: "exact", MEASURED: "measured"}.get(self.tolerance, "given")
+        """``exact``, ``measured``, ``photograph``, or ``given`` tolerances; None where nothing was grown."""
+        names = {None: None, EXACT: "exact", MEASURED: "measured", PHOTOGRAPH: "photograph"}
+        return names.get(self.tolerance, "given")
 
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""

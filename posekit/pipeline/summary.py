@@ -17,7 +17,7 @@ def summary_lines(recovery: Recovery) -> list[str]:
     """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
     frames = list(enumerate(recovery.frames))
     lines = [
-        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>9}  rejected most by (of 8192)"
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected most by (of 8192)"
     ]
     cut = len(frames) - 2 * SHOWN
     for k, frame in frames:
@@ -54,7 +54,7 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
     judged = frame.judged or "-"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
-    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>9}  {most}"
+    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
 
 
 def verdict_lines(report: Report) -> list[str]:

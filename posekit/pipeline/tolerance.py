@@ -48,3 +48,7 @@ EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9, placement=True)
 
 MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False, angle=2.0)
 """For measured image points and bodies: what real torsos give (docs, "Tolerances")."""
+
+PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.05, placement=False, angle=10.0)
+"""For uncalibrated pictures: what took them was no scaled orthographic camera, and from a few metres the scale
+differs by some percent between the nearer and the farther limbs (docs, "Uncalibrated pictures")."""

@@ -16,8 +16,9 @@ from posekit.robot.names import SHORT_NAMES
 
 STICK_FIGURE: Final = "stick_figure"
 PACKAGE: Final = "example-robot-data"
-FOLDERS_OF_URDFS: Final = frozenset(("urdf", "urdfs", "robot", "robots", "model", "models"))
-"""Folders that lie beside the folder of meshes, not above it."""
+FOLDERS_OF_URDFS: Final = frozenset(("urdf", "urdfs", "robot", "robots"))
+FOLDERS_OF_MESHES: Final = ("meshes", "mesh")
+"""A folder of the first kind beside one of the second is one of two in a package."""
 _PACKAGE_DEPTH: Final = 4
 _URDF: Final = (".urdf", ".xml")
 
@@ -64,7 +65,8 @@ def find(
         The SRDF; by default the published one, or that of the URDF's own name beside it.
     package_dirs : sequence of path
         Directories that hold its packages, besides the URDF's own. By default those are the URDF's folder, the
-        folder above where it is called ``urdf`` or ``robots``, and the nearest one above with a ``package.xml``.
+        folder above where that holds ``urdf`` or ``robots`` beside ``meshes``, and the nearest one above with a
+        ``package.xml``.
 
     Raises
     ------
@@ -154,7 +156,8 @@ def _from_path(path: Path) -> RobotFiles:
     beside = path.with_suffix(".srdf")
     robots = robots_folder()
     built_in = robots is not None and path.resolve().is_relative_to(robots.resolve())
-    above = [folder.parent] if folder.name in FOLDERS_OF_URDFS else []
+    has_meshes = any((folder.parent / name).is_dir() for name in FOLDERS_OF_MESHES)
+    above = [folder.parent] if has_meshes and folder.name in FOLDERS_OF_URDFS else []
     ancestors = folder, *list(folder.parents)[:_PACKAGE_DEPTH]
     package = [place for place in ancestors if (place / "package.xml").is_file()][:1]
     data = [robots.parent, robots] if built_in and robots is not None else []

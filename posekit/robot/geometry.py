@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import pinocchio as pin
 
-from posekit.intake import cut, one_line, refusal
+from posekit.intake import cut, refusal
 from posekit.robot.declared import declared_bodies
 
 
@@ -31,10 +31,8 @@ def build_geometry(
     try:
         geometry = pin.buildGeomFromUrdfString(model, text, wanted)
     except (ValueError, RuntimeError) as error:
-        reason = cut(one_line(str(error).splitlines()[0]))
-        raise refusal(
-            source, "", f"{kind} bodies that coal cannot load: {reason}", "bodies", "correct them"
-        ) from error
+        got = f"a {kind} body that coal cannot load: {_reason(error)}"
+        raise refusal(source, "", got, "a mesh with triangles", "export the mesh again") from error
     if kind == "collision":
         _check_loaded(model, geometry, robot, source)
     return geometry
@@ -49,6 +47,13 @@ def shape_of(body: pin.GeometryObject) -> str:
     """Return a body's shape as URDF calls it."""
     kind = type(body.geometry).__name__
     return "mesh" if kind.startswith(("BVHModel", "Convex")) else kind.lower()
+
+
+def _reason(error: Exception) -> str:
+    """Take from coal's several lines what it says, and the file's name without its folder."""
+    _, _, message = str(error).rpartition("message: ")
+    first, *rest = [line for line in message.splitlines() if not line.startswith("Hint")] or [""]
+    return ", ".join(cut(line) for line in (first.rpartition("/")[2], *rest[:1]))
 
 
 def _check_loaded(

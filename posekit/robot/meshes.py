@@ -12,7 +12,7 @@ from posekit.intake import check_mesh, refusal
 from posekit.robot.declared import declared_bodies
 from posekit.robot.mesh_path import resolve_mesh
 
-MAX_FACES: Final = 3_000_000
+MAX_FACES: Final = 2_000_000
 """Faces of all meshes of one robot together."""
 
 

@@ -56,17 +56,15 @@ def _set_limits(memory: int, cpu: int) -> None:
     """Bound memory (bytes) and processor time (s), write no file and leave no core dump."""
     import resource
 
-    bounds: dict[int, Any] = {
-        resource.RLIMIT_AS: memory,
-        resource.RLIMIT_CPU: cpu,
-        resource.RLIMIT_FSIZE: 0,
-        resource.RLIMIT_CORE: 0,
+    bounds = {
+        resource.RLIMIT_AS: (memory, memory),
+        resource.RLIMIT_CPU: (cpu, cpu + 5),  # the first sends SIGXCPU, the second SIGKILL
+        resource.RLIMIT_FSIZE: (0, 0),
+        resource.RLIMIT_CORE: (0, 0),
     }
     for kind, bound in bounds.items():
-        with suppress(
-            ValueError, OSError
-        ):  # a lower one is set already, or the system knows none of this kind
-            resource.setrlimit(kind, (bound, bound))
+        with suppress(ValueError, OSError):  # a lower bound is set already, or the system knows none such
+            resource.setrlimit(kind, bound)
 
 
 if __name__ == "__main__":

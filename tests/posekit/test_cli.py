@@ -16,9 +16,17 @@ import pytest
 from posekit.cli.options import examples, numbers, rule_numbers, signed_length, split
 from posekit.errors import InputError
 from posekit.figure import load_figure
-from posekit.files import read_postures, read_report, read_result, read_view
+from posekit.files import (
+    ScaledOrthographicModel,
+    View,
+    read_postures,
+    read_report,
+    read_result,
+    read_view,
+    write_view,
+)
 from posekit.head import HeadPoints
-from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 
 FIGURE = load_figure()
@@ -821,11 +829,13 @@ def test_an_uncalibrated_view_by_scale_and_flips(run: Run, tmp_path: Path) -> No
         for a, b in TREE_SEGMENTS
         if abs(joints[a, 2] - joints[b, 2]) > 0.01
     }
-    Path("near.json").write_text(json.dumps({"schema": "posekit.nearer/1", "frames": [near]}), encoding="utf-8")
+    Path("near.json").write_text(
+        json.dumps({"schema": "posekit.nearer/1", "frames": [near]}), encoding="utf-8"
+    )
     done = run("recover", "view.json", "-o", "out.json", "--scale", "4.0", "--nearer", "near.json")
     assert done.code == 0, done.err
     assert "scale by value: 400 to 400 pixels a metre" in done.out
-    frame = files.read_result("out.json").frames[0]
+    frame = read_result("out.json").frames[0]
     np.testing.assert_allclose(frame.joints[0], joints, atol=1e-6)
     failed = run("recover", "view.json", "-o", "no.json", "--scale", "1")
     assert failed.code == 2

@@ -11,7 +11,7 @@ import pytest
 from posekit.cameras import PinholeCamera
 from posekit.errors import FigureError, HeadError, InputError
 from posekit.figure import Figure, load_figure
-from posekit.files import LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
+from posekit.files import LeeChenModel, OpenCVModel, View
 from posekit.head import HeadWarning
 from posekit.pipeline import (
     EXACT,
@@ -250,11 +250,6 @@ def test_a_view_without_any_neck_is_refused(f: float | None, text: str) -> None:
         recover(view)
     assert str(caught.value).startswith(text)
     assert "or root" in str(caught.value)
-
-
-def test_a_scaled_orthographic_view_is_refused_with_what_is_taken() -> None:
-    with pytest.raises(InputError, match=r"scaled-orthographic; recover takes lee-chen and opencv cameras"):
-        recover(change(SEQ1, camera=ScaledOrthographicModel(scale=100.0)))
 
 
 def test_a_head_point_that_does_not_fit_is_named() -> None:

@@ -129,8 +129,9 @@ def test_the_rigid_torso_fixes_the_scale() -> None:
     assert nearest(recovery, TRUTH).max() < 1e-6
     for frame in recovery.frames:
         assert frame.family is not None
-        assert frame.family.minima_s == pytest.approx(frame.family.chosen)
-        assert np.abs(frame.family.minima_s / S - 1).min() < 1e-9
+        assert set(frame.family.chosen) <= set(frame.family.minima_s)
+        assert np.abs(frame.family.chosen / S - 1).min() < 1e-9
+        assert (np.diff(frame.family.minima_residual) >= 0).all()
         assert len(frame.family.curve_s) == len(frame.family.curve_residual) > 10
         assert frame.scales is not None
         assert set(np.unique(frame.scales)) <= set(frame.family.chosen)
@@ -185,7 +186,8 @@ def test_taylors_human_needs_neither_neck_nor_pelvis(scale: str | None) -> None:
     frame = recovery.frames[0]
     assert len(frame) > 0
     assert np.isfinite(frame.joints).all()
-    assert nearest(recovery, truth)[0] < 0.05
+    # His spine is straight; the figure's, by 4 cm, is not: 0.6 cm too long is 10 cm of depth.
+    assert nearest(recovery, truth)[0] < 0.15
     assert frame.inferred is not None
     assert set(frame.inferred[0]) == {"neck", "pelvis"}
     assert len(frame) + sum(frame.rejected.values()) == 8192

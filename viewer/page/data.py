@@ -12,13 +12,15 @@ from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
 from posekit.figure import Figure
+from posekit.files.camera_model import ScaledOrthographicModel
 from posekit.files.postures import Postures
 from posekit.files.result import Result, ResultFrame
 from posekit.files.view import View
-from posekit.skeleton import JOINTS, POINTS, SEGMENTS
+from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
+from posekit.viewer.page.family import family_data, inferred_data, tree_of, walk
 from posekit.viewer.scene.colours import GROUPS, SIDES, number, side
-from posekit.viewer.scene.subject import Shown, subject_of
-from posekit.viewer.scene.world import upright_world
+from posekit.viewer.scene.subject import Shown, Subject, subject_of
+from posekit.viewer.scene.world import World, upright_world
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
@@ -68,9 +70,9 @@ def page_data(
     result = None if isinstance(given, Postures) else given
     subject = subject_of(given, view)
     chosen = _chosen(len(subject.frames), frames)
-    bodies = [subject.frames[index].points for index in chosen]
+    bodies = [subject.frames[index].aligned_points for index in chosen]
     _check_count(bodies)
-    truth = None if view is None else view.truth[chosen]
+    truth = None if view is None else _truth(result, view, subject, chosen)
     world = upright_world(np.concatenate([body[:, : len(JOINTS)] for body in bodies]), subject.R_cam_world)
     return {
         "title": title,
@@ -83,7 +85,10 @@ def page_data(
         "pointSides": [side(name) or "middle" for name in POINTS],
         "segments": [[a, b, _segment_side(a, b)] for a, b in SEGMENTS],
         "capsules": _capsules(subject.figure),
+        "tree": None if result is None else tree_of(result.frames[0].levels["joint"]),
+        "level": result is not None and subject.R_cam_world is None,
         "camera": {
+            "parallel": result is not None and any(frame.family is not None for frame in result.frames),
             "position": world.t_world_cam.tolist(),
             "forward": world.R_world_cam[:, 2].tolist(),
             "right": world.R_world_cam[:, 0].tolist(),
@@ -96,6 +101,11 @@ def page_data(
                 "number": index + 1,
                 "points": _steps(world.place(body)),
                 **({} if result is None else _frame(result.frames[index])),
+                **(
+                    {}
+                    if result is None
+                    else _uncalibrated(result.frames[index], subject.frames[index], world)
+                ),
                 "image": _image(subject.frames[index], view, index),
                 "truth": None if truth is None else _steps(world.place(truth[k : k + 1]))[0],
             }
@@ -120,6 +130,34 @@ def _frame(frame: ResultFrame) -> Json:
         "margins": {name: _numbers(values) for name, values in frame.margins.items()},
         "rejected": [[*reason.partition("/")[::2], leaves] for reason, leaves in reasons],
     }
+
+
+def _uncalibrated(frame: ResultFrame, shown: Shown, world: World) -> Json:
+    """Return what a frame has where its camera is not calibrated, or where joints were not seen."""
+    found: Json = {}
+    family = family_data(frame, shown, world, walk(frame.levels["joint"]))
+    if family is not None:
+        found["family"] = family
+    if frame.inferred is not None:
+        found["inferred"] = inferred_data(frame)
+    return found
+
+
+def _truth(result: Result | None, view: View, subject: Subject, chosen: Sequence[int]) -> Array:
+    """Return the true postures; of an uncalibrated view they are moved to where the survivors are drawn."""
+    truth = np.array(view.truth[chosen])
+    for row, index in enumerate(chosen):
+        shown = subject.frames[index]
+        if result is None or result.frames[index].family is None or not len(shown):
+            continue
+        # Depth is relative, and so is the place in a picture whose scale is another one.
+        moves = shown.points[0, : len(JOINTS)] - truth[row]
+        known = np.isfinite(moves).all(axis=1)
+        if known.any():
+            root = JOINT.get(result.frames[index].levels["joint"][0], 0)
+            root = root if known[root] else int(np.argmax(known))
+            truth[row] += [*moves[known, :2].mean(axis=0), moves[root, 2]]
+    return truth
 
 
 def _chosen(count: int, frames: Sequence[int] | None) -> list[int]:
@@ -190,9 +228,10 @@ def _steps(points: Array) -> list[list[int | None]]:
 
 
 def _image(shown: Shown, view: View | None, index: int) -> list[list[float] | None] | None:
-    """Return the 19 image points: the view's, or those that the result's own camera makes of its survivors."""
+    """Return the 19 image points, as wide as the view's pixels: the view's, or those of the result's own camera."""
     if view is not None:
-        return _rows(np.concatenate([view.image[index], view.head_image[index]]))
+        width = view.camera.aspect if isinstance(view.camera, ScaledOrthographicModel) else 1.0
+        return _rows(np.concatenate([view.image[index], view.head_image[index]]) * [width, 1.0])
     return None if shown.sight is None else _rows(shown.sight.image)
 
 

@@ -20,6 +20,9 @@ from posekit.viewer.standalone import script_json, standalone_page
 START = Eye(position=np.array([-2.6, -3.0, 1.7]), target=np.array([0.0, 0.0, 0.85]))
 """Until the page's own script has measured the postures."""
 
+SCRIPTS = ("lift.js", "panel.js", "scale.js")
+"""In the order that they need each other; ``scene.js`` runs after them."""
+
 
 def page_html(
     given: Result | Postures,
@@ -30,7 +33,8 @@ def page_html(
 ) -> str:
     """Make the page, as text; see `write_page`."""
     data = page_data(given, view, title=title, frames=frames)
-    panel = f"<script>\nconst DATA = {script_json(data)};\n{_file('panel.js')}\n</script>"
+    scripts = "\n".join(_file(name) for name in SCRIPTS)
+    panel = f"<script>\nconst DATA = {script_json(data)};\n{scripts}\npage.chooseFrame(0);\n</script>"
     return standalone_page(
         Scene(),
         eye=START,

@@ -2,7 +2,7 @@
 // file gave is set as text, never as HTML. scene.js draws what is chosen here.
 "use strict";
 const page = (() => {
-  const state = { frame: 0, survivor: 0, sort: { key: "number", down: false } };
+  const state = { frame: 0, survivor: 0, scale: null, sort: { key: "number", down: false } };
   const listeners = [];
   const byId = (id) => document.getElementById(id);
   const frame = () => DATA.frames[state.frame];
@@ -36,11 +36,13 @@ const page = (() => {
     const code = frame().branches?.[state.survivor];
     state.frame = Math.min(Math.max(index, 0), DATA.frames.length - 1);
     state.survivor = Math.max(0, frame().branches?.indexOf(code) ?? 0);
+    state.scale = null;
     byId("frame").value = state.frame;
     showTime();
     showSurvivors();
     showLevels();
     showRejected();
+    showInferred();
     showSeen();
     changed();
   }
@@ -48,16 +50,37 @@ const page = (() => {
   function chooseSurvivor(index) {
     if (!(index in frame().points)) return;
     state.survivor = index;
+    state.scale = null;
     for (const made of byId("survivors-body").rows) {
       const chosen = Number(made.dataset.survivor) === index;
       made.setAttribute("aria-selected", chosen);
       if (chosen) made.scrollIntoView({ block: "nearest" });
     }
     showLevels();
+    showInferred();
     changed();
   }
 
-  const changed = () => listeners.forEach((listener) => listener());
+  // Draws the chosen posture at another scale; null is its own.
+  function chooseScale(s) {
+    state.scale = s;
+    changed();
+  }
+
+  function changed() {
+    listeners.forEach((listener) => listener());
+    showMargins();
+  }
+
+  // Margins are judged at the scale that a posture was recovered at, wherever the slider is.
+  function showMargins() {
+    const { family } = frame(), own = family && lift.scaleOf(family, state.survivor);
+    const away = Boolean(family) && state.scale !== null && Math.abs(state.scale / own - 1) > 1e-9;
+    byId("survivors").classList.toggle("elsewhere", away);
+    byId("margins-of")?.replaceChildren(
+      away ? ` – margins are those of the recovered scale, ${own.toPrecision(4)} px/m` : " – with the room left to each check's bound",
+    );
+  }
 
   function showTime() {
     const { number, time } = frame();
@@ -67,6 +90,7 @@ const page = (() => {
 
   function columns() {
     const found = [{ key: "number", title: "posture" }];
+    if (frame().family?.scales.length > 1) found.push({ key: "scale", title: "s (px/m)" });
     if (frame().groups) found.push({ key: "group", title: "group" });
     for (const margin of DATA.margins) {
       found.push({ key: margin.name, title: words(margin.name) + (margin.unit ? ` (${margin.unit})` : ""), margin });
@@ -77,7 +101,7 @@ const page = (() => {
   function sorted() {
     const { key, down } = state.sort, here = frame();
     const value = (index) =>
-      key === "number" ? index : key === "group" ? here.groups[index] : here.margins[key][index] ?? -Infinity;
+      key === "number" ? index : key === "scale" ? lift.scaleOf(here.family, index) : key === "group" ? here.groups[index] : here.margins[key][index] ?? -Infinity;
     const order = here.points.map((_, index) => index);
     return order.sort((a, b) => (value(a) - value(b) || 0) * (down ? -1 : 1) || a - b);
   }
@@ -95,7 +119,10 @@ const page = (() => {
           ? `${plural(count, "posture survives", "postures survive")}${groups}`
           : plural(count, "posture", "postures");
     if (count && DATA.margins.length) {
-      byId("survivors-title").append(element("span", " – with the room left to each check's bound", "soft"));
+      const made = element("span", undefined, "soft");
+      made.id = "margins-of";
+      byId("survivors-title").append(made);
+      showMargins();
     }
     row(
       head,
@@ -112,6 +139,7 @@ const page = (() => {
     for (const index of sorted()) {
       const cells = columns().map((column) => {
         if (column.key === "number") return element("td", index + 1);
+        if (column.key === "scale") return element("td", lift.scaleOf(here.family, index).toPrecision(4));
         if (column.key === "group") {
           const made = element("td"), chip = element("span", undefined, "chip");
           chip.style.background = css(groupColour(index));
@@ -178,6 +206,32 @@ const page = (() => {
       bar.style.width = `${(leaves / top) * 55}%`;
       count.append(bar, leaves.toLocaleString("en"));
       row(body, [element("td", words(check), "text"), element("td", words(where), "text wrap"), count]);
+    }
+  }
+
+  // Joints that the image does not show: where they can be, from where they are drawn.
+  function showInferred() {
+    const here = frame().inferred?.[state.survivor] ?? {}, section = byId("unseen"), note = byId("survivors-note");
+    const names = Object.keys(here).map((joint) => DATA.points[joint]);
+    const [head, body] = [section.querySelector("thead"), section.querySelector("tbody")];
+    note.hidden = !names.length;
+    note.textContent = `Inferred, not seen: ${names.map(words).join(", ")}.`;
+    section.querySelector("p").textContent = names.length
+      ? "These joints were not seen. They are drawn hollow, at one position in the middle of all that lengths, ranges and neighbours allow; boxes hold them all. All others are exact."
+      : "All joints of this posture were seen.";
+    head.replaceChildren();
+    body.replaceChildren();
+    if (!names.length) return;
+    row(head, ["joint", "can be on", "right (cm)", "down (cm)", "deeper (cm)", "within (cm)"].map((title, k) => element("th", title, k < 2 ? "text" : "")));
+    const cm = (value) => (100 * value).toFixed(1).replace("-0.0", "0.0").replace("-", "−");
+    for (const [joint, one] of Object.entries(here)) {
+      const share = one.fraction < 1 ? `, ${(100 * one.fraction).toPrecision(2)} %` : "";
+      const cells = [element("td", words(DATA.points[joint]), "text"), element("td", one.kind + share, "text wrap")];
+      for (const k of [0, 1, 2]) {
+        const point = one.upper[k] - one.lower[k] < 1e-4;
+        cells.push(element("td", point ? cm(one.lower[k]) : `${cm(one.lower[k])} … ${cm(one.upper[k])}`));
+      }
+      row(body, [...cells, element("td", cm(one.radius))]);
     }
   }
 
@@ -266,6 +320,8 @@ const page = (() => {
   byId("key-left").style.background = css(DATA.colours.left);
   byId("truth-box").hidden = !DATA.frames.some((one) => one.truth?.some((step) => step !== null));
   byId("look-camera").hidden = byId("rays-box").hidden = DATA.kind !== "result";
+  byId("unseen-tab").hidden = !DATA.frames.some((one) => one.inferred?.some((joints) => Object.keys(joints).length));
+  if (DATA.level) byId("hint").textContent += " – upright as if the camera was held level";
   byId("time").hidden = DATA.frames.length < 2;
   byId("tabs").hidden = byId("levels").hidden = DATA.kind !== "result";
   byId("frame").max = DATA.frames.length - 1;
@@ -274,7 +330,6 @@ const page = (() => {
   for (const tab of document.querySelectorAll("#tabs button")) tab.onclick = () => chooseTab(tab.dataset.tab);
   document.addEventListener("keydown", keys);
   showSettings();
-  chooseFrame(0);
   // Without WebGL meshcat's viewer throws when it is made, and scene.js is never reached.
   window.addEventListener("error", () => {
     if (state.drawn) return;
@@ -283,5 +338,5 @@ const page = (() => {
     );
   });
 
-  return { state, frame, chooseFrame, chooseSurvivor, groupColour, onChange: (listener) => listeners.push(listener) };
+  return { state, frame, chooseFrame, chooseSurvivor, chooseScale, groupColour, onChange: (listener) => listeners.push(listener) };
 })();

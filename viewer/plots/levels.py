@@ -11,6 +11,7 @@ from posekit.errors import ViewerError
 from posekit.files.result import ResultFrame
 from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
 from posekit.viewer.plots.panels import panels
+from posekit.viewer.plots.tree_nodes import scale_count
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,7 +65,7 @@ def plot_levels(
             largest = max(
                 largest, *(int(row.max(initial=1)) for row in (*rows.values(), *print_rows.values()))
             )
-            _draw(panel, rows, print_rows)
+            _draw(panel, rows, print_rows, trees=scale_count(frame))
             panel.set_title(name)
             panel.set_yticks(range(len(frame.levels["joint"])), [_label(j) for j in frame.levels["joint"]])
         axes[0].invert_yaxis()
@@ -76,7 +77,9 @@ def plot_levels(
     return figure
 
 
-def _draw(panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, np.ndarray]) -> None:
+def _draw(
+    panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, np.ndarray], *, trees: int
+) -> None:
     for stage, counts in rows.items():
         label, colour, marker = STAGES[stage]
         levels = np.arange(len(counts))
@@ -109,7 +112,7 @@ def _draw(panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, 
         )  # fmt: skip
     depth = len(next(iter(rows.values())))
     panel.plot(
-        2.0 ** np.arange(depth), np.arange(depth), color=MUTED, linestyle=(0, (1, 2)), linewidth=0.9,
+        trees * 2.0 ** np.arange(depth), np.arange(depth), color=MUTED, linestyle=(0, (1, 2)), linewidth=0.9,
         label="if nothing were pruned", gid="full tree",
     )  # fmt: skip
 

@@ -64,6 +64,8 @@ def plot_projections(
 ) -> Figure:
     """Draw survivors of one frame from the side: the camera is on the left and looks to the right.
 
+    Of an uncalibrated picture depth is relative: it counts from the root.
+
     Parameters
     ----------
     joints : array (N, 14, 3)
@@ -107,7 +109,9 @@ def plot_projections(
         alpha = max(0.25, len(joints) ** -0.5) if superposed else 1.0
         for panel, posture in zip(axes, points, strict=True):
             draw_stick(panel, posture, extent=extent, alpha=alpha)
-        figure.supxlabel("depth $z_c$ from the optical centre (m); the camera is to the left", fontsize=9)
+        # Nobody stands behind the centre of a camera: depth is then that of an uncalibrated picture.
+        origin = "root" if bool((joints[..., 2] <= 0).any()) else "optical centre"
+        figure.supxlabel(f"depth $z_c$ from the {origin} (m); the camera is to the left", fontsize=9)
         figure.supylabel("height $y_c$ (m)", fontsize=9)
         add_key(figure)
     return figure

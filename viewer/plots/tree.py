@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final
 from posekit.errors import ViewerError
 from posekit.files.result import ResultFrame
 from posekit.viewer.plots.figure import MUTED, TRUNK, drawing
-from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, tips
+from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, scale_count, tips
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,8 +68,10 @@ def plot_tree(frame: ResultFrame, levels: int | None = None) -> Figure:
         axes.spines[["left", "bottom"]].set_visible(False)
         axes.grid(axis="y")
         deeper = "" if shown == depth else f"; {depth - shown} levels below are not drawn"
+        trees = scale_count(frame)
+        leaves = f"{2**depth} leaves" if trees == 1 else f"{trees} scales of {2**depth} leaves each"
         axes.set_title(
-            f"{frame.time:.3g} s: {2**depth} leaves, {len(frame.branches)} survive\n"
+            f"{frame.time:.3g} s: {leaves}, {len(frame.branches)} survive\n"
             f"left: nearer to the camera, right: farther{deeper}",
             loc="left",
         )

@@ -34,6 +34,8 @@ class Tip:
 def tips(frame: ResultFrame, levels: int) -> list[Tip]:
     """Return where the branches of a frame's tree end, from the nearest to the farthest.
 
+    Of a frame that was recovered at several scales it is the union of their trees.
+
     Parameters
     ----------
     frame : ResultFrame
@@ -51,10 +53,16 @@ def tips(frame: ResultFrame, levels: int) -> list[Tip]:
         _check(code, frame)
         alive[code[:levels]] = alive.get(code[:levels], 0) + 1
     found = [Tip(branch=branch, reason="", survivors=count) for branch, count in alive.items()]
+    pruned = pruned_branches(frame)
     inner = {code[:level] for code in frame.branches for level in range(len(code) + 1)}
+    deeper: set[str] = set()
+    if scale_count(frame) > 1:  # what one scale prunes may grow on at another: drawn is what grew at any
+        deeper = inner | {branch[:level] for branch, _ in pruned for level in range(len(branch))}
     cut: dict[str, Tip] = {}
-    for branch, reason in pruned_branches(frame):
+    for branch, reason in pruned:
         shown = branch[:levels]
+        if branch in deeper:
+            continue
         if branch in inner:
             raise ViewerError(f"pruned: branch {branch} also leads to a survivor; expected one or the other")
         if len(branch) <= levels:
@@ -63,6 +71,11 @@ def tips(frame: ResultFrame, levels: int) -> list[Tip]:
             # Everything below dies, but deeper than is drawn: the branch ends without a reason of its own.
             cut.setdefault(shown, Tip(branch=shown, reason="", survivors=0))
     return sorted([*found, *cut.values()], key=lambda tip: tip.branch)
+
+
+def scale_count(frame: ResultFrame) -> int:
+    """Count the trees that were grown: one, or one a scale of an uncalibrated frame."""
+    return 1 if frame.family is None else max(1, len(frame.family.chosen))
 
 
 def readable_levels(frame: ResultFrame) -> int:

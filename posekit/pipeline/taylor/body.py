@@ -18,6 +18,7 @@ from posekit.pipeline.taylor.proportions import TABLE_1, figure_of
 from posekit.pipeline.tolerance import Tolerance
 from posekit.skeleton import HEAD
 from posekit.tree import Check, InterpretationTree, Leaves
+from posekit.validators import collision, judge
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,9 +76,20 @@ class TaylorBody:
             judges.checks,
             ranges=judges.ranges,
             tolerance=tolerance,
-            contact_margin=judges.contact_margin,
+            contact_margin=judges.contact_margin + self.overlap,
         )
         return [*self._human.closing, *judging]
+
+    @cached_property
+    def overlap(self) -> float:
+        """How deep bodies are in each other where the figure stands with hanging arms, metres; zero or negative.
+
+        Table 1's hips are as wide as a body and its forearms reach to the fingers: where they overlap in standing they
+        may overlap in any posture.
+        """
+        standing = self.figure.neutral_points[None]
+        pairs = judge(collision(self.figure, exact=True), standing)
+        return min(0.0, *(float(one.worst[0]) for one in pairs))
 
     @cached_property
     def _relative(self) -> Human:

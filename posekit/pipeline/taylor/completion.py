@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 
@@ -29,10 +28,6 @@ MIDDLES = ("mid_shoulders", "mid_hips")
 SHOULDERS = ("right_shoulder", "left_shoulder")
 NEEDS = {"pelvis": MIDDLES, "neck": (*SHOULDERS, *MIDDLES)}
 """The points of Taylor's human that place the two joints which it lacks; it has the others itself."""
-
-PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.01, placement=False, angle=10.0)
-"""For photographs taken from a few metres: a scaled orthographic camera is not what took them, and a scale that is too
-large draws every segment out in depth (docs, "Uncalibrated pictures")."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

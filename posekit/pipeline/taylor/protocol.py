@@ -53,6 +53,12 @@ class Accuracy:
     n: NDArray[np.int64]
     right: Array
 
+    def __post_init__(self) -> None:
+        for name in ("rms", "angles", "n", "right"):
+            values = np.array(getattr(self, name))
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+
     @property
     def chosen(self) -> NDArray[np.bool_]:
         """Where there was something to choose (F,)."""

@@ -11,12 +11,11 @@ import numpy as np
 
 from posekit.figure import load_figure
 from posekit.pipeline.reproduce import table_lines
-from posekit.pipeline.taylor.completion import PHOTOGRAPH
 from posekit.pipeline.taylor.human import Human, taylor_human
 from posekit.pipeline.taylor.protocol import Accuracy, accuracy, accuracy_lines
 from posekit.pipeline.taylor.survival import Survival, survival, survival_lines
 from posekit.pipeline.taylor.views import Proportions, Scale, Seen, exact_views, photographs
-from posekit.pipeline.tolerance import MEASURED, Tolerance
+from posekit.pipeline.tolerance import MEASURED, PHOTOGRAPH, Tolerance
 from posekit.synthesis import CameraSphere, Scene, mocap_scenes, random_views, read_capture
 
 SPHERE = CameraSphere(distance=(3.0, 6.0))

@@ -43,6 +43,12 @@ class Survival:
     truth: NDArray[np.bool_]
     mirror: NDArray[np.bool_]
 
+    def __post_init__(self) -> None:
+        for name in ("count", "truth", "mirror"):
+            values = np.array(getattr(self, name))
+            values.flags.writeable = False
+            object.__setattr__(self, name, values)
+
     @property
     def pair(self) -> NDArray[np.bool_]:
         """Whether the true flips and their mirror image both survive: the checks do not tell them apart (F,)."""

@@ -1,0 +1,148 @@
+"""What is grown for frames that show the same points of an object: its tree, and the checks that prune it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.linkage import Linkage, Midpoint, SpanningTree, span
+from posekit.linkage.consistency import components
+from posekit.pipeline.objects.articulated import ArticulatedObject
+from posekit.pipeline.objects.shape import shape_checks
+from posekit.pipeline.objects.tolerance import ObjectTolerance
+from posekit.tree import Check
+from posekit.validators import linkage as validators
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Plan:
+    """The tree over the points that are seen.
+
+    Parameters
+    ----------
+    thing : ArticulatedObject
+    linkage : Linkage
+        As much of it as is seen, in working units.
+    columns : tuple of int
+        The object's point that each point of `linkage` is.
+    segments : tuple of int
+        The object's segment that each segment of `linkage` is.
+    nearer : mapping
+        Flips given by hand: segment to nearer end.
+    """
+
+    thing: ArticulatedObject
+    linkage: Linkage
+    columns: tuple[int, ...]
+    segments: tuple[int, ...]
+    nearer: Mapping[str, str]
+
+    @staticmethod
+    def of(thing: ArticulatedObject, seen: NDArray[np.bool_], nearer: Mapping[str, str]) -> Plan:
+        """Make the plan for frames that show some points (P,).
+
+        Raises
+        ------
+        InputError
+            Where what is seen falls apart without a point that is not; where there are too many flips.
+        """
+        linkage, columns, segments = seen_part(thing.working, seen)
+        kept = set(linkage.segment_names)
+        choices = {}
+        for name, end in nearer.items():
+            number = thing.linkage.segment(name)
+            if thing.linkage.segment_names[number] in kept:
+                choices[thing.linkage.segment_names[number]] = end
+        plan = Plan(thing=thing, linkage=linkage, columns=columns, segments=segments, nearer=choices)
+        _ = plan.spanned
+        return plan
+
+    @cached_property
+    def spanned(self) -> SpanningTree:
+        """The tree; its root is the first point that is seen."""
+        return span(self.linkage)
+
+    @property
+    def hypotheses(self) -> int:
+        """How many leaves the tree has before any is pruned."""
+        return 1 << (len(self.spanned.nodes) - 1)
+
+    @cached_property
+    def evidence_level(self) -> int | None:
+        """The level at which a loop first closes or a middle is met: exactly, only if the image is exact."""
+        closing = validators.closure(self.spanned)
+        return min((max(check.points) for check in closing), default=None)
+
+    def checks(self, tolerance: ObjectTolerance) -> list[Check]:
+        """Make the checks: loops, shape, flips given by hand, limits of the robot."""
+        spanned = self.spanned
+        checks = [
+            *validators.closure(spanned, tolerance=tolerance.rigid),
+            *shape_checks(spanned, tolerance=tolerance.rigid),
+            *validators.nearer(self.nearer, joints=spanned.tree.joints, segments=self.linkage.segment_names),
+        ]
+        if self.thing.limits is not None:
+            checks += self.thing.limits.checks(spanned.tree.joints, tolerance=tolerance.point)
+        return checks
+
+    def place(self, points: Array) -> Array:
+        """Put points of the seen part (N, p, 3) among all of the object's (N, P, 3), NaN elsewhere."""
+        placed = np.full((len(points), len(self.thing.linkage.points), 3), np.nan)
+        placed[:, list(self.columns)] = points
+        return placed
+
+
+def seen_part(linkage: Linkage, seen: NDArray[np.bool_]) -> tuple[Linkage, tuple[int, ...], tuple[int, ...]]:
+    """Leave out the points of a linkage that are not seen, with their segments.
+
+    Raises
+    ------
+    InputError
+        Where the rest falls apart: the missing points join it.
+    """
+    if seen.all():
+        return linkage, tuple(range(len(linkage.points))), tuple(range(len(linkage.segments)))
+    missing = ", ".join(name for name, there in zip(linkage.points, seen, strict=True) if not there)
+    middles = [m for m in linkage.midpoints if seen[list(m.ends)].all()]
+    kept_middles = {linkage.nodes.index(middle.name) for middle in middles}
+    nodes = [
+        node
+        for node in range(len(linkage.nodes))
+        if node in kept_middles or (node < len(seen) and seen[node])
+    ]
+    new = {node: number for number, node in enumerate(nodes)}
+    segments = [k for k, (a, b) in enumerate(linkage.segments) if a in new and b in new]
+    renumbered = {old: number for number, old in enumerate(segments)}
+    edges = [(new[linkage.segments[k][0]], new[linkage.segments[k][1]]) for k in segments]
+    halves = [(new[m.ends[k]], new[linkage.nodes.index(m.name)]) for m in middles for k in (0, 1)]
+    parts = components(len(nodes), [*edges, *halves])
+    if not segments or len(parts) > 1:
+        groups = [", ".join(linkage.nodes[nodes[k]] for k in part[:6]) for part in parts[:3]]
+        raise InputError(
+            f"linkage {linkage.name}: {missing} not seen: without, the rest falls apart into ({') and ('.join(groups)}); "
+            "add image points, or drop the frame"
+        )
+    columns = tuple(int(column) for column in np.flatnonzero(seen))
+    part = replace(
+        linkage,
+        points=tuple(linkage.points[column] for column in columns),
+        segments=tuple(edges),
+        lengths=linkage.lengths[segments],
+        midpoints=tuple(Midpoint(name=m.name, ends=(new[m.ends[0]], new[m.ends[1]])) for m in middles),
+        coplanar=tuple(
+            group
+            for group in (tuple(new[k] for k in old if k in new) for old in linkage.coplanar)
+            if len(group) >= 4
+        ),
+        perpendicular=tuple(
+            (renumbered[a], renumbered[b]) for a, b in linkage.perpendicular if {a, b} <= set(renumbered)
+        ),
+        collinear=tuple((new[a], new[b], new[c]) for a, b, c in linkage.collinear if {a, b, c} <= set(new)),
+    )
+    return part, columns, tuple(segments)
