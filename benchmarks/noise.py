@@ -16,7 +16,7 @@ import numpy as np
 
 from posekit.figure import load_figure
 from posekit.pipeline import recover, view_of
-from posekit.pipeline.reproduce import table_lines
+from posekit.pipeline.markdown import table_lines
 from posekit.synthesis import random_views
 
 NEAR = 0.035

@@ -11,7 +11,7 @@ from posekit.cameras import Array
 from posekit.cameras.camera import COINCIDENT
 from posekit.errors import InputError
 from posekit.intake.refusal import shown
-from posekit.linkage import Linkage, SpanningTree
+from posekit.linkage import SpanningTree
 from posekit.linkage.naming import meant
 from posekit.tree import Check, Findings
 
@@ -83,15 +83,6 @@ def nearer(
         other = pair[1] if end == pair[0] else pair[0]
         checks.append(Nearer(where=(name,), points=(joints.index(end), joints.index(other)), nothing=nothing))
     return checks
-
-
-def nearer_of(linkage: Linkage, flips: Sequence[int] | Array) -> dict[str, str]:
-    """Turn flips (S,), +1 where a segment's first end is nearer and -1 its second, into choices by name; 0 is none."""
-    return {
-        name: linkage.nodes[ends[0] if flip > 0 else ends[1]]
-        for name, ends, flip in zip(linkage.segment_names, linkage.segments, flips, strict=True)
-        if flip
-    }
 
 
 def _ends(name: str, joints: Sequence[str], segments: Sequence[str]) -> tuple[str, str]:

@@ -10,12 +10,12 @@ import typer
 from posekit.cli.options import Pictures, examples
 from posekit.errors import InputError
 
-PAPERS = ("lee-chen",)
-EXAMPLES = examples("posekit reproduce lee-chen -o tables")
+PAPERS = ("lee-chen", "taylor")
+EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen.")],
+    paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen or taylor.")],
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the tables.")],
     pictures: Pictures = True,
 ) -> None:
@@ -25,6 +25,7 @@ def reproduce(
     if paper not in PAPERS:
         raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")
     files.make_folder(output)
-    for line in pipeline.reproduce_lee_chen(output, pictures=pictures):
+    make = pipeline.reproduce_lee_chen if paper == "lee-chen" else pipeline.reproduce_taylor
+    for line in make(output, pictures=pictures):
         typer.echo(line)
-    typer.echo(f"written: {output / 'lee-chen.md'}, {output / 'lee-chen.json'}")
+    typer.echo(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")

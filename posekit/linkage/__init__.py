@@ -1,6 +1,7 @@
 """Any articulated object from a single uncalibrated picture (Taylor 2000): linkages, and their family of postures."""
 
 from posekit.linkage.family import Family as Family
+from posekit.linkage.family import name_nearer as name_nearer
 from posekit.linkage.family import read_nearer as read_nearer
 from posekit.linkage.linkage import Linkage as Linkage
 from posekit.linkage.linkage import Midpoint as Midpoint

@@ -253,6 +253,17 @@ def read_nearer(linkage: Linkage, choices: Mapping[str, str]) -> Flips:
     return flips
 
 
+def name_nearer(linkage: Linkage, flips: ArrayLike) -> dict[str, str]:
+    """Turn flips (S,) into choices by name, a segment to its nearer end: what `read_nearer` reads."""
+    return {
+        name: linkage.nodes[ends[0] if flip > 0 else ends[1]]
+        for name, ends, flip in zip(
+            linkage.segment_names, linkage.segments, np.asarray(flips).tolist(), strict=True
+        )
+        if flip != 0
+    }
+
+
 def _first(values: Array, good: NDArray[np.bool_]) -> float:
     """Return the first value that is not good."""
     return float(values[~good].flat[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,7 +20,7 @@ from posekit.occlusion.narrow import narrowed, thinned
 from posekit.occlusion.placed import Placed
 from posekit.occlusion.plan import HIP_JOINTS, TORSO_JOINTS, Limb, Plan, State
 from posekit.occlusion.rays import Rays
-from posekit.occlusion.refine import seek_ends
+from posekit.occlusion.refine import GOALS, reaches, seek_ends
 from posekit.occlusion.settings import Sampling
 from posekit.occlusion.together import choose
 from posekit.occlusion.trunk import TrunkPlacer
@@ -29,8 +29,14 @@ from posekit.skeleton import PARENTS, segment_name
 HOSTS_TRIED = 8
 """Places of the trunk on which limbs are sought that pass together, the middle one first."""
 
-ATTAINED, ATTAINED_IN_CROWD = 0.01, 0.1
-"""Of a step on the lattice: how near the ends of a box are found on one host, and on many (measured: see docs)."""
+SAME = 1e-6
+"""Metres between two ends that count as one."""
+
+ATTAINED, ATTAINED_IN_FOUR, ATTAINED_IN_CROWD = 0.125, 0.02, 0.1
+"""Of a step on the lattice: how near the ends of a box are found, with two angles free, with four, and on many hosts.
+
+Measured against rejection sampling: see the documentation.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,11 +49,14 @@ class Way:
     survivor : int array (S,)
         In order.
     rows : Placed
+    reach : array (2, C, 7)
+        How far the sets of the cores reach, known limbs apart.
     """
 
     placer: LimbPlacer
     survivor: Index
     rows: Placed
+    reach: Array
 
     @property
     def limb(self) -> Limb:
@@ -56,7 +65,7 @@ class Way:
 
     def keep(self, alive: Mask) -> Way:
         """Keep some placements."""
-        return Way(placer=self.placer, survivor=self.survivor[alive], rows=self.rows.take(alive))
+        return replace(self, survivor=self.survivor[alive], rows=self.rows.take(alive))
 
     def position(self, joint: int) -> Array:
         """Return where a joint of the limb is in each placement (S, 3)."""
@@ -204,8 +213,25 @@ class Party:
 
     def _way(self, placer: LimbPlacer) -> Way:
         placed = placer.place()
+        cores = len(self.core_frame)
+        reach = np.full((2, cores, GOALS), -np.inf)
+        if self.plan.hidden(placer.limb):
+            # Most of the ends of a survivor's sets are those of its core's: they are sought once.
+            wanted = np.zeros(reach.shape, dtype=bool)
+            wanted[[joint in self.plan.free(placer.limb) for joint in placer.limb.free], :, : GOALS - 1] = (
+                True
+            )
+            ends = seek_ends(
+                placer,
+                self.hosts.core[placed.host],
+                placed,
+                np.full((2, cores, 3), np.nan),
+                lambda _, rows: self._passes_own(placer, rows),
+                wanted,
+            )
+            reach, placed = ends.reach, placed.and_(ends.rows)
         survivor, row = pairs(self.hosts.core[placed.host], self.core, len(self))
-        way = Way(placer=placer, survivor=survivor, rows=placed.take(row))
+        way = Way(placer=placer, survivor=survivor, rows=placed.take(row), reach=reach)
         checks = self.plan.limb_cross[placer.limb]
         if not checks:
             return way
@@ -342,31 +368,33 @@ class Party:
         done.accuracy[part, joint] = self._unsettled() * length
 
     def _ends(self, way: Way, middle: Array) -> Array:
-        """Return the ends of the boxes and the radii (2, N, 7) of a limb's joints: see `seek_ends`."""
-        n, who = len(self), way.survivor
+        """Return the ends of the boxes and the radii (2, N, 7) of a limb's joints; NaN where a set is empty."""
+        representatives = np.stack([middle[:, joint] for joint in way.limb.free])
+        table = reaches(way.placer, way.rows, way.survivor, representatives)
+        reach = np.full((2, len(self), GOALS), -np.inf)
+        for joint, goal in np.ndindex(2, GOALS):
+            reach[joint, :, goal] = largest(
+                way.survivor, len(self), np.nan_to_num(table[joint, goal], nan=-np.inf)
+            )[1]
         if self.plan.hidden(way.limb):
-            representatives = [middle[:, joint] for joint in way.limb.free]
-            return seek_ends(
+            # Where an end of the core's set is not among them, a known limb or the trunk cut it off: it is sought anew.
+            wanted = reach < way.reach[:, self.core] - SAME
+            wanted[:, :, -1] = True
+            wanted &= np.array([joint in self.plan.free(way.limb) for joint in way.limb.free])[:, None, None]
+            ends = seek_ends(
                 way.placer,
-                who,
+                way.survivor,
                 way.rows,
-                n,
                 representatives,
-                lambda survivor, tried: self._passes(way.placer, survivor, tried),
-                way.placer.spacing()[way.rows.host],
+                lambda survivor, rows: self._passes(way.placer, survivor, rows),
+                wanted,
             )
-        ends = np.empty((2, n, 7))
-        for k, joint in enumerate(way.limb.free):
-            position = way.position(joint)
-            lower, upper = box(who, n, position)
-            _, radius = largest(who, n, np.linalg.norm(position - middle[who, joint], axis=1))
-            ends[k] = np.concatenate([-lower, upper, radius[:, None]], axis=1)
-        return ends
+            reach = np.maximum(reach, ends.reach)
+        return np.where(np.isfinite(reach), reach, np.nan)
 
     def _describe_limb(self, done: Completion, part: Index, way: Way, joint: int, ends: Array) -> None:
         """Describe where a joint of a limb can be."""
         n, placer, rows, who = len(self), way.placer, way.rows, way.survivor
-        ends = np.where(np.isfinite(ends), ends, np.nan)
         done.lower[part, joint], done.upper[part, joint] = -ends[:, :3], ends[:, 3:6]
         done.radius[part, joint] = ends[:, 6]
         lattice = placer.spacing()[rows.host]
@@ -378,7 +406,9 @@ class Party:
         done.spacing[part, joint] = spacing + trunk
         lever = self._length(way.limb.middle) + (self._length(way.limb.end) if joint == way.limb.end else 0.0)
         crowd = np.bincount(self.hosts.core, minlength=len(self.core_frame))[self.core] > 1
-        attained = np.where(crowd, ATTAINED_IN_CROWD, ATTAINED)
+        attained = np.where(
+            crowd, ATTAINED_IN_CROWD, ATTAINED_IN_FOUR if way.placer.both_hidden else ATTAINED
+        )
         done.accuracy[part, joint] = spacing * attained * lever + trunk * (
             lever + self._length(way.limb.base)
         )
@@ -389,11 +419,19 @@ class Party:
         return self.hosts.spacing[self.core] * (2.0 if turn is None or turn.about is None else 1.0)
 
     def _passes(self, placer: LimbPlacer, survivor: Index, rows: Placed) -> Mask:
-        limb = placer.limb
-        checks = [*self.plan.limb_cross[limb], *self.plan.middle_own[limb], *self.plan.end_own[limb]]
-        finite: Mask = np.asarray(np.isfinite(rows.end).all(axis=1))
-        passed = finite.copy()
-        passed[finite], _ = ask(checks, self._limb_columns(placer, survivor[finite], rows.take(finite)))
+        """Judge placements by all checks of their limb."""
+        passed = self._passes_own(placer, rows)
+        own = np.flatnonzero(passed)
+        checks = self.plan.limb_cross[placer.limb]
+        passed[own], _ = ask(checks, self._limb_columns(placer, survivor[own], rows.take(own)))
+        return passed
+
+    def _passes_own(self, placer: LimbPlacer, rows: Placed) -> Mask:
+        """Judge placements by the checks that read nothing but the core; what is out of reach does not pass."""
+        passed = np.asarray(np.isfinite(rows.end).all(axis=1)).copy()
+        reached = np.flatnonzero(passed)
+        checks = [*self.plan.middle_own[placer.limb], *self.plan.end_own[placer.limb]]
+        passed[reached], _ = ask(checks, placer.columns(rows.take(reached)))
         return passed
 
     def _fraction(self, done: Completion, part: Index, way: Way, joint: int) -> Array:

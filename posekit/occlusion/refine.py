@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,103 +17,143 @@ from posekit.occlusion.placed import Placed
 PROPOSALS = 6
 """Steps tried at once from each place, evenly around; and one more the way the last one went."""
 
-STARTS = 3
-"""Places from which each end is sought, each far from those before it."""
+STARTS, STARTS_IN_FOUR = 3, 8
+"""Places from which each end is sought, each far from those before it; with four free angles."""
 
 APART = 2.5
-"""Spacings between them."""
+"""Spacings between them; with four free angles a third of that."""
 
 LONGER, SHORTER = 1.3, 0.55
 """What a step is multiplied with after it succeeded, and after none did."""
 
+SETTLED = 0.004
+"""Of the first step: where a walk ends."""
+
 AXES = np.concatenate([-np.eye(3), np.eye(3)])
 """Directions whose ends make the bounding box: lower, then upper."""
+
+GOALS = len(AXES) + 1
+"""The ends of the box, and the distance from the representative."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ends:
+    """How far n sets reach, and the placements that do.
+
+    Parameters
+    ----------
+    reach : array (2, n, 7)
+        For a limb's middle and end: less the lower, then the upper ends of the box, and the distance from the
+        representative; -inf where a set is empty or was not asked about.
+    group : int array (K,)
+        The set of each placement.
+    rows : Placed
+    """
+
+    reach: Array
+    group: Index
+    rows: Placed
+
+
+def reaches(placer: LimbPlacer, rows: Placed, group: Index, representatives: Array) -> Array:
+    """Return how far each of S placements reaches towards every goal (2, 7, S); NaN without a representative."""
+    table = np.empty((2, GOALS, len(group)))
+    for joint, position in enumerate((rows.middle, rows.end)):
+        table[joint, : len(AXES)] = AXES @ position.T
+        table[joint, -1] = np.linalg.norm(position - representatives[joint, group], axis=1)
+    return table
 
 
 def seek_ends(
     placer: LimbPlacer,
-    survivor: Index,
+    group: Index,
     rows: Placed,
-    n: int,
-    representatives: Sequence[Array],
+    representatives: Array,
     passes: Callable[[Index, Placed], Mask],
-    spacing: Array,
-) -> Array:
+    wanted: Mask,
+) -> Ends:
     """Walk from the outermost samples of each set further out while all checks pass.
 
     Parameters
     ----------
-    survivor : int array (S,)
-        Whose set each feasible row belongs to, in order.
+    group : int array (S,)
+        Which of n sets each feasible row belongs to, in order.
     rows : Placed
-    representatives : sequence of 2 arrays (n, 3)
+    representatives : array (2, n, 3)
         Of the limb's middle and end: from which radii are measured; NaN where there is none.
     passes : callable
-        Judges rows of survivors by every check of the limb.
-    spacing : array (S,)
-        Radians between the samples of each row's host: the first step.
-
-    Returns
-    -------
-    array (2, n, 7)
-        For middle and end: less the lower, then the upper ends of the box, and the radius; -inf where a set is empty.
+        Judges rows of sets by every check of the limb.
+    wanted : bool array (2, n, 7)
+        Which ends to seek.
     """
-    goals = len(AXES) + 1
-    joints = [k for k, joint in enumerate(placer.limb.free) if joint in placer.plan.free(placer.limb)]
-    ends = np.full((2, n, goals), -np.inf)
-    starts: list[tuple[Index, Index, Index]] = []
+    n = wanted.shape[1]
+    spacing = placer.spacing()[rows.host]
     levers = np.cumsum(placer.lengths)
-    for joint in joints:
+    table = reaches(placer, rows, group, representatives)
+    many, apart = (STARTS_IN_FOUR, APART / 3.0) if placer.both_hidden else (STARTS, APART)
+    columns: list[tuple[Index, Index, Index]] = []
+    for joint, goal in zip(*np.nonzero(wanted.any(axis=1)), strict=True):
+        left = np.where(wanted[joint, group, goal], table[joint, goal], -np.inf)
         position = rows.end if joint else rows.middle
-        away = np.linalg.norm(position - representatives[joint][survivor], axis=1)
-        values = [position @ axis for axis in AXES] + [np.where(np.isnan(away), -np.inf, away)]
-        for k, value in enumerate(values):
-            left = value
-            for _ in range(STARTS):
-                start, most = largest(survivor, n, left)
-                some = np.flatnonzero((start >= 0) & np.isfinite(most))
-                starts.append((some, start[some], np.full(len(some), joint * goals + k)))
-                first = position[np.maximum(start, 0)][survivor]
-                near = np.linalg.norm(position - first, axis=1) < APART * spacing * levers[joint]
-                left = np.where(near, -np.inf, left)
-    who, start, goal = (np.concatenate(column) for column in zip(*starts, strict=True))
-    here, step = rows.take(start), spacing[start].copy()
-    best = _value(here, goal, representatives, who)
-    last = np.zeros((len(who), 4))
+        for _ in range(many if goal < len(AXES) else 2):
+            start, most = largest(group, n, left)
+            some = np.flatnonzero((start >= 0) & np.isfinite(most))
+            columns.append((some, start[some], np.full(len(some), joint * GOALS + goal)))
+            near = np.linalg.norm(position - position[np.maximum(start, 0)][group], axis=1)
+            left = np.where(near < apart * spacing * levers[joint], -np.inf, left)
+    reach = np.full((2, n, GOALS), -np.inf)
+    if not columns:
+        return Ends(reach=reach, group=group[:0], rows=rows.take(group[:0]))
+    who, start, goal = (np.concatenate(column) for column in zip(*columns, strict=True))
+    here = rows.take(start)
+    best = table.reshape(2 * GOALS, -1)[goal, start]
+    step, last = spacing[start].copy(), np.zeros((len(who), 4))
     for round_ in range(placer.sampling.rounds):
-        by = np.concatenate([_around(len(who), round_, both=placer.both_hidden), last[:, None]], axis=1)
-        each = np.repeat(np.arange(len(who)), by.shape[1])
-        tried = placer.moved(here.take(each), by.reshape(-1, 4) * step[each, None])
-        reached = _value(tried, goal[each], representatives, who[each])
-        further = np.flatnonzero(reached > best[each])  # NaN is not
-        further = further[passes(who[each[further]], tried.take(further))]
-        row, value = largest(each[further], len(who), reached[further])
-        moved = row >= 0
-        chosen = further[row[moved]]
-        here = here.replaced(np.flatnonzero(moved), tried.take(chosen))
-        best[moved] = value[moved]
-        last[moved] = by.reshape(-1, 4)[chosen]
-        step *= np.where(moved, LONGER, SHORTER)
-    np.maximum.at(ends, (goal // goals, who, goal % goals), best)
-    return ends
+        walking = np.flatnonzero(step > SETTLED * spacing[start])
+        by = _around(len(walking), round_, both=placer.both_hidden)
+        by = np.concatenate([by, last[walking, None]], axis=1)
+        each = np.repeat(walking, by.shape[1])
+        by = by.reshape(-1, 4)
+        tried = placer.moved(here.take(each), by * step[each, None])
+        value = _value(tried, goal[each], representatives, who[each])
+        # The furthest first: where that passes the others need not be asked.
+        order = np.flatnonzero(value > best[each])  # NaN is not
+        first, _ = largest(each[order], len(who), value[order])
+        ahead = order[first[first >= 0]]
+        good = [ahead[passes(who[each[ahead]], tried.take(ahead))]]
+        stuck = np.ones(len(who), dtype=bool)
+        stuck[each[good[0]]] = False
+        rest = np.setdiff1d(order[stuck[each[order]]], ahead)
+        good.append(rest[passes(who[each[rest]], tried.take(rest))])
+        passed = np.sort(np.concatenate(good))
+        first, furthest = largest(each[passed], len(who), value[passed])
+        moved = np.flatnonzero(first >= 0)
+        chosen = passed[first[moved]]
+        here = here.replaced(moved, tried.take(chosen))
+        best[moved], last[moved] = furthest[moved], by[chosen]
+        step[walking] *= SHORTER
+        step[moved] *= LONGER / SHORTER
+    np.maximum.at(reach, (goal // GOALS, who, goal % GOALS), best)
+    order = np.argsort(who, kind="stable")
+    return Ends(reach=reach, group=who[order], rows=here.take(order).with_seed(np.full(len(who), -1)))
 
 
 def _around(n: int, round_: int, *, both: bool) -> Array:
     """Return unit steps (n, PROPOSALS, 4): evenly around, turned from round to round; or scattered in 4-space."""
     if both:
-        steps = np.random.default_rng(round_).standard_normal((n, PROPOSALS, 4))
-        return np.asarray(steps / np.linalg.norm(steps, axis=-1, keepdims=True))
-    turn = round_ * GOLDEN_ANGLE + np.arange(PROPOSALS) * 2.0 * np.pi / PROPOSALS
-    steps = np.tile(np.stack([np.cos(turn), np.sin(turn)], axis=-1), 2)
+        steps = np.random.default_rng(round_).standard_normal((PROPOSALS, 4))
+        steps /= np.linalg.norm(steps, axis=-1, keepdims=True)
+    else:
+        turn = round_ * GOLDEN_ANGLE + np.arange(PROPOSALS) * 2.0 * np.pi / PROPOSALS
+        steps = np.tile(np.stack([np.cos(turn), np.sin(turn)], axis=-1), 2)
     return np.broadcast_to(steps, (n, PROPOSALS, 4))
 
 
-def _value(rows: Placed, goal: Index, representatives: Sequence[Array], who: Index) -> Array:
-    """Return how far rows have come towards their goals: along an axis, or away from the representative."""
-    goals = len(AXES) + 1
-    end = (goal >= goals)[:, None]
-    position = np.where(end, rows.end, rows.middle)
-    middle = np.where(end, representatives[1][who], representatives[0][who])
-    axis = goal % goals
+def _value(rows: Placed, goal: Index, representatives: Array, who: Index) -> Array:
+    """Return how far rows have come towards their goals."""
+    end = (goal >= GOALS).astype(np.intp)
+    position = np.where(end[:, None] > 0, rows.end, rows.middle)
+    axis = goal % GOALS
     along = np.einsum("si,si->s", position, AXES[np.minimum(axis, len(AXES) - 1)])
-    return np.asarray(np.where(axis < len(AXES), along, np.linalg.norm(position - middle, axis=1)))
+    away = np.linalg.norm(position - representatives[end, who], axis=1)
+    return np.asarray(np.where(axis < len(AXES), along, away))

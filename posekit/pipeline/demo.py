@@ -19,9 +19,10 @@ from posekit.files import (
     write_view,
 )
 from posekit.pipeline.illustrate import illustrate
+from posekit.pipeline.markdown import table_lines
 from posekit.pipeline.recover import recover
 from posekit.pipeline.recovery import Recovery
-from posekit.pipeline.reproduce import reproduce_lee_chen, table_lines
+from posekit.pipeline.reproduce import reproduce_lee_chen
 from posekit.pipeline.result import result_of
 from posekit.pipeline.validate import validate
 from posekit.pipeline.views import builtin_view, view_of

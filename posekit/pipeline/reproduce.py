@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ import numpy as np
 from posekit.files import write_json, write_lines
 from posekit.pipeline import printed
 from posekit.pipeline.illustrate import illustrate
+from posekit.pipeline.markdown import table_lines
 from posekit.pipeline.result import result_of
 from posekit.pipeline.table2 import CameraEstimate, camera_estimates, exact_tables
 from posekit.pipeline.tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, recover_sequence
@@ -102,18 +103,6 @@ def _plain(sequence: Sequence1985) -> dict[str, Any]:
         "groups_after_rules_1_5": sequence.final[1],
         "truth_survives": sequence.truth_survives,
     }
-
-
-def table_lines(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    """Lay out a Markdown table, columns aligned."""
-    cells = [[str(cell) for cell in row] for row in rows]
-    widths = [max(len(row[k]) for row in [list(head), *cells]) for k in range(len(head))]
-    layout = [
-        f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
-        for row in cells
-    ]
-    top = f"| {' | '.join(cell.ljust(width) for cell, width in zip(head, widths, strict=True))} |"
-    return [top, f"|{'|'.join('-' * (width + 2) for width in widths)}|", *layout, ""]
 
 
 def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -> list[str]:

@@ -59,19 +59,20 @@ def declared_bodies(
 def check_bodies(robot: ElementTree.Element, source: str) -> None:
     """Refuse collision bodies that Pinocchio would drop without an exception, or that have no size.
 
-    A ``<capsule>`` is read under ``<robot version="1.1">`` and later alone.
+    A ``<capsule>`` is read under ``<robot version="1.1">`` and later alone. A visual body without a shape takes
+    the collision bodies of its link with it.
     """
     for link in robot.findall("link"):
         place = f"link {link.get('name')!r}"
         if len(link.findall("inertial")) > 1:
             raise refusal(source, place, "two <inertial>", "one", "remove the other")
-        for body in link.findall("collision"):
-            if len(body.findall("geometry/*")) != 1 or len(body.findall("geometry")) != 1:
-                shapes = [element.tag for element in body.findall("geometry/*")]
-                got = f"a collision body with {len(shapes)} shapes"
-                raise refusal(source, place, got, f"one of {', '.join(SIZES)}", "make each a body of its own")
-            if len(body.findall("origin")) > 1:
-                raise refusal(source, place, "two <origin>", "one", "remove the other")
+        for named in link.findall("collision_checking/*"):
+            if not named.get("name"):
+                expected = "the name of a collision body"
+                raise refusal(source, f"{place}: <collision_checking>", "no name", expected, "add it")
+        for kind in ("collision", "visual"):
+            for body in link.findall(kind):
+                _check_body(body, kind, place, source)
     bodies = list(declared_bodies(robot))
     if len(bodies) > MAX_BODIES:
         raise refusal(source, "", f"{len(bodies):,} collision bodies", f"at most {MAX_BODIES}", "simplify it")
@@ -86,14 +87,25 @@ def check_bodies(robot: ElementTree.Element, source: str) -> None:
             raise refusal(source, f"link {declared.link!r}", got, "one that is read", remedy)
 
 
+def _check_body(body: ElementTree.Element, kind: str, place: str, source: str) -> None:
+    shapes = body.findall("geometry/*")
+    if len(shapes) != 1 or len(body.findall("geometry")) != 1:
+        got = f"a {kind} body with {len(shapes)} shapes"
+        raise refusal(source, place, got, f"one of {', '.join(SIZES)}", "make each a body of its own")
+    if len(body.findall("origin")) > 1:
+        raise refusal(source, place, "two <origin>", "one", "remove the other")
+    if any("name" not in material.attrib for material in body.findall("material")):
+        raise refusal(source, place, "a material without a name", "one with a name", "add it")
+    if shapes[0].tag == "mesh" and not shapes[0].get("filename"):
+        raise refusal(source, place, "a mesh without a file name", '<mesh filename="…"/>', "add it")
+
+
 def _check_shape(declared: Body, place: str, source: str) -> None:
     element, tag = declared.element, declared.element.tag
     if tag not in SIZES:
         got = f"a collision body <{shown(tag)[1:-1]}>"
         raise refusal(source, place, got, f"one of {', '.join(SIZES)}", "replace it")
     if tag == "mesh":
-        if not element.get("filename"):
-            raise refusal(source, place, "a mesh without a file name", '<mesh filename="…"/>', "add it")
         if 0.0 in (scale := numbers(element, "scale", "1 1 1")):
             raise refusal(source, place, f"a mesh of scale {scale}", "none of them zero", "correct it")
         return

@@ -18,7 +18,7 @@ SLOWER, FASTER = 8.0, 0.05
 FLOOR = 1e-6
 """Added to the normal equations' diagonal before it scales the damping (m^2/rad^2): for what moves no point."""
 
-SETTLED = 1e-9
+SETTLED = 1e-6
 """Predicted decrease of the cost, as a fraction of it, that ends the search."""
 
 NOTHING = 1e-19

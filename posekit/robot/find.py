@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import Final
 
 from posekit.intake import cut, nearest, refusal, shown
+from posekit.intake.regular_file import check_file
+from posekit.intake.xml_file import MAX_BYTES
 from posekit.robot.names import SHORT_NAMES
 
 STICK_FIGURE: Final = "stick_figure"
@@ -152,6 +154,7 @@ def _known_files() -> dict[str, tuple[str, str]]:
 def _from_path(path: Path) -> RobotFiles:
     if path.name.endswith(".xacro"):
         raise refusal(path, "", "a xacro file", "a URDF", "expand it first: xacro FILE > FILE.urdf")
+    check_file(path, limit=MAX_BYTES, too_large="name a robot's URDF")
     folder = path.resolve().parent
     beside = path.with_suffix(".srdf")
     robots = robots_folder()

@@ -22,8 +22,8 @@ TOLERANCE = 1e-3
 PULL = 1e-10
 """m^2/rad^2: strong enough to choose among postures that place the points alike, too weak to move a point."""
 
-JUMP = 1.5
-"""Times the last frame's largest distance beyond which a frame is searched for anew."""
+JUMP = 2.0
+"""Times the last frame's largest distance, and at least that many tolerances, beyond which a frame is searched for anew."""
 
 FARTHEST = 1e6
 """Metres beyond which a target is taken for a mistake."""

@@ -170,7 +170,9 @@ def parse_joint_map(table: Mapping[str, Any], source: str) -> JointMap:
         Where it is not what `posekit.joint_map/1` says.
     """
     if table.get("schema") != SCHEMA:
-        raise refusal(source, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line")
+        raise refusal(
+            source, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line"
+        )
     unknown = sorted(set(table) - {"schema", "points", "optional"})
     if unknown:
         raise refusal(source, unknown[0], "an unknown entry", "schema, [points], [optional]", "remove it")
@@ -185,7 +187,9 @@ def parse_joint_map(table: Mapping[str, Any], source: str) -> JointMap:
     points, optional = both
     twice = sorted(set(points) & set(optional))
     if twice:
-        raise refusal(source, f"optional.{twice[0]}", "a point that is in [points] too", "one of them", "drop one")
+        raise refusal(
+            source, f"optional.{twice[0]}", "a point that is in [points] too", "one of them", "drop one"
+        )
     if len(points) < FEWEST:
         raise refusal(source, "points", f"{len(points)} points", f"at least {FEWEST}", "name more joints")
     return JointMap(name=source, points=points, optional=optional)
@@ -200,7 +204,11 @@ def _point(name: str, entry: object, source: str, part: str) -> BodyPoint:
         means = entry["mean"]
         if set(entry) != {"mean"} or not isinstance(means, list) or not 1 <= len(means) <= MAX_SITES:
             raise refusal(
-                source, field, shown(entry), f"mean = [1 to {MAX_SITES} frames] and nothing else", "correct it"
+                source,
+                field,
+                shown(entry),
+                f"mean = [1 to {MAX_SITES} frames] and nothing else",
+                "correct it",
             )
         return BodyPoint(
             name=name, sites=tuple(_site(site, source, f"{field}.mean[{k}]") for k, site in enumerate(means))

@@ -206,7 +206,9 @@ class _Work:
         path = self._path(neck, pelvis)
         carriers = {int(self.model.parents[joint]) for joint in path}
         ends = {
-            body for name, body in (("neck", neck), ("pelvis", pelvis)) if np.linalg.norm(self._offset(name)) > 0
+            body
+            for name, body in (("neck", neck), ("pelvis", pelvis))
+            if np.linalg.norm(self._offset(name)) > 0
         }
         before = {joint: self.model.jointPlacements[joint].translation.copy() for joint in path}
         for body in sorted((carriers | ends) - taken - {0}):

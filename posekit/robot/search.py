@@ -99,9 +99,7 @@ class Search:
             self._try_other_trunks(found, problem.take(rows), rows, trunk[rows])
         return found
 
-    def _try_other_trunks(
-        self, found: Found, problem: Problem, rows: NDArray[np.intp], trunk: Array
-    ) -> None:
+    def _try_other_trunks(self, found: Found, problem: Problem, rows: NDArray[np.intp], trunk: Array) -> None:
         """Start from trunks that lie on their points as well, but otherwise: as a flat trunk does back to front.
 
         All points together cost no less than the trunk's alone: a trunk that costs more than the best posture found

@@ -32,6 +32,8 @@ def check_joints(robot: ElementTree.Element, source: str) -> None:
                 raise refusal(
                     source, place, f"two <{tag}>", "one", "remove the other: readers differ on which"
                 )
+        if any("k_velocity" not in safety.attrib for safety in joint.findall("safety_controller")):
+            raise refusal(source, f"{place}: <safety_controller>", "no k_velocity", "a number", "add it")
         _check_limit(joint, kind, place, source)
         if kind in ("revolute", "continuous", "prismatic", "planar"):
             _check_axis(joint, kind, place, source)

@@ -23,6 +23,8 @@ NUMBERS: Final[dict[str, dict[str, int]]] = {
     "cylinder": {"radius": 1, "length": 1},
     "capsule": {"radius": 1, "length": 1},
     "mesh": {"scale": 3},
+    "color": {"rgba": 4},
+    "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1, "k_position": 1, "k_velocity": 1},
 }
 """How many numbers each attribute of an element holds."""
 LENGTHS: Final = frozenset(("xyz", "rpy", "size", "radius", "length", "scale"))

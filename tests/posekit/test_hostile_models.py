@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,7 +55,7 @@ def more_links(count: int, *, chain: bool) -> str:
 
 
 ENTITY = '<!DOCTYPE robot [<!ENTITY a "b"><!ENTITY c "&a;&a;&a;&a;">]><robot '
-NUMBERS = ("nan", "inf", "-inf", "1e999", "", "x", "1 2 3 4", "1,5", "0x10", "1_0", "١", "1e", "--1")
+NUMBERS = ("nan", "inf", "-inf", "1e999", "", "x", "1 2 3 4", "1,5", "0x10", "1_0", "\u0661", "1e", "--1")
 PLACES = {
     "xyz": 'xyz="0 0 1"',
     "rpy": 'rpy="0 0 0"',
@@ -131,7 +132,7 @@ HOSTILE: dict[str, tuple[Callable[[str], str], str]] = {
     "no effort": (swap(' effort="1"', ""), "no effort"),
     "swapped limits": (swap('lower="-1"', 'lower="2"'), "lower limit 2 above its upper 1; swap them"),
     "an axis of zeros": (swap('axis xyz="0 0 1"', 'axis xyz="0 0 0"'), "an axis of length 0"),
-    "a tiny axis": (swap('axis xyz="0 0 1"', 'axis xyz="0 0 1e-200"'), "an axis of length 0"),
+    "a tiny axis": (swap('axis xyz="0 0 1"', 'axis xyz="0 0 1e-200"'), "an axis of length 1e-200"),
     "a long slide": (swap('axis xyz="1 0 0"', 'axis xyz="2 0 0"'), "an axis of length 2"),
     "a mimic of nothing": (swap('mimic joint="j"', 'mimic joint="z"'), 'a mimic of "z"'),
     "a mimic of itself": (swap('mimic joint="j"', 'mimic joint="k"'), "a mimic of itself"),
@@ -160,6 +161,30 @@ HOSTILE: dict[str, tuple[Callable[[str], str], str]] = {
     "501 bodies": (
         swap("</link>", '<collision><geometry><sphere radius="1"/></geometry></collision>' * 500 + "</link>"),
         "503 collision bodies",
+    ),
+    "a visual body without a shape": (
+        swap('<link name="b">', '<link name="b"><visual><geometry/></visual>'),
+        "a visual body with 0 shapes",
+    ),
+    "a material without a name": (
+        swap(
+            '<link name="b">',
+            '<link name="b"><visual><geometry><sphere radius="1"/></geometry><material/></visual>',
+        ),
+        "a material without a name",
+    ),
+    "a colour of NaN": (
+        swap(
+            '<link name="b">',
+            '<link name="b"><visual><geometry><sphere radius="1"/></geometry><material name="m">'
+            '<color rgba="1 1 nan 1"/></material></visual>',
+        ),
+        "4 finite numbers",
+    ),
+    "a safety controller without gain": (swap("<mimic", "<safety_controller/><mimic"), "no k_velocity"),
+    "a capsule of no name": (
+        swap("</link>", "<collision_checking><capsule/></collision_checking></link>"),
+        "<collision_checking>: got no name",
     ),
     "a mesh without a name": (swap('<sphere radius="0.1"/>', "<mesh/>"), "a mesh without a file name"),
     "a mesh of no extent": (
@@ -203,7 +228,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "model"
 
 
-def refused(path: Path, **options: object) -> str:
+def refused(path: Path, **options: Any) -> str:
     """Load a model that is to be refused: one line, within a few seconds, nothing written."""
     before, start = sorted(path.parent.iterdir()), time.monotonic()
     with pytest.raises(InputError) as caught:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import CameraError, InputError
-from posekit.linkage import Family, Linkage, load_linkage, read_nearer, span
+from posekit.linkage import Family, Linkage, load_linkage, name_nearer, read_nearer, span
 from posekit.validators.linkage import closure
 
 HUMAN = load_linkage("taylor_human")
@@ -257,6 +257,8 @@ def test_flips_given_by_hand() -> None:
     linkage = hinge().linkage
     assert read_nearer(linkage, {"a-b": "b", "c-b": "b"}).tolist() == [-1, 1]
     assert read_nearer(linkage, {}).tolist() == [0, 0]
+    assert name_nearer(linkage, [-1, 1]) == {"a-b": "b", "b-c": "b"}
+    assert name_nearer(linkage, [0, 1]) == {"b-c": "b"}
     with pytest.raises(InputError, match="nearer end of a-b is 'c'; expected a or b"):
         read_nearer(linkage, {"a-b": "c"})
     with pytest.raises(InputError, match="a-c is not one of its segments; they are a-b, b-c"):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posekit.pipeline import printed, recover, reproduce_lee_chen, view_of
+from posekit.pipeline import printed, recover, reproduce_lee_chen, reproduce_taylor, view_of
 from posekit.pipeline.table2 import CameraEstimate, camera_estimates, exact_image, exact_tables
 from posekit.pipeline.tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, sequences
 from posekit.skeleton import JOINTS
@@ -232,3 +232,20 @@ def test_the_report_is_the_same_every_time(folder: Path, tmp_path: Path) -> None
     reproduce_lee_chen(tmp_path, pictures=False)
     for name in ("lee-chen.md", "lee-chen.json"):
         assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
+
+
+def test_taylors_objects_and_experiment_are_reproduced(tmp_path: Path) -> None:
+    lines = reproduce_taylor(tmp_path)
+    text = (tmp_path / "taylor.md").read_text(encoding="utf-8")
+    assert text.splitlines() == lines
+    assert "3.76" in text, "the paper's own figure stands beside"
+    document = json.loads((tmp_path / "taylor.json").read_text(encoding="utf-8"))
+    for one in document["objects"]:
+        worst = np.array(one["worst_degrees"])
+        assert (worst <= one["printed_degrees"]).mean() >= 0.95
+        assert np.abs(np.array([minimum["s"] for minimum in one["minima"]]) / one["true_s"] - 1).min() < 1e-9
+    checks = {row["checks"]: row for row in document["survivors_exact"]}
+    assert checks["none"]["mean"] == 2048
+    assert checks["all, urdf"]["mean"] < checks["rigid parts"]["mean"]
+    for name in ("taylor.fig7.png", "taylor.fig8.png"):
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")

@@ -28,6 +28,7 @@ from posekit.robot import (
     robot_names,
     untrusted,
 )
+from posekit.robot.declared import declared_bodies
 from posekit.robot.find import robots_folder
 from posekit.robot.pairs import neutral_inside_limits
 from posekit.robot.second_reader import compare_readers
@@ -212,7 +213,8 @@ class TestPublishedRobots:
         robot = load_robot("ur5", free_flyer=False, geometry=False)
         assert robot.model.nq == 6
         assert robot.geometry is None
-        assert robot.body_names == robot.body_links == robot.collision_pairs == ()
+        assert not robot.body_names + robot.body_links
+        assert not robot.collision_pairs
         assert robot.configuration_names == robot.joint_names
 
     def test_visual_bodies_are_loaded_when_they_are_wanted(self) -> None:
@@ -309,7 +311,7 @@ class TestRobot:
         tree = robot.tree
         box = tree.find("link[@name='d']/collision/geometry/sphere")
         assert box is not None
-        declared = list(geometry.declared_bodies(tree))
+        declared = list(declared_bodies(tree))
         monkeypatch.setattr(geometry, "declared_bodies", lambda _robot: declared)
         collision = tree.find("link[@name='d']/collision")
         assert collision is not None

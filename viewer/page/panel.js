@@ -215,23 +215,25 @@ const page = (() => {
     const names = Object.keys(here).map((joint) => DATA.points[joint]);
     const [head, body] = [section.querySelector("thead"), section.querySelector("tbody")];
     note.hidden = !names.length;
-    note.textContent = `Inferred, not seen: ${names.map(words).join(", ")}.`;
+    note.textContent = `Inferred: ${names.map(words).join(", ")}.`;
     section.querySelector("p").textContent = names.length
-      ? "These joints were not seen. They are drawn hollow, at one position in the middle of all that lengths, ranges and neighbours allow; boxes hold them all. All others are exact."
-      : "All joints of this posture were seen.";
+      ? "No image point places these joints. They are drawn hollow, in the middle of all positions that lengths, ranges and neighbours allow; a box holds them all. Here it is counted from the joint. All other joints are exact."
+      : "The image places all joints of this posture.";
     head.replaceChildren();
     body.replaceChildren();
     if (!names.length) return;
-    row(head, ["joint", "can be on", "right (cm)", "down (cm)", "deeper (cm)", "within (cm)"].map((title, k) => element("th", title, k < 2 ? "text" : "")));
-    const cm = (value) => (100 * value).toFixed(1).replace("-0.0", "0.0").replace("-", "−");
+    row(head, ["joint", "right (cm)", "down (cm)", "deeper (cm)", "within"].map((title, k) => element("th", title, k ? "" : "text")));
+    const cm = (value, digits) => (100 * value).toFixed(digits).replace(/^-(0(\.0)?)$/, "$1").replace("-", "−");
     for (const [joint, one] of Object.entries(here)) {
       const share = one.fraction < 1 ? `, ${(100 * one.fraction).toPrecision(2)} %` : "";
-      const cells = [element("td", words(DATA.points[joint]), "text"), element("td", one.kind + share, "text wrap")];
+      const name = element("td", words(DATA.points[joint]), "text");
+      name.append(element("div", words(one.kind) + share, "soft"));
+      const cells = [name];
       for (const k of [0, 1, 2]) {
-        const point = one.upper[k] - one.lower[k] < 1e-4;
-        cells.push(element("td", point ? cm(one.lower[k]) : `${cm(one.lower[k])} … ${cm(one.upper[k])}`));
+        const [low, high] = [one.lower[k], one.upper[k]], digits = high - low < 0.1 ? 1 : 0;
+        cells.push(element("td", high - low < 1e-4 ? cm(low, digits) : `${cm(low, digits)}…${cm(high, digits)}`));
       }
-      row(body, [...cells, element("td", cm(one.radius))]);
+      row(body, [...cells, element("td", cm(one.radius, one.radius < 0.1 ? 1 : 0))]);
     }
   }
 

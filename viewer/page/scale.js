@@ -40,6 +40,7 @@ const scale = (() => {
   function drawMarks(family) {
     const drawing = byId("scale-marks"), top = farthest(family), place = (s) => (angleOf(family, s) / top) * WIDE;
     drawing.replaceChildren();
+    drawing.classList.toggle("low", family.curve.length < 2 && !family.minima.length);
     const line = (s, name, height, text) => {
       const x = place(s);
       drawing.append(element("line", { x1: x, x2: x, y1: HIGH - height, y2: HIGH, class: name }, text));
@@ -101,7 +102,7 @@ const scale = (() => {
     const [a, b] = family.segment.split("-").map(nodeOf), length = apart(all[a], all[b]);
     const lean = degrees(Math.asin(Math.min(1, Math.abs(all[a]?.[2] - all[b]?.[2]) / length)));
     const isLifted = DATA.tree.steps.some(([c, p]) => (c === a && p === b) || (c === b && p === a)) || a >= DATA.points.length || DATA.tree.root !== 0;
-    if (!isLifted) said[0] += " (the tree does not lift it: its ends are lifted by themselves)";
+    if (!isLifted) said[0] += " (inside the rigid torso or hips: the tree lifts each of its ends from another joint)";
     if (!Number.isNaN(lean)) said[0] += lean < 0.05 ? "; here it lies in the image plane" : `; here it leans ${lean.toFixed(1)}° out of the image plane`;
     const deep = extent(all), was = extent(old);
     said.push(`From the nearest joint to the farthest ${deep.toFixed(2)} m` + (elsewhere() ? `, at the recovered scale ${was.toFixed(2)} m` : ""));

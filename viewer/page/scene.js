@@ -72,6 +72,7 @@ const scene = (() => {
 
   // What follows from a joint that was not seen is hollow.
   function hollow(mesh, unseen) {
+    if (mesh.material.transparent === unseen) return;
     mesh.material.transparent = unseen;
     mesh.material.opacity = unseen ? HOLLOW : 1;
     mesh.material.depthWrite = !unseen;
@@ -163,7 +164,7 @@ const scene = (() => {
       axes.forEach((axis, k) => centre.addScaledVector(axis, (one.upper[k] + one.lower[k]) / 2));
       const box = new T.BoxGeometry(...size.map((width) => Math.max(width, 0.003)));
       const colour = DATA.colours[DATA.pointSides[joint]];
-      const faces = new T.Mesh(box, new T.MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.14, depthWrite: false }));
+      const faces = new T.Mesh(box, new T.MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.09, depthWrite: false }));
       const edges = new T.LineSegments(new T.EdgesGeometry(box), new T.LineBasicMaterial({ color: colour }));
       for (const made of [faces, edges]) {
         made.position.copy(centre);
@@ -175,9 +176,11 @@ const scene = (() => {
   }
 
   // The camera's pyramid, the rays to the joints, and the image that they make on a plane in front of it.
-  function drawRays(all) {
+  function drawRays(every) {
     clear(layers.rays);
-    if (!shownNow.rays || !all) return;
+    if (!shownNow.rays || !every) return;
+    const { image: onPicture, inferred } = page.frame(), unseen = inferred?.[page.state.survivor] ?? {};
+    const all = every.map((point, k) => (k in unseen && !onPicture?.[k] ? null : point));
     if (DATA.camera.parallel) return drawParallel(all);
     const onImage = (point) => {
       const ray = point.clone().sub(eye), depth = ray.dot(forward);
@@ -283,7 +286,7 @@ const scene = (() => {
     const all = DATA.frames.flatMap(({ family }) => (family ? family.image.flatMap((point) => (point ? [[point[0] + family.middle[0], point[1] + family.middle[1]]] : [])) : []));
     const [us, vs] = [0, 1].map((k) => all.map((point) => point[k]));
     const [low, high] = [[Math.min(...us), Math.min(...vs)], [Math.max(...us), Math.max(...vs)]];
-    return { middle: low.map((value, k) => (value + high[k]) / 2), half: low.map((value, k) => 0.6 * (high[k] - value)) };
+    return { middle: low.map((value, k) => (value + high[k]) / 2), half: low.map((value, k) => 0.66 * (high[k] - value)) };
   }
 
   function lookAlong() {

@@ -1,5 +1,6 @@
 """The paper's figures as matplotlib plots."""
 
+from posekit.viewer.plots.curve import plot_curve as plot_curve
 from posekit.viewer.plots.figure import save as save
 from posekit.viewer.plots.image import plot_image as plot_image
 from posekit.viewer.plots.levels import plot_levels as plot_levels

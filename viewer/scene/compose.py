@@ -16,6 +16,7 @@ from posekit.viewer.scene.body import Look, add_posture
 from posekit.viewer.scene.colours import GROUPS
 from posekit.viewer.scene.culprit import Culprit, culprit
 from posekit.viewer.scene.framing import sight_axes
+from posekit.viewer.scene.region import corners_of
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.sight import add_sight
 from posekit.viewer.scene.stage import add_mat, add_stage
@@ -133,9 +134,11 @@ def compose(
             inferred=shown.inferred[k] if shown.inferred else None,
             shift=shift,
         )
-        drawn.append(world.place(points) + shift)
+        body = world.place(points) + shift
+        regions = shown.inferred[k].values() if shown.inferred else ()
+        drawn += [body, *(corners_of(one, world) + shift for one in regions)]
         if apart and shown.groups is not None:
-            mat = add_mat(scene, f"posture-{k}/mat", drawn[-1], GROUPS[int(shown.groups[k]) % len(GROUPS)])
+            mat = add_mat(scene, f"posture-{k}/mat", body, GROUPS[int(shown.groups[k]) % len(GROUPS)])
             drawn.append(mat)
     bodies = np.concatenate(drawn)
     points = bodies

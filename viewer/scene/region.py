@@ -20,8 +20,17 @@ THINNEST = 0.003
 POINT = 1e-4
 """Metres: a joint whose positions are no farther apart has one."""
 
-FACES, EDGES, EDGE_RADIUS = 0.16, 0.8, 0.0025
+FACES, EDGES, EDGE_RADIUS = 0.08, 0.8, 0.0025
 """Opacity of the box's faces and of its edges, and their radius, metres."""
+
+
+SIGNS: Array = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
+
+
+def corners_of(inferred: Inferred, world: World) -> Array:
+    """Return the corners (8, 3) of the box that holds all positions of a joint, world, metres."""
+    middle, half = (inferred.upper + inferred.lower) / 2, (inferred.upper - inferred.lower) / 2
+    return world.place(middle + SIGNS * half)
 
 
 def add_region(
@@ -49,9 +58,8 @@ def add_region(
     box[:3, :3], box[:3, 3] = world.R_world_cam * (2 * half), middle
     scene.meshcat[f"{path}/faces"].set_object(mg.Mesh(UNIT_BOX, glow(colour, FACES)))
     scene.transform(f"/meshcat/{path}/faces", box)
-    signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=np.float64)
-    corners = middle + (signs * half) @ world.R_world_cam.T
-    pairs = [(a, b) for a in range(8) for b in range(a) if np.count_nonzero(signs[a] - signs[b]) == 1]
+    corners = middle + (SIGNS * half) @ world.R_world_cam.T
+    pairs = [(a, b) for a in range(8) for b in range(a) if np.count_nonzero(SIGNS[a] - SIGNS[b]) == 1]
     starts, ends = (corners[[pair[k] for pair in pairs]] for k in (0, 1))
     colours = np.tile(np.array(colour), (len(pairs), 1))
     add_tubes(scene, f"{path}/edges", starts, ends, colours, radius=EDGE_RADIUS, opacity=EDGES)

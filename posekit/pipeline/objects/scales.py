@@ -68,7 +68,9 @@ def family_of(
     solutions = Solutions(linkage=plan.linkage, image=image[list(plan.columns)], aspect=camera.aspect)
     bound, segment = solutions.minimum_scale, solutions.bounding_segment
     if bound == 0:
-        raise InputError(f"linkage {plan.linkage.name}: all its segments are seen end on; the image fixes no scale")
+        raise InputError(
+            f"linkage {plan.linkage.name}: all its segments are seen end on; the image fixes no scale"
+        )
     how, way = _choice(camera, scale)
     minima, curve_s, curve = np.empty((0, 2)), np.empty(0), np.empty(0)
     if way.how == "constraints":
@@ -114,7 +116,9 @@ def _choice(camera: ScaledOrthographicModel, scale: Scale | None) -> tuple[str, 
     return ("min", Scale()) if camera.scale is None else ("view", Scale(how="value", value=camera.scale))
 
 
-def _constrained(plan: Plan, solutions: Solutions, weights: Mapping[str, float]) -> tuple[Array, Array, Array]:
+def _constrained(
+    plan: Plan, solutions: Solutions, weights: Mapping[str, float]
+) -> tuple[Array, Array, Array]:
     """Search by constraints: over all flips, or where these are too many over the rigid triangles."""
     looped = int((np.abs(solutions.incidence.loops) > 0).any(axis=0).sum())
     if set(weights) == {"closure"} and looped > MOST_SEGMENTS:

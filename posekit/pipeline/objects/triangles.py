@@ -53,7 +53,9 @@ class Triangles:
         corners = triangles(linkage)
         known = np.isfinite(family.place[corners]).all(axis=(1, 2))
         corners = corners[known]
-        length = {frozenset(ends): l for ends, l in zip(linkage.segments, linkage.lengths.tolist(), strict=True)}
+        length = {
+            frozenset(ends): l for ends, l in zip(linkage.segments, linkage.lengths.tolist(), strict=True)
+        }
         sides = np.array(
             [[length[frozenset((p, q))] for p, q in ((a, b), (a, c), (b, c))] for a, b, c in corners.tolist()]
         ).reshape(-1, 3)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.measures import adjacent_segments, angle_disparity, best_of, rms_distance
-from posekit.pipeline.reproduce import table_lines
+from posekit.pipeline.markdown import table_lines
 from posekit.pipeline.taylor.completion import Completion, joint_checks, taylor_checks
 from posekit.pipeline.taylor.human import Human
 from posekit.pipeline.taylor.survival import AT_ONCE

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from posekit.figure import load_figure
-from posekit.pipeline.reproduce import table_lines
+from posekit.pipeline.markdown import table_lines
 from posekit.pipeline.taylor.human import Human, taylor_human
 from posekit.pipeline.taylor.protocol import Accuracy, accuracy, accuracy_lines
 from posekit.pipeline.taylor.survival import Survival, survival, survival_lines

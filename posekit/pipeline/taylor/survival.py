@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.pipeline.reproduce import table_lines
+from posekit.pipeline.markdown import table_lines
 from posekit.pipeline.taylor.completion import taylor_checks
 from posekit.pipeline.taylor.human import Human
 from posekit.pipeline.taylor.views import Seen
