@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.robot import Robot
-from posekit.robot.kinematics import Kinematics, body_points
+from posekit.robot.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
 from posekit.robot.linkage import Carried
 
 Groups = NDArray[np.intp]
@@ -23,7 +23,7 @@ Second = Callable[[float, float], float]
 MOST = 3
 """The most joints between two points whose distance is bounded; there are grids over all but one of them."""
 
-GRID = {1: 1, 2: 512, 3: 96}
+GRID = {1: 1, 2: 512, 3: 64}
 """Points of the grid for each joint but the last, by how many joints there are."""
 
 THIRDS = np.array([-2.0, 0.0, 2.0]) * np.pi / 3
@@ -46,17 +46,20 @@ class Attainable:
     Parameters
     ----------
     robot : Robot
-    names : tuple of str (P,)
+    names : tuple of str
         Frames of the robot, not the same place twice.
+    extra : tuple of (int, array (3,))
+        Further points, as `Carried` has them.
     """
 
     robot: Robot
     names: tuple[str, ...]
+    extra: tuple[tuple[int, Array], ...] = ()
 
     @cached_property
     def carried(self) -> Carried:
         """Which bodies carry which points."""
-        return Carried(model=self.robot.model, names=self.names)
+        return Carried(model=self.robot.model, names=self.names, extra=self.extra)
 
     @cached_property
     def ranges(self) -> dict[int, tuple[float, float]]:
@@ -73,7 +76,9 @@ class Attainable:
     def distances(self, joints: tuple[int, ...], pairs: Groups) -> tuple[Array, Array]:
         """Bound the distances of pairs of points (T, 2) between which there are some joints: (T,) each, metres."""
         E = self.extent(pairs)
-        low, high = self._bounds(joints, pairs, _squared_distances, lambda i, j: 2 * i * j + 2 * E * max(i, j), E)
+        low, high = self._bounds(
+            joints, pairs, _squared_distances, lambda i, j: 2 * i * j + 2 * E * max(i, j), E
+        )
         low, high = np.maximum(low * (1 - ROUNDING), 0.0), np.maximum(high * (1 + ROUNDING), 0.0)
         return np.sqrt(low), np.sqrt(high)
 
@@ -96,13 +101,25 @@ class Attainable:
     @cached_property
     def kinematics(self) -> Kinematics:
         """Where the points are."""
-        return Kinematics(model=self.robot.model, points=body_points(self.names))
+        return Kinematics(model=self.robot.model, points=self._points)
+
+    @cached_property
+    def _points(self) -> tuple[BodyPoint, ...]:
+        """The frames, and the further points as offsets from a frame of their body."""
+        model = self.robot.model
+        home: dict[int, str] = {}
+        for name, index in frame_index(model).items():
+            home.setdefault(model.frames[index].parentJoint, name)
+        points = list(body_points(self.names))
+        for k, (body, at) in enumerate(self.extra):
+            frame = model.frames[frame_index(model)[home[body]]]
+            x, y, z = frame.placement.actInv(at).tolist()
+            points.append(BodyPoint(name=f"{k} on {home[body]}", sites=(Site(frame=home[body], offset=(x, y, z)),)))
+        return tuple(points)
 
     def extent(self, groups: Groups) -> float:
         """Return a length (m) that no two points of a group, nor one and an axis between them, are further apart."""
-        return max(
-            self._way(int(a), int(b)) for group in groups for a in group for b in group if a < b
-        )
+        return max(self._way(int(a), int(b)) for group in groups for a in group for b in group if a < b)
 
     def _way(self, a: int, b: int) -> float:
         """Return the way from one point to another along the bodies between them, joints at their farthest."""
@@ -138,7 +155,7 @@ class Attainable:
         used, columns = np.unique(groups, return_inverse=True)
         columns = columns.reshape(groups.shape)
         kinematics = Kinematics(
-            model=self.robot.model, points=body_points([self.names[point] for point in used])
+            model=self.robot.model, points=tuple(self._points[int(point)] for point in used)
         )
         if not joints:
             value = invariant(kinematics.positions(self.configurations((), np.zeros((1, 0)))), columns)[0]
@@ -176,13 +193,13 @@ class Attainable:
 
 def _squared_distances(points: Array, pairs: Groups) -> Array:
     apart = points[:, pairs[:, 1]] - points[:, pairs[:, 0]]
-    return np.einsum("nti,nti->nt", apart, apart)
+    return np.asarray(np.einsum("nti,nti->nt", apart, apart))
 
 
 def six_volumes(points: Array, quads: Groups) -> Array:
     """Return (b - a) x (c - a) . (d - a) of quadruples (T, 4) of points (N, P, 3): (N, T)."""
     a, b, c, d = (points[:, quads[:, k]] for k in range(4))
-    return np.einsum("nti,nti->nt", np.cross(b - a, c - a), d - a)
+    return np.asarray(np.einsum("nti,nti->nt", np.cross(b - a, c - a), d - a))
 
 
 def _circle(values: Array, limits: tuple[float, float]) -> tuple[Array, Array]:
@@ -197,7 +214,9 @@ def _circle(values: Array, limits: tuple[float, float]) -> tuple[Array, Array]:
         crest = phase if sign > 0 else phase + np.pi
         within = lower + np.mod(crest - lower, 2 * np.pi) <= upper
         top = A + sign * amplitude
-        low, high = (np.where(within, pick(end, top), end) for pick, end in ((np.minimum, low), (np.maximum, high)))
+        low, high = (
+            np.where(within, pick(end, top), end) for pick, end in ((np.minimum, low), (np.maximum, high))
+        )
     return low, high
 
 

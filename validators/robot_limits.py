@@ -7,8 +7,8 @@ configuration passes them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.robot import Robot
+from posekit.robot.linkage import Carried
 from posekit.tree import Check, Findings
 from posekit.validators.attainable import MOST, Attainable, six_volumes
+from posekit.validators.axis_points import AxisPoint, find_axis_points, place_axis_point
 
 AT_ONCE = 8
 """Volumes that one check asks, those with the narrowest intervals: more of one joint say the same again."""
@@ -87,15 +89,25 @@ class RobotLimits:
     names: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        _ = self._attainable.carried.place
+        _ = self.axis_points
+
+    @cached_property
+    def axis_points(self) -> tuple[AxisPoint, ...]:
+        """Points on axes that rigid bodies place: numbered after the robot's own."""
+        return find_axis_points(Carried(model=self.robot.model, names=self.names))
 
     @cached_property
     def distances(self) -> tuple[Interval, ...]:
-        """Distances with one to three joints between, where the interval is narrower than rigid lengths make it."""
+        """Distances with one to three joints between, where the interval is narrower than rigid lengths make it.
+
+        Between points on axes, inside a rigid body too.
+        """
         attainable, found = self._attainable, []
-        for joints, pairs in self._by_joints(2, range(1, MOST + 1)).items():
+        for joints, pairs in self._by_joints(2, range(MOST + 1), self._count).items():
             low, high = attainable.distances(joints, pairs)
             for pair, lower, upper in zip(pairs.tolist(), low.tolist(), high.tolist(), strict=True):
+                if not joints and max(pair) < len(self.names):
+                    continue  # a segment, or a chord, of the linkage itself
                 least, most = self._implied(*pair)
                 share = (min(upper, most) - max(lower, least)) / max(most - least, 1e-12)
                 if share < NARROWER:
@@ -106,7 +118,7 @@ class RobotLimits:
     def volumes(self) -> tuple[Interval, ...]:
         """Signed volumes with up to two joints between: they tell a posture from its mirror image."""
         attainable, found = self._attainable, []
-        for joints, quads in self._by_joints(4, range(MOST_VOLUMES + 1)).items():
+        for joints, quads in self._by_joints(4, range(MOST_VOLUMES + 1), len(self.names)).items():
             solid = quads[~self._flat(quads)]
             if not len(solid):
                 continue
@@ -120,7 +132,9 @@ class RobotLimits:
                 widest = max(size, 1e-3 * length**3)
                 share = (min(upper, widest) - max(lower, -widest)) / (2 * widest)
                 if share < NARROWER:
-                    found.append(self._interval(joints, quad, lower / length**2, upper / length**2, length, share))
+                    found.append(
+                        self._interval(joints, quad, lower / length**2, upper / length**2, length, share)
+                    )
         return tuple(found)
 
     def checks(self, order: Sequence[str], *, tolerance: float) -> list[Check]:
@@ -138,30 +152,64 @@ class RobotLimits:
         for kind in (self.distances, self.volumes):
             fresh: dict[tuple[int, tuple[str, ...]], list[Interval]] = {}
             for interval in kind:
-                if all(point in place for point in interval.points):
-                    level = max(place[point] for point in interval.points)
+                needed = self._needed(interval.points)
+                if all(point in place for point in needed if point < len(self.names)):
+                    level = max(place[point] for point in needed if point < len(self.names))
                     fresh.setdefault((level, interval.joints), []).append(interval)
             for key, intervals in fresh.items():
                 best = sorted(intervals, key=lambda interval: interval.share)
                 groups.setdefault(key, []).extend(best[:AT_ONCE])
-        checks: list[Check] = []
-        for (_, joints), intervals in sorted(groups.items(), key=lambda item: (item[0][0], len(item[0][1]))):
-            used = sorted({point for interval in intervals for point in interval.points})
-            checks.append(
-                Within(
-                    name="robot_limits" if joints else "rigid_body",
-                    where=("+".join(joints) or self._body(intervals[0].points),) * len(intervals),
-                    points=tuple(place[point] for point in used),
-                    intervals=tuple(intervals),
-                    columns=tuple(tuple(used.index(point) for point in i.points) for i in intervals),
-                    tolerance=tolerance,
-                )
-            )
-        return checks
+        return [
+            self._check(intervals, joints, place, tolerance)
+            for (_, joints), intervals in sorted(groups.items(), key=lambda item: (item[0][0], len(item[0][1])))
+        ]
+
+    def _check(
+        self, intervals: Sequence[Interval], joints: tuple[str, ...], place: Mapping[int, int], tolerance: float
+    ) -> Within:
+        """Put intervals of one level and the same joints into one check."""
+        needed = self._needed([point for interval in intervals for point in interval.points])
+        column = {point: k for k, point in enumerate(needed)}
+        shown = [point for point in needed if point < len(self.names)]
+        looseness = [
+            1.0 if point < len(self.names) else self.axis_points[point - len(self.names)].looseness
+            for point in needed
+        ]
+        return Within(
+            name="robot_limits" if joints else "rigid_body",
+            where=tuple("+".join(joints) or self._body(interval.points) for interval in intervals),
+            points=tuple(place[point] for point in shown),
+            axis_points=tuple(
+                replace(point, corners=tuple(column[corner] for corner in point.corners))
+                for point in (self.axis_points[k - len(self.names)] for k in needed[len(shown) :])
+            ),
+            intervals=tuple(intervals),
+            columns=tuple(tuple(column[point] for point in interval.points) for interval in intervals),
+            tolerance=np.array(
+                [sum(looseness[column[point]] for point in interval.points) * tolerance for interval in intervals]
+            ),
+        )
+
+    def _needed(self, points: Sequence[int]) -> list[int]:
+        """Return the points, and those that place the ones on axes among them, in order."""
+        needed: set[int] = set()
+        waiting = list(points)
+        while waiting:
+            point = waiting.pop()
+            if point not in needed:
+                needed.add(point)
+                if point >= len(self.names):
+                    waiting.extend(self.axis_points[point - len(self.names)].corners)
+        return sorted(needed)
+
+    @property
+    def _count(self) -> int:
+        return len(self.names) + len(self.axis_points)
 
     @cached_property
     def _attainable(self) -> Attainable:
-        return Attainable(robot=self.robot, names=self.names)
+        extra = tuple((point.body, point.place) for point in self.axis_points)
+        return Attainable(robot=self.robot, names=self.names, extra=extra)
 
     @cached_property
     def _samples(self) -> Array:
@@ -172,11 +220,13 @@ class RobotLimits:
         values = np.stack([rng.uniform(-1.5, 1.5, 8) for _ in joints], axis=-1)
         return attainable.kinematics.positions(attainable.configurations(joints, values))
 
-    def _by_joints(self, size: int, counts: Iterable[int]) -> dict[tuple[int, ...], NDArray[np.intp]]:
+    def _by_joints(
+        self, size: int, counts: Iterable[int], number_of_points: int
+    ) -> dict[tuple[int, ...], NDArray[np.intp]]:
         """Return all groups of so many points by the joints between them, where their number is asked for."""
         moved, left = self._attainable.carried.sides
-        groups = np.array(list(combinations(range(len(self.names)), size)), dtype=np.intp).reshape(-1, size)
-        between = moved[:, groups].any(axis=2) & left[:, groups].any(axis=2)
+        groups = np.array(list(combinations(range(number_of_points), size)), dtype=np.intp).reshape(-1, size)
+        between = np.asarray(moved[:, groups].any(axis=2) & left[:, groups].any(axis=2))
         found: dict[tuple[int, ...], list[int]] = {}
         number = between.sum(axis=0)
         for k in np.flatnonzero(np.isin(number, list(counts))):
@@ -210,7 +260,13 @@ class RobotLimits:
         return flat
 
     def _interval(
-        self, joints: tuple[int, ...], points: Sequence[int], lower: float, upper: float, length: float, share: float
+        self,
+        joints: tuple[int, ...],
+        points: Sequence[int],
+        lower: float,
+        upper: float,
+        length: float,
+        share: float,
     ) -> Interval:
         names = tuple(str(self.robot.model.names[joint]) for joint in joints)
         return Interval(
@@ -236,13 +292,16 @@ class Within:
     name: str
     where: tuple[str, ...]
     points: tuple[int, ...]
+    axis_points: tuple[AxisPoint, ...]
     intervals: tuple[Interval, ...]
     columns: tuple[tuple[int, ...], ...]
-    tolerance: float
+    tolerance: Array
     unit: str = "m"
 
     def judge(self, points: Array) -> Findings:
         """Compare with the intervals; see `posekit.tree.Check`."""
+        for axis_point in self.axis_points:
+            points = np.concatenate([points, place_axis_point(points, axis_point)[:, None]], axis=1)
         value = np.empty((len(points), len(self.intervals)))
         pairs, quads = self._split
         if len(pairs[0]):
@@ -255,7 +314,7 @@ class Within:
             value=value,
             lower=np.array([interval.lower for interval in self.intervals]),
             upper=np.array([interval.upper for interval in self.intervals]),
-            tolerance=np.array([len(columns) for columns in self.columns]) * self.tolerance,
+            tolerance=self.tolerance,
         )
 
     @cached_property
@@ -263,10 +322,12 @@ class Within:
         """The places of distances and of volumes, each with the columns of their points."""
         return tuple(
             (
-                np.array([k for k, columns in enumerate(self.columns) if len(columns) == size], dtype=np.intp),
-                np.array([columns for columns in self.columns if len(columns) == size], dtype=np.intp).reshape(
-                    -1, size
+                np.array(
+                    [k for k, columns in enumerate(self.columns) if len(columns) == size], dtype=np.intp
                 ),
+                np.array(
+                    [columns for columns in self.columns if len(columns) == size], dtype=np.intp
+                ).reshape(-1, size),
             )
             for size in (2, 4)
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -46,6 +46,7 @@ class ObjectFrame:
     margins : mapping of str to array (N,)
         By check; NaN where undecided.
     q : array (N, nq), optional
+        NaN where none was looked for.
     fk_distance : array (N,), optional
         Metres.
     certified : tuple of N (bool or None)
@@ -206,7 +207,8 @@ def _record(frame: ObjectFrame, result: ObjectResult) -> dict[str, Any]:
         }
         if frame.q is not None and frame.fk_distance is not None:
             distance = frame.fk_distance[k : k + 1] * per
-            posture |= {"q": _nullable(frame.q[k]), "fk_distance": _nullable(distance)[0]}
+            found = bool(np.isfinite(frame.q[k]).all())
+            posture |= {"q": _nullable(frame.q[k]) if found else None, "fk_distance": _nullable(distance)[0]}
         if frame.reasons[k]:
             posture["reason"] = frame.reasons[k]
         postures.append(posture)
@@ -237,7 +239,9 @@ def _nullable(values: Array) -> list[Any]:
 def _frame(path: str | Path, index: int, record: ObjectFrameRecord, file: ObjectFile) -> ObjectFrame:
     per, where = _per(file.unit), f"frames[{index}]"
     if len(record.levels.point) != len(record.levels.survivors):
-        raise refusal(path, f"{where}.levels", "lists of two lengths", "one entry a level", "add what is missing")
+        raise refusal(
+            path, f"{where}.levels", "lists of two lengths", "one entry a level", "add what is missing"
+        )
     postures = record.postures
     count, P, nq = len(postures), len(file.points), len(file.configuration_names)
     for k, posture in enumerate(postures):
@@ -254,7 +258,8 @@ def _frame(path: str | Path, index: int, record: ObjectFrameRecord, file: Object
         for column, (name, ends) in enumerate(zip(names, file.segments, strict=True)):
             end = posture.flips.get(name)
             flips[k, column] = 0 if end is None else 1 if end == ends[0] else -1
-    solved = bool(postures) and all(posture.q is not None for posture in postures)
+    solved = any(posture.q is not None for posture in postures)
+    unknown = [np.nan] * nq
     margins = dict.fromkeys(name for posture in postures for name in posture.margins)
     return ObjectFrame(
         time=record.time,
@@ -269,7 +274,9 @@ def _frame(path: str | Path, index: int, record: ObjectFrameRecord, file: Object
             name: np.array([posture.margins.get(name) for posture in postures], dtype=np.float64) / per
             for name in margins
         },
-        q=np.array([p.q for p in postures], dtype=np.float64).reshape(count, nq) if solved else None,
+        q=np.array([p.q or unknown for p in postures], dtype=np.float64).reshape(count, nq)
+        if solved
+        else None,
         fk_distance=np.array([p.fk_distance for p in postures], dtype=np.float64) / per if solved else None,
         certified=tuple(posture.certified for posture in postures),
         reasons=tuple(posture.reason for posture in postures),

@@ -57,7 +57,9 @@ class ObjectFrameRecord(FileModel):
     """One frame."""
 
     time: float = Field(description="Seconds.")
-    judged: str | None = Field(description="exact, measured or given: the tolerance; null where nothing was grown.")
+    judged: str | None = Field(
+        description="exact, measured or given: the tolerance; null where nothing was grown."
+    )
     reason: str = Field(default="", description="Why there is nothing.")
     levels: ObjectLevels
     postures: Annotated[list[ObjectPosture], FailFast()]

@@ -63,7 +63,11 @@ class ObjectView:
         frames, count = len(self.time), len(self.points)
         if frames == 0:
             raise refusal("view", "time", "no frame", "at least one", "give every frame its time")
-        for name, shape in (("time", (frames,)), ("image", (frames, count, 2)), ("truth", (frames, count, 3))):
+        for name, shape in (
+            ("time", (frames,)),
+            ("image", (frames, count, 2)),
+            ("truth", (frames, count, 3)),
+        ):
             given = np.array(getattr(self, name), dtype=np.float64)
             values = np.full(shape, np.nan) if given.shape == (0,) and name == "truth" else given
             if values.shape != shape:

@@ -22,7 +22,8 @@ class ObjectFrameFields(FileModel):
         description="Where each point of the linkage is seen; one that is not seen is left out."
     )
     truth: Annotated[dict[str, Point3], FEW] | None = Field(
-        default=None, description="Points, camera frame, in `unit`, or in the linkage's own where that is null."
+        default=None,
+        description="Points, camera frame, in `unit`, or in the linkage's own where that is null.",
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +12,7 @@ from posekit.intake.mesh_numbers import MAX_POLYGON, finite_numbers, whole_numbe
 from posekit.intake.refusal import refusal, shown
 
 _MAX_CORNERS: Final = 5_000_000
+_MAX_MATERIAL: Final = 10_000_000
 _KNOWN: Final = frozenset(b"v vt vn vp f l p o g s mg usemtl mtllib".split())
 
 
@@ -64,8 +66,17 @@ def count_obj(path: Path, data: bytes) -> int:
 def _check_material(path: Path, number: int, line: bytes) -> None:
     """Refuse a material library elsewhere: the native reader would open whatever it names."""
     name = line.strip()[len("mtllib") :].strip().decode("utf-8", "replace").removeprefix("./")
-    target = path.parent / name if name.isprintable() else path
     plain = name not in ("", "..") and not set("/\\") & set(name) and name.isprintable()
-    if not plain or target.is_symlink() or (target.exists() and not target.is_file()):
-        expected = "the name of a file beside the mesh"
+    if not plain or not _harmless(path.parent / name):
+        expected = f"the name of a file beside the mesh, of at most {_MAX_MATERIAL / 1e6:.0f} MB"
         raise refusal(path, f"line {number}", f"mtllib {shown(name)}", expected, "remove the line")
+
+
+def _harmless(target: Path) -> bool:
+    try:
+        status = target.lstat()
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return stat.S_ISREG(status.st_mode) and status.st_size <= _MAX_MATERIAL

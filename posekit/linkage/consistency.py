@@ -6,6 +6,8 @@ import heapq
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.linkage.naming import shown
@@ -13,8 +15,14 @@ from posekit.linkage.naming import shown
 Halves = Sequence[tuple[int, int, int]]
 Segments = Sequence[tuple[int, int]]
 
-MAX_NODES = 1000
+MAX_NODES = 500
 """The most points and midpoints of one object."""
+
+MAX_SEGMENTS = 2000
+"""The most segments of one object."""
+
+LENGTHS = (1e-12, 1e12)
+"""Lengths that double precision can square and compare."""
 
 ROUNDING = 1e-9
 """Of a length: how far rounded lengths may miss the triangle inequality and still make a flat loop."""
@@ -62,6 +70,8 @@ def check_segments(
         raise InputError(
             f"{where}: {lengths.size} lengths for {len(segments)} segments; expected one for each"
         )
+    if len(segments) > MAX_SEGMENTS:
+        raise InputError(f"{where}: {len(segments)} segments; expected at most {MAX_SEGMENTS}")
     pieces = {frozenset((end, middle)) for end, middle, _ in halves}
     seen: set[frozenset[int]] = set()
     for (a, b), length in zip(segments, lengths.tolist(), strict=True):
@@ -75,6 +85,11 @@ def check_segments(
         if not (math.isfinite(length) and length > 0):
             raise InputError(
                 f"{where}: segment {name} has length {length:g}; expected a finite length above zero"
+            )
+        if not LENGTHS[0] <= length <= LENGTHS[1]:
+            raise InputError(
+                f"{where}: segment {name} has length {length:g}; expected one from {LENGTHS[0]:g} to "
+                f"{LENGTHS[1]:g}: choose another unit"
             )
         if frozenset((a, b)) in seen:
             raise InputError(f"{where}: segment {name} is given twice; keep one of the two")
@@ -122,9 +137,14 @@ def check_loops(where: str, nodes: Sequence[str], segments: Segments, lengths: A
     ]
     if len(edges) < len(nodes):
         return  # a tree
+    nearest = np.full((len(nodes), len(nodes)), np.inf)
+    for a, b, length in edges:
+        nearest[a, b] = nearest[b, a] = min(nearest[a, b], length)
+    for node in range(len(nodes)):  # Floyd 1962, Warshall 1962
+        nearest = np.minimum(nearest, nearest[:, node, None] + nearest[node])
     for number, (a, b, length) in enumerate(edges):
-        others, path = _shortest(len(nodes), edges, number)
-        if length > others * (1 + ROUNDING):
+        if length > nearest[a, b] * (1 + ROUNDING):
+            others, path = _shortest(len(nodes), edges, number)
             loop = "-".join(nodes[node] for node in [*path, a])
             raise InputError(
                 f"{where}: the loop {_cut(loop)} cannot close: {nodes[a]}-{nodes[b]} is {length:g} long, the others "

@@ -16,6 +16,9 @@ from posekit.linkage.linkage import Linkage
 
 Flips = NDArray[np.int8]
 
+FARTHEST = 1e9
+"""Pixels; no picture is larger."""
+
 AT_BOUND = 1e-12
 """Of the bound: so little below it, a scale is at it, and so near to it, a segment is foreshortened to nothing."""
 
@@ -58,10 +61,10 @@ class Family:
                 f"{where}: image points of shape {image.shape}; expected ({len(linkage.points)}, 2), one for each point"
             )
         for point, place in zip(linkage.points, image, strict=True):
-            if np.isinf(place).any() or np.isnan(place).sum() == 1:
+            if (np.abs(place) > FARTHEST).any() or np.isnan(place).sum() == 1:
                 raise InputError(
-                    f"{where}: image point {point} is ({place[0]:g}, {place[1]:g}); expected two finite numbers, "
-                    "or leave it out"
+                    f"{where}: image point {point} is ({place[0]:g}, {place[1]:g}); expected two finite numbers of "
+                    f"at most {FARTHEST:g} pixels, or leave it out"
                 )
         if not (np.isfinite(self.aspect) and self.aspect > 0):
             raise CameraError(f"aspect must be finite and positive; got {self.aspect:g}")

@@ -91,8 +91,8 @@ def incidence(linkage: Linkage, seen: Sequence[bool]) -> Incidence:
 def _loops(A: Array, kept: NDArray[np.intp]) -> Array:
     """Write each segment that depends on those before it by them: the left null space of A, loop by loop."""
     basis: list[int] = []
+    chords: list[int] = []
     orthonormal = np.empty((0, A.shape[1]))
-    rows: list[Array] = []
     for number in kept.tolist():
         rest = A[number] - (A[number] @ orthonormal.T) @ orthonormal
         rest -= (rest @ orthonormal.T) @ orthonormal  # once more, against rounding
@@ -100,10 +100,12 @@ def _loops(A: Array, kept: NDArray[np.intp]) -> Array:
         if size > NOTHING:
             basis.append(number)
             orthonormal = np.concatenate([orthonormal, rest[None] / size])
-            continue
-        row = np.zeros(len(A))
-        row[basis] = -np.linalg.lstsq(A[basis].T, A[number], rcond=None)[0]
-        row[number] = 1.0
-        row = np.round(row * 4096) / 4096  # coefficients are sums of halves
-        rows.append(row / np.abs(row).max())
-    return np.stack(rows) if rows else np.empty((0, len(A)))
+        else:
+            chords.append(number)
+    loops = np.zeros((len(chords), len(A)))
+    if chords:
+        loops[:, basis] = -np.linalg.lstsq(A[basis].T, A[chords].T, rcond=None)[0].T
+        loops[np.arange(len(chords)), chords] = 1.0
+        loops = np.round(loops * 4096) / 4096  # coefficients are sums of halves
+        loops /= np.abs(loops).max(axis=1, keepdims=True)
+    return loops

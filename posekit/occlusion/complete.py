@@ -12,6 +12,7 @@ from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.occlusion.asking import Index
 from posekit.occlusion.completion import Completion
+from posekit.occlusion.describing import write
 from posekit.occlusion.party import Party
 from posekit.occlusion.plan import Plan, State
 from posekit.occlusion.rays import find_rays
@@ -93,7 +94,7 @@ def complete(
         rows = open_[which.reshape(-1) == k]
         for part in _parts(rows, plan, sampling):
             frame = np.asarray(leaves.frame[part], dtype=np.intp)
-            party(points=points[part], frame=frame).write(done, part)
+            write(party(points=points[part], frame=frame), done, part)
     return done
 
 

@@ -87,6 +87,9 @@ def seek_ends(
         Which ends to seek.
     """
     n = wanted.shape[1]
+    reach = np.full((2, n, GOALS), -np.inf)
+    if not (len(group) and wanted.any()):
+        return Ends(reach=reach, group=group[:0], rows=rows.take(group[:0]))
     spacing = placer.spacing()[rows.host]
     levers = np.cumsum(placer.lengths)
     table = reaches(placer, rows, group, representatives)
@@ -101,9 +104,6 @@ def seek_ends(
             columns.append((some, start[some], np.full(len(some), joint * GOALS + goal)))
             near = np.linalg.norm(position - position[np.maximum(start, 0)][group], axis=1)
             left = np.where(near < apart * spacing * levers[joint], -np.inf, left)
-    reach = np.full((2, n, GOALS), -np.inf)
-    if not columns:
-        return Ends(reach=reach, group=group[:0], rows=rows.take(group[:0]))
     who, start, goal = (np.concatenate(column) for column in zip(*columns, strict=True))
     here = rows.take(start)
     best = table.reshape(2 * GOALS, -1)[goal, start]

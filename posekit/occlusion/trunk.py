@@ -20,6 +20,9 @@ from posekit.occlusion.settings import Sampling
 MISFIT = 1e-6
 """Metres by which known points may miss the figure's rigid part and their placement still be sure."""
 
+RINGS = 24
+"""Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""
+
 FEWER = 6
 """By how much the hips are turned in coarser steps where the torso turns as well."""
 
@@ -98,20 +101,13 @@ class TrunkPlacer:
             R = np.tile(every, (len(hosts), 1, 1))
             spacing = float(rotation_spacing(len(every)))
         placed = hosts.take(row).filled(R, turn)
-        if known and HIP_JOINTS[0] in turn.free and [states[j] for j in HIP_JOINTS[1:]] == [State.SEEN] * 2:
-            # The hips' line has one length: nothing that is sampled meets it, so its angles are found.
-            pelvis = np.einsum("nij,j->ni", first, body[joints.index(HIP_JOINTS[0])])
-            which, angle = closing_angles(
-                self.figure,
-                self.rays,
-                self.frame[hosts.core],
-                hosts.points[:, pivot],
-                axis,
-                pelvis,
-                self.sampling.circle,
-            )
-            R = turned(axis[which], angle) @ first[which]
-            placed = placed.and_(hosts.take(which).uneven().filled(R, turn))
+        offset = body[joints.index(HIP_JOINTS[0])]
+        if HIP_JOINTS[0] in turn.free and [states[j] for j in HIP_JOINTS[1:]] == [State.SEEN] * 2:
+            if known:
+                row, R = self._closing(hosts, pivot, offset, np.arange(len(hosts)), axis, first)
+            else:
+                row, R = self._closing_rings(hosts, pivot, offset)
+            placed = placed.and_(hosts.take(row).uneven().filled(R, turn))
         return replace(
             placed,
             tried=np.bincount(placed.core[placed.even], minlength=len(hosts.tried)).astype(np.float64),
@@ -119,6 +115,56 @@ class TrunkPlacer:
             sure=np.zeros(len(hosts.sure), dtype=bool),
             turn=turn if not loose and self._last(joints) else None,
         )
+
+    def _closing(
+        self, hosts: Hosts, pivot: int, offset: Array, row: Index, axis: Array, first: Array
+    ) -> tuple[Index, Array]:
+        """Find the turns of a torso at which both hips, lifted from its pelvis, are as far apart as they must be.
+
+        The hips' line has one length: nothing that is sampled meets it.
+
+        Parameters
+        ----------
+        offset : array (3,)
+            From the pivot to the pelvis in the torso's frame.
+        row : int array (K,)
+            The host of each circle.
+        axis, first : array (K, 3), (K, 3, 3)
+            The circles, and the torso's rotation at angle zero of each.
+
+        Returns
+        -------
+        row, R
+            Hosts, and rotations.
+        """
+        which, angle = closing_angles(
+            self.figure,
+            self.rays,
+            self.frame[hosts.core[row]],
+            hosts.points[row, pivot],
+            axis,
+            np.einsum("nij,j->ni", first, offset),
+            self.sampling.circle,
+        )
+        return row[which], turned(axis[which], angle) @ first[which]
+
+    def _closing_rings(self, hosts: Hosts, pivot: int, offset: Array) -> tuple[Index, Array]:
+        """Do the same where only the neck is known: on rings of pelvis positions, spun about each root."""
+        z = np.array([0.0, 0.0, 1.0])
+        tilt = np.pi * (np.arange(RINGS) + 0.5) / RINGS
+        towards = np.stack([np.sin(tilt), np.zeros(RINGS), np.cos(tilt)], axis=1)
+        ring = onto(np.broadcast_to(unit(offset), towards.shape), towards)
+        row, R = self._closing(
+            hosts,
+            pivot,
+            offset,
+            np.repeat(np.arange(len(hosts)), RINGS),
+            np.broadcast_to(z, (len(hosts) * RINGS, 3)),
+            np.tile(ring, (len(hosts), 1, 1)),
+        )
+        spin = np.tile(circle(RINGS), len(row))
+        row, R = np.repeat(row, RINGS), np.repeat(R, RINGS, axis=0)
+        return row, turned(np.einsum("nij,j->ni", R, unit(offset)), spin) @ R
 
     def _last(self, joints: tuple[int, ...]) -> bool:
         """Whether nothing of the trunk hangs on the part that is turned."""

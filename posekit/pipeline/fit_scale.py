@@ -93,7 +93,8 @@ def _family(
         found = search(solutions, scale.weights)
         minima = np.stack([found.s, found.residual], axis=-1)
         curve = np.stack([found.curve_s, found.curve_residual], axis=-1)
-        chosen = _near_enough(found, tolerance)
+        chosen = _near_enough(found, tolerance) if len(found) else np.array([bound])
+        name = name if len(found) else f"min: {name} fixes no scale here"
     elif scale.how == "min":
         chosen = np.array([bound])
     else:

@@ -93,91 +93,103 @@ def descend(
     if columns is None:
         columns = np.flatnonzero(kinematics.moved_by.any(axis=0))
     parts = [
-        _descend(kinematics, problem.take(rows), start[rows], steps, columns)
+        _Block(kinematics, problem.take(rows), columns).descend(start[rows], steps)
         for rows in (slice(at, at + BLOCK) for at in range(0, max(len(start), 1), BLOCK))
     ]
     return Descent(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def _descend(
-    kinematics: Kinematics, problem: Problem, start: Array, steps: int, moving: NDArray[np.intp]
-) -> Descent:
-    space = kinematics.space
-    q = np.clip(start, problem.lower, problem.upper)
-    n = len(q)
-    weight = np.sqrt(np.where(np.isfinite(problem.targets).all(axis=2), problem.weights, 0.0))[..., None]
-    target = np.nan_to_num(problem.targets)
-    pull = np.full(space.nv, problem.pull)
-    for first in space.free_v:
-        pull[first : first + 6] = 0.0
-    pull = pull[moving]
-    lower, upper = _limits(kinematics, problem.lower, problem.upper)
-    position_of = np.full(space.nv, -1)
-    position_of[space.bounded_v] = space.bounded_q
-    at = position_of[moving]
-    bounded = at >= 0
+class _Equations(NamedTuple):
+    """The problem at a configuration, linearised: its cost, J'J and the gradient."""
 
-    def look(rows: NDArray[np.intp], where: Array) -> tuple[Array, Array, Array, Array]:
-        placed = kinematics.place(where, moving)
-        residual = ((placed.positions - target[rows]) * weight[rows]).reshape(len(rows), -1)
+    cost: Array
+    normal: Array
+    gradient: Array
+
+
+class _Block:
+    """A block of postures and the entries of v that are moved."""
+
+    def __init__(self, kinematics: Kinematics, problem: Problem, moving: NDArray[np.intp]) -> None:
+        self.kinematics, self.problem, self.moving = kinematics, problem, moving
+        known = np.isfinite(problem.targets).all(axis=2)
+        self.weight = np.sqrt(np.where(known, problem.weights, 0.0))[..., None]
+        self.target = np.nan_to_num(problem.targets)
+        space = kinematics.space
+        pull = np.full(space.nv, problem.pull)
+        for first in space.free_v:
+            pull[first : first + 6] = 0.0
+        self.pull = pull[moving]
+        position = np.full(space.nv, -1)
+        position[space.bounded_v] = space.bounded_q
+        self.bounded = np.flatnonzero(position[moving] >= 0)
+        self.at = position[moving][self.bounded]
+
+    def descend(self, start: Array, steps: int) -> Descent:
+        """Take steps until every posture is settled, or so many are taken."""
+        q = np.clip(start, self.problem.lower, self.problem.upper)
+        n = len(q)
+        active = np.arange(n)
+        here = self._linearise(active, q)
+        cost = here.cost.copy()
+        damping = np.full(n, DAMPING)
+        taken, settled = np.zeros(n, dtype=np.intp), np.zeros(n, dtype=np.bool_)
+        for _ in range(steps):
+            if not active.size:
+                break
+            step, gain = self._step(here, q[active], damping[active])
+            trial = self._moved(q[active], step)
+            there = self._linearise(active, trial)
+            # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
+            better = there.cost <= cost[active]
+            ratio = np.minimum((cost[active] - there.cost) / np.maximum(gain, 1e-300), 1.0)
+            factor = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), SLOWER)
+            small = gain <= np.maximum(SETTLED * cost[active], NOTHING)
+            settled[active] = small & (damping[active] <= DAMPING)
+            damping[active] = np.maximum(damping[active] * factor, LEAST)
+            settled[active] |= damping[active] > MOST
+            taken[active] += 1
+            q[active[better]], cost[active[better]] = trial[better], there.cost[better]
+            for mine, theirs in zip(here, there, strict=True):
+                mine[better] = theirs[better]
+            left = ~settled[active]
+            if not left.all():
+                active, here = active[left], _Equations(*(array[left] for array in here))
+        return Descent(q, cost, taken, settled)
+
+    def _linearise(self, rows: NDArray[np.intp], q: Array) -> _Equations:
+        placed = self.kinematics.place(q, self.moving)
+        residual = ((placed.positions - self.target[rows]) * self.weight[rows]).reshape(len(rows), -1)
         jacobian = placed.jacobians
-        jacobian *= weight[rows][..., None]
-        away = space.difference(problem.reference[rows], where)[:, moving]
-        cost = 0.5 * (np.einsum("ni,ni->n", residual, residual) + (away * away) @ pull)
-        return residual, jacobian.reshape(len(rows), -1, len(moving)), away, cost
+        jacobian *= self.weight[rows][..., None]
+        away = self.kinematics.space.difference(self.problem.reference[rows], q)[:, self.moving]
+        cost = 0.5 * (np.einsum("ni,ni->n", residual, residual) + (away * away) @ self.pull)
+        normal, gradient = normal_equations(residual, jacobian.reshape(len(rows), -1, len(self.moving)))
+        return _Equations(cost, normal, gradient + self.pull * away)
 
-    active = np.arange(n)
-    residual, jacobian, away, cost_here = look(active, q)
-    normal, gradient = normal_equations(residual, jacobian)
-    gradient += pull * away
-    cost = cost_here.copy()
-    damping = np.full(n, DAMPING)
-    taken = np.zeros(n, dtype=np.intp)
-    settled = np.zeros(n, dtype=np.bool_)
-    diagonal = np.arange(len(moving))
-    for _ in range(steps):
-        if not active.size:
-            break
-        here = q[active]
-        scale = normal[:, diagonal, diagonal] + FLOOR
-        damped = normal.copy()
-        damped[:, diagonal, diagonal] += pull + damping[active, None] * scale
-        room = np.zeros((2, len(active), len(moving)))
-        room[0], room[1] = -np.inf, np.inf
-        room[0][:, bounded] = lower[moving[bounded]] - here[:, at[bounded]]
-        room[1][:, bounded] = upper[moving[bounded]] - here[:, at[bounded]]
-        step = limited_step(damped, gradient, *room)
-        bend = (normal @ step[..., None])[..., 0] + pull * step
-        gain = -np.einsum("ni,ni->n", step, gradient + 0.5 * bend)
-        dv = np.zeros((len(active), space.nv))
-        dv[:, moving] = step
-        trial = space.integrate(here, dv)
-        trial[:, space.bounded_q] = np.clip(
-            trial[:, space.bounded_q], problem.lower[space.bounded_q], problem.upper[space.bounded_q]
+    def _step(self, here: _Equations, q: Array, damping: Array) -> tuple[Array, Array]:
+        """Return a damped step (N, m) inside the limits, and the decrease that it promises (N,)."""
+        diagonal = np.arange(len(self.moving))
+        damped = here.normal.copy()
+        damped[:, diagonal, diagonal] += self.pull + damping[:, None] * (
+            here.normal[:, diagonal, diagonal] + FLOOR
         )
-        new_residual, new_jacobian, new_away, new_cost = look(active, trial)
-        better = new_cost <= cost[active]
-        ratio = np.minimum((cost[active] - new_cost) / np.maximum(gain, 1e-300), 1.0)
-        small = gain <= np.maximum(SETTLED * cost[active], NOTHING)
-        taken[active] += 1
-        settled[active] = small & (damping[active] <= DAMPING)
-        factor = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), SLOWER)
-        damping[active] = np.maximum(damping[active] * factor, LEAST)
-        settled[active] |= damping[active] > MOST
-        rows = np.flatnonzero(better)
-        q[active[rows]], cost[active[rows]] = trial[rows], new_cost[rows]
-        if rows.size:
-            normal[rows], gradient[rows] = normal_equations(new_residual[rows], new_jacobian[rows])
-            gradient[rows] += pull * new_away[rows]
-        left = ~settled[active]
-        if not left.all():
-            active, normal, gradient = active[left], normal[left], gradient[left]
-    return Descent(q, cost, taken, settled)
+        lowest, highest = np.full(here.gradient.shape, -np.inf), np.full(here.gradient.shape, np.inf)
+        lowest[:, self.bounded] = self.problem.lower[self.at] - q[:, self.at]
+        highest[:, self.bounded] = self.problem.upper[self.at] - q[:, self.at]
+        step = limited_step(damped, here.gradient, lowest, highest)
+        bend = (here.normal @ step[..., None])[..., 0] + self.pull * step
+        return step, -np.einsum("ni,ni->n", step, here.gradient + 0.5 * bend)
 
-
-def _limits(kinematics: Kinematics, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return the limits of the entries of v."""
-    space = kinematics.space
-    low, high = np.full(space.nv, -np.inf), np.full(space.nv, np.inf)
-    low[space.bounded_v], high[space.bounded_v] = lower[space.bounded_q], upper[space.bounded_q]
-    return low, high
+    def _moved(self, q: Array, step: Array) -> Array:
+        """Take steps; rounding does not pass a limit."""
+        space = self.kinematics.space
+        dv = np.zeros((len(q), space.nv))
+        dv[:, self.moving] = step
+        moved = space.integrate(q, dv)
+        moved[:, space.bounded_q] = np.clip(
+            moved[:, space.bounded_q],
+            self.problem.lower[space.bounded_q],
+            self.problem.upper[space.bounded_q],
+        )
+        return moved

@@ -14,7 +14,8 @@ from posekit.errors import InputError
 from posekit.robot.descent import Problem
 from posekit.robot.kinematics import Kinematics
 from posekit.robot.search import Found, Search, unlimited
-from posekit.robot.starts import make_starts
+from posekit.robot.start_tables import make_tables
+from posekit.robot.starts import Starts
 
 TOLERANCE = 1e-3
 """Metres: a posture is met when none of its known points is farther off."""
@@ -23,7 +24,7 @@ PULL = 1e-10
 """m^2/rad^2: strong enough to choose among postures that place the points alike, too weak to move a point."""
 
 JUMP = 2.0
-"""Times the last frame's largest distance, and at least that many tolerances, beyond which a frame is searched for anew."""
+"""Times the last frame's largest distance, or tolerances, beyond which a frame is searched for anew."""
 
 FARTHEST = 1e6
 """Metres beyond which a target is taken for a mistake."""
@@ -210,7 +211,7 @@ class InverseKinematics:
                 reference[rows] = before
                 here = here._replace(reference=before)
                 found = self._search.descend(here, before)
-                lost = found.worst > np.maximum(self.tolerance, JUMP * parts[-1].worst[: len(rows)])
+                lost = found.worst > JUMP * np.maximum(self.tolerance, parts[-1].worst[: len(rows)])
                 again = np.flatnonzero(lost)
                 if again.size:
                     found.improve(again, self._search.everywhere(here.take(again)))
@@ -246,7 +247,8 @@ class InverseKinematics:
 
     @cached_property
     def _search(self) -> Search:
-        return Search(starts=make_starts(self.kinematics, *self._limits), tolerance=self.tolerance)
+        tables = make_tables(self.kinematics, *self._limits)
+        return Search(starts=Starts(kinematics=self.kinematics, tables=tables), tolerance=self.tolerance)
 
     def _problem(self, targets: ArrayLike, weights: ArrayLike | None) -> Problem:
         """Check what is asked for."""

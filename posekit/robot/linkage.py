@@ -37,8 +37,10 @@ class Carried:
     Parameters
     ----------
     model : pinocchio.Model
-    names : tuple of str (P,)
+    names : tuple of str
         Frames of the model.
+    extra : tuple of (int, array (3,))
+        Further points, after those of the frames: a body and the place on it, metres.
 
     Raises
     ------
@@ -48,6 +50,7 @@ class Carried:
 
     model: pin.Model
     names: tuple[str, ...]
+    extra: tuple[tuple[int, Array], ...] = ()
 
     def __post_init__(self) -> None:
         _ = self.place
@@ -61,10 +64,13 @@ class Carried:
     def place(self) -> Array:
         """Where each body carries each point (njoints, P, 3), metres, the body's frame; NaN where it does not."""
         frames = frame_index(self.model)
-        place = np.full((self.model.njoints, len(self.names), 3), np.nan)
+        count = len(self.names)
+        place = np.full((self.model.njoints, count + len(self.extra), 3), np.nan)
         for column, name in enumerate(self.names):
             frame = self.model.frames[find_frame(frames, name, f"model {self.model.name!r}")]
             self.spread(place[:, column], frame.parentJoint, frame.placement.translation)
+        for column, (body, at) in enumerate(self.extra, start=count):
+            self.spread(place[:, column], body, at)
         place.flags.writeable = False
         return place
 
@@ -74,7 +80,7 @@ class Carried:
         waiting = [body]
         while waiting:
             here = waiting.pop()
-            for joint, axis in self._axes.items():
+            for joint, axis in self.axes.items():
                 parent, placement = self.model.parents[joint], self.model.jointPlacements[joint]
                 if here == parent and np.isnan(place[joint, 0]):
                     moved = placement.actInv(place[here])
@@ -103,9 +109,9 @@ class Carried:
     @cached_property
     def sides(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Which points a joint moves, and which it leaves (njoints, P) each; one on its axis is in neither."""
-        moved = ~(self.on[None] & ~self.beyond[..., None]).any(axis=1)
-        left = ~(self.on[None] & self.beyond[..., None]).any(axis=1)
-        return moved, left
+        inside: NDArray[np.bool_] = np.any(self.on[None] & self.beyond[..., None], axis=1)
+        outside: NDArray[np.bool_] = np.any(self.on[None] & ~self.beyond[..., None], axis=1)
+        return np.asarray(~outside), np.asarray(~inside)
 
     def joints_between(self, points: Sequence[int]) -> tuple[int, ...]:
         """Return the joints on which the shape of some points depends: those that move some and leave others."""
@@ -115,7 +121,7 @@ class Carried:
         return tuple(int(joint) for joint in np.flatnonzero(between))
 
     @cached_property
-    def _axes(self) -> dict[int, Array]:
+    def axes(self) -> dict[int, Array]:
         """The axes of turning joints, in the joint's own frame."""
         axes = {}
         for joint in (*self.space.hinges, *self.space.turns):
@@ -161,7 +167,8 @@ def linkage_of(robot: Robot, *, points: Sequence[str] | None = None) -> Linkage:
     unknown = [name for name in points or () if name not in robot.frame_names]
     if unknown:
         raise InputError(
-            f"robot {robot.name}: there is no link or joint {shown(unknown[0])}; {nearest(unknown[0], robot.frame_names)}"
+            f"robot {robot.name}: there is no link or joint {shown(unknown[0])}; "
+            f"{nearest(unknown[0], robot.frame_names)}"
         )
     names = _points_of(robot) if points is None else tuple(points)
     if len(names) < 2:
@@ -196,6 +203,7 @@ def _points_of(robot: Robot) -> tuple[str, ...]:
         if joint in turning and model.parents[joint] in within:
             within.add(joint)
     inner = {model.parents[joint] for joint in within if joint != base}
+    frames = frame_index(model)
     names: list[str] = []
     places: list[Array] = []
 
@@ -207,30 +215,32 @@ def _points_of(robot: Robot) -> tuple[str, ...]:
             names.append(name)
             places.append(place)
 
+    def add_link(link: str, bodies: set[int]) -> None:
+        frame = model.frames[frames[link]]
+        if frame.parentJoint in bodies:
+            add(link, frame.parentJoint, frame.placement.translation, apart=AWAY)
+
     for joint in sorted(within - {base}):
         add(model.names[joint], joint, np.zeros(3), apart=ON_AXIS)
-    n_joints = len(names)
-    frames = frame_index(model)
-    for link in [*_base_links(robot), *_last_links(robot)]:
-        frame = model.frames[frames[link]]
-        body = frame.parentJoint
-        if body in within and (body == base or body not in inner):
-            if link in _base_links(robot) or body not in inner:
-                add(link, body, frame.placement.translation, apart=AWAY)
-    root = [name for name in names[n_joints:] if name in _base_links(robot)]
-    return (*root, *(name for name in names if name not in root))
+    turning_points = len(names)
+    for link in _base_links(robot):
+        add_link(link, {base})
+    base_points = names[turning_points:]
+    for link in _last_links(robot):
+        add_link(link, within - inner)
+    return (*base_points, *names[:turning_points], *names[turning_points + len(base_points) :])
 
 
 def _base_links(robot: Robot) -> list[str]:
     """Return the link of the base that carries the first moving joint."""
-    moving = {robot.model.names[joint] for joint in range(1, robot.model.njoints)}
-    for joint in robot.tree.findall("joint"):
-        parent = joint.find("parent")
-        if joint.get("name") in moving and parent is not None:
-            frame = robot.model.frames[robot.frame_id(parent.get("link", ""))]
-            if frame.parentJoint <= int(robot.free_flyer):
-                return [parent.get("link", "")]
-    return []
+    moving = set(robot.joint_names)
+    carriers = (
+        parent.get("link", "")
+        for joint in robot.tree.findall("joint")
+        if joint.get("name") in moving and (parent := joint.find("parent")) is not None
+    )
+    on_base = int(robot.free_flyer)
+    return [link for link in carriers if robot.model.frames[robot.frame_id(link)].parentJoint == on_base][:1]
 
 
 def _last_links(robot: Robot) -> list[str]:

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.errors import InputError
+from posekit.robot.body_point import frame_index
 from posekit.robot.descent import Descent, Problem, descend
+from posekit.robot.joint_chain import beyond
 from posekit.robot.kinematics import Kinematics
-from posekit.robot.starts import Starts, Table
+from posekit.robot.start_tables import Table
+from posekit.robot.starts import Starts
 
 RETRIES = 6
 """Other shapes of a trunk or a limb that are tried where the first does not meet its own points."""
@@ -131,7 +133,7 @@ class Search:
         """Lay the trunk: the first candidate, and the best of the others where it does not meet its points."""
         first = self.starts.trunks(problem.targets, 1)
         if not self._trunk_part.columns.size:
-            return first[0]
+            return np.asarray(first[0])
         q, cost = self._descend_part(self._trunk_part, problem, first, TRUNK_STEPS)
         rows = self._missed(cost)
         if rows.size:
@@ -202,11 +204,11 @@ class Search:
     @cached_property
     def _trunk_part(self) -> _Part:
         free = [int(v) + k for v in self.kinematics.space.free_v for k in range(6)]
-        return self._part(self.starts.trunk, np.array(free, dtype=np.intp))
+        return self._part(self.starts.tables.trunk, np.array(free, dtype=np.intp))
 
     @cached_property
     def _limb_parts(self) -> tuple[_Part, ...]:
-        return tuple(self._part(table, np.zeros(0, dtype=np.intp)) for table in self.starts.limbs)
+        return tuple(self._part(table, np.zeros(0, dtype=np.intp)) for table in self.starts.tables.limbs)
 
     def _part(self, table: Table, free: NDArray[np.intp]) -> _Part:
         columns = np.concatenate([free, table.dofs])
@@ -214,10 +216,14 @@ class Search:
             return _Part(self.kinematics, np.zeros(0, dtype=np.intp), table.points)
         points = tuple(self.kinematics.points[p] for p in table.points)
         model = self.kinematics.model
-        try:
-            part = Kinematics(model=model, points=points, carrier=table.carrier)
-        except InputError:  # a mean with a site on another limb
-            part = Kinematics(model=model, points=points)
+        # A mean may have a site on another limb: then it is seen from the world.
+        frames = frame_index(model)
+        bodies = {
+            int(model.frames[frames[site.frame]].parentJoint) for point in points for site in point.sites
+        }
+        carried = set(beyond(model, table.carrier))
+        carrier = table.carrier if bodies <= carried else 0
+        part = Kinematics(model=model, points=points, carrier=carrier)
         return _Part(part, columns, table.points)
 
 

@@ -1,20 +1,15 @@
-"""Where inverse kinematics starts from: tables of sampled limbs and trunks, looked up by the points they place."""
+"""Where inverse kinematics starts from: shapes looked up in tables by the points that they place."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.robot.configuration_space import ConfigurationSpace
 from posekit.robot.kinematics import Kinematics
-
-SAMPLES = 4096
-"""Shapes in a table: a limb of four joints is then met to some 20 degrees."""
+from posekit.robot.start_tables import Table, Tables, write
 
 NEAREST = 96
 """Shapes of a table among which the starts are chosen."""
@@ -22,81 +17,19 @@ NEAREST = 96
 APART = 0.7
 """Radians by which two starts differ in at least one joint."""
 
-PULL = 1e-3
-"""Preference of shapes near the neutral one, m^2/rad^2: it decides between shapes that place the points alike."""
-
-FEW = 3
-"""Joints that place a limb's first point: up to so many are sampled with the trunk, where that point is needed to
-tell how the trunk is turned: a clavicle's, not a hip's."""
-
-GIRDLE = 0.5
-"""Weight of such a point in the trunk's table."""
-
-
-class Branch(NamedTuple):
-    """Entries of v that move points as a chain does: each moves a part of what the one before moves.
-
-    Attributes
-    ----------
-    dofs : int array
-        Entries of v, those that move most first.
-    points : int array
-        What they move.
-    """
-
-    dofs: NDArray[np.intp]
-    points: NDArray[np.intp]
-
-
-class Table(NamedTuple):
-    """Sampled shapes.
-
-    Attributes
-    ----------
-    dofs : int array (D,)
-        Entries of v.
-    values : array (M, D)
-        Their values: angles and positions, zero for a continuous joint's neutral.
-    points : int array (K,)
-    weights : array (K,)
-    positions : array (M, K, 3)
-        Where the points are, in the frame of the body that carries the shape (the world for a trunk), metres.
-    penalty : array (M,)
-        Added to the squared distances, m^2.
-    carrier : int
-        The joint whose body carries it.
-    """
-
-    dofs: NDArray[np.intp]
-    values: Array
-    points: NDArray[np.intp]
-    weights: Array
-    positions: Array
-    penalty: Array
-    carrier: int
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Starts:
-    """Tables for one model, its points and its limits.
+    """Starts for one model, its points and its limits.
 
     Parameters
     ----------
     kinematics : Kinematics
-    trunk : Table
-        Joints that move several limbs, and the roots of the limbs; without the free-flyer.
-    limbs : tuple of Table
-    base : int
-        Where the free-flyer at the root starts in q; -1 for a fixed base.
-    rest : array (nq,)
-        The neutral configuration inside the limits.
+    tables : Tables
     """
 
     kinematics: Kinematics
-    trunk: Table
-    limbs: tuple[Table, ...]
-    base: int
-    rest: Array
+    tables: Tables
 
     def trunks(self, targets: Array, count: int) -> Array:
         """Find configurations whose trunk lies best on the targets.
@@ -115,14 +48,16 @@ class Starts:
         array (count, N, nq)
             The best first; limbs at rest.
         """
-        table, n = self.trunk, len(targets)
+        table, n = self.tables.trunk, len(targets)
         seen = targets[:, table.points]
-        known = np.isfinite(seen).all(axis=2)
+        known: NDArray[np.bool_] = np.isfinite(seen).all(axis=2)
         weights = np.where(known, table.weights, 0.0)
         seen = np.where(known[..., None], seen, 0.0)
-        if self.base < 0:
+        if self.tables.base < 0:
             rank = choose(table, _squared_distances(table.positions, seen, weights), count)
-            return np.stack([self._write(np.tile(self.rest, (n, 1)), table, chosen) for chosen in rank.T])
+            return np.stack(
+                [self._write(np.tile(self.tables.rest, (n, 1)), table, chosen) for chosen in rank.T]
+            )
         first, second = np.triu_indices(len(table.points), 1)
         shape = np.linalg.norm(table.positions[:, first] - table.positions[:, second], axis=2)
         gap = np.linalg.norm(seen[:, first] - seen[:, second], axis=2)
@@ -134,7 +69,7 @@ class Starts:
         laid, misfits = [], []
         for chosen in rank.T:
             R, t, left = lay(table.positions[chosen], seen, weights)
-            q = self._write(np.tile(self.rest, (n, 1)), table, chosen)
+            q = self._write(np.tile(self.tables.rest, (n, 1)), table, chosen)
             laid.append(self._lay_base(q, R, t))
             misfits.append(left + table.penalty[chosen])
         order = np.argsort(np.array(misfits), axis=0, kind="stable")[:count]
@@ -156,7 +91,7 @@ class Starts:
         array (count, N, nq)
             q with the limb's joints replaced, the best first.
         """
-        table = self.limbs[index]
+        table = self.tables.limbs[index]
         rotation, origin = self.kinematics.joint_placements(q, table.carrier)
         seen = targets[:, table.points]
         known = np.isfinite(seen).all(axis=2)
@@ -175,93 +110,10 @@ class Starts:
         shift = (
             np.einsum("nij,j->ni", R, placement.translation) + t - placement.translation
         ) @ placement.rotation
-        at = self.base
+        at = self.tables.base
         q[:, at : at + 3] = np.einsum("nij,nj->ni", turn, q[:, at : at + 3]) + shift
         q[:, at + 3 : at + 7] = quaternions(turn)
         return q
-
-
-def make_starts(kinematics: Kinematics, lower: Array, upper: Array) -> Starts:
-    """Sample the tables: deterministic, the same for the same model, points and limits."""
-    space, model = kinematics.space, kinematics.model
-    rest = np.clip(pin.neutral(model), lower, upper)
-    base = -1
-    moved = kinematics.moved_by
-    if space.free and model.parents[space.free[0]] == 0 and moved[:, space.free_v[0]].all():
-        base = int(space.free_q[0])
-    branches = find_branches(kinematics)
-    in_branches = {int(v) for branch in branches for v in branch.dofs}
-    free = {int(v) + k for v in space.free_v for k in range(6)}
-    trunk_dofs = [v for v in range(space.nv) if moved[:, v].any() and v not in in_branches and v not in free]
-    limb_points = {int(p) for branch in branches for p in branch.points}
-    points = [p for p in range(len(moved)) if p not in limb_points]
-    weights = [1.0] * len(points)
-    for branch in branches:
-        count = moved[:, branch.dofs].sum(axis=1)
-        near = [p for p in branch.points if count[p] == count[branch.points].min()]
-        roots = [int(v) for v in branch.dofs if moved[near, v].any()]
-        held = _held_by(kinematics, carrier_of(model, int(branch.dofs[0])))
-        if len(roots) < len(branch.dofs) and len(roots) <= FEW and len(held) < 3:
-            trunk_dofs += roots
-            points += [int(p) for p in near]
-            weights += [GIRDLE] * len(near)
-    trunk = _sample(kinematics, rest, lower, upper, np.array(trunk_dofs, dtype=np.intp), points, weights, 0)
-    limbs = []
-    for branch in branches:
-        joint = next(
-            j
-            for j in range(1, model.njoints)
-            if model.idx_vs[j] <= branch.dofs[0] < model.idx_vs[j] + model.nvs[j]
-        )
-        limbs.append(
-            _sample(
-                kinematics,
-                rest,
-                lower,
-                upper,
-                branch.dofs,
-                list(branch.points),
-                [1.0] * len(branch.points),
-                int(model.parents[joint]),
-            )
-        )
-    return Starts(kinematics=kinematics, trunk=trunk, limbs=tuple(limbs), base=base, rest=rest)
-
-
-def find_branches(kinematics: Kinematics) -> tuple[Branch, ...]:
-    """Find the limbs: the longest runs of joints that move ever fewer of the same points."""
-    moved = kinematics.moved_by
-    free = {int(v) + k for v in kinematics.space.free_v for k in range(6)}
-    sets = {
-        v: frozenset(np.flatnonzero(moved[:, v]).tolist())
-        for v in range(moved.shape[1])
-        if moved[:, v].any() and v not in free
-    }
-    different = set(sets.values())
-    chains = [s for s in different if _is_chain([t for t in different if t <= s])]
-    tops = sorted((s for s in chains if not any(s < other for other in chains)), key=sorted)
-    branches = []
-    for top in tops:
-        dofs = sorted((v for v, s in sets.items() if s <= top), key=lambda v: (-len(sets[v]), v))
-        branches.append(Branch(np.array(dofs, dtype=np.intp), np.array(sorted(top), dtype=np.intp)))
-    return tuple(branches)
-
-
-def carrier_of(model: pin.Model, v: int) -> int:
-    """Return the joint whose body carries the joint of an entry of v; 0 is the world."""
-    first = list(model.idx_vs)
-    joint = next(j for j in range(1, model.njoints) if first[j] <= v < first[j] + model.nvs[j])
-    return int(model.parents[joint])
-
-
-def _held_by(kinematics: Kinematics, joint: int) -> list[int]:
-    """List the points that keep their place in a joint's body: three of them tell how it is turned."""
-    space = kinematics.space
-    draws = np.random.default_rng(0).uniform(-1.0, 1.0, (4, space.nv))
-    q = space.integrate(np.tile(pin.neutral(kinematics.model), (4, 1)), draws)
-    rotation, origin = kinematics.joint_placements(q, joint)
-    local = np.einsum("nji,npj->npi", rotation, kinematics.positions(q) - origin[:, None])
-    return np.flatnonzero((np.ptp(local, axis=0) < 1e-9).all(axis=1)).tolist()
 
 
 def choose(table: Table, misfit: Array, count: int) -> NDArray[np.intp]:
@@ -302,21 +154,8 @@ def lay(shape: Array, seen: Array, weights: Array) -> tuple[Array, Array, Array]
     return R, b - np.einsum("nij,nj->ni", R, a), np.einsum("nk,nki,nki->n", weights, left, left)
 
 
-def write(space: ConfigurationSpace, q: Array, dofs: NDArray[np.intp], values: Array) -> Array:
-    """Set joints of configurations q (N, nq), in place, by their entries of v."""
-    where = {int(v): int(k) for v, k in zip(space.bounded_v, space.bounded_q, strict=True)}
-    turns = {int(v): int(k) for v, k in zip(space.turn_v, space.turn_q, strict=True)}
-    for column, v in enumerate(dofs):
-        if int(v) in where:
-            q[:, where[int(v)]] = values[:, column]
-        else:
-            k = turns[int(v)]
-            q[:, k], q[:, k + 1] = np.cos(values[:, column]), np.sin(values[:, column])
-    return q
-
-
 def quaternions(R: Array) -> Array:
-    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), order x, y, z, w, from the largest entry (Shepperd 1978)."""
+    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), x, y, z, w, by the largest entry (Shepperd 1978)."""
     xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
     a, b, c = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
     u, v, w = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
@@ -333,52 +172,9 @@ def quaternions(R: Array) -> Array:
     return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
 
 
-def _is_chain(sets: list[frozenset[int]]) -> bool:
-    return all(a <= b or b <= a for a in sets for b in sets)
-
-
 def _squared_distances(positions: Array, seen: Array, weights: Array) -> Array:
     """Return the weighted sum of squared distances of seen points (N, K, 3) to shapes (M, K, 3): (N, M)."""
     m = len(positions)
     cross = (seen * weights[..., None]).reshape(len(seen), -1) @ positions.reshape(m, -1).T
     own = (weights * np.einsum("nki,nki->nk", seen, seen)).sum(axis=1)
     return np.asarray(own[:, None] - 2 * cross + weights @ np.einsum("mki,mki->mk", positions, positions).T)
-
-
-def _sample(
-    kinematics: Kinematics,
-    rest: Array,
-    lower: Array,
-    upper: Array,
-    dofs: NDArray[np.intp],
-    points: list[int],
-    weights: list[float],
-    carrier: int,
-) -> Table:
-    """Sample joints within their limits by an additive recurrence of low discrepancy (Roberts 2018), rest first."""
-    space = kinematics.space
-    q_of = dict(zip(space.bounded_v.tolist(), space.bounded_q.tolist(), strict=True))
-    middle = np.array([rest[q_of[v]] if v in q_of else 0.0 for v in dofs.tolist()])
-    low = np.array([lower[q_of[v]] if v in q_of else -np.pi for v in dofs.tolist()])
-    high = np.array([upper[q_of[v]] if v in q_of else np.pi for v in dofs.tolist()])
-    low = np.where(np.isfinite(low), np.maximum(low, middle - 2 * np.pi), middle - np.pi)
-    high = np.where(np.isfinite(high), np.minimum(high, middle + 2 * np.pi), middle + np.pi)
-    count = SAMPLES if len(dofs) else 1
-    root = 2.0
-    for _ in range(60):  # the root of x^(d+1) = x + 1
-        root = (1 + root) ** (1 / (len(dofs) + 1))
-    step = root ** -np.arange(1, len(dofs) + 1)
-    values = low + (high - low) * np.mod(0.5 + np.outer(np.arange(count), step), 1.0)
-    values[0] = middle
-    q = write(space, np.tile(rest, (count, 1)), dofs, values)
-    positions = kinematics.positions(q)[:, points]
-    rotation, origin = kinematics.joint_placements(q, carrier)
-    return Table(
-        dofs=dofs,
-        values=values,
-        points=np.array(points, dtype=np.intp),
-        weights=np.array(weights),
-        positions=np.einsum("nji,npj->npi", rotation, positions - origin[:, None]),
-        penalty=PULL * ((values - middle) ** 2).sum(axis=1),
-        carrier=carrier,
-    )

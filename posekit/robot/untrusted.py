@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-import posekit
 from posekit.errors import InputError
 from posekit.intake import refusal
 
@@ -64,7 +63,7 @@ def probe(settings: dict[str, Any], *, compare: bool, limits: ProbeLimits | None
         "memory": limits.memory,
         "cpu": limits.cpu,
     }
-    home = str(Path(posekit.__file__).parents[1])
+    home = str(Path(__file__).parents[2])  # where posekit lies, if it is not installed
     try:
         child = subprocess.run(
             [sys.executable, "-P", "-c", _CODE, home],

@@ -74,6 +74,19 @@ def test_a_segment_without_length_is_refused(length: float) -> None:
         make({("a", "b"): 1.0, ("b", "c"): length})
 
 
+@pytest.mark.parametrize("length", [1e-200, 1e200])
+def test_a_length_beyond_all_measure_is_refused(length: float) -> None:
+    with pytest.raises(InputError, match=r"b-c has length 1e[-+]200; expected one from 1e-12 to 1e\+12"):
+        make({("a", "b"): 1.0, ("b", "c"): length})
+
+
+def test_an_object_too_large_is_refused() -> None:
+    with pytest.raises(InputError, match="601 points; expected at most 500"):
+        make({(f"p{k}", f"p{k + 1}"): 1.0 for k in range(600)})
+    with pytest.raises(InputError, match="2016 segments; expected at most 2000"):
+        make({(f"p{a}", f"p{b}"): 1.0 for a in range(64) for b in range(a)})
+
+
 def test_an_object_in_parts_is_refused_and_the_parts_are_named() -> None:
     with pytest.raises(InputError, match=r"falls into 2 parts, \(a, b\) and \(c, d, e\)"):
         make({("a", "b"): 1.0, ("c", "d"): 1.0, ("d", "e"): 1.0})

@@ -234,6 +234,7 @@ def test_a_hidden_hip_cuts_the_human_in_two(rng: np.random.Generator) -> None:
     [
         ([np.inf, 0.0], r"image point b is \(inf, 0\); expected two finite numbers"),
         ([np.nan, 0.0], r"image point b is \(nan, 0\)"),
+        ([1e300, 0.0], r"image point b is \(1e\+300, 0\); .* at most 1e\+09 pixels"),
         ([np.nan, np.nan], r"no segment is seen at both ends \(not seen: b\)"),
     ],
 )

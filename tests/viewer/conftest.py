@@ -14,9 +14,10 @@ import posekit
 from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import ViewerError
 from posekit.files import Family, Inferred, Result, ResultFrame, ScaledOrthographicModel, View
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_postures
 from posekit.viewer.browser.studio import Studio
+from posekit.viewer.scene.branch import lift_branch
 from posekit.viewer.scene.subject import Subject, subject_of
 
 
@@ -89,7 +90,8 @@ def _view(*, scale: float | None = SCALE, aspect: float = 1.0) -> View:
     """Return what an uncalibrated camera sees of them."""
     image = ScaledOrthographicCamera(scale=SCALE, aspect=aspect).project(_truth())
     model = ScaledOrthographicModel(scale=scale, aspect=aspect)
-    return View(camera=model, time=0.1 * np.arange(FRAMES), image=image, truth=_truth(), unit="cm")
+    time: Array = np.arange(FRAMES) / 10
+    return View(camera=model, time=time, image=image, truth=_truth(), unit="cm")
 
 
 @functools.cache
@@ -123,10 +125,15 @@ def _at_scales(*scales: float) -> Result:
     frames = []
     for frame, joints in zip(result.frames, _truth(), strict=True):
         found = []
+        starts, ends = np.array(TREE_SEGMENTS).T
+        deep = joints[ends, 2] - joints[starts, 2]
+        lengths = np.linalg.norm(joints[ends] - joints[starts], axis=1)
         for s in scales:
-            flat = joints[:, :2] * SCALE / s
-            for sign in (1.0, -1.0):
-                found.append(np.concatenate([flat, sign * joints[:, 2:]], axis=1))
+            camera, image = ScaledOrthographicCamera(scale=s), SCALE * joints[:, :2]
+            root = np.array([*(image[0] / s), 0.0])
+            for far in (deep > 0, deep < 0):
+                bits = "".join("1" if one else "0" for one in far)
+                found.append(lift_branch(camera, root, image, lengths, bits, tolerance=1e-9))
         minima = np.array([*scales, 1.7 * max(scales)])
         assert frame.family is not None
         psi = np.linspace(0, 1.5, 600)
@@ -181,7 +188,7 @@ def _taylor() -> Result:
 
 def _with_hidden_elbow() -> tuple[Result, View]:
     """Return a result and a view without the right elbow: the wrist's depth is an interval then."""
-    result, seen = _recovered(), view()
+    result, seen = _recovered(), _view()
     image = np.array(seen.image)
     image[:, JOINT["right_elbow"]] = np.nan
     frames = []
@@ -189,6 +196,7 @@ def _with_hidden_elbow() -> tuple[Result, View]:
         inferred = []
         for joints in frame.joints:
             elbow, wrist = joints[JOINT["right_elbow"]], joints[JOINT["right_wrist"]]
+            nearer, deeper = np.array([0.0, 0.0, -0.2]), np.array([0.0, 0.0, 0.4])
             low, high = np.array([-0.1, -0.2, -0.3]), np.array([0.05, 0.25, 0.15])
             inferred.append(
                 {
@@ -196,7 +204,7 @@ def _with_hidden_elbow() -> tuple[Result, View]:
                         kind="region", lower=elbow + low, upper=elbow + high, radius=0.31, fraction=0.25
                     ),
                     "right_wrist": Inferred(
-                        kind="interval", lower=wrist + [0, 0, -0.2], upper=wrist + [0, 0, 0.4], radius=0.4
+                        kind="interval", lower=wrist + nearer, upper=wrist + deeper, radius=0.4
                     ),
                 }
             )

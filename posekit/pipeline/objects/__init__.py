@@ -1,4 +1,4 @@
-"""Any articulated object from an uncalibrated picture: every posture behind it (Taylor 2000), with its configuration."""
+"""Any articulated object from an uncalibrated picture (Taylor 2000): every posture, with its configuration."""
 
 from posekit.pipeline.objects.articulated import ArticulatedObject as ArticulatedObject
 from posekit.pipeline.objects.articulated import load_object as load_object

@@ -11,6 +11,9 @@ from posekit.robot import Robot
 from posekit.robot.ik import InverseKinematics, Reach, Solution
 from posekit.robot.kinematics import Kinematics, body_points
 
+MOST = 256
+"""Postures of one frame whose configurations are looked for: some milliseconds each."""
+
 
 class Certificate(NamedTuple):
     """Configurations of N postures.
@@ -18,7 +21,7 @@ class Certificate(NamedTuple):
     Attributes
     ----------
     q : array (N, nq)
-        Within the limits; the best that was found.
+        Within the limits; the best that was found. NaN where none was looked for.
     distance : array (N,)
         The largest distance of a known point from the posture's, metres.
     certified : list of bool
@@ -53,14 +56,18 @@ class Certifier:
         """Find configurations that place points (N, P, 3), metres, NaN unknown, within a tolerance in metres."""
         if tolerance not in self._solvers:
             self._solvers[tolerance] = InverseKinematics(kinematics=self.kinematics, tolerance=tolerance)
-        if not len(points):
-            return Certificate(np.empty((0, self.robot.model.nq)), np.empty(0), [], [])
-        with np.errstate(over="ignore"):  # the damping of a step that made things far worse
-            solution = self._solvers[tolerance].solve(points)
-        distance = np.nanmax(solution.residual, axis=1)
+        n, nq = len(points), self.robot.model.nq
+        q, distance = np.full((n, nq), np.nan), np.full(n, np.nan)
+        reasons = [f"undecided: configurations of the first {MOST} postures alone were looked for"] * n
+        if n:
+            with np.errstate(over="ignore"):  # the damping after a step that made things far worse
+                solution = self._solvers[tolerance].solve(points[:MOST])
+            q[:MOST] = solution.q
+            distance[:MOST] = np.nanmax(solution.residual, axis=1)
+            reasons[:MOST] = [self._reason(solution, k) for k in range(len(solution.q))]
         certified = (distance <= tolerance).tolist()
-        reasons = ["" if sure else self._reason(solution, k) for k, sure in enumerate(certified)]
-        return Certificate(np.array(solution.q), distance, certified, reasons)
+        reasons = ["" if sure else reason for sure, reason in zip(certified, reasons, strict=True)]
+        return Certificate(q, distance, certified, reasons)
 
     def _reason(self, solution: Solution, k: int) -> str:
         """Say what the nearest configuration lacks."""

@@ -18,8 +18,8 @@ from posekit.tree import Check, Leaves
 AT_ONCE = 1 << 20
 """Leaves before pruning that are grown together."""
 
-MOST = 1 << 16
-"""The most postures of one frame: sixteen segments that nothing decides."""
+MOST = 1 << 14
+"""The most postures of one frame: fourteen segments that nothing decides."""
 
 LEVEL = 1e-7
 """Working units of depth below which neither end of a segment is nearer."""
@@ -115,7 +115,7 @@ class Grown:
     def exact(self) -> bool:
         """Whether there is evidence that the image is exact: loops closed that need not have.
 
-        In a survivor, or in a branch that something else pruned after its first loop had closed.
+        In a survivor, or in a branch that something else pruned after the last of its loops had closed.
         """
         level = self.plan.evidence_level
         if level is None:
@@ -170,8 +170,8 @@ def grow(
         if count > MOST:
             free = len(spanned.nodes) - 1
             raise InputError(
-                f"linkage {plan.linkage.name}: more than {MOST:,} of the 2^{free} flips survive; say which end is nearer "
-                "of some segments (--nearer), or recover a part of the object"
+                f"linkage {plan.linkage.name}: more than {MOST:,} of the 2^{free} flips survive; say which end is "
+                "nearer of some segments (--nearer), or recover a part of the object"
             )
         parts.append((leaves, first))
     return Grown(plan=plan, parts=tuple(parts), checks=checks, tolerance=tolerance, judged=judged)

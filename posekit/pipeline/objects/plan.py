@@ -75,9 +75,9 @@ class Plan:
 
     @cached_property
     def evidence_level(self) -> int | None:
-        """The level at which a loop first closes or a middle is met: exactly, only if the image is exact."""
+        """The level at which the last loop closes, or middle is met: exactly, only if the image is exact."""
         closing = validators.closure(self.spanned)
-        return min((max(check.points) for check in closing), default=None)
+        return max((max(check.points) for check in closing), default=None)
 
     def checks(self, tolerance: ObjectTolerance) -> list[Check]:
         """Make the checks: loops, shape, flips given by hand, limits of the robot."""
@@ -125,8 +125,8 @@ def seen_part(linkage: Linkage, seen: NDArray[np.bool_]) -> tuple[Linkage, tuple
     if not segments or len(parts) > 1:
         groups = [", ".join(linkage.nodes[nodes[k]] for k in part[:6]) for part in parts[:3]]
         raise InputError(
-            f"linkage {linkage.name}: {missing} not seen: without, the rest falls apart into ({') and ('.join(groups)}); "
-            "add image points, or drop the frame"
+            f"linkage {linkage.name}: {missing} not seen, and without the rest falls apart into "
+            f"({') and ('.join(groups)}); add image points, or drop the frame"
         )
     columns = tuple(int(column) for column in np.flatnonzero(seen))
     part = replace(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.errors import InputError, PosekitError
 from posekit.files import Family
@@ -206,14 +205,8 @@ def _frame(
         certified=certified,
         reasons=reasons,
         rejected=grown.rejected,
-        family=_mirrored(family, grown),
+        family=replace(family, mirrored=int(grown.mirrored.sum())),
     )
-
-
-def _mirrored(family: Family, grown: Grown) -> Family:
-    from dataclasses import replace
-
-    return replace(family, mirrored=int(grown.mirrored.sum()))
 
 
 def _nothing(view: ObjectView, k: int, thing: ArticulatedObject, reason: str) -> ObjectFrame:

@@ -136,4 +136,4 @@ def _distinct(scales: Array) -> Array:
     group = np.cumsum(new)
     first = np.full(group.max(initial=0) + 1, len(scales))
     np.minimum.at(first, group, order)
-    return scales[np.sort(first[1:])]
+    return np.asarray(scales[np.sort(first[1:])])

@@ -21,7 +21,7 @@ def shape_checks(spanned: SpanningTree, *, tolerance: float) -> list[Check]:
     tolerance : float
         How far a point may be beside the plane or line, and the foot of a segment's end beside its start.
     """
-    linkage, checks = spanned.linkage, []
+    linkage = spanned.linkage
     groups = [
         *(("coplanar", group, 2) for group in linkage.coplanar),
         *(("collinear", group, 1) for group in linkage.collinear),
@@ -38,7 +38,7 @@ def shape_checks(spanned: SpanningTree, *, tolerance: float) -> list[Check]:
             where = f"{linkage.segment_names[first]}_{linkage.segment_names[second]}"
             points = tuple(spanned.joint(node) for node in nodes)
             found.append(Perpendicular(where=(where,), points=points, tolerance=tolerance))
-    return [*checks, *found]
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)

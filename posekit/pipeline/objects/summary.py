@@ -31,7 +31,7 @@ def object_lines(result: ObjectResult) -> list[str]:
     undecided = sum(verdict is False for frame in frames for verdict in frame.certified)
     if undecided:
         lines.append(
-            f"{undecided} postures are undecided: nothing excludes them, but no configuration within the limits was found"
+            f"{undecided} postures are undecided: nothing excludes them, but no configuration within limits was found"
         )
     return lines + _scale_lines(result)
 

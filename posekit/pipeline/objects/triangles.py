@@ -54,7 +54,8 @@ class Triangles:
         known = np.isfinite(family.place[corners]).all(axis=(1, 2))
         corners = corners[known]
         length = {
-            frozenset(ends): l for ends, l in zip(linkage.segments, linkage.lengths.tolist(), strict=True)
+            frozenset(ends): size
+            for ends, size in zip(linkage.segments, linkage.lengths.tolist(), strict=True)
         }
         sides = np.array(
             [[length[frozenset((p, q))] for p, q in ((a, b), (a, c), (b, c))] for a, b, c in corners.tolist()]
@@ -121,7 +122,9 @@ class Triangles:
 
 def triangles(linkage: Linkage) -> NDArray[np.intp]:
     """Return the triples of nodes (T, 3) that are joined each with each, and not on one line."""
-    length = {frozenset(ends): l for ends, l in zip(linkage.segments, linkage.lengths.tolist(), strict=True)}
+    length = {
+        frozenset(ends): size for ends, size in zip(linkage.segments, linkage.lengths.tolist(), strict=True)
+    }
     found = []
     for a, b, c in combinations(range(len(linkage.nodes)), 3):
         sides = sorted(length.get(frozenset(pair), 0.0) for pair in ((a, b), (a, c), (b, c)))

@@ -1,0 +1,417 @@
+"""The slider over the scale of an uncalibrated picture: the laws of the family it moves through, in a real Chromium."""
+
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.cameras import ScaledOrthographicCamera
+from posekit.errors import ViewerError
+from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS, segment_name
+from posekit.viewer.browser.find import find_browser
+from posekit.viewer.page.data import page_data
+from posekit.viewer.page.family import walk
+from posekit.viewer.page.page import write_page
+from posekit.viewer.scene.branch import lift_branch
+from posekit.viewer.scene.subject import subject_of
+from posekit.viewer.scene.world import upright_world
+
+FLAGS = [
+    "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
+]  # fmt: skip
+TENTH_OF_MM = 1e-4
+MINUS = "\N{MINUS SIGN}"
+TRUNK = [
+    JOINT[name] for name in ("right_shoulder", "left_shoulder", "right_hip", "left_hip", "neck", "pelvis")
+]
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    sync_api = pytest.importorskip("playwright.sync_api")
+    try:
+        program = find_browser()
+    except ViewerError as error:
+        pytest.skip(str(error))
+    flags = FLAGS + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=flags)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(chromium, tmp_path):
+    """Open the page of a result; whatever goes wrong in it, or asks the network, fails the test."""
+    tabs, wrong = [], []
+
+    def open_page(given, view=None):
+        path = tmp_path / "page.html"
+        write_page(path, given, view)
+        tab = chromium.new_page(viewport={"width": 1280, "height": 800})
+        tabs.append(tab)
+        tab.on("request", lambda one: wrong.append(one.url) if one.url != path.as_uri() else None)
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        tab.goto(path.as_uri())
+        deadline = 500
+        while not tab.evaluate("page.state.drawn === true"):
+            deadline -= 1
+            assert deadline, "the page never drew"
+            tab.wait_for_timeout(20)
+        return tab
+
+    yield open_page
+    for tab in tabs:
+        tab.close()
+    assert wrong == []
+
+
+def world_of(result):
+    """Return the page's world: it stands on all survivors where they are drawn."""
+    subject = subject_of(result)
+    return upright_world(np.concatenate([frame.aligned_points[:, : len(JOINTS)] for frame in subject.frames]))
+
+
+def drawn(tab):
+    return np.array(tab.evaluate("scene.drawn()"), dtype=float)
+
+
+def lifted(tab, s):
+    """Move the slider; return what is drawn in the camera's axes, metres from the middle of the image (14, 3)."""
+    tab.evaluate(f"scale.choose({float(s)!r})")
+    camera = tab.evaluate("DATA.camera")
+    axes = np.array([camera["right"], camera["down"], camera["forward"]])
+    return (drawn(tab) - tab.evaluate("page.frame().family.anchor")) @ axes.T
+
+
+def choose(tab, frame, survivor):
+    tab.evaluate(f"page.chooseFrame({frame}); page.chooseSurvivor({survivor})")
+
+
+def scales_to_try(family):
+    return family.bound * np.array([1.0, 1.0 + 1e-9, 1.003, 1.1, 1.6, 4.0, 200.0])
+
+
+def distances(points, pairs):
+    start, end = np.array(pairs).T
+    return np.linalg.norm(points[..., end, :] - points[..., start, :], axis=-1)
+
+
+def test_at_the_recovered_scale_the_recovered_posture_is_drawn(opened, flat):
+    tab, world = opened(flat), world_of(flat)
+    for k, frame in enumerate(flat.frames):
+        for survivor in (0, len(frame.joints) - 1):
+            choose(tab, k, survivor)
+            expected = world.place(frame.joints[survivor])
+            tab.evaluate(f"scale.choose({float(frame.scales[survivor])!r})")
+            assert tab.evaluate("page.state.scale") is not None  # it is lifted, not looked up
+            np.testing.assert_allclose(drawn(tab), expected, rtol=0, atol=1e-6)
+            # The element's own value, as a hand leaves it.
+            tab.evaluate("byId = document.getElementById('scale'), byId.oninput({ target: byId })")
+            assert np.linalg.norm(drawn(tab) - expected, axis=1).max() < TENTH_OF_MM
+
+
+def test_at_every_scale_the_image_is_the_same_and_lengths_are_kept(opened, flat):
+    tab = opened(flat)
+    lengths = np.array([posekit.load_figure().lengths[segment_name(pair)] for pair in TREE_SEGMENTS])
+    starts, ends = np.array(TREE_SEGMENTS).T
+    for k, frame in enumerate(flat.frames):
+        choose(tab, k, k % len(frame.joints))
+        branch = frame.branches[k % len(frame.joints)]
+        image = frame.joints[0, :, :2] * frame.scales[0]
+        middle = image.mean(axis=0)
+        for s in scales_to_try(frame.family):
+            points = lifted(tab, s)
+            np.testing.assert_allclose(points[:, :2] * s + middle, image, rtol=0, atol=1e-6)
+            np.testing.assert_allclose(distances(points, TREE_SEGMENTS), lengths, rtol=0, atol=1e-7)
+            deep = points[ends, 2] - points[starts, 2]
+            far = np.array(list(branch)) == "1"
+            assert (np.where(far, deep, -deep) > -1e-9).all()
+
+
+def test_it_is_the_tree_s_own_lift(opened, flat):
+    tab = opened(flat)
+    lengths = np.array([posekit.load_figure().lengths[segment_name(pair)] for pair in TREE_SEGMENTS])
+    frame = flat.frames[1]
+    image = frame.joints[0, :, :2] * frame.scales[0]
+    choose(tab, 1, 2)
+    for s in scales_to_try(frame.family)[1:]:  # at the bound itself near and far are one
+        camera = ScaledOrthographicCamera(scale=s)
+        root = np.array([*(image[0] / s), 0.0])
+        wanted = lift_branch(camera, root, image, lengths, frame.branches[2], tolerance=1e-9)
+        wanted[:, :2] -= image.mean(axis=0) / s
+        np.testing.assert_allclose(lifted(tab, s), wanted, rtol=0, atol=1e-6)
+
+
+def test_at_the_bound_its_segment_lies_in_the_image_plane(opened, flat):
+    tab = opened(flat)
+    tree = {segment_name(pair): pair for pair in TREE_SEGMENTS}
+    judged = 0
+    for k, frame in enumerate(flat.frames):
+        choose(tab, k, 0)
+        tab.click("#scale-bound")
+        family = frame.family
+        assert tab.evaluate("page.state.scale") == pytest.approx(family.bound, rel=1e-12)
+        said = tab.inner_text("#scale-note")
+        assert said.startswith(family.segment.replace("_", " ").replace("-", " \N{EN DASH} "))
+        if family.segment in tree:
+            a, b = tree[family.segment]
+            points = lifted(tab, family.bound)
+            assert abs(points[a, 2] - points[b, 2]) < 1e-6
+            assert "here it lies in the image plane" in said
+            judged += 1
+        else:
+            assert "lifts each of its ends from another joint" in said
+    assert judged >= 4
+
+
+def test_the_walk_of_taylors_twelve_points_keeps_his_eleven_lengths(opened, taylor):
+    tab = opened(taylor)
+    middles = {"mid_shoulders": ("right_shoulder", "left_shoulder"), "mid_hips": ("right_hip", "left_hip")}
+
+    def nodes(points):
+        found = {name: points[JOINT[name]] for name in JOINTS}
+        return found | {name: (found[a] + found[b]) / 2 for name, (a, b) in middles.items()}
+
+    limbs = [("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle")]
+    segments = [(f"{side}_{a}", f"{side}_{b}") for side in ("right", "left") for a, b in limbs]
+    segments += [*middles.values(), ("mid_shoulders", "mid_hips")]
+    assert len(segments) == 11
+    seen = [index for index in range(len(JOINTS)) if JOINTS[index] not in ("neck", "pelvis")]
+    for k, frame in enumerate(taylor.frames):
+        choose(tab, k, 0)
+        before = nodes(frame.joints[0])
+        image = frame.joints[0, :, :2] * frame.scales[0]
+        middle = image[[bool(np.isfinite(p).all()) for p in image]][seen].mean(axis=0)
+        np.testing.assert_allclose(
+            lifted(tab, frame.scales[0])[:, 2] - frame.joints[0][:, 2], 0, rtol=0, atol=TENTH_OF_MM
+        )
+        for s in scales_to_try(frame.family):
+            points = lifted(tab, s)
+            now = nodes(points)
+            for a, b in segments:
+                length = np.linalg.norm(before[a] - before[b])
+                assert np.linalg.norm(now[a] - now[b]) == pytest.approx(length, abs=1e-7)
+            np.testing.assert_allclose(points[seen, :2] * s, (image - middle)[seen], rtol=0, atol=1e-6)
+            spine = now["mid_hips"] - now["mid_shoulders"]
+            along = np.dot(now["pelvis"] - now["mid_shoulders"], spine) / np.dot(spine, spine)
+            assert along == pytest.approx(0.8, abs=1e-3)  # where it was on the spine, and on it
+            off = np.linalg.norm(now["pelvis"] - now["mid_shoulders"] - along * spine)
+            assert off < 2 * TENTH_OF_MM
+            neck = [np.linalg.norm(one["neck"] - one["mid_shoulders"]) for one in (before, now)]
+            assert neck[1] == pytest.approx(neck[0], abs=2 * TENTH_OF_MM)
+        a, b = frame.family.segment.split("-")
+        now = nodes(lifted(tab, frame.family.bound))
+        assert abs(now[a][2] - now[b][2]) < 1e-6
+        assert "here it lies in the image plane" in tab.inner_text("#scale-note")
+
+
+def test_from_the_camera_nothing_moves_whatever_the_scale(opened, scales):
+    tab = opened(scales)
+    tab.click("[data-look=camera]")
+    assert tab.evaluate("viewer.camera.type") == "OrthographicCamera"
+    on_screen = """() => {
+      viewer.render();
+      const place = (mesh) => mesh.getWorldPosition(new MeshCat.THREE.Vector3());
+      const joints = scene.layers.joints.children.slice(0, 14);
+      return joints.map((mesh) => place(mesh).project(viewer.camera).toArray().slice(0, 2));
+    }"""
+    for k in (0, 3):
+        seen = []
+        for survivor in range(6):  # of three scales, and mirrored
+            choose(tab, k, survivor)
+            seen.append(tab.evaluate(on_screen))
+            for factor in (1.0, 1.2, 3.0):
+                tab.evaluate(f"scale.choose({factor} * page.frame().family.bound)")
+                seen.append(tab.evaluate(on_screen))
+        np.testing.assert_allclose(seen[1:], [seen[0]] * 23, rtol=0, atol=2e-3)
+        assert np.abs(seen[0]).max() < 1
+        # It is the image, upright and of one scale in both directions.
+        image = scales.frames[k].joints[0, :, :2] * scales.frames[k].scales[0]
+        pane = np.array([840, -800]) / 2
+        slope = [np.polyfit(image[:, axis], np.array(seen[0])[:, axis] * pane[axis], 1)[0] for axis in (0, 1)]
+        assert slope[0] == pytest.approx(slope[1], rel=2e-3)
+        assert slope[0] > 0
+    tab.click("[data-look=side]")
+    assert tab.evaluate("viewer.camera.type") == "PerspectiveCamera"
+    for layer in ("others", "rays"):
+        tab.check(f"[data-show={layer}]")
+        assert tab.evaluate(f"scene.layers.{layer}.children.length") > 0
+
+
+def test_survivors_of_several_scales_are_listed_and_drawn_in_one_place(opened, scales, flat_view):
+    tab, world = opened(scales, flat_view), world_of(scales)
+    shown = tab.locator("#survivors-body tr td:nth-child(2)").all_inner_texts()
+    assert [float(text) for text in shown] == [400.0, 400.0, 416.0, 416.0, 530.0, 530.0]
+    centres = []
+    for survivor, s in enumerate(scales.frames[0].scales):
+        tab.click(f"#survivors-body tr:nth-child({survivor + 1})")
+        assert tab.evaluate("scale.now()") == pytest.approx(s, rel=1e-12)
+        assert tab.inner_text("#scale-text").startswith(f"{s:.0f} px/m")
+        tab.evaluate(f"scale.choose({float(s)!r})")
+        own = subject_of(scales).frames[0].aligned_points[survivor, :14]
+        np.testing.assert_allclose(drawn(tab), world.place(own), rtol=0, atol=TENTH_OF_MM)
+        centres.append(np.delete(drawn(tab).mean(axis=0) @ np.array(tab.evaluate("DATA.camera.right")), []))
+    assert np.ptp(centres) < 1e-6
+    marks = tab.locator("#scale-marks line")
+    assert marks.count() == 1 + 4 + 3  # the bound, the minima, the recovered scales
+    assert tab.locator("#scale-marks polyline").count() == 1
+    places = tab.evaluate(
+        "[...document.querySelectorAll('#scale-marks .minimum')].map((one) => Number(one.getAttribute('x1')))"
+    )
+    family = scales.frames[0].family
+    angles = np.degrees(np.arccos(family.bound / family.minima_s))
+    np.testing.assert_allclose(np.array(places) / 400 * 80, angles, atol=1e-3)
+    assert "minima of closure at" in tab.get_attribute("#scale-marks", "aria-label")
+    tab.click("#scale-minima button:nth-child(4)")
+    assert tab.evaluate("scale.now()") == pytest.approx(family.minima_s[3])
+    # The truth of an uncalibrated view is drawn where the survivors are.
+    tab.check("[data-show=truth]")
+    truth = np.array(page_data(scales, flat_view)["frames"][0]["truth"][:42]).reshape(14, 3) / 10_000
+    expected = world.place(scales.frames[0].joints[0])
+    assert np.linalg.norm((truth - expected).mean(axis=0)[1]) < 1e-3
+
+
+def test_margins_are_marked_and_a_button_leads_back(opened, flat):
+    tab = opened(flat)
+    before, room = drawn(tab), tab.inner_text("#survivors-title")
+    assert "room left to each check's bound" in room
+    assert tab.is_disabled("#scale-back")
+    tab.focus("#scale")
+    tab.keyboard.press("End")
+    assert tab.evaluate("scale.now()") == pytest.approx(flat.frames[0].family.bound / np.cos(np.radians(80)))
+    assert tab.evaluate("page.state.survivor") == 0  # the keys are the slider's
+    assert np.linalg.norm(drawn(tab) - before, axis=1).max() > 0.3
+    assert "margins are those of the recovered scale, 400.0 px/m" in tab.inner_text("#survivors-title")
+    assert "at the recovered scale" in tab.inner_text("#scale-note")
+    assert "they fit at the recovered scale" in tab.inner_text("#scale-note")
+    assert tab.get_attribute("#scale", "aria-valuetext").endswith("pixels a metre")
+    tab.keyboard.press("ArrowLeft")
+    assert tab.evaluate("scale.now()") < flat.frames[0].family.bound / np.cos(np.radians(79.5))
+    tab.click("#scale-back")
+    np.testing.assert_array_equal(drawn(tab), before)
+    assert tab.inner_text("#survivors-title") == room
+    tab.evaluate("scale.choose(1)")  # below the bound there is nothing
+    assert tab.evaluate("scale.now()") == flat.frames[0].family.bound
+    tab.click("#survivors-body tr:nth-child(2)")
+    assert tab.evaluate("page.state.scale") is None
+    assert tab.get_attribute("label[for=scale]", "for") == "scale"
+
+
+def test_inferred_joints_are_hollow_boxed_and_named(opened, hidden_elbow):
+    result, view = hidden_elbow
+    tab = opened(result, view)
+    assert tab.inner_text("#survivors-note") == "Inferred: right elbow, right wrist."
+    hollow = """DATA.points.filter((_, k) => scene.layers.joints.children[k].material.opacity < 1)"""
+    assert tab.evaluate(hollow) == ["right_elbow", "right_wrist"]
+    boxes = """scene.layers.regions.children.filter((one) => one.isMesh).map((one) => {
+      one.geometry.computeBoundingBox();
+      one.updateWorldMatrix(true, false);
+      const box = one.geometry.boundingBox.clone().applyMatrix4(one.matrix);
+      return [one.name, box.min.toArray(), box.max.toArray()];
+    })"""
+    found = {name: np.array([low, high]) for name, low, high in tab.evaluate(boxes)}
+    world = world_of(result)
+    for name, one in result.frames[0].inferred[0].items():
+        ends = np.sort(world.place(np.array([one.lower, one.upper])), axis=0)
+        assert np.abs(found[name] - ends).max() < 2e-3  # an interval is drawn 3 mm thick
+    tab.click("#unseen-tab")
+    rows = tab.locator("#unseen tbody tr").all_inner_texts()
+    assert rows[0].split() == [
+        "right",
+        "elbow",
+        "region,",
+        "25",
+        "%",
+        f"{MINUS}10…5",
+        f"{MINUS}20…25",
+        f"{MINUS}30…15",
+        "31",
+    ]
+    assert rows[1].split() == ["right", "wrist", "interval", "0.0", "0.0", f"{MINUS}20…40", "40"]
+    # At another scale the boxes, which were found at this one, are gone; the hollow limb goes along.
+    tab.evaluate("scale.choose(1.2 * scale.now())")
+    assert tab.evaluate("scene.layers.regions.children.length") == 0
+    frame = result.frames[0]
+    points = lifted(tab, 480.0)
+    forearm = frame.joints[0, JOINT["right_elbow"]] - frame.joints[0, JOINT["right_shoulder"]]
+    moved = points[JOINT["right_elbow"]] - points[JOINT["right_shoulder"]]
+    np.testing.assert_allclose(moved, forearm, atol=2 * TENTH_OF_MM)
+    wrist = frame.joints[0, JOINT["right_wrist"], :2] * 400.0
+    neck = frame.joints[0, 0, :2] * 400.0
+    np.testing.assert_allclose(
+        (points[JOINT["right_wrist"], :2] - points[0, :2]) * 480.0, wrist - neck, atol=1e-6
+    )
+
+
+def test_inferred_joints_of_a_calibrated_view_need_no_family(opened, walked, walk):
+    frames = []
+    for frame in walked.frames:
+        wrist = frame.joints[:, JOINT["left_wrist"]]
+        donor = {"kind": "circle", "radius": 0.1, "fraction": 0.5}
+        inferred = [
+            {"left_wrist": posekit.files.Inferred(lower=at - 0.1, upper=at + 0.1, **donor)} for at in wrist
+        ]
+        frames.append(dataclasses.replace(frame, inferred=inferred))
+    tab = opened(dataclasses.replace(walked, frames=frames), walk)
+    assert tab.is_hidden("#family")
+    assert tab.inner_text("#survivors-note") == "Inferred: left wrist."
+    assert tab.evaluate("scene.layers.regions.children.length") == 2
+
+
+def test_calibrated_results_have_no_slider(opened, walked, walk):
+    tab = opened(walked, walk)
+    assert tab.is_hidden("#family")
+    assert tab.is_hidden("#unseen-tab")
+    data = page_data(walked, walk)
+    assert not any("family" in frame or "inferred" in frame for frame in data["frames"])
+    assert data["camera"]["parallel"] is False
+
+
+def test_frames_without_survivors_have_no_family(opened, flat):
+    frames = list(flat.frames)
+    frame = frames[1]
+    empty = {
+        name: getattr(frame, name)[:0] for name in ("joints", "q", "fk_distance", "length_residual", "scales")
+    }
+    margins = {name: values[:0] for name, values in frame.margins.items()}
+    frames[1] = dataclasses.replace(frame, branches=[], groups=np.empty(0, int), margins=margins, **empty)
+    tab = opened(dataclasses.replace(flat, frames=frames))
+    tab.click("[data-look=camera]")
+    tab.locator("#frame").fill("1")
+    assert tab.is_hidden("#family")
+    tab.evaluate("scale.choose(500)")
+    tab.locator("#frame").fill("2")
+    assert tab.is_visible("#family")
+    assert tab.evaluate("page.state.scale") is None
+
+
+def test_walks_reach_every_joint_once():
+    figure = walk(JOINTS)
+    assert [(parent, child) for child, parent, _ in figure] == list(TREE_SEGMENTS)
+    twelve = [name for name in JOINTS if name not in ("neck", "pelvis")]
+    for root in twelve:
+        names = [root, *(name for name in twelve if name != root), "mid_shoulders", "mid_hips"]
+        steps = walk(names)
+        reached = [child for child, _, _ in steps]
+        assert sorted(reached) == sorted(
+            {*(JOINT[name] for name in names[1:-2]), len(POINTS), len(POINTS) + 1}
+        )
+        placed = {JOINT[root]}
+        for child, parent, other in steps:
+            assert parent in placed
+            assert other == -1 or (other in placed and {other, child} in ({1, 2}, {4, 5}))
+            placed.add(child)
+        # Both ends of a girdle hang on its middle: one is lifted, the other mirrors it.
+        assert sum(other >= 0 for _, _, other in steps) == 2
+
+
+def test_the_curve_is_thinned_but_keeps_its_lowest_points(scales):
+    family = page_data(scales)["frames"][0]["family"]
+    residual = np.array(family["curve"])[:, 1]
+    assert 100 < len(residual) <= 240
+    assert residual.min() == pytest.approx(scales.frames[0].family.curve_residual.min(), rel=1e-3)
+    assert [minimum[0] for minimum in family["minima"]] == scales.frames[0].family.minima_s.tolist()
