@@ -114,7 +114,9 @@ class Attainable:
         for k, (body, at) in enumerate(self.extra):
             frame = model.frames[frame_index(model)[home[body]]]
             x, y, z = frame.placement.actInv(at).tolist()
-            points.append(BodyPoint(name=f"{k} on {home[body]}", sites=(Site(frame=home[body], offset=(x, y, z)),)))
+            points.append(
+                BodyPoint(name=f"{k} on {home[body]}", sites=(Site(frame=home[body], offset=(x, y, z)),))
+            )
         return tuple(points)
 
     def extent(self, groups: Groups) -> float:

@@ -134,7 +134,9 @@ def _axis_point(
     normal = np.cross(u, v)
     alpha, beta, gamma = np.linalg.solve(np.stack([u, v, normal], axis=1), place - a)
     loose = [looseness[corner] for corner in corners]
-    turned = abs(gamma) * ((loose[0] + loose[1]) * np.linalg.norm(v) + (loose[0] + loose[2]) * np.linalg.norm(u))
+    turned = abs(gamma) * (
+        (loose[0] + loose[1]) * np.linalg.norm(v) + (loose[0] + loose[2]) * np.linalg.norm(u)
+    )
     shifted = abs(1 - alpha - beta) * loose[0] + abs(alpha) * loose[1] + abs(beta) * loose[2]
     return AxisPoint(
         body=body,

@@ -161,11 +161,17 @@ class RobotLimits:
                 groups.setdefault(key, []).extend(best[:AT_ONCE])
         return [
             self._check(intervals, joints, place, tolerance)
-            for (_, joints), intervals in sorted(groups.items(), key=lambda item: (item[0][0], len(item[0][1])))
+            for (_, joints), intervals in sorted(
+                groups.items(), key=lambda item: (item[0][0], len(item[0][1]))
+            )
         ]
 
     def _check(
-        self, intervals: Sequence[Interval], joints: tuple[str, ...], place: Mapping[int, int], tolerance: float
+        self,
+        intervals: Sequence[Interval],
+        joints: tuple[str, ...],
+        place: Mapping[int, int],
+        tolerance: float,
     ) -> Within:
         """Put intervals of one level and the same joints into one check."""
         needed = self._needed([point for interval in intervals for point in interval.points])
@@ -186,7 +192,10 @@ class RobotLimits:
             intervals=tuple(intervals),
             columns=tuple(tuple(column[point] for point in interval.points) for interval in intervals),
             tolerance=np.array(
-                [sum(looseness[column[point]] for point in interval.points) * tolerance for interval in intervals]
+                [
+                    sum(looseness[column[point]] for point in interval.points) * tolerance
+                    for interval in intervals
+                ]
             ),
         )
 

@@ -24,7 +24,8 @@ from posekit.figure.frames import quaternions, torso_frame
 from posekit.figure.lengths import check_lengths
 from posekit.figure.pool import collides, make_pool
 from posekit.figure.stature import lengths_from_stature
-from posekit.figure.urdf import parse, replace_limits, rewrite, write_texts
+from posekit.figure.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
+from posekit.robot.srdf import check_srdf
 from posekit.skeleton import (
     DOFS,
     HEAD,
@@ -97,8 +98,7 @@ class Figure:
         return _figure, (self.urdf, self.srdf, self.source)
 
     def __post_init__(self) -> None:
-        parse(self.urdf, self.source)
-        parse(self.srdf, f"{self.source}, SRDF")
+        links = [link.get("name", "") for link in parse(self.urdf, self.source).findall("link")]
         names = set(self.model.names)
         missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
         missing += [link for link in map(_frame_name, POINTS) if not self.model.existFrame(link)]
@@ -107,6 +107,8 @@ class Figure:
                 f"{self.source}: not a stick figure: it has {self.model.nq} configuration variables, expected "
                 f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
             )
+        with as_figure_error():
+            check_srdf(self.srdf, f"{self.source}, SRDF", links)
         _ = self.limits, self.capsules
         self._check_layout()
 

@@ -14,8 +14,7 @@ from posekit.cameras import Array
 from posekit.errors import FigureError, InputError
 from posekit.figure.capsules import Capsule
 from posekit.figure.lengths import hips_points, torso_points
-from posekit.intake import parse_xml
-from posekit.robot.urdf import check_robot, read_urdf
+from posekit.robot.urdf import check_urdf, read_urdf
 from posekit.skeleton import HEAD_POINTS, SIDES
 
 LIMB_SEGMENTS = (
@@ -48,7 +47,7 @@ def write_texts(path: Path, urdf: str, srdf: str) -> None:
 
 
 def parse(text: str, source: str) -> ElementTree.Element:
-    """Parse the figure's URDF or SRDF: what is checked of any robot's, and no meshes.
+    """Parse the figure's URDF: what is checked of any robot's, and no meshes.
 
     Raises
     ------
@@ -56,10 +55,7 @@ def parse(text: str, source: str) -> ElementTree.Element:
         With the place that is wrong. Pinocchio would accept or silently drop most of these.
     """
     with as_figure_error():
-        robot = parse_xml(text, source)
-        if robot.tag == "robot" and robot.find("link") is None:
-            return robot  # an SRDF has none
-        check_robot(robot, source)
+        robot = check_urdf(text, source)
     if robot.find(".//collision//mesh") is not None:
         raise FigureError(
             f"{source}: a collision body is a mesh; expected capsules (Pinocchio would load any file)"

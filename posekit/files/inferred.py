@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.files.refusal import refusal
 from posekit.files.units import Unit, from_metres, to_metres
+from posekit.intake.refusal import refusal
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from posekit.files.family import Family
 from posekit.files.npz import suffix
 from posekit.files.object_result_schema import SCHEMA, ObjectFile, ObjectFrameRecord
 from posekit.files.reading import read_json
-from posekit.files.refusal import refusal
 from posekit.files.units import PER_METRE, Unit
 from posekit.files.validation import validated
 from posekit.files.writing import check_target, json_pieces, write_text
+from posekit.intake.refusal import refusal
 
 Array = NDArray[np.float64]
 

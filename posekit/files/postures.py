@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from posekit.files.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
 from posekit.files.postures_schema import SCHEMA, PosturesFile
 from posekit.files.reading import read_json
-from posekit.files.refusal import nearest, refusal, shown
 from posekit.files.result import Result
 from posekit.files.result_json import result_of
 from posekit.files.result_npz import MAX_PADDED, result_in
@@ -21,6 +20,7 @@ from posekit.files.result_schema import SCHEMA as RESULT_SCHEMA
 from posekit.files.units import Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.writing import json_pieces, replacing, write_text
+from posekit.intake.refusal import nearest, refusal, shown
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS
 
 Array = NDArray[np.float64]

@@ -7,9 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, FailFast, Field
 
-from posekit.files.refusal import nearest, shown
 from posekit.files.units import Unit
 from posekit.files.validation import FileModel, refuse
+from posekit.intake.refusal import nearest, shown
 from posekit.skeleton import POINTS
 
 SCHEMA = "posekit.postures/1"

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from posekit.files.npz import suffix
 from posekit.files.reading import read_json
-from posekit.files.refusal import refusal, shown
 from posekit.files.report_schema import SCHEMA, ReportFile, Verdict
 from posekit.files.validation import validated
 from posekit.files.writing import check_target, json_pieces, write_text
+from posekit.intake.refusal import refusal, shown
 from posekit.tree.check import Findings
 
 NUMBERS = ("value", "lower", "upper", "margin")

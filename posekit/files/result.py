@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
-from posekit.files.refusal import refusal
 from posekit.files.units import Unit
+from posekit.intake.refusal import refusal
 from posekit.skeleton import JOINTS
 
 Array = NDArray[np.float64]

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
 from posekit.files.reading import read_json
-from posekit.files.refusal import refusal
 from posekit.files.result import Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.writing import json_pieces, write_text
+from posekit.intake.refusal import refusal
 
 Array = NDArray[np.float64]
 

@@ -25,11 +25,11 @@ from posekit.files.family import Family
 from posekit.files.inferred import Inferred
 from posekit.files.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.files.reading import parse_json
-from posekit.files.refusal import refusal, shown
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultDetails
 from posekit.files.units import PER_METRE, UNITS, Unit, from_metres, to_metres
 from posekit.files.writing import replacing
+from posekit.intake.refusal import refusal, shown
 from posekit.skeleton import JOINTS
 
 Array = NDArray[Any]

@@ -7,9 +7,9 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, FailFast, Field
 
-from posekit.files.refusal import shown
 from posekit.files.units import Unit
 from posekit.files.validation import FEW, FileModel, named, refuse
+from posekit.intake.refusal import shown
 from posekit.skeleton import JOINTS
 
 SCHEMA = "posekit.result/1"

@@ -7,8 +7,8 @@ from typing import Any, Final
 
 from posekit.files import nearer as nearer_schema
 from posekit.files import postures_schema, report_schema, result_schema, view_schema
-from posekit.files.refusal import nearest, refusal, shown
 from posekit.files.validation import FileModel
+from posekit.intake.refusal import nearest, refusal, shown
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
     view_schema.SCHEMA: view_schema.ViewFile,

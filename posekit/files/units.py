@@ -10,7 +10,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.files.refusal import refusal, shown
+from posekit.intake.refusal import refusal, shown
 
 Unit = Literal["m", "cm", "mm"]
 UNITS: Final = get_args(Unit)

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Val
 from pydantic_core import ErrorDetails, PydanticCustomError
 
 from posekit.errors import InputError, PosekitError
-from posekit.files.refusal import cut, nearest, refusal, shown
+from posekit.intake.refusal import cut, nearest, refusal, shown
 
 Model = TypeVar("Model", bound="FileModel")
 
@@ -54,7 +54,7 @@ def refuse(expected: str, remedy: str, *, at: str = "", got: str = "") -> NoRetu
     Parameters
     ----------
     expected, remedy : str
-        See `posekit.files.refusal.refusal`.
+        See `posekit.intake.refusal.refusal`.
     at : str
         Where inside the validated value, ``"neck"``; the value itself when empty.
     got : str

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.files.camera_model import CameraModel, ScaledOrthographicModel
-from posekit.files.refusal import nearest, refusal, shown
 from posekit.files.units import Unit
 from posekit.files.view_schema import HEAD_NAMES
+from posekit.intake.refusal import nearest, refusal, shown
 from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
 
 Array = NDArray[np.float64]

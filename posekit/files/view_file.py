@@ -12,12 +12,12 @@ from posekit.cameras.lee_chen import image_from_paper
 from posekit.errors import CameraError
 from posekit.files.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
 from posekit.files.reading import read_json
-from posekit.files.refusal import refusal
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.view import View
 from posekit.files.view_schema import SCHEMA, LeeChenCamera, OpenCVCamera, ScaledOrthographicCamera, ViewFile
 from posekit.files.writing import json_pieces, write_text
+from posekit.intake.refusal import refusal
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import FailFast, Field, model_validator
+from pydantic import ConfigDict, FailFast, Field, model_validator
 
 from posekit.files.camera_model import check_intrinsics, check_rotation
 from posekit.files.units import Unit
@@ -115,6 +115,17 @@ class ViewFile(FileModel):
         "frames": "a view has at least one frame, each of them an object with time and image",
         "time": "give it in seconds",
     }
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "if": {"properties": {"camera": {"properties": {"model": {"const": "scaled-orthographic"}}}}},
+            "else": {
+                "properties": {
+                    "frames": {"items": {"properties": {"image": {"required": ["neck"]}}}},
+                }
+            },
+        }
+    )
 
     schema_: Literal["posekit.view/1"] = Field(alias="schema")
     unit: Unit

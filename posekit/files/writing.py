@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 
 from posekit.errors import InputError
 from posekit.files.reading import MAX_BYTES
-from posekit.files.refusal import cut, refusal
+from posekit.intake.refusal import cut, refusal
 
 
 @contextmanager

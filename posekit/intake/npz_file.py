@@ -55,7 +55,7 @@ class Archive:
         if declared > limit:
             raise _too_large(self.path, declared, limit)
 
-    def array(self, name: str, kinds: str, shape: tuple[int | None, ...]) -> NDArray[Any]:
+    def array(self, name: str, kinds: str, shape: tuple[int | None, ...] | None) -> NDArray[Any]:
         """Read an array.
 
         Parameters
@@ -65,7 +65,7 @@ class Archive:
         kinds : str
             NumPy's letters of the dtypes that are accepted, ``"fiu"``.
         shape : tuple of int or None
-            The shape that is expected, None where any extent is accepted.
+            The shape that is expected, None where any extent is accepted; None for any shape.
         """
         with self._member(name, kinds, shape) as (file, found, dtype, fortran):
             data = _read(file, math.prod(found) * dtype.itemsize)
@@ -97,7 +97,7 @@ class Archive:
 
     @contextmanager
     def _member(
-        self, name: str, kinds: str, shape: tuple[int | None, ...]
+        self, name: str, kinds: str, shape: tuple[int | None, ...] | None
     ) -> Iterator[tuple[IO[bytes], tuple[int, ...], np.dtype[Any], bool]]:
         """Open an array whose header says what is expected, at its data."""
         if name not in self.names:
@@ -125,8 +125,9 @@ class Archive:
                     f"{length:,} for shape {found}",
                     "write the file again: it is damaged",
                 )
-            if len(found) != len(shape) or any(
-                want not in (None, have) for want, have in zip(shape, found, strict=True)
+            if shape is not None and (
+                len(found) != len(shape)
+                or any(want not in (None, have) for want, have in zip(shape, found, strict=True))
             ):
                 wanted = f"({', '.join('any' if extent is None else str(extent) for extent in shape)})"
                 raise refusal(self.path, name, f"shape {found}", f"shape {wanted}", "reshape it")
@@ -138,6 +139,7 @@ _KINDS: Final = {
     "iuf": "numbers",
     "iu": "whole numbers",
     "U": "text (a unicode array)",
+    "iufU": "numbers or text",
 }
 
 

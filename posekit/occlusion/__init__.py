@@ -9,4 +9,5 @@ from posekit.occlusion.completion import Completion as Completion
 from posekit.occlusion.completion import Kind as Kind
 from posekit.occlusion.completion import Outcome as Outcome
 from posekit.occlusion.completion import Region as Region
+from posekit.occlusion.rejecting import reject as reject
 from posekit.occlusion.settings import Sampling as Sampling

@@ -72,7 +72,7 @@ def complete(
     unknown = np.asarray(np.isnan(postures).any(axis=-1))
     open_ = np.flatnonzero(unknown.any(axis=1))
     if not len(open_):
-        return done
+        return done.frozen()
     rootless = open_[unknown[open_, 0]]
     if len(rootless):
         raise InputError(
@@ -95,7 +95,7 @@ def complete(
         for part in _parts(rows, plan, sampling):
             frame = np.asarray(leaves.frame[part], dtype=np.intp)
             write(party(points=points[part], frame=frame), done, part)
-    return done
+    return done.frozen()
 
 
 def _parts(rows: Index, plan: Plan, sampling: Sampling) -> list[Index]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import IntEnum
 
 import numpy as np
@@ -93,7 +93,7 @@ class Completion:
         The joint for which no position was found; -1 where none is to blame.
     miss : array (N,)
         Where no place of the trunk was found: how far the nearest one that was looked at breaks a check, radians (a
-        metre counts as 1 / 0.3); else 0.
+        metre counts as 1 / 0.3); NaN where some pass but for limbs that are known. Else 0.
     kind : int array (N, 14)
         `Kind`, as the pattern of seen and hidden joints gives it.
     lower, upper : array (N, 14, 3)
@@ -134,6 +134,20 @@ class Completion:
             accuracy=np.zeros((n, joints)),
         )
 
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return len(self.outcome)
+
+    def frozen(self) -> Completion:
+        """Set all arrays read-only."""
+        for field in fields(self):
+            getattr(self, field.name).flags.writeable = False
+        return self
+
+    def take(self, rows: Index | Mask) -> Completion:
+        """Take some survivors."""
+        return Completion(**{field.name: getattr(self, field.name)[rows] for field in fields(self)}).frozen()
+
     @property
     def inferred(self) -> Mask:
         """Which joints (N, 14) were not placed by the image."""
@@ -144,11 +158,11 @@ class Completion:
         """Which survivors (N,) are proven to have no completion."""
         return np.asarray(self.outcome == Outcome.IMPOSSIBLE)
 
-    def reason(self, k: int) -> str:
+    def reason(self, k: int | np.integer) -> str:
         """Return why survivor k is not completed, ``occluded/right_elbow``; empty where it is."""
         return f"occluded/{JOINTS[self.blamed[k]]}" if self.blamed[k] >= 0 else ""
 
-    def regions(self, k: int) -> list[Region]:
+    def regions(self, k: int | np.integer) -> list[Region]:
         """Describe the inferred joints of survivor k, in tree order; empty where nothing was found."""
         if self.outcome[k] != Outcome.COMPLETED:
             return []

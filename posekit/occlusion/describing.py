@@ -62,7 +62,8 @@ def _blame(party: Party, done: Completion, part: Index, found: Mask) -> None:
         sure |= proven
         blamed = np.where(none & (blamed < 0), first, blamed)
     blamed = np.where(blamed < 0, party.plan.unknown[0], blamed)
-    done.miss[part] = np.where(without, party.hosts.miss[party.core], 0.0)
+    miss = party.hosts.miss[party.core]
+    done.miss[part] = np.where(without, np.where(miss > 0.0, miss, np.nan), 0.0)
     done.blamed[part] = np.where(found, -1, blamed)
     done.outcome[part[sure & ~found]] = Outcome.IMPOSSIBLE
 

@@ -1,4 +1,4 @@
-"""Survivors with one pattern of hidden joints, completed together."""
+"""Survivors with one pattern of hidden joints: their trunks, and the feasible placements of their limbs."""
 
 from __future__ import annotations
 
@@ -24,18 +24,6 @@ from posekit.occlusion.refine import GOALS, seek_ends
 from posekit.occlusion.settings import Sampling
 from posekit.occlusion.trunk import TrunkPlacer
 from posekit.skeleton import PARENTS, segment_name
-
-HOSTS_TRIED = 8
-"""Places of the trunk on which limbs are sought that pass together, the middle one first."""
-
-SAME = 1e-6
-"""Metres between two ends that count as one."""
-
-ATTAINED, ATTAINED_IN_FOUR, ATTAINED_IN_CROWD = 0.125, 0.02, 0.1
-"""Of a step on the lattice: how near the ends of a box are found, with two angles free, with four, and on many hosts.
-
-Measured against rejection sampling: see the documentation.
-"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

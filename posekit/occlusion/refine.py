@@ -95,15 +95,17 @@ def seek_ends(
     table = reaches(placer, rows, group, representatives)
     many, apart = (STARTS_IN_FOUR, APART / 3.0) if placer.both_hidden else (STARTS, APART)
     columns: list[tuple[Index, Index, Index]] = []
+    mode = rows.branch @ np.array([2, 1])  # near and far are sets of their own
     for joint, goal in zip(*np.nonzero(wanted.any(axis=1)), strict=True):
-        left = np.where(wanted[joint, group, goal], table[joint, goal], -np.inf)
         position = rows.end if joint else rows.middle
-        for _ in range(many if goal < len(AXES) else 2):
-            start, most = largest(group, n, left)
-            some = np.flatnonzero((start >= 0) & np.isfinite(most))
-            columns.append((some, start[some], np.full(len(some), joint * GOALS + goal)))
-            near = np.linalg.norm(position - position[np.maximum(start, 0)][group], axis=1)
-            left = np.where(near < apart * spacing * levers[joint], -np.inf, left)
+        for one in np.unique(mode):
+            left = np.where((mode == one) & wanted[joint, group, goal], table[joint, goal], -np.inf)
+            for _ in range(many if goal < len(AXES) else 2):
+                start, most = largest(group, n, left)
+                some = np.flatnonzero((start >= 0) & np.isfinite(most))
+                columns.append((some, start[some], np.full(len(some), joint * GOALS + goal)))
+                near = np.linalg.norm(position - position[np.maximum(start, 0)][group], axis=1)
+                left = np.where(near < apart * spacing * levers[joint], -np.inf, left)
     who, start, goal = (np.concatenate(column) for column in zip(*columns, strict=True))
     here = rows.take(start)
     best = table.reshape(2 * GOALS, -1)[goal, start]

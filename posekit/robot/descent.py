@@ -84,16 +84,18 @@ def descend(
     start: Array,
     steps: int = STEPS,
     columns: NDArray[np.intp] | None = None,
+    precision: float = SETTLED,
 ) -> Descent:
     r"""Minimise :math:`\frac12 \sum_p w_p |p(q) - y_p|^2 + \frac{\epsilon}{2} |q \ominus q_0|^2` within limits.
 
     Levenberg 1944, Marquardt 1963, damping after Nielsen 1999; limits by `limited_step`. A start outside the
-    limits is clipped first. Only `columns` of v are moved, all that move a point unless told otherwise.
+    limits is clipped first. Only `columns` of v are moved, all that move a point unless told otherwise. The
+    search ends where a step promises less than `precision` of the cost.
     """
     if columns is None:
         columns = np.flatnonzero(kinematics.moved_by.any(axis=0))
     parts = [
-        _Block(kinematics, problem.take(rows), columns).descend(start[rows], steps)
+        _Block(kinematics, problem.take(rows), columns).descend(start[rows], steps, precision)
         for rows in (slice(at, at + BLOCK) for at in range(0, max(len(start), 1), BLOCK))
     ]
     return Descent(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
@@ -125,7 +127,7 @@ class _Block:
         self.bounded = np.flatnonzero(position[moving] >= 0)
         self.at = position[moving][self.bounded]
 
-    def descend(self, start: Array, steps: int) -> Descent:
+    def descend(self, start: Array, steps: int, precision: float) -> Descent:
         """Take steps until every posture is settled, or so many are taken."""
         q = np.clip(start, self.problem.lower, self.problem.upper)
         n = len(q)
@@ -142,9 +144,9 @@ class _Block:
             there = self._linearise(active, trial)
             # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
             better = there.cost <= cost[active]
-            ratio = np.minimum((cost[active] - there.cost) / np.maximum(gain, 1e-300), 1.0)
+            ratio = np.clip((cost[active] - there.cost) / np.maximum(gain, 1e-300), 0.0, 1.0)
             factor = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), SLOWER)
-            small = gain <= np.maximum(SETTLED * cost[active], NOTHING)
+            small = gain <= np.maximum(precision * cost[active], NOTHING)
             settled[active] = small & (damping[active] <= DAMPING)
             damping[active] = np.maximum(damping[active] * factor, LEAST)
             settled[active] |= damping[active] > MOST

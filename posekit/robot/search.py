@@ -22,8 +22,14 @@ RETRIES = 6
 
 TRUNK_STEPS, LIMB_STEPS = 15, 25
 
+ROUGHLY = 1e-4
+"""Precision with which trunks and limbs are laid: what cannot be met is then given up early."""
+
 TRUNKS = 16
 """Trunks among which others are tried where the posture is not met."""
+
+TRIED = 4
+"""So many of them at most."""
 
 DISTINCT = 0.05
 """Radians (of a joint, or of the base) or metres by which another trunk must differ."""
@@ -111,7 +117,7 @@ class Search:
         starts = self.starts.trunks(problem.targets, TRUNKS)
         trunks, cost = self._descend_each(self._trunk_part, problem, starts, TRUNK_STEPS)
         order = np.argsort(cost, axis=0, kind="stable")
-        tried = [trunk]
+        tried, count = [trunk], np.zeros(len(rows), dtype=np.intp)
         for k in order:
             each = np.arange(len(rows))
             other = trunks[k, each]
@@ -119,7 +125,8 @@ class Search:
             for before in tried:
                 new &= np.abs(space.difference(before, other)).max(axis=1) > DISTINCT
             tried.append(other)
-            some = np.flatnonzero(new)
+            some = np.flatnonzero(new & (count < TRIED))
+            count[some] += 1
             if some.size:
                 few = problem.take(some)
                 found.improve(rows[some], self.descend(few, self._with_limbs(other[some], few)))
@@ -198,8 +205,9 @@ class Search:
             reference=np.tile(problem.reference, (count, 1)),
             pull=problem.pull,
         )
-        descent = descend(part.kinematics, small, starts.reshape(count * n, -1), steps, part.columns)
-        return descent.q.reshape(count, n, -1), descent.cost.reshape(count, n)
+        flat = starts.reshape(count * n, starts.shape[2])
+        descent = descend(part.kinematics, small, flat, steps, part.columns, ROUGHLY)
+        return descent.q.reshape(starts.shape), descent.cost.reshape(count, n)
 
     @cached_property
     def _trunk_part(self) -> _Part:

@@ -114,9 +114,10 @@ def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> Tables:
         roots = [int(v) for v in branch.dofs if moved[near, v].any()]
         few = len(roots) < len(branch.dofs) and len(roots) <= FEW
         if few and len(_held_by(kinematics, carrier)) < 3:
-            trunk_dofs += roots
-            points += near
-            weights += [GIRDLE] * len(near)
+            trunk_dofs += [v for v in roots if v not in trunk_dofs]
+            new = [p for p in near if p not in points]
+            points += new
+            weights += [GIRDLE] * len(new)
         own = branch.points.tolist()
         limbs.append(_sample(kinematics, (lower, upper), rest, branch.dofs, own, [1.0] * len(own), carrier))
     dofs = np.array(trunk_dofs, dtype=np.intp)

@@ -50,7 +50,7 @@ class Starts:
         """
         table, n = self.tables.trunk, len(targets)
         seen = targets[:, table.points]
-        known: NDArray[np.bool_] = np.isfinite(seen).all(axis=2)
+        known = np.asarray(np.isfinite(seen).all(axis=2))
         weights = np.where(known, table.weights, 0.0)
         seen = np.where(known[..., None], seen, 0.0)
         if self.tables.base < 0:

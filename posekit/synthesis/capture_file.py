@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from tokenize import TokenError
 from typing import Any
 
 import numpy as np
@@ -16,6 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.intake import open_npz
 from posekit.skeleton import JOINTS, POINTS
 from posekit.synthesis.capture import Capture
 
@@ -112,34 +109,8 @@ class _Refusal:
 
 def _load(path: str | Path) -> dict[str, NDArray[Any]]:
     """Read the arrays we know of, without pickles, and no more of them than they may declare."""
-    with _refused(path):
-        with zipfile.ZipFile(path) as archive:
-            declared = sum(member.file_size for member in archive.infolist())
-        if declared > MAX_BYTES:
-            raise InputError(
-                f"{path}: its arrays take {declared / 1e6:,.0f} MB unpacked; expected at most "
-                f"{MAX_BYTES / 1e6:,.0f} MB; split the file"
-            )
-        with np.load(path, allow_pickle=False) as arrays:
-            return {key: arrays[key] for key in KEYS if key in arrays.files}
-
-
-@contextmanager
-def _refused(path: str | Path) -> Iterator[None]:
-    """Turn whatever zipfile and NumPy raise about a broken file into one line."""
-    try:
-        yield
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise InputError(f"{path}: cannot be read: {reason}; check the path") from error
-    except (
-        *(ValueError, TypeError, SyntaxError, KeyError, EOFError, MemoryError, RuntimeError),
-        *(TokenError, zipfile.BadZipFile, zlib.error),
-    ) as error:
-        reason = " ".join(str(error).split())[:120]
-        raise InputError(
-            f"{path}: not an NPZ of plain arrays: {reason}; write it with numpy.savez, without objects"
-        ) from error
+    with open_npz(path, limit=MAX_BYTES) as archive:
+        return {key: archive.array(key, "iufU", None) for key in KEYS if key in archive.names}
 
 
 def _required(arrays: Mapping[str, NDArray[Any]], key: str, refuse: _Refusal) -> NDArray[Any]:

@@ -16,6 +16,7 @@ from posekit.files import (
     ResultFrame,
     ScaledOrthographicModel,
     View,
+    read_nearer,
     schema,
     schema_text,
     write_postures,
@@ -58,6 +59,9 @@ def write_all(folder, rng) -> dict[str, list]:
     joints[0, 1] = np.nan
     write_postures(folder / "postures.json", joints)
     write_report(folder / "report.json", Report(settings={}, postures=[]))
+    near = {"schema": "posekit.nearer/1", "frames": [{"neck-pelvis": "neck"}]}
+    (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
+    assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]
     documents: dict[str, list] = {name: [] for name in SCHEMAS}
     for path in folder.iterdir():
         document = json.loads(path.read_text())
@@ -66,7 +70,7 @@ def write_all(folder, rng) -> dict[str, list]:
 
 
 def test_each_is_versioned_and_closed():
-    assert SCHEMAS == ("posekit.view/1", "posekit.result/1", "posekit.postures/1", "posekit.report/1")
+    assert SCHEMAS == tuple(f"posekit.{kind}/1" for kind in ("view", "result", "postures", "report", "nearer"))
     for name in SCHEMAS:
         found = schema(name)
         assert found["title"] == name

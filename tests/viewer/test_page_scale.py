@@ -2,6 +2,7 @@
 
 import dataclasses
 import os
+import time
 
 import numpy as np
 import pytest
@@ -22,10 +23,6 @@ FLAGS = [
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
 ]  # fmt: skip
 TENTH_OF_MM = 1e-4
-MINUS = "\N{MINUS SIGN}"
-TRUNK = [
-    JOINT[name] for name in ("right_shoulder", "left_shoulder", "right_hip", "left_hip", "neck", "pelvis")
-]
 
 
 @pytest.fixture(scope="module")
@@ -42,30 +39,43 @@ def chromium():
         browser.close()
 
 
+def open_page(chromium, folder, given, view, wrong):
+    """Open the page of a result; note what goes wrong in it, and what it asks the network for."""
+    path = folder / "page.html"
+    write_page(path, given, view)
+    tab = chromium.new_page(viewport={"width": 1280, "height": 800})
+    tab.on("request", lambda one: wrong.append(one.url) if one.url != path.as_uri() else None)
+    tab.on("pageerror", lambda error: wrong.append(str(error)))
+    tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    tab.goto(path.as_uri())
+    deadline = time.monotonic() + 10
+    while not tab.evaluate("page.state.drawn === true"):
+        assert time.monotonic() < deadline, "the page never drew"
+        tab.wait_for_timeout(20)
+    return tab
+
+
 @pytest.fixture
 def opened(chromium, tmp_path):
-    """Open the page of a result; whatever goes wrong in it, or asks the network, fails the test."""
-    tabs, wrong = [], []
+    tabs, wrong = [], list[str]()
 
-    def open_page(given, view=None):
-        path = tmp_path / "page.html"
-        write_page(path, given, view)
-        tab = chromium.new_page(viewport={"width": 1280, "height": 800})
-        tabs.append(tab)
-        tab.on("request", lambda one: wrong.append(one.url) if one.url != path.as_uri() else None)
-        tab.on("pageerror", lambda error: wrong.append(str(error)))
-        tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
-        tab.goto(path.as_uri())
-        deadline = 500
-        while not tab.evaluate("page.state.drawn === true"):
-            deadline -= 1
-            assert deadline, "the page never drew"
-            tab.wait_for_timeout(20)
-        return tab
+    def open_one(given, view=None):
+        tabs.append(open_page(chromium, tmp_path, given, view, wrong))
+        return tabs[-1]
 
-    yield open_page
+    yield open_one
     for tab in tabs:
         tab.close()
+    assert wrong == []
+
+
+@pytest.fixture(scope="module")
+def flat_tab(chromium, flat, tmp_path_factory):
+    """Open the page of the uncalibrated result once; each test starts at a frame of its own choice."""
+    wrong: list[str] = []
+    tab = open_page(chromium, tmp_path_factory.mktemp("flat"), flat, None, wrong)
+    yield tab
+    tab.close()
     assert wrong == []
 
 
@@ -100,8 +110,8 @@ def distances(points, pairs):
     return np.linalg.norm(points[..., end, :] - points[..., start, :], axis=-1)
 
 
-def test_at_the_recovered_scale_the_recovered_posture_is_drawn(opened, flat):
-    tab, world = opened(flat), world_of(flat)
+def test_at_the_recovered_scale_the_recovered_posture_is_drawn(flat_tab, flat):
+    tab, world = flat_tab, world_of(flat)
     for k, frame in enumerate(flat.frames):
         for survivor in (0, len(frame.joints) - 1):
             choose(tab, k, survivor)
@@ -114,8 +124,8 @@ def test_at_the_recovered_scale_the_recovered_posture_is_drawn(opened, flat):
             assert np.linalg.norm(drawn(tab) - expected, axis=1).max() < TENTH_OF_MM
 
 
-def test_at_every_scale_the_image_is_the_same_and_lengths_are_kept(opened, flat):
-    tab = opened(flat)
+def test_at_every_scale_the_image_is_the_same_and_lengths_are_kept(flat_tab, flat):
+    tab = flat_tab
     lengths = np.array([posekit.load_figure().lengths[segment_name(pair)] for pair in TREE_SEGMENTS])
     starts, ends = np.array(TREE_SEGMENTS).T
     for k, frame in enumerate(flat.frames):
@@ -132,8 +142,8 @@ def test_at_every_scale_the_image_is_the_same_and_lengths_are_kept(opened, flat)
             assert (np.where(far, deep, -deep) > -1e-9).all()
 
 
-def test_it_is_the_tree_s_own_lift(opened, flat):
-    tab = opened(flat)
+def test_it_is_the_tree_s_own_lift(flat_tab, flat):
+    tab = flat_tab
     lengths = np.array([posekit.load_figure().lengths[segment_name(pair)] for pair in TREE_SEGMENTS])
     frame = flat.frames[1]
     image = frame.joints[0, :, :2] * frame.scales[0]
@@ -146,8 +156,8 @@ def test_it_is_the_tree_s_own_lift(opened, flat):
         np.testing.assert_allclose(lifted(tab, s), wanted, rtol=0, atol=1e-6)
 
 
-def test_at_the_bound_its_segment_lies_in_the_image_plane(opened, flat):
-    tab = opened(flat)
+def test_at_the_bound_its_segment_lies_in_the_image_plane(flat_tab, flat):
+    tab = flat_tab
     tree = {segment_name(pair): pair for pair in TREE_SEGMENTS}
     judged = 0
     for k, frame in enumerate(flat.frames):
@@ -181,7 +191,7 @@ def test_the_walk_of_taylors_twelve_points_keeps_his_eleven_lengths(opened, tayl
     segments += [*middles.values(), ("mid_shoulders", "mid_hips")]
     assert len(segments) == 11
     seen = [index for index in range(len(JOINTS)) if JOINTS[index] not in ("neck", "pelvis")]
-    for k, frame in enumerate(taylor.frames):
+    for k, frame in enumerate(taylor.frames[:5]):
         choose(tab, k, 0)
         before = nodes(frame.joints[0])
         image = frame.joints[0, :, :2] * frame.scales[0]
@@ -221,13 +231,13 @@ def test_from_the_camera_nothing_moves_whatever_the_scale(opened, scales):
     }"""
     for k in (0, 3):
         seen = []
-        for survivor in range(6):  # of three scales, and mirrored
+        for survivor in (0, 2, 5):  # of three scales, one mirrored
             choose(tab, k, survivor)
             seen.append(tab.evaluate(on_screen))
-            for factor in (1.0, 1.2, 3.0):
+            for factor in (1.0, 3.0):
                 tab.evaluate(f"scale.choose({factor} * page.frame().family.bound)")
                 seen.append(tab.evaluate(on_screen))
-        np.testing.assert_allclose(seen[1:], [seen[0]] * 23, rtol=0, atol=2e-3)
+        np.testing.assert_allclose(seen[1:], [seen[0]] * 8, rtol=0, atol=2e-3)
         assert np.abs(seen[0]).max() < 1
         # It is the image, upright and of one scale in both directions.
         image = scales.frames[k].joints[0, :, :2] * scales.frames[k].scales[0]
@@ -320,18 +330,9 @@ def test_inferred_joints_are_hollow_boxed_and_named(opened, hidden_elbow):
         assert np.abs(found[name] - ends).max() < 2e-3  # an interval is drawn 3 mm thick
     tab.click("#unseen-tab")
     rows = tab.locator("#unseen tbody tr").all_inner_texts()
-    assert rows[0].split() == [
-        "right",
-        "elbow",
-        "region,",
-        "25",
-        "%",
-        f"{MINUS}10…5",
-        f"{MINUS}20…25",
-        f"{MINUS}30…15",
-        "31",
-    ]
-    assert rows[1].split() == ["right", "wrist", "interval", "0.0", "0.0", f"{MINUS}20…40", "40"]
+    plain = [row.replace("\N{MINUS SIGN}", "-").split() for row in rows]
+    assert plain[0] == ["right", "elbow", "region,", "25", "%", "-10…5", "-20…25", "-30…15", "31"]
+    assert plain[1] == ["right", "wrist", "interval", "0.0", "0.0", "-20…40", "40"]
     # At another scale the boxes, which were found at this one, are gone; the hollow limb goes along.
     tab.evaluate("scale.choose(1.2 * scale.now())")
     assert tab.evaluate("scene.layers.regions.children.length") == 0
@@ -351,11 +352,11 @@ def test_inferred_joints_of_a_calibrated_view_need_no_family(opened, walked, wal
     frames = []
     for frame in walked.frames:
         wrist = frame.joints[:, JOINT["left_wrist"]]
-        donor = {"kind": "circle", "radius": 0.1, "fraction": 0.5}
-        inferred = [
-            {"left_wrist": posekit.files.Inferred(lower=at - 0.1, upper=at + 0.1, **donor)} for at in wrist
+        boxes = [
+            posekit.files.Inferred(kind="circle", lower=at - 0.1, upper=at + 0.1, radius=0.1, fraction=0.5)
+            for at in wrist
         ]
-        frames.append(dataclasses.replace(frame, inferred=inferred))
+        frames.append(dataclasses.replace(frame, inferred=[{"left_wrist": box} for box in boxes]))
     tab = opened(dataclasses.replace(walked, frames=frames), walk)
     assert tab.is_hidden("#family")
     assert tab.inner_text("#survivors-note") == "Inferred: left wrist."

@@ -15,7 +15,7 @@ from PIL import Image
 import posekit
 from posekit.cli.main import main
 from posekit.errors import InputError, ViewerError
-from posekit.files import Postures
+from posekit.files import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.subject import Subject, subject_of
@@ -216,3 +216,52 @@ def test_render_refuses(
     monkeypatch.setenv("POSEKIT_BROWSER", "no-such-browser")
     assert "'no-such-browser' is no program" in refused(monkeypatch, capsys, result, "-o", picture)
     assert [entry.name for entry in tmp_path.iterdir()] == ["empty.json"]
+
+
+def test_render_draws_uncalibrated_results(
+    flat: Result,
+    scales: Result,
+    flat_view: View,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result, several, view = (tmp_path / name for name in ("result.json", "several.npz", "view.json"))
+    posekit.write_result(result, flat)
+    posekit.write_result(several, scales)
+    posekit.write_view(view, flat_view)
+    small = ("--size", "160x120", "--supersample", 1)
+    out = tmp_path / "a.png"
+    for words in (
+        (result, "--posture", 1),
+        (result, "--posture", 1, "--through-view"),
+        (result, "--view", view, "--layout", "superposed"),
+        (result, "--rejected"),
+        (several, "--view", view),
+        (several, "--posture", 3, "--through-view"),
+    ):
+        assert render(monkeypatch, *words, "-o", out, *small) == 0
+    assert (
+        render(monkeypatch, result, "-o", tmp_path / "a.gif", "--posture", 1, "--through-view", *small) == 0
+    )
+    assert render(monkeypatch, several, "--view", view, "-o", tmp_path / "page.html") == 0
+    assert render(monkeypatch, view, "-o", tmp_path / "recovered.html") == 0
+    capsys.readouterr()
+    error = refused(monkeypatch, capsys, several, "-o", tmp_path / "b.png", "--through-view", *small)
+    assert "have 3 scales; expected one to look through the view's camera" in error
+    assert "--posture 1,2\n" in error
+
+
+def test_through_an_uncalibrated_view_the_image_fills_the_picture(flat: Result, tmp_path: Path) -> None:
+    subject = subject_of(flat)
+    frame = subject.frames[4].chosen([0])
+    shot = Shot(size=(400, 300), supersample=1, through_view=True)
+    write_picture(tmp_path / "a.png", subject, [frame], shot=shot, style=Style(ground=False))
+    with Image.open(tmp_path / "a.png") as drawn:
+        rows, columns = np.nonzero(np.asarray(drawn.convert("RGB")).min(axis=-1) < 250)
+    assert frame.sight is not None
+    image = frame.sight.image[:14]
+    fit = ((image.max(axis=0) - image.min(axis=0)) / (image.max(axis=0) - image.min(axis=0)).max()).tolist()
+    size = np.array([np.ptp(columns), np.ptp(rows)])
+    assert size.max() > 220
+    assert size[0] / size[1] == pytest.approx(fit[0] / fit[1], rel=0.35)  # bodies are thicker than lines

@@ -232,3 +232,66 @@ def test_without_matplotlib_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(ViewerError, match=r"posekit\[pictures\]"):
         plot_levels([first_frame()])
+
+
+# --- uncalibrated views ----------------------------------------------------------------------------------
+
+
+def test_y_grows_downwards_in_every_number_of_panels():
+    view = builtin_view("seq1")
+    for count in (1, 2, 3, 4):
+        for axes in plot_image(view, range(count)).axes:
+            low, high = axes.get_ylim()
+            assert low > high
+
+
+def test_rings_are_where_the_camera_projects_the_survivors(flat, narrow_view, scales, flat_view):
+    for result, view in ((flat, narrow_view), (scales, flat_view)):
+        figure = plot_image(view, [0, 3], result=result)
+        for axes, k in zip(figure.axes, (0, 3), strict=True):
+            (rings,) = [line for line in axes.lines if line.get_gid() == "reprojected"]
+            found = np.asarray(rings.get_xydata())
+            # All survivors, of whatever scale, have one image: that of the view.
+            assert len(found) == len(JOINTS)
+            gaps = np.linalg.norm(found[:, None] - view.image[k], axis=2)
+            assert gaps.min(axis=0).max() < 1e-5
+            assert axes.get_aspect() == pytest.approx(1 / view.camera.aspect)
+
+
+def test_rings_of_a_calibrated_view_are_its_image_too():
+    view, result = builtin_view("seq1"), walking_result()
+    figure = plot_image(view, [0], result=result)
+    (rings,) = [line for line in figure.axes[0].lines if line.get_gid() == "reprojected"]
+    gaps = np.linalg.norm(np.asarray(rings.get_xydata())[:, None] - 100 * view.image[0], axis=2)
+    assert gaps.min(axis=0).max() < 1e-5
+    assert not any(line.get_gid() == "reprojected" for line in plot_image(view, [0]).axes[0].lines)
+
+
+def test_depth_counts_from_the_root_where_it_is_relative(flat):
+    assert "from the root" in plot_projections(flat.frames[0].joints).get_supxlabel()
+    assert "from the optical centre" in plot_projections(first_frame().joints).get_supxlabel()
+
+
+def test_levels_of_several_scales_are_compared_with_as_many_trees(flat, scales):
+    for result, trees in ((flat, 1), (scales, 3)):
+        (axes,) = plot_levels(result.frames[:1]).axes
+        (full,) = [line for line in axes.lines if line.get_gid() == "full tree"]
+        np.testing.assert_array_equal(full.get_xdata(), trees * 2.0 ** np.arange(14))
+
+
+def test_trees_of_several_scales_are_drawn_as_their_union(flat):
+    single = flat.frames[0]
+    assert plot_tree(single).axes
+    survivor = single.branches[0]
+    family = dataclasses.replace(single.family, chosen=np.array([400.0, 410.0]))
+    # At the second scale a survivor of the first is pruned early, and nothing else grew.
+    early = {"branch": survivor[:4], "reason": "rigid_parts/early"}
+    both = dataclasses.replace(single, family=family, pruned=[*single.pruned, early])
+    shown = tips(both, 13)
+    assert sum(tip.survivors for tip in shown) == len(single.branches)
+    assert "rigid_parts/early" not in {tip.reason for tip in shown}
+    assert {tip.branch for tip in shown} == {tip.branch for tip in tips(single, 13)}
+    assert "2 scales of 8192 leaves each" in plot_tree(both).axes[0].get_title(loc="left")
+    # At one scale that would be a contradiction.
+    with pytest.raises(ViewerError, match="also leads to a survivor"):
+        tips(dataclasses.replace(both, family=single.family), 13)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cameras import Array
+from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import ViewerError
-from posekit.files import Postures, Result, View
+from posekit.files import Postures, Result, ScaledOrthographicModel, View
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
 from posekit.viewer.scene.body import Look, add_posture
 from posekit.viewer.scene.branch import lift_branch, one_a_reason, rejected_of
@@ -21,7 +21,7 @@ from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.stage import background_colour
-from posekit.viewer.scene.subject import Subject, subject_of
+from posekit.viewer.scene.subject import Subject, check_one_scale, subject_of
 from posekit.viewer.scene.superposed import superposed_looks
 from posekit.viewer.scene.world import upright_world
 
@@ -261,3 +261,153 @@ def test_files_without_postures_are_refused(walk: View, walked: Result) -> None:
     truth = subject_of(walk)
     assert truth.frames[0].points.shape == (1, 19, 3)
     assert len(JOINTS) == np.isfinite(truth.frames[0].points[0]).all(axis=1).sum()
+
+
+# --- uncalibrated views ----------------------------------------------------------------------------------
+
+
+def test_uncalibrated_survivors_are_seen_at_their_image(flat: Result, narrow_view: View) -> None:
+    shown = subject_of(flat).frames[2]
+    assert shown.sight is not None
+    np.testing.assert_allclose(
+        shown.sight.camera.project(shown.points[:, :14]),
+        np.broadcast_to(shown.sight.image, (len(shown), 14, 2)),
+        rtol=0,
+        atol=1e-6,
+    )
+    wide = subject_of(flat, narrow_view).frames[2].sight
+    assert wide is not None
+    np.testing.assert_allclose(
+        wide.camera.project(shown.points[:1, :14])[0], narrow_view.image[2], rtol=0, atol=1e-6
+    )
+
+
+def test_a_camera_infinitely_far_has_parallel_rays_and_no_eye(flat: Result) -> None:
+    subject = subject_of(flat)
+    shown = subject.frames[0].chosen([0, 5])
+    world = upright_world(subject.points())
+    made = compose(shown, figure=subject.figure, world=world, style=Style(layout="superposed"))
+    assert "/meshcat/camera/rays" in made.scene.nodes
+    assert "/meshcat/camera/eye" not in made.scene.nodes
+    for name in JOINTS:
+        dot = placement(made.scene, f"/meshcat/camera/points/{name}")[:3, 3]
+        joint = placement(made.scene, f"/meshcat/posture-0/joints/{name}")[:3, 3]
+        gap = (joint - dot) @ world.R_world_cam  # along the camera's axes: in depth alone
+        np.testing.assert_allclose(gap[:2], 0, atol=1e-6)
+        assert gap[2] > 0.59
+    assert np.isfinite(made.points).any(axis=1).sum() >= 2 * 14 + 4  # the image plane is in the picture
+
+
+def test_survivors_of_several_scales_stand_in_one_place(scales: Result) -> None:
+    subject = subject_of(scales)
+    shown = subject.frames[1]
+    assert shown.scales is not None
+    middles = shown.aligned_points[:, :14, :2].mean(axis=1)
+    np.testing.assert_allclose(middles, np.broadcast_to(middles[0], middles.shape), rtol=0, atol=1e-9)
+    assert np.ptp(shown.points[:, :14, 0].mean(axis=1)) > 0.3  # where the image's corner would put them
+    third = shown.chosen([4])
+    assert third.sight is not None
+    np.testing.assert_allclose(
+        third.sight.camera.project(third.points[:, :14])[0], third.sight.image, rtol=0, atol=1e-6
+    )
+    np.testing.assert_array_equal(third.alignment, 0)
+    world = upright_world(subject.points())
+    scene = compose(shown, figure=subject.figure, world=world, style=Style(layout="superposed")).scene
+    for k in range(len(shown)):
+        found = [path for path in scene.nodes if path.startswith(f"/meshcat/posture-{k}/joints/")]
+        for path in found:
+            index = JOINT[path.rpartition("/")[2]]
+            wanted = world.place(shown.aligned_points[k, index])
+            np.testing.assert_allclose(placement(scene, path)[:3, 3], wanted, rtol=0, atol=1e-8)
+    with pytest.raises(ViewerError, match=r"3 scales.*--posture 1,2"):
+        check_one_scale(shown)
+    check_one_scale(third)
+
+
+def test_pruned_branches_of_an_uncalibrated_frame_are_placed(flat: Result) -> None:
+    subject = subject_of(flat)
+    rejected = rejected_of(flat, subject, 0)
+    assert rejected.sight is not None
+    seen = np.isfinite(rejected.points[:, :14]).all(axis=2)
+    again = rejected.sight.camera.project(rejected.points[:, :14])
+    gap = np.linalg.norm(again - rejected.sight.image, axis=2)[seen]
+    assert gap.max() < 1e-6
+    assert seen.sum() > 100
+
+
+def test_pruned_branches_without_a_place_are_refused(scales: Result, taylor: Result) -> None:
+    with pytest.raises(ViewerError, match="recovered at 3 scales"):
+        rejected_of(scales, subject_of(scales), 0)
+    with pytest.raises(ViewerError, match="--proportions figure"):
+        rejected_of(taylor, subject_of(taylor), 0)
+
+
+def test_a_view_of_the_other_kind_is_refused(
+    flat: Result, walked: Result, walk: View, flat_view: View
+) -> None:
+    five = posekit.result_of(posekit.recover(walk))
+    short = View(camera=flat_view.camera, time=flat_view.time[:5], image=flat_view.image[:5])
+    with pytest.raises(ViewerError, match="a calibrated picture, the view's camera is uncalibrated"):
+        subject_of(five, short)
+    long = View(camera=walk.camera, time=np.arange(8.0), image=np.resize(walk.image, (8, 14, 2)))
+    with pytest.raises(ViewerError, match="an uncalibrated picture, the view's camera is calibrated"):
+        subject_of(flat, long)
+
+
+def test_the_truth_of_an_uncalibrated_view_tells_its_scale(flat_view: View) -> None:
+    assert isinstance(flat_view.camera, ScaledOrthographicModel)
+    unknown = View(
+        camera=ScaledOrthographicModel(scale=None),
+        time=flat_view.time,
+        image=flat_view.image,
+        truth=flat_view.truth,
+    )
+    sight = subject_of(unknown).frames[0].sight
+    assert sight is not None
+    assert isinstance(sight.camera, ScaledOrthographicCamera)
+    assert float(sight.camera.scale) == pytest.approx(400.0)
+
+
+def test_joints_that_were_not_seen_are_translucent_and_boxed(hidden_elbow: tuple[Result, View]) -> None:
+    result, view = hidden_elbow
+    subject = subject_of(result, view)
+    shown = subject.frames[0].chosen([0])
+    world = upright_world(subject.points())
+    made = compose(shown, figure=subject.figure, world=world, style=Style())
+    nodes = made.scene.nodes
+
+    def opacity(path: str) -> float:
+        node = nodes[f"/meshcat/posture-0/{path}"]
+        assert node.object is not None
+        return float(node.object["material"].get("opacity", 1.0))
+
+    assert opacity("joints/right_elbow") < 0.5
+    assert opacity("joints/right_wrist") < 0.5
+    assert opacity("joints/left_elbow") == 1.0
+    assert opacity("bodies/right_forearm") < opacity("bodies/left_forearm")
+    assert opacity("bones-inferred") < opacity("bones")
+    one = result.frames[0].inferred[0]["right_elbow"] if result.frames[0].inferred else None
+    assert one is not None
+    box = placement(made.scene, "/meshcat/posture-0/regions/right_elbow/faces")
+    np.testing.assert_allclose(box[:3, 3], world.place((one.lower + one.upper) / 2), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(np.linalg.norm(box[:3, :3], axis=0), one.upper - one.lower, rtol=0, atol=1e-8)
+    # The interval of depth is a thin box along the ray.
+    thin = placement(made.scene, "/meshcat/posture-0/regions/right_wrist/faces")
+    np.testing.assert_allclose(np.linalg.norm(thin[:3, :3], axis=0), [0.003, 0.003, 0.6], rtol=0, atol=1e-8)
+    assert "/meshcat/posture-0/regions/left_elbow/faces" not in nodes
+    assert "/meshcat/camera/points/right_elbow" not in nodes
+    assert "/meshcat/camera/points/right_wrist" in nodes
+    low, high = made.points.min(axis=0), made.points.max(axis=0)
+    corners = world.place(np.array([one.lower, one.upper]))
+    assert (corners >= low - 1e-9).all()
+    assert (corners <= high + 1e-9).all()
+
+
+def test_completed_joints_have_no_box(taylor: Result) -> None:
+    subject = subject_of(taylor)
+    shown = subject.frames[0]
+    world = upright_world(subject.points())
+    nodes = compose(shown, figure=subject.figure, world=world, style=Style()).scene.nodes
+    assert not any("/regions/" in path for path in nodes)
+    assert nodes["/meshcat/posture-0/joints/pelvis"].object["material"]["opacity"] < 0.5  # type: ignore[index]
+    assert "/meshcat/camera/points/pelvis" not in nodes

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posekit.cameras import Array, PinholeCamera
+from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import ViewerError
 from posekit.skeleton import JOINTS
 from posekit.viewer.browser.browser import Browser
@@ -19,7 +19,7 @@ from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_drawn
 from posekit.viewer.scene.body import Look, add_posture
 from posekit.viewer.scene.compose import Style, compose
-from posekit.viewer.scene.eye import Eye, ViewEye
+from posekit.viewer.scene.eye import Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.framing import fitted_eye, view_eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.sight import Sight
@@ -104,9 +104,34 @@ def test_joints_are_drawn_where_a_tilted_camera_and_a_free_eye_see_them(
 def test_view_eye_fits_the_views_image(subject: Subject) -> None:
     sight = Sight(camera=PinholeCamera(K=K), image=np.zeros((14, 2)), size=(640, 480))
     eye = view_eye(sight, upright_world(subject.points()), (1280, 960))
+    assert isinstance(eye, ViewEye)
     point = np.array([[0.3, -0.2, 4.0]])
     small, large = (PinholeCamera(K=each).project(point)[0] for each in (K, eye.K))
     np.testing.assert_allclose(large + 0.5, 2 * (small + 0.5), atol=1e-9)
+
+
+@pytest.mark.parametrize("aspect", [1.0, 1.25])
+def test_joints_are_drawn_where_an_uncalibrated_camera_projects_them(
+    studio: Studio, subject: Subject, aspect: float
+) -> None:
+    points = spread(subject.frames[0].points[0]) - [0.0, 0.0, subject.frames[0].points[0, 0, 2]]
+    assert (points[:14, 2] < 0).any()  # depth is relative: some of it is behind the origin
+    world = upright_world(points)
+    sight = Sight(
+        camera=ScaledOrthographicCamera(scale=217.0, aspect=aspect), image=np.zeros((14, 2)), size=(640, 480)
+    )
+    scene = scene_of_joints(subject, world, points)
+    for size in (SIZE, (1280, 960)):  # the picture's own size, and one that is twice as large
+        eye = view_eye(sight, world, size)
+        assert isinstance(eye, ParallelEye)
+        times = size[0] / SIZE[0]
+        middle = np.array([320.0, 240.0]) / times
+        shifted = ParallelEye(scale=eye.scale, centre=eye.centre + middle * times, world=world)
+        wanted = sight.camera.project(points[:14]) + 0.5 + middle
+        drawn = drawn_joints(studio.draw(scene, shifted, size=size))
+        error = np.linalg.norm((drawn + 0.5) / times - wanted, axis=1)
+        assert np.isfinite(error).all()
+        assert np.sort(error)[-2] < 1.0  # of one ball a part is hidden behind another
 
 
 def eye_at(position: list[float], target: list[float]) -> Eye:

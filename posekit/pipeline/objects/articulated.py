@@ -15,8 +15,8 @@ from posekit.robot import Robot, load_robot, robot_names
 from posekit.robot.linkage import Carried, linkage_of
 from posekit.validators.robot_limits import RobotLimits
 
-SAME_LENGTH = 1e-6
-"""Of the longest: how far a linkage's lengths may be from those of its robot."""
+SAME_LENGTH = 1e-3
+"""Of the longest: how far a linkage's rounded lengths may be from those of its robot, which are taken then."""
 
 URDF = (".urdf", ".xml")
 
@@ -43,7 +43,7 @@ class ArticulatedObject:
 
     def __post_init__(self) -> None:
         if self.robot is not None:
-            _check_robot(self.linkage, self.robot)
+            object.__setattr__(self, "linkage", _with_lengths_of(self.robot, self.linkage))
 
     @cached_property
     def factor(self) -> float:
@@ -112,8 +112,8 @@ def load_object(name: str | Path) -> ArticulatedObject:
     )
 
 
-def _check_robot(linkage: Linkage, robot: Robot) -> None:
-    """Refuse a linkage that is not the robot's."""
+def _with_lengths_of(robot: Robot, linkage: Linkage) -> Linkage:
+    """Give a linkage its robot's lengths, to the last digit; refuse one that is not the robot's."""
     where = f"linkage {linkage.name}"
     if linkage.unit is None:
         raise InputError(
@@ -132,7 +132,10 @@ def _check_robot(linkage: Linkage, robot: Robot) -> None:
             )
     carried = Carried(model=robot.model, names=linkage.points)
     allowed = SAME_LENGTH * float(linkage.lengths.max()) * linkage.unit
-    for name, (a, b), length in zip(linkage.segment_names, linkage.segments, linkage.lengths, strict=True):
+    lengths = linkage.lengths.copy()
+    for number, (name, (a, b), length) in enumerate(
+        zip(linkage.segment_names, linkage.segments, linkage.lengths.tolist(), strict=True)
+    ):
         bodies = np.flatnonzero(carried.on[:, a] & carried.on[:, b])
         if not bodies.size:
             between = ", ".join(robot.model.names[joint] for joint in carried.joints_between((a, b)))
@@ -145,3 +148,5 @@ def _check_robot(linkage: Linkage, robot: Robot) -> None:
                 f"{where}: {name} is {length * linkage.unit:.6g} m long, and {true:.6g} m in its robot {robot.name}; "
                 "correct one of the two"
             )
+        lengths[number] = true / linkage.unit
+    return replace(linkage, lengths=lengths)
