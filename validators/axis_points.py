@@ -7,7 +7,8 @@ next, though that may have one or two points of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -52,6 +53,11 @@ class AxisPoint:
     corners: tuple[int, int, int]
     numbers: tuple[float, float, float]
     looseness: float
+
+    def among(self, column: Mapping[int, int]) -> AxisPoint:
+        """Return the same with its corners renumbered."""
+        a, b, c = self.corners
+        return replace(self, corners=(column[a], column[b], column[c]))
 
 
 def place_axis_point(points: Array, axis_point: AxisPoint) -> Array:

@@ -8,7 +8,7 @@ configuration passes them all.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 
@@ -82,7 +82,7 @@ class RobotLimits:
     >>> limits = RobotLimits(robot=load_robot("panda", geometry=False), names=("panda_joint3", "panda_joint5"))
     >>> [interval] = limits.distances
     >>> interval.joints, round(interval.lower, 3), round(interval.upper, 3)
-    (('panda_joint4',), 0.331, 0.474)
+    (('panda_joint4',), 0.39, 0.475)
     """
 
     robot: Robot
@@ -186,7 +186,7 @@ class RobotLimits:
             where=tuple("+".join(joints) or self._body(interval.points) for interval in intervals),
             points=tuple(place[point] for point in shown),
             axis_points=tuple(
-                replace(point, corners=tuple(column[corner] for corner in point.corners))
+                point.among(column)
                 for point in (self.axis_points[k - len(self.names)] for k in needed[len(shown) :])
             ),
             intervals=tuple(intervals),

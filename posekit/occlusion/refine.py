@@ -17,11 +17,11 @@ from posekit.occlusion.placed import Placed
 PROPOSALS = 6
 """Steps tried at once from each place, evenly around; and one more the way the last one went."""
 
-STARTS, STARTS_IN_FOUR = 3, 8
+STARTS, STARTS_IN_FOUR = 4, 8
 """Places from which each end is sought, each far from those before it; with four free angles."""
 
-APART = 2.5
-"""Spacings between them; with four free angles a third of that."""
+APART, APART_IN_FOUR = 1.6, 0.8
+"""Spacings between them."""
 
 LONGER, SHORTER = 1.3, 0.55
 """What a step is multiplied with after it succeeded, and after none did."""
@@ -93,7 +93,7 @@ def seek_ends(
     spacing = placer.spacing()[rows.host]
     levers = np.cumsum(placer.lengths)
     table = reaches(placer, rows, group, representatives)
-    many, apart = (STARTS_IN_FOUR, APART / 3.0) if placer.both_hidden else (STARTS, APART)
+    many, apart = (STARTS_IN_FOUR, APART_IN_FOUR) if placer.both_hidden else (STARTS, APART)
     columns: list[tuple[Index, Index, Index]] = []
     mode = rows.branch @ np.array([2, 1])  # near and far are sets of their own
     for joint, goal in zip(*np.nonzero(wanted.any(axis=1)), strict=True):

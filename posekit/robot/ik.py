@@ -149,6 +149,8 @@ class InverseKinematics:
             finite, or a start is not a configuration.
         """
         problem = self._problem(targets, weights)
+        if not len(problem.targets):
+            return self._explain(problem, self._search.descend(problem, problem.reference))
         if start is None:
             return self._explain(problem, self._search.everywhere(problem))
         given = np.asarray(start, dtype=np.float64)
@@ -220,7 +222,7 @@ class InverseKinematics:
         joined = (
             Found(*(np.concatenate(arrays)[order] for arrays in zip(*parts, strict=True)))
             if parts
-            else self._search.everywhere(problem)
+            else self._search.descend(problem, reference)
         )
         return self._explain(problem._replace(reference=reference), joined)
 

@@ -32,6 +32,9 @@ PASSES = 30
 EXACT = 1e-12
 """Metres within which all lengths are met: no further pass."""
 
+STUCK = 1e-7
+"""Metres by which a pass must change the largest miss: where it does not, the lengths cannot be met."""
+
 ALREADY = 1e-9
 """Relative difference of a length below which it is left alone."""
 
@@ -127,11 +130,14 @@ def scaled(
     wanted = _check(lengths, own)
     work = _Work(kinematics)
     if any(abs(length / own[name] - 1) > ALREADY for name, length in wanted.items()):
+        last = math.inf
         for _ in range(PASSES):
             work.scale(wanted)
             reached = model_lengths(work.kinematics)
-            if max(abs(reached[name] - length) for name, length in wanted.items()) < EXACT:
+            missed = max(abs(reached[name] - length) for name, length in wanted.items())
+            if missed < EXACT or abs(last - missed) < STUCK:
                 break
+            last = missed
     new_geometry = None if geometry is None else work.geometry(geometry)
     reached = model_lengths(work.kinematics)
     return Scaled(

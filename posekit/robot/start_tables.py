@@ -120,6 +120,10 @@ def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> Tables:
             weights += [GIRDLE] * len(new)
         own = branch.points.tolist()
         limbs.append(_sample(kinematics, (lower, upper), rest, branch.dofs, own, [1.0] * len(own), carrier))
+    if base >= 0 and len(points) < 3:
+        # As of a hand of which the fingertips are known: they alone tell how it is turned.
+        trunk_dofs += [int(v) for branch in branches for v in branch.dofs if v not in trunk_dofs]
+        points, weights = list(range(len(moved))), [1.0] * len(moved)
     dofs = np.array(trunk_dofs, dtype=np.intp)
     trunk = _sample(kinematics, (lower, upper), rest, dofs, points, weights, 0)
     return Tables(trunk, tuple(limbs), base, rest)

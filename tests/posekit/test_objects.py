@@ -47,6 +47,18 @@ def to_root(truth):
     return truth - truth[..., :1, :] * [0, 0, 1]
 
 
+def robot_of(thing):
+    """Return the robot of an object that has one."""
+    assert thing.robot is not None
+    return thing.robot
+
+
+def family_of(frame):
+    """Return the scales of a frame of which something was grown."""
+    assert frame.family is not None
+    return frame.family
+
+
 def off(frame, truth):
     """Return the largest distance of a point, for the survivor that is nearest to the truth (P, 3)."""
     apart = np.linalg.norm(frame.points - to_root(truth), axis=-1)
@@ -80,13 +92,13 @@ def robots():
         if name not in found:
             found[name] = load_object(name)
         thing = found[name]
-        model = thing.robot.model
+        model = robot_of(thing).model
         kinematics = Kinematics(model=model, points=body_points(thing.linkage.points))
         rng = np.random.default_rng(seed)
         q = np.tile(pin.neutral(model), (n, 1))
         for at in kinematics.space.bounded_q:
-            limits = np.clip([kinematics.space.lower[at], kinematics.space.upper[at]], -np.pi, np.pi)
-            q[:, at] = rng.uniform(*limits, n)
+            lower, upper = np.clip([kinematics.space.lower[at], kinematics.space.upper[at]], -np.pi, np.pi)
+            q[:, at] = rng.uniform(lower, upper, n)
         turned = rng.standard_normal((n, 4))
         q[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         return thing, kinematics.positions(q)
@@ -96,7 +108,7 @@ def robots():
 
 class TestLaws:
     @given(seed=st.integers(0, 10_000), segments=st.integers(1, 9), loops=st.integers(0, 3))
-    @settings(deadline=None, max_examples=40, derandomize=True)
+    @settings(deadline=None, max_examples=30, derandomize=True)
     def test_the_truth_is_among_the_survivors_with_its_flips(self, seed, segments, loops):
         thing, truth = drawn(seed, segments, loops)
         result = recover_object(view_of(thing, truth), thing, scale=VALUE)
@@ -109,7 +121,7 @@ class TestLaws:
             assert len(frame) == 2**segments
 
     @given(seed=st.integers(0, 10_000), segments=st.integers(2, 8), loops=st.integers(0, 3))
-    @settings(deadline=None, max_examples=25, derandomize=True)
+    @settings(deadline=None, max_examples=15, derandomize=True)
     def test_every_survivor_has_the_lengths_and_the_image(self, seed, segments, loops):
         thing, truth = drawn(seed, segments, loops)
         frame = recover_object(view_of(thing, truth), thing, scale=VALUE).frames[0]
@@ -120,7 +132,7 @@ class TestLaws:
         assert (frame.points[:, 0, 2] == 0).all()
 
     @given(seed=st.integers(0, 10_000), segments=st.integers(2, 8), loops=st.integers(0, 3))
-    @settings(deadline=None, max_examples=25, derandomize=True)
+    @settings(deadline=None, max_examples=15, derandomize=True)
     def test_survivors_and_losses_are_all_flips(self, seed, segments, loops):
         thing, truth = drawn(seed, segments, loops)
         frame = recover_object(view_of(thing, truth), thing, scale=VALUE).frames[0]
@@ -131,7 +143,7 @@ class TestLaws:
     def test_without_a_robot_everything_comes_in_mirror_pairs(self):
         thing, truth = drawn(5, 6, 2)
         frame = recover_object(view_of(thing, truth), thing, scale=VALUE).frames[0]
-        assert frame.family.mirrored == len(frame) and len(frame) % 2 == 0
+        assert family_of(frame).mirrored == len(frame) and len(frame) % 2 == 0
         mirrored = frame.points * [1, 1, -1]
         assert all(np.abs(frame.points - one).max(axis=(1, 2)).min() < 1e-9 for one in mirrored)
         assert set(frame.certified) == {None} and frame.q is None
@@ -156,13 +168,14 @@ class TestLaws:
     def test_robots_with_their_configurations(self, robots, name):
         thing, truth = robots(name)
         result = recover_object(view_of(thing, truth, scale=SCALE), thing)
-        assert result.configuration_names == thing.robot.configuration_names
-        kinematics = Kinematics(model=thing.robot.model, points=body_points(thing.linkage.points))
+        assert result.configuration_names == robot_of(thing).configuration_names
+        kinematics = Kinematics(model=robot_of(thing).model, points=body_points(thing.linkage.points))
         for frame, posture in zip(result.frames, truth, strict=True):
             assert frame.judged == "exact"
             nearest = int(np.abs(frame.points - to_root(posture)).max(axis=(1, 2)).argmin())
             assert off(frame, posture) < 1e-6
             assert frame.certified[nearest] is True and frame.reasons[nearest] == ""
+            assert frame.q is not None and frame.fk_distance is not None
             placed = kinematics.positions(frame.q)
             apart = np.linalg.norm(placed - frame.points, axis=-1).max(axis=1)
             np.testing.assert_allclose(apart, frame.fk_distance, atol=1e-9)
@@ -174,11 +187,11 @@ class TestLaws:
 
     def test_limits_leave_few_and_tell_a_hand_from_its_mirror_image(self, robots):
         thing, truth = robots("allegro")
-        frames = recover_object(view_of(thing, truth, scale=SCALE), thing).frames
-        assert all(1 <= len(frame) <= 8 and frame.family.mirrored == 0 for frame in frames)
+        frames = recover_object(view_of(thing, truth, scale=SCALE), thing, certify=False).frames
+        assert all(1 <= len(frame) <= 8 and family_of(frame).mirrored == 0 for frame in frames)
         arm, truth = robots("panda")
-        result = recover_object(view_of(arm, truth, scale=SCALE), arm)
-        assert all(frame.family.mirrored == len(frame) > 0 for frame in result.frames)
+        result = recover_object(view_of(arm, truth, scale=SCALE), arm, certify=False)
+        assert all(family_of(frame).mirrored == len(frame) > 0 for frame in result.frames)
         assert any(
             "in 3 a posture and its mirror image both survive" in line for line in object_lines(result)
         )
@@ -187,7 +200,7 @@ class TestLaws:
 class TestScale:
     def test_the_least_is_the_default_and_names_its_segment(self):
         thing, truth = drawn(3, 5, 0)
-        family = recover_object(view_of(thing, truth), thing).frames[0].family
+        family = family_of(recover_object(view_of(thing, truth), thing).frames[0])
         a, b = np.array(thing.linkage.segments).T
         bounds = np.linalg.norm(truth[0, a, :2] - truth[0, b, :2], axis=1) * SCALE / thing.linkage.lengths
         assert family.how == "min" and family.segment == thing.linkage.segment_names[bounds.argmax()]
@@ -196,24 +209,31 @@ class TestScale:
     def test_the_views_own_scale_comes_next(self):
         thing, truth = drawn(3, 5, 0)
         frame = recover_object(view_of(thing, truth, scale=SCALE), thing).frames[0]
-        assert frame.family.how == "view" and off(frame, truth[0]) < 1e-9
+        assert family_of(frame).how == "view" and off(frame, truth[0]) < 1e-9
         np.testing.assert_allclose(frame.scales, SCALE)
 
     def test_a_closed_loop_fixes_it(self):
         thing, truth = drawn(11, 5, 1)
         frame = recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0]
-        assert np.abs(frame.family.minima_s / SCALE - 1).min() < 1e-9
+        assert np.abs(family_of(frame).minima_s / SCALE - 1).min() < 1e-9
         assert off(frame, truth[0]) < 1e-7
+
+    def test_a_single_loop_that_was_made_to_close_is_no_evidence(self):
+        thing, truth = drawn(11, 5, 1)
+        assert recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0].judged == "measured"
+        assert recover_object(view_of(thing, truth), thing, scale=VALUE).frames[0].judged == "exact"
+        thing, truth = drawn(11, 5, 2)
+        assert recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0].judged == "exact"
 
     def test_rigid_triangles_fix_it_where_there_are_too_many_flips(self, robots):
         thing, truth = robots("allegro")
-        frames = recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames
+        frames = recover_object(view_of(thing, truth), thing, scale=CLOSURE, certify=False).frames
         for frame, posture in zip(frames, truth, strict=True):
-            assert abs(frame.family.minima_s[0] / SCALE - 1) < 1e-9
+            assert abs(family_of(frame).minima_s[0] / SCALE - 1) < 1e-9
             assert off(frame, posture) < 1e-6
 
     @given(seed=st.integers(0, 10_000))
-    @settings(deadline=None, max_examples=50, derandomize=True)
+    @settings(deadline=None, max_examples=40, derandomize=True)
     def test_one_triangle_alone(self, seed):
         points = np.random.default_rng(seed).uniform(-1, 1, (3, 3))
         thing = ArticulatedObject(
@@ -267,7 +287,7 @@ class TestScale:
     def test_below_the_bound_is_refused_with_the_segment_and_what_it_needs(self):
         thing, truth = drawn(3, 5, 0)
         view = view_of(thing, truth)
-        family = recover_object(view, thing).frames[0].family
+        family = family_of(recover_object(view, thing).frames[0])
         match = rf"below {family.bound:.6g}, which {family.segment} needs: .*give at least"
         with pytest.raises(InputError, match=match):
             recover_object(view, thing, scale=Scale(how="value", value=0.9 * family.bound))
@@ -372,7 +392,7 @@ class TestMissing:
     def test_a_corner_of_a_triangle_may_be_missing(self, robots):
         thing, truth = robots("panda")
         view = view_of(thing, truth, scale=SCALE, missing=["panda_joint3"])
-        frames = recover_object(view, thing).frames
+        frames = recover_object(view, thing, certify=False).frames
         assert all(off(frame, posture) < 1e-6 for frame, posture in zip(frames, truth, strict=True))
 
     def test_what_joins_the_rest_may_not(self, robots):
@@ -381,13 +401,27 @@ class TestMissing:
         with pytest.raises(InputError, match="panda_joint5 not seen, and without the rest falls apart"):
             recover_object(view, thing)
 
+    def test_nothing_seen_at_all(self):
+        thing, truth = drawn(4, 3, 0)
+        view = view_of(thing, truth, missing=thing.linkage.points)
+        with pytest.raises(InputError, match="no segment is seen at both ends"):
+            recover_object(view, thing)
+
+    def test_a_picture_whose_pixels_are_not_square(self):
+        thing, truth = drawn(4, 5, 1)
+        view = view_of(thing, truth)
+        camera = ScaledOrthographicModel(scale=SCALE, aspect=1.25)
+        image = view.image / [1.25, 1.0]
+        wide = ObjectView(points=view.points, camera=camera, time=view.time, image=image, unit=None)
+        assert off(recover_object(wide, thing).frames[0], truth[0]) < 1e-9
+
     def test_other_frames_are_recovered_all_the_same(self, robots):
         thing, truth = robots("panda")
         view = view_of(thing, truth, scale=SCALE)
         image = view.image.copy()
         image[1, thing.linkage.points.index("panda_joint5")] = np.nan
         broken = ObjectView(points=view.points, camera=view.camera, time=view.time, image=image, unit="m")
-        result = recover_object(broken, thing)
+        result = recover_object(broken, thing, certify=False)
         assert [bool(frame.reason) for frame in result.frames] == [False, True, False]
         assert len(result.frames[1]) == 0 and any("falls apart" in line for line in object_lines(result))
 

@@ -233,35 +233,14 @@ def test_render_draws_uncalibrated_results(
     small = ("--size", "160x120", "--supersample", 1)
     out = tmp_path / "a.png"
     for words in (
-        (result, "--posture", 1),
-        (result, "--posture", 1, "--through-view"),
         (result, "--view", view, "--layout", "superposed"),
         (result, "--rejected"),
-        (several, "--view", view),
         (several, "--posture", 3, "--through-view"),
     ):
         assert render(monkeypatch, *words, "-o", out, *small) == 0
-    assert (
-        render(monkeypatch, result, "-o", tmp_path / "a.gif", "--posture", 1, "--through-view", *small) == 0
-    )
     assert render(monkeypatch, several, "--view", view, "-o", tmp_path / "page.html") == 0
     assert render(monkeypatch, view, "-o", tmp_path / "recovered.html") == 0
     capsys.readouterr()
     error = refused(monkeypatch, capsys, several, "-o", tmp_path / "b.png", "--through-view", *small)
     assert "have 3 scales; expected one to look through the view's camera" in error
     assert "--posture 1,2\n" in error
-
-
-def test_through_an_uncalibrated_view_the_image_fills_the_picture(flat: Result, tmp_path: Path) -> None:
-    subject = subject_of(flat)
-    frame = subject.frames[4].chosen([0])
-    shot = Shot(size=(400, 300), supersample=1, through_view=True)
-    write_picture(tmp_path / "a.png", subject, [frame], shot=shot, style=Style(ground=False))
-    with Image.open(tmp_path / "a.png") as drawn:
-        rows, columns = np.nonzero(np.asarray(drawn.convert("RGB")).min(axis=-1) < 250)
-    assert frame.sight is not None
-    image = frame.sight.image[:14]
-    fit = ((image.max(axis=0) - image.min(axis=0)) / (image.max(axis=0) - image.min(axis=0)).max()).tolist()
-    size = np.array([np.ptp(columns), np.ptp(rows)])
-    assert size.max() > 220
-    assert size[0] / size[1] == pytest.approx(fit[0] / fit[1], rel=0.35)  # bodies are thicker than lines

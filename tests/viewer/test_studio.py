@@ -114,24 +114,28 @@ def test_view_eye_fits_the_views_image(subject: Subject) -> None:
 def test_joints_are_drawn_where_an_uncalibrated_camera_projects_them(
     studio: Studio, subject: Subject, aspect: float
 ) -> None:
-    points = spread(subject.frames[0].points[0]) - [0.0, 0.0, subject.frames[0].points[0, 0, 2]]
+    points = spread(subject.frames[0].points[0])
+    points += [1.5, 1.4, 0.0] - points[0]
     assert (points[:14, 2] < 0).any()  # depth is relative: some of it is behind the origin
     world = upright_world(points)
-    sight = Sight(
-        camera=ScaledOrthographicCamera(scale=217.0, aspect=aspect), image=np.zeros((14, 2)), size=(640, 480)
-    )
+    camera = ScaledOrthographicCamera(scale=190.0, aspect=aspect)
+    image = camera.project(points[:14])
+    sight = Sight(camera=camera, image=image, size=(640, 480))
     scene = scene_of_joints(subject, world, points)
-    for size in (SIZE, (1280, 960)):  # the picture's own size, and one that is twice as large
+    for size in (SIZE, (1280, 960)):  # the view's own size, and twice as large
         eye = view_eye(sight, world, size)
         assert isinstance(eye, ParallelEye)
-        times = size[0] / SIZE[0]
-        middle = np.array([320.0, 240.0]) / times
-        shifted = ParallelEye(scale=eye.scale, centre=eye.centre + middle * times, world=world)
-        wanted = sight.camera.project(points[:14]) + 0.5 + middle
-        drawn = drawn_joints(studio.draw(scene, shifted, size=size))
-        error = np.linalg.norm((drawn + 0.5) / times - wanted, axis=1)
-        assert np.isfinite(error).all()
-        assert np.sort(error)[-2] < 1.0  # of one ball a part is hidden behind another
+        seen = (drawn_joints(studio.draw(scene, eye, size=size)) + 0.5) * SIZE[0] / size[0] - 0.5
+        error = np.linalg.norm(seen - image, axis=1)
+        assert (error < 1.0).sum() >= 12  # one ball is hidden behind another, and a part of one
+        # The same without the pixels' raster: where the clip matrix puts them, from the corner of the picture.
+        pose, clip = eye.matrices(*size)
+        placed = np.concatenate([world.place(points[:14]), np.ones((14, 1))], axis=1)
+        clipped = placed @ np.linalg.inv(pose).T @ clip.T
+        np.testing.assert_array_equal(clipped[:, 3], 1.0)  # nothing is divided by the depth
+        exact = (clipped[:, :2] * [1, -1] + 1) / 2 * SIZE - 0.5
+        np.testing.assert_allclose(exact, image, rtol=0, atol=1e-9)
+        assert np.abs(clipped[:, 2]).max() < 1
 
 
 def eye_at(position: list[float], target: list[float]) -> Eye:

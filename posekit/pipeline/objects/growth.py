@@ -111,13 +111,17 @@ class Grown:
         base = 2 * 3 ** turns.shape[1] * self.hypothesis.astype(np.int64)
         return np.isin(base - turns @ powers, base + turns @ powers)
 
-    @property
-    def exact(self) -> bool:
-        """Whether there is evidence that the image is exact: loops closed that need not have.
+    def exact(self, *, fitted: bool) -> bool:
+        """Tell whether there is evidence that the image is exact: loops closed that need not have.
 
         In a survivor, or in a branch that something else pruned after the last of its loops had closed.
+
+        Parameters
+        ----------
+        fitted : bool
+            Whether the scale was chosen so that loops close.
         """
-        level = self.plan.evidence_level
+        level = self.plan.evidence_level(fitted=fitted)
         if level is None:
             return False
         if any(len(leaves.code) for leaves, _ in self.parts):

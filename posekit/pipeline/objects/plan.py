@@ -73,11 +73,13 @@ class Plan:
         """How many leaves the tree has before any is pruned."""
         return 1 << (len(self.spanned.nodes) - 1)
 
-    @cached_property
-    def evidence_level(self) -> int | None:
-        """The level at which the last loop closes, or middle is met: exactly, only if the image is exact."""
+    def evidence_level(self, *, fitted: bool) -> int | None:
+        """Return the level at which the last loop closes, or middle is met: exactly, only if the image is exact.
+
+        None where there is no loop, or one alone and the scale was fitted so that it closes.
+        """
         closing = validators.closure(self.spanned)
-        return max((max(check.points) for check in closing), default=None)
+        return None if len(closing) <= int(fitted) else max(max(check.points) for check in closing)
 
     def checks(self, tolerance: ObjectTolerance) -> list[Check]:
         """Make the checks: loops, shape, flips given by hand, limits of the robot."""
@@ -122,7 +124,11 @@ def seen_part(linkage: Linkage, seen: NDArray[np.bool_]) -> tuple[Linkage, tuple
     edges = [(new[linkage.segments[k][0]], new[linkage.segments[k][1]]) for k in segments]
     halves = [(new[m.ends[k]], new[linkage.nodes.index(m.name)]) for m in middles for k in (0, 1)]
     parts = components(len(nodes), [*edges, *halves])
-    if not segments or len(parts) > 1:
+    if not segments:
+        raise InputError(
+            f"linkage {linkage.name}: no segment is seen at both ends (not seen: {missing}); add image points"
+        )
+    if len(parts) > 1:
         groups = [", ".join(linkage.nodes[nodes[k]] for k in part[:6]) for part in parts[:3]]
         raise InputError(
             f"linkage {linkage.name}: {missing} not seen, and without the rest falls apart into "

@@ -169,7 +169,8 @@ def _grow(
     if given is not None:
         return grow(plan, image, aspect, scales, given, "given")
     grown = grow(plan, image, aspect, scales, exact, "exact")
-    return grown if grown.exact else grow(plan, image, aspect, scales, measured, "measured")
+    fitted = "closure" in family.how
+    return grown if grown.exact(fitted=fitted) else grow(plan, image, aspect, scales, measured, "measured")
 
 
 def _frame(
