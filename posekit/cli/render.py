@@ -111,7 +111,12 @@ def render(
     ] = "0,0,0.9",
     fov: Annotated[float, typer.Option("--fov", help="Vertical field of view, degrees.")] = 25.0,
     through_view: Annotated[
-        bool, typer.Option("--through-view", help="Look through the view's own camera.")
+        bool,
+        typer.Option(
+            "--through-view",
+            help="Look through the view's own camera: exactly over its image points. Of survivors of several scales, "
+            "choose those of one with --posture.",
+        ),
     ] = False,
     camera: Annotated[
         bool, typer.Option("--camera/--no-camera", help="Draw the view's camera, image and rays.")

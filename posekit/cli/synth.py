@@ -20,6 +20,10 @@ app = typer.Typer(
 )
 
 Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")]
+Uncalibrated = Annotated[
+    bool,
+    typer.Option("--uncalibrated", help="Forget the camera: write the pictures as photographs without one."),
+]
 Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
 
 
@@ -76,6 +80,7 @@ def random(
     ] = "2.5,6",
     noise: Noise = 0.0,
     seed: Seed = 0,
+    uncalibrated: Uncalibrated = False,
 ) -> None:
     """Draw random legal postures, each seen from anywhere on a sphere around the person."""
     import numpy as np
@@ -86,7 +91,7 @@ def random(
     near, far = numbers(distance, 2, "--distance")
     sphere = synthesis.CameraSphere(distance=(near, far))
     scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), sphere)
-    _write(output, scene, noise, seed)
+    _write(output, scene, noise, seed, uncalibrated=uncalibrated)
 
 
 @app.command(
@@ -110,6 +115,7 @@ def mocap(
     dt: Dt = 0.2,
     noise: Noise = 0.0,
     seed: Seed = 0,
+    uncalibrated: Uncalibrated = False,
 ) -> None:
     """See a motion-capture clip through a virtual camera, with the segment lengths of the clip."""
     import numpy as np
@@ -125,10 +131,10 @@ def mocap(
         dt=dt,
         position=numbers(camera, 3, "--camera") if camera else None,
     )
-    _write(output, scene, noise, seed)
+    _write(output, scene, noise, seed, uncalibrated=uncalibrated)
 
 
-def _write(output: Path, scene: Scene, noise: float, seed: int) -> None:
+def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated: bool = False) -> None:
     """Add noise, write the view, say so."""
     import numpy as np
 
@@ -138,5 +144,6 @@ def _write(output: Path, scene: Scene, noise: float, seed: int) -> None:
         raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
-    files.write_view(output, pipeline.view_of(scene))
+    view = pipeline.view_of(scene)
+    files.write_view(output, pipeline.forget_camera(view) if uncalibrated else view)
     typer.echo(f"written: {output} ({len(scene)} frames)")

@@ -18,4 +18,5 @@ from posekit.pipeline.tolerance import Tolerance as Tolerance
 from posekit.pipeline.validate import recovered_with as recovered_with
 from posekit.pipeline.validate import validate as validate
 from posekit.pipeline.views import builtin_view as builtin_view
+from posekit.pipeline.views import forget_camera as forget_camera
 from posekit.pipeline.views import view_of as view_of

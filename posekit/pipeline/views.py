@@ -9,7 +9,7 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure
-from posekit.files import CameraModel, LeeChenModel, OpenCVModel, View
+from posekit.files import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.head import TABLE_A2
 from posekit.skeleton import HEAD_POINTS
 from posekit.synthesis import Scene, seq1, seq2
@@ -41,6 +41,19 @@ def view_of(scene: Scene) -> View:
         lengths=_differences(scene.figure),
         head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
         unit="m" if scene.lee_chen_f is None else "cm",
+    )
+
+
+def forget_camera(view: View) -> View:
+    """Return the same pictures as photographs of which no camera is known: scaled orthographic, without a scale."""
+    return View(
+        camera=ScaledOrthographicModel(scale=None),
+        time=view.time,
+        image=view.image,
+        truth=view.truth,
+        lengths=view.lengths,
+        stature=view.stature,
+        unit=view.unit,
     )
 
 

@@ -32,7 +32,7 @@ PASSES = 30
 EXACT = 1e-12
 """Metres within which all lengths are met: no further pass."""
 
-STUCK = 1e-7
+STUCK = 1e-10
 """Metres by which a pass must change the largest miss: where it does not, the lengths cannot be met."""
 
 ALREADY = 1e-9

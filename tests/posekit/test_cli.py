@@ -842,3 +842,14 @@ def test_an_uncalibrated_view_by_scale_and_flips(run: Run, tmp_path: Path) -> No
     assert failed.err.startswith("posekit: error: view.json: frames[0]: --scale: 1 pixels a cm is below ")
     assert failed.err.count("\n") == 1
     assert not Path("no.json").exists()
+
+
+def test_synthetic_photographs_have_no_camera_and_are_recovered(run: Run) -> None:
+    assert run("synth", "random", "-o", "photo.json", "--frames", "4", "--uncalibrated", "--seed", "3").code == 0
+    view = read_view("photo.json")
+    assert isinstance(view.camera, ScaledOrthographicModel)
+    assert np.isfinite(view.truth).all()
+    assert np.isnan(view.root).all()
+    done = run("recover", "photo.json", "-o", "photo.npz")
+    assert done.code == 0, done.err
+    assert "scale by min" in done.out

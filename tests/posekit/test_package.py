@@ -1,6 +1,7 @@
 """The package as it is installed: its version, its files, and an import that does nothing else."""
 
 import importlib.metadata
+import importlib.util
 import subprocess
 import sys
 import tomllib
@@ -89,3 +90,12 @@ def test_linked_folders_are_packages_of_posekit() -> None:
 def test_test_files_have_unique_names() -> None:
     names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
     assert len(names) == len(set(names))
+
+
+def test_the_api_page_lists_every_module() -> None:
+    spec = importlib.util.spec_from_file_location("make_api", ROOT / "docs" / "make_api.py")
+    assert spec is not None
+    assert spec.loader is not None
+    page = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(page)
+    assert (ROOT / "docs" / "api.md").read_text(encoding="utf-8") == page.text(), "run: python docs/make_api.py"

@@ -65,7 +65,7 @@ def test_a_person_s_lengths_are_met(name: str) -> None:
         assert result.lengths[segment] == pytest.approx(length, abs=1e-9)
 
 
-@settings(max_examples=20)
+@settings(max_examples=10)
 @given(st.integers(0, 2**32 - 1), st.sampled_from(MODELS))
 def test_limbs_are_met_whatever_the_torso_is(seed: int, name: str) -> None:
     wanted = person(seed)

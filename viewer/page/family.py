@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from posekit.files.family import Family
 from posekit.files.result import ResultFrame
 from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS
-from posekit.viewer.scene.subject import Shown, hidden
+from posekit.viewer.scene.seen import hidden
+from posekit.viewer.scene.subject import Shown
 from posekit.viewer.scene.world import World
 
 Array = NDArray[np.float64]

@@ -36,25 +36,35 @@ const scale = (() => {
     page.chooseScale(s === null || !family ? null : Math.max(s, family.bound));
   }
 
-  // Marks of the bound, the recovered scales and the minima, and the curve of the residual.
+  // The curve's residual at s, between its samples; infinite beyond them.
+  function envelope(curve, s) {
+    const k = curve.findIndex((one) => one[0] >= s), [after, before] = [curve[k], curve[k - 1]];
+    if (!after || (!before && after[0] > s)) return Infinity;
+    return before ? before[1] + ((s - before[0]) / (after[0] - before[0])) * (after[1] - before[1]) : after[1];
+  }
+
+  // Marks of the bound, the recovered scales and the minima, and the curve of the residual, the least over all flips.
   function drawMarks(family) {
     const drawing = byId("scale-marks"), top = farthest(family), place = (s) => (angleOf(family, s) / top) * WIDE;
     drawing.replaceChildren();
     drawing.classList.toggle("low", family.curve.length < 2 && !family.minima.length);
-    const line = (s, name, height, text) => {
+    // Minima of the least are its corners; others belong to flips that are worse there.
+    const lowest = family.minima.filter(([s, residual]) => residual <= envelope(family.curve, s));
+    const curve = [...family.curve, ...lowest].sort((a, b) => a[0] - b[0]).filter(([s]) => angleOf(family, s) <= top);
+    const most = Math.max(...[...curve, ...family.minima].map((one) => one[1]), 1e-12);
+    // The square root shows how sharp minima are that end at zero.
+    const height = (residual) => HIGH - 4 - Math.sqrt(residual / most) * (HIGH - 8);
+    const line = (s, name, low, high, text) => {
       const x = place(s);
-      drawing.append(element("line", { x1: x, x2: x, y1: HIGH - height, y2: HIGH, class: name }, text));
+      drawing.append(element("line", { x1: x, x2: x, y1: low, y2: high, class: name }, text));
     };
-    const curve = [...family.curve, ...family.minima].sort((a, b) => a[0] - b[0]).filter(([s]) => angleOf(family, s) <= top);
-    const most = Math.max(...curve.map((one) => one[1]), 1e-12);
     if (curve.length > 1) {
-      // The square root shows how sharp minima are that end at zero.
-      const points = curve.map(([s, residual]) => `${place(s)},${HIGH - 4 - Math.sqrt(residual / most) * (HIGH - 8)}`);
+      const points = curve.map(([s, residual]) => `${place(s)},${height(residual)}`);
       drawing.append(element("polyline", { points: points.join(" "), class: "curve" }, `residual of ${family.how}, at most ${most.toPrecision(2)}`));
     }
-    line(family.bound, "bound", HIGH, `bound: ${pixels(family.bound)}`);
-    for (const [s, residual] of family.minima) line(s, "minimum", HIGH / 2, `minimum: ${pixels(s)}, residual ${residual.toPrecision(2)}`);
-    for (const s of family.scales) line(s, "chosen", HIGH, `recovered at ${pixels(s)}`);
+    line(family.bound, "bound", 0, HIGH, `bound: ${pixels(family.bound)}`);
+    for (const s of family.scales) line(s, "chosen", 0, HIGH, `recovered at ${pixels(s)}`);
+    for (const [s, residual] of family.minima) line(s, "minimum", height(residual) - 4, height(residual) + 4, `minimum: ${pixels(s)}, residual ${residual.toPrecision(2)}`);
     const listed = family.minima.slice(0, 8).map(([s]) => pixels(s)).join(", ");
     drawing.setAttribute("aria-label", `bound ${pixels(family.bound)}, recovered at ${family.scales.map(pixels).join(", ")}` + (listed ? `, minima of ${family.how} at ${listed}` : ""));
   }
@@ -102,12 +112,12 @@ const scale = (() => {
     const [a, b] = family.segment.split("-").map(nodeOf), length = apart(all[a], all[b]);
     const lean = degrees(Math.asin(Math.min(1, Math.abs(all[a]?.[2] - all[b]?.[2]) / length)));
     const isLifted = DATA.tree.steps.some(([c, p]) => (c === a && p === b) || (c === b && p === a)) || a >= DATA.points.length || DATA.tree.root !== 0;
-    if (!isLifted) said[0] += " (inside the rigid torso or hips: the tree lifts each of its ends from another joint)";
+    if (!isLifted) said[0] += " (its ends are lifted from other joints)";
     if (!Number.isNaN(lean)) said[0] += lean < 0.05 ? "; here it lies in the image plane" : `; here it leans ${lean.toFixed(1)}° out of the image plane`;
     const deep = extent(all), was = extent(old);
-    said.push(`From the nearest joint to the farthest ${deep.toFixed(2)} m` + (elsewhere() ? `, at the recovered scale ${was.toFixed(2)} m` : ""));
+    said.push(`From the nearest joint to the farthest ${deep.toFixed(2)} m` + (elsewhere() ? `, recovered ${was.toFixed(2)} m` : ""));
     const off = broken(all, old);
-    if (elsewhere() && off > 5e-4) said.push(`Distances inside torso and hips change by up to ${(100 * off).toFixed(1)} cm: they fit at the recovered scale`);
+    if (elsewhere() && off > 5e-4) said.push(`Distances inside torso and hips are off by up to ${(100 * off).toFixed(1)} cm`);
     byId("scale-note").textContent = `${said.join(". ")}.`;
     byId("scale-back").disabled = !elsewhere();
   }

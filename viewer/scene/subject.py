@@ -8,27 +8,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera, lee_chen
+from posekit.cameras import Array
 from posekit.errors import FigureError, ViewerError
 from posekit.figure import Figure, load_figure, with_head
 from posekit.files import (
     Inferred,
-    LeeChenModel,
     OpenCVModel,
     Postures,
     Result,
     ResultFrame,
-    ScaledOrthographicModel,
     View,
 )
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import JOINTS
+from posekit.viewer.scene.seen import check_camera, scale_of, sight_of, view_sight
 from posekit.viewer.scene.sight import Sight
 
 UNIT = 1e-6
 """How far a quaternion's length may be off for forward kinematics to be asked."""
-
-ON_RAY = 1e-6
-"""Metres across the image within which all positions of a joint are one image point."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -151,7 +147,7 @@ def subject_of(given: Result | Postures | View, view: View | None = None) -> Sub
                 "recovered from"
             )
         if view is not None:
-            _check_camera(given, view)
+            check_camera(given, view)
         figure = _figure_of(given)
         frames = [_of_frame(frame, figure, view, k) for k, frame in enumerate(given.frames)]
     if not any(len(frame) for frame in frames):
@@ -180,28 +176,11 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
         points=points,
         q=q,
         groups=frame.groups,
-        sight=_sight(frame, view, index),
+        sight=sight_of(frame, view, index),
         scales=frame.scales,
         inferred=frame.inferred or (),
         time=frame.time,
     )
-
-
-def _sight(frame: ResultFrame, view: View | None, index: int) -> Sight | None:
-    f = frame.camera["f"]
-    scale = float(frame.scales[0]) if frame.scales is not None and len(frame.scales) else None
-    if view is not None:
-        image = np.concatenate([view.image[index], view.head_image[index]])
-        return _view_sight(view, image, f, scale)
-    if scale is not None:
-        uncalibrated = ScaledOrthographicCamera(scale=scale)
-        image = uncalibrated.project(frame.joints[:1])[0]
-        image[[JOINT[name] for name in hidden(frame)]] = np.nan
-        return Sight(camera=uncalibrated, image=image)
-    if f is None or len(frame.joints) == 0:
-        return None
-    camera = lee_chen.pinhole(f)
-    return Sight(camera=camera, image=camera.project(frame.joints[:1])[0])  # all survivors have one image
 
 
 def check_one_scale(shown: Shown) -> None:
@@ -221,25 +200,6 @@ def check_one_scale(shown: Shown) -> None:
     )
 
 
-def hidden(frame: ResultFrame) -> list[str]:
-    """Name the joints of which the image shows nothing: those that are inferred, and not along a ray alone."""
-    found: dict[str, bool] = {}
-    for joints in frame.inferred or ():
-        for name, one in joints.items():
-            on_ray = bool((one.upper - one.lower)[:2].max() < ON_RAY < one.upper[2] - one.lower[2])
-            found[name] = found.get(name, True) and not on_ray
-    return [name for name in JOINTS if found.get(name)]
-
-
-def _check_camera(result: Result, view: View) -> None:
-    uncalibrated = any(frame.family is not None for frame in result.frames)
-    if uncalibrated != isinstance(view.camera, ScaledOrthographicModel):
-        was, other = ("an uncalibrated", "calibrated") if uncalibrated else ("a calibrated", "uncalibrated")
-        raise ViewerError(
-            f"the result is of {was} picture, the view's camera is {other}; give the view that it was recovered from"
-        )
-
-
 def _of_view(view: View) -> Subject:
     points = with_head(np.asarray(view.truth)).copy()
     unseen = np.isnan(points[:, 0]).any(axis=1)
@@ -251,7 +211,7 @@ def _of_view(view: View) -> Subject:
         frames.append(
             Shown(
                 points=points[k : k + 1] if known else points[:0],
-                sight=_view_sight(view, image, None, _scale_of(points[k, : len(JOINTS)], view, k)),
+                sight=view_sight(view, image, None, scale_of(points[k, : len(JOINTS)], view, k)),
                 time=float(view.time[k]),
             )
         )
@@ -263,36 +223,6 @@ def _of_view(view: View) -> Subject:
     figure = load_figure()
     figure = figure if view.stature is None else figure.from_stature(view.stature)
     return Subject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
-
-
-def _scale_of(truth: Array, view: View, index: int) -> float | None:
-    """Measure the scale of an uncalibrated view whose truth is known: its image by its truth, least squares."""
-    model = view.camera
-    if not isinstance(model, ScaledOrthographicModel) or model.scale is not None:
-        return None
-    image = view.image[index] * [model.aspect, 1.0]
-    both = np.isfinite(truth).all(axis=1) & np.isfinite(image).all(axis=1)
-    if both.sum() < 2:
-        return None
-    seen, flat = (values[both] - values[both].mean(axis=0) for values in (image, truth[:, :2]))
-    extent = float((flat * flat).sum())
-    scale = float((seen * flat).sum()) / extent if extent > 0 else 0.0
-    return scale if np.isfinite(scale) and scale > 0 else None
-
-
-def _view_sight(view: View, image: Array, f: float | None, scale: float | None) -> Sight | None:
-    model = view.camera
-    if isinstance(model, OpenCVModel):
-        return Sight(
-            camera=PinholeCamera(K=model.K, distortion=model.distortion), image=image, size=model.size
-        )
-    if isinstance(model, LeeChenModel):
-        f = model.f if f is None else f
-        return None if f is None else Sight(camera=lee_chen.pinhole(f), image=image)
-    scale = model.scale if scale is None else scale
-    if scale is None or not np.isfinite(image).all(axis=1).any():
-        return None
-    return Sight(camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect), image=image)
 
 
 def _figure_of(result: Result) -> Figure:

@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.pipeline.objects.draw import draw_configurations
 from posekit.robot import Robot
-from posekit.robot.ik import InverseKinematics, Reach, Solution
+from posekit.robot.descent import Problem, descend
+from posekit.robot.ik import PULL, InverseKinematics, Reach, Solution
 from posekit.robot.kinematics import Kinematics, body_points
+from posekit.robot.starts import lay, quaternions
 
 MOST = 256
 """Postures of one frame whose configurations are looked for: some milliseconds each."""
+
+
+SHAPES, NEAR, AGAIN = 2048, 48, 12
+"""Random configurations that are compared with a posture by its distances, then laid on it, then started from."""
 
 
 class Certificate(NamedTuple):
@@ -64,10 +74,62 @@ class Certifier:
                 solution = self._solvers[tolerance].solve(points[:MOST])
             q[:MOST] = solution.q
             distance[:MOST] = np.nanmax(solution.residual, axis=1)
+            self._try_again(points, q, distance, np.flatnonzero(distance > tolerance))
             reasons[:MOST] = [self._reason(solution, k) for k in range(len(solution.q))]
         certified = (distance <= tolerance).tolist()
         reasons = ["" if sure else reason for sure, reason in zip(certified, reasons, strict=True)]
         return Certificate(q, distance, certified, reasons)
+
+    def _try_again(self, points: Array, q: Array, distance: Array, rows: NDArray[np.intp]) -> None:
+        """Start some rows from random configurations that are like them; what does better is taken over, in place."""
+        if not rows.size:
+            return
+        n, nq = len(rows), q.shape[1]
+        starts = self._starts(points[rows]).reshape(n * AGAIN, nq)
+        goals = np.repeat(points[rows], AGAIN, axis=0)
+        space = self.kinematics.space
+        for _ in range(2):  # the second time what the points do not determine is drawn to where it is
+            problem = Problem(
+                targets=goals,
+                weights=np.ones(goals.shape[:2]),
+                lower=space.lower,
+                upper=space.upper,
+                reference=starts,
+                pull=PULL,
+            )
+            starts = descend(self.kinematics, problem, starts).q
+        apart = np.linalg.norm(self.kinematics.positions(starts) - goals, axis=2)
+        worst = np.nanmax(apart, axis=1).reshape(n, AGAIN)
+        best = worst.argmin(axis=1)
+        closer = worst[np.arange(n), best] < distance[rows]
+        chosen = starts.reshape(n, AGAIN, nq)[np.arange(n), best]
+        q[rows[closer]] = chosen[closer]
+        distance[rows[closer]] = worst[np.arange(n), best][closer]
+
+    def _starts(self, points: Array) -> Array:
+        """Find configurations (N, AGAIN, nq) whose points lie best on postures (N, P, 3), the base laid."""
+        q, shapes, lengths = self._shapes
+        first, second = np.triu_indices(points.shape[1], 1)
+        gap = np.linalg.norm(points[:, first] - points[:, second], axis=2)
+        known = np.isfinite(gap).astype(np.float64)
+        gap = np.nan_to_num(gap)
+        misfit = known @ (lengths**2).T - 2 * gap @ lengths.T
+        near = np.argpartition(misfit, NEAR, axis=1)[:, :NEAR].reshape(-1)
+        weights = np.isfinite(points[..., 0]).astype(np.float64).repeat(NEAR, axis=0)
+        R, t, left = lay(shapes[near], np.nan_to_num(points).repeat(NEAR, axis=0), weights)
+        laid = q[near]
+        laid[:, :3], laid[:, 3:7] = t, quaternions(R)
+        best = np.argsort(left.reshape(-1, NEAR), axis=1, kind="stable")[:, :AGAIN]
+        return np.take_along_axis(laid.reshape(len(points), NEAR, -1), best[..., None], axis=1)
+
+    @cached_property
+    def _shapes(self) -> tuple[Array, Array, Array]:
+        """Random configurations (M, nq) with the base at rest, their points and the distances of these."""
+        q = draw_configurations(self.robot, SHAPES, np.random.default_rng(0))
+        q[:, :7] = pin.neutral(self.robot.model)[:7]
+        shapes = self.kinematics.positions(q)
+        first, second = np.triu_indices(shapes.shape[1], 1)
+        return q, shapes, np.linalg.norm(shapes[:, first] - shapes[:, second], axis=2)
 
     def _reason(self, solution: Solution, k: int) -> str:
         """Say what the nearest configuration lacks."""

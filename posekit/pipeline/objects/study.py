@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.files import ScaledOrthographicModel
 from posekit.files.object_view import ObjectView
 from posekit.pipeline.objects.articulated import ArticulatedObject
+from posekit.pipeline.objects.draw import draw_configurations
 from posekit.pipeline.objects.recover import recover_object
 from posekit.pipeline.scale import Scale
-from posekit.robot import Robot
-from posekit.robot.configuration_space import ConfigurationSpace
 from posekit.robot.kinematics import Kinematics, body_points
 
 PIXELS = 500.0
@@ -97,30 +93,6 @@ def study_object(
         found=np.array([hits.any() for hits in right]),
         sure=np.array([(hits & verdicts).any() for hits, verdicts in zip(right, sure, strict=True)]),
     )
-
-
-def draw_configurations(robot: Robot, count: int, rng: np.random.Generator) -> Array:
-    """Draw configurations (N, nq): joints evenly within their limits, within one turn at most; the base any way round.
-
-    Parameters
-    ----------
-    robot : Robot
-        Free-flying.
-    count : int
-    rng : numpy.random.Generator
-    """
-    space = ConfigurationSpace(robot.model)
-    q = np.tile(pin.neutral(robot.model), (count, 1))
-    for at in space.bounded_q:
-        lower, upper = max(space.lower[at], -math.pi), min(space.upper[at], math.pi)
-        q[:, at] = rng.uniform(min(lower, upper), upper, count)
-    for at in space.turn_q:
-        angle = rng.uniform(-np.pi, np.pi, count)
-        q[:, at], q[:, at + 1] = np.cos(angle), np.sin(angle)
-    for at in space.free_q:
-        turned = rng.standard_normal((count, 4))
-        q[:, at + 3 : at + 7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-    return q
 
 
 def study_lines(name: str, study: ObjectStudy) -> list[str]:
