@@ -7,7 +7,7 @@ configuration passes them all.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -30,6 +30,8 @@ NARROWER = 0.999
 
 FLAT = 1e-6
 """Of the extent squared: three points with less area between them are on one line."""
+
+Looseness = Callable[[Sequence[int]], float]
 
 MOST_VOLUMES = 2
 """The most joints between four points whose volume is bounded."""
@@ -137,15 +139,15 @@ class RobotLimits:
                     )
         return tuple(found)
 
-    def checks(self, order: Sequence[str], *, tolerance: float) -> list[Check]:
+    def checks(self, order: Sequence[str], *, tolerance: float | Looseness) -> list[Check]:
         """Make the checks that prune a tree over the points.
 
         Parameters
         ----------
         order : sequence of str
             Joints of the tree; those that are none of the points are passed over.
-        tolerance : float
-            Metres by which a point may be off.
+        tolerance : float or callable
+            Metres by which a point may be off; or what returns that for some joints of the tree, given together.
         """
         place = {self.names.index(name): at for at, name in enumerate(order) if name in self.names}
         groups: dict[tuple[int, tuple[str, ...]], list[Interval]] = {}
@@ -171,7 +173,7 @@ class RobotLimits:
         intervals: Sequence[Interval],
         joints: tuple[str, ...],
         place: Mapping[int, int],
-        tolerance: float,
+        tolerance: float | Looseness,
     ) -> Within:
         """Put intervals of one level and the same joints into one check."""
         needed = self._needed([point for interval in intervals for point in interval.points])
@@ -181,6 +183,12 @@ class RobotLimits:
             1.0 if point < len(self.names) else self.axis_points[point - len(self.names)].looseness
             for point in needed
         ]
+
+        def allowed(interval: Interval) -> float:
+            joints = [place[point] for point in self._needed(interval.points) if point < len(self.names)]
+            off = tolerance(joints) if callable(tolerance) else tolerance
+            return off * sum(looseness[column[point]] for point in interval.points)
+
         return Within(
             name="robot_limits" if joints else "rigid_body",
             where=tuple("+".join(joints) or self._body(interval.points) for interval in intervals),
@@ -191,12 +199,7 @@ class RobotLimits:
             ),
             intervals=tuple(intervals),
             columns=tuple(tuple(column[point] for point in interval.points) for interval in intervals),
-            tolerance=np.array(
-                [
-                    sum(looseness[column[point]] for point in interval.points) * tolerance
-                    for interval in intervals
-                ]
-            ),
+            tolerance=np.array([allowed(interval) for interval in intervals]),
         )
 
     def _needed(self, points: Sequence[int]) -> list[int]:

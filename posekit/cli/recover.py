@@ -105,6 +105,13 @@ def recover(
             help="Recover another articulated object from an uncalibrated view.",
         ),
     ] = "",
+    infer: Annotated[
+        bool,
+        typer.Option(
+            "--infer/--no-infer",
+            help="Complete joints that were not seen, each with the set of its positions.",
+        ),
+    ] = True,
     explain: Annotated[
         bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
     ] = False,
@@ -132,6 +139,7 @@ def recover(
             group=files.parse_length(group, name="--group") if group else None,
             scale=how,
             proportions=proportions,
+            infer=infer,
             nearer=None if nearer is None else files.read_nearer(nearer),
             progress=done,
         )

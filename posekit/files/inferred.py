@@ -24,7 +24,8 @@ class Inferred:
     Parameters
     ----------
     kind : str
-        What the set is: ``completed`` from its rigid part, ``circle``, ``region`` of a sphere, ``interval`` of depth.
+        What the set is: ``completed`` or ``point`` from its rigid part, ``circle``, ``sphere region``, ``depth
+        interval`` of a joint that was seen beyond a hidden one, or ``region`` of space.
     lower, upper : array (3,)
         Its bounding box, camera frame, metres.
     radius : float

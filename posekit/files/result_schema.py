@@ -61,7 +61,9 @@ class ResultLevels(FileModel):
 class ResultInferred(FileModel):
     """What is known of the position of a joint that was not seen."""
 
-    kind: str = Field(description="completed, circle, region or interval: what the set of positions is.")
+    kind: str = Field(
+        description="completed, point, circle, sphere region, depth interval or region: what the set of positions is."
+    )
     lower: Row = Field(description="The least x, y, z of the set, in `unit`.")
     upper: Row = Field(description="The greatest x, y, z of the set, in `unit`.")
     radius: float = Field(

@@ -49,7 +49,8 @@ def complete(
     checks : sequence of Check
         Those that judged the trees, those of the leaves included: each that reads an unknown joint is asked now.
     tolerance : float
-        Metres by which a segment may be too short for its image, as for the tree.
+        Metres by which a segment may be too short for its image, as for the tree. Above 1e-6 the points were
+        measured: what follows from the rigid parts is then no proof, and a torso without its pelvis may spin.
     sampling : Sampling, optional
         How finely sets are sampled.
 

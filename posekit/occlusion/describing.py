@@ -30,7 +30,7 @@ def write(party: Party, done: Completion, part: Index) -> None:
     done.outcome[part] = np.where(found, Outcome.COMPLETED, Outcome.UNDECIDED)
     _blame(party, done, part, found)
     for joint in party.plan.unknown:
-        done.kind[part, joint] = party.kinds[joint]
+        done.kind[part, joint] = party.kind(joint)
         done.postures[part, joint] = np.where(found[:, None], postures[:, joint], np.nan)
     middle = np.where(found[:, None, None], postures, np.nan)
     for joint in party.plan.trunk:
@@ -88,7 +88,7 @@ def _describe_trunk(party: Party, done: Completion, part: Index, joint: int, mid
         if party.plan.states[joint] == State.SEEN
         else even / tried
     )
-    lone = np.asarray((spacing == 0.0) | (party.kinds[joint] == Kind.POINT))
+    lone = np.asarray((spacing == 0.0) | (party.kind(joint) == Kind.POINT))
     done.samples[part, joint] = count
     done.fraction[part, joint] = np.where(lone, 1.0, np.minimum(fraction, 1.0))
     done.spacing[part, joint] = np.where(lone, 0.0, spacing)

@@ -14,6 +14,9 @@ from posekit.occlusion.lattices import turned
 CHILDREN = 8
 """Parts into which the neighbourhood of a sample is split: eight arcs, or a cube's eight corners."""
 
+EXACT_WITHIN = 1e-6
+"""Metres of tolerance, and of misfit, up to which points are exact: what a rigid part then forbids is proven."""
+
 CORNERS = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
@@ -66,6 +69,8 @@ class Hosts:
         Whether what is not here is proven impossible.
     miss : array (C,)
         How far the best place looked at is from being feasible, radians; 0 where one is.
+    spins : bool array (C,)
+        Whether the torso spins about the line of its shoulders: it was measured, and its pelvis is open.
     turn : Turn or None
         What the places differ by, where it is one turn.
     """
@@ -78,6 +83,7 @@ class Hosts:
     spacing: Array
     sure: Mask
     miss: Array
+    spins: Mask
     turn: Turn | None = None
 
     @staticmethod
@@ -93,6 +99,7 @@ class Hosts:
             spacing=np.zeros(n),
             sure=np.ones(n, dtype=bool),
             miss=np.zeros(n),
+            spins=np.zeros(n, dtype=bool),
         )
 
     def __len__(self) -> int:

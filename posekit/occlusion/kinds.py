@@ -6,15 +6,16 @@ from posekit.occlusion.completion import Kind
 from posekit.occlusion.plan import HIP_JOINTS, TORSO_JOINTS, Plan, State
 
 
-def kinds(plan: Plan) -> dict[int, Kind]:
-    """Name the kind of each unknown joint's set.
+def kinds(plan: Plan, *, spins: bool = False) -> dict[int, Kind]:
+    """Name the kind of each unknown joint's set; `spins` where a measured torso turns about its shoulders' line.
 
     A position that is one of finitely many does not widen what hangs on it: an elbow on either of two shoulders
     is in a part of a sphere.
     """
     found: dict[int, Kind] = {}
     known = [joint for joint in TORSO_JOINTS[1:] if plan.states[joint] == State.EXACT]
-    torso = {0: Kind.SPHERE_REGION, 1: Kind.CIRCLE}.get(len(known), Kind.POINT)
+    few = 1 if spins else len(known)
+    torso = {0: Kind.SPHERE_REGION, 1: Kind.CIRCLE}.get(few, Kind.POINT)
     found |= {joint: torso for joint in TORSO_JOINTS if plan.states[joint] == State.HIDDEN}
     pelvis, *hips = HIP_JOINTS
     hidden = [joint for joint in hips if plan.states[joint] == State.HIDDEN]

@@ -9,7 +9,7 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.occlusion.asking import Index, Mask, Rows, ask
-from posekit.occlusion.hosts import CHILDREN, Hosts
+from posekit.occlusion.hosts import CHILDREN, EXACT_WITHIN, Hosts
 from posekit.occlusion.limb import NEAR_MISS, LimbPlacer
 from posekit.occlusion.plan import Limb, Plan
 
@@ -122,6 +122,8 @@ def _proven(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Mask:
     if turn is None or turn.about is None:
         return proven
     for limb in plan.limbs:
+        if placer(limb, hosts).tolerance > EXACT_WITHIN:
+            return np.zeros(len(hosts), dtype=bool)
         far = float(np.linalg.norm(turn.body[turn.free.index(limb.base)])) if limb.base in turn.free else 0.0
         proven |= placer(limb, hosts).too_short() > far * hosts.spacing[hosts.core] / 2.0
     return proven

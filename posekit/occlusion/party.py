@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure import Figure
 from posekit.occlusion.asking import Index, Mask, Rows, ask
-from posekit.occlusion.completion import Kind
 from posekit.occlusion.groups import pairs
 from posekit.occlusion.hosts import Hosts
 from posekit.occlusion.kinds import kinds
@@ -143,10 +143,10 @@ class Party:
         """Count the survivors."""
         return len(self.points)
 
-    @cached_property
-    def kinds(self) -> dict[int, Kind]:
-        """The kind of each unknown joint's set."""
-        return kinds(self.plan)
+    def kind(self, joint: int) -> NDArray[np.int8]:
+        """Return the kind of an unknown joint's set, by survivor (N,)."""
+        table = np.array([kinds(self.plan, spins=spins)[joint] for spins in (False, True)], dtype=np.int8)
+        return table[self.hosts.spins[self.core].astype(np.intp)]
 
     @cached_property
     def even(self) -> Mask:

@@ -11,14 +11,12 @@ from posekit.figure import Figure
 from posekit.figure.frames import fit_rotation, unit
 from posekit.occlusion.asking import Index, Rows, ask
 from posekit.occlusion.closure import closing_angles
-from posekit.occlusion.hosts import Hosts, Turn
+from posekit.occlusion.hosts import EXACT_WITHIN, Hosts, Turn
 from posekit.occlusion.lattices import circle, onto, rotation_spacing, rotations, turned
 from posekit.occlusion.plan import HIP_JOINTS, TORSO_JOINTS, Plan, State
 from posekit.occlusion.rays import Rays
 from posekit.occlusion.settings import Sampling
-
-MISFIT = 1e-6
-"""Metres by which known points may miss the figure's rigid part and their placement still be sure."""
+from posekit.skeleton import JOINT
 
 RINGS = 24
 """Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""
@@ -86,7 +84,11 @@ class TrunkPlacer:
         if len(known) >= 2:
             R = fit_rotation(body[known], seen)
             misfit = np.linalg.norm(np.einsum("nij,pj->npi", R, body[known]) - seen, axis=-1).max(axis=1)
-            return replace(hosts.filled(R, turn), sure=hosts.sure & (misfit <= MISFIT))
+            # By chance some of what was measured fits: that the rest does too is not said.
+            fits = np.asarray((misfit <= EXACT_WITHIN) & (self.tolerance <= EXACT_WITHIN))
+            placed = replace(hosts.filled(R, turn), sure=hosts.sure & fits)
+            spun = np.flatnonzero(~fits) if HIP_JOINTS[0] in turn.free else np.zeros(0, dtype=np.intp)
+            return self._spun(placed, spun, body[joints.index(HIP_JOINTS[0])]) if len(spun) else placed
         loose = bool((hosts.spacing > 0.0).any())
         if known:
             n = self.sampling.circle // FEWER if loose else self.sampling.circle
@@ -102,7 +104,7 @@ class TrunkPlacer:
             spacing = float(rotation_spacing(len(every)))
         placed = hosts.take(row).filled(R, turn)
         offset = body[joints.index(HIP_JOINTS[0])]
-        if HIP_JOINTS[0] in turn.free and [states[j] for j in HIP_JOINTS[1:]] == [State.SEEN] * 2:
+        if HIP_JOINTS[0] in turn.free and self._hips_seen():
             if known:
                 row, R = self._closing(hosts, pivot, offset, np.arange(len(hosts)), axis, first)
             else:
@@ -115,6 +117,30 @@ class TrunkPlacer:
             sure=np.zeros(len(hosts.sure), dtype=bool),
             turn=turn if not loose and self._last(joints) else None,
         )
+
+    def _spun(self, hosts: Hosts, rows: Index, offset: Array) -> Hosts:
+        """Spin measured torsos without a pelvis about the line of their shoulders.
+
+        Neck and shoulders are almost in line, and spines bend: where points are off by a centimetre, the pelvis that
+        they give is off by ten. It is left open, for the checks and the hips to decide.
+        """
+        n, right, left = self.sampling.circle, JOINT["right_shoulder"], JOINT["left_shoulder"]
+        turn = Turn(pivot=TORSO_JOINTS[0], about=None, free=(HIP_JOINTS[0],), body=offset[None])
+        axis, first = unit(hosts.points[:, left] - hosts.points[:, right]), hosts.R
+        row = np.repeat(rows, n)
+        R = turned(axis[row], np.tile(circle(n), len(rows))) @ first[row]
+        spun = hosts.take(row).filled(R, turn)
+        if self._hips_seen():
+            row, R = self._closing(hosts, turn.pivot, offset, rows, axis[rows], first[rows])
+            spun = spun.and_(hosts.take(row).uneven().filled(R, turn))
+        both = hosts.and_(spun)
+        spacing, spins = hosts.spacing.copy(), np.zeros(len(hosts.tried), dtype=bool)
+        spacing[hosts.core[rows]], spins[hosts.core[rows]] = 2.0 * np.pi / n, True
+        tried = np.bincount(both.core[both.even], minlength=len(hosts.tried)).astype(np.float64)
+        return replace(both, tried=tried, spacing=spacing, spins=spins)
+
+    def _hips_seen(self) -> bool:
+        return all(self.plan.states[joint] == State.SEEN for joint in HIP_JOINTS[1:])
 
     def _closing(
         self, hosts: Hosts, pivot: int, offset: Array, row: Index, axis: Array, first: Array

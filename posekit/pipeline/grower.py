@@ -9,8 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.cameras import Array, Camera
 from posekit.files import View
-from posekit.pipeline.body import Body, Judges
+from posekit.occlusion import Completion, complete, reject
+from posekit.pipeline.body import Body, FigureBody, Judges
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch
@@ -31,6 +33,8 @@ class Grower:
     judges : Judges
     nearer : Nearer, optional
         Flips given by hand.
+    infer : bool
+        Whether joints that were not seen are completed.
     """
 
     view: View
@@ -38,15 +42,17 @@ class Grower:
     body: Body
     judges: Judges
     nearer: Nearer | None = None
+    infer: bool = True
 
     def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
         """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
         suite, measured = self._suites_of(tolerance)
         image = self.body.image(self.view.image[self.fit.frame[chosen]])
         tree = self.body.tree
+        camera = self.fit.cameras(chosen)
         with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
             leaves = tree.grow(
-                self.fit.cameras(chosen),
+                camera,
                 self.fit.root[chosen],
                 image,
                 [check for check in suite if check.name != "walking"],
@@ -58,7 +64,13 @@ class Grower:
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
             physical = leaves.counts()
+        leaves, completion = self._complete(leaves, camera, image, suite, tolerance)
+        if completion is not None:
+            physical = leaves.counts()
+        before = leaves
         leaves = tree.prune(leaves, [check for check in suite if check.name == "walking"])
+        if completion is not None and len(leaves.code) < len(before.code):
+            completion = completion.take(np.isin(_keys(before), _keys(leaves)))
         return Batch(
             leaves=leaves,
             physical=physical,
@@ -66,7 +78,19 @@ class Grower:
             body=self.body,
             tolerance=tolerance,
             exact=exact,
+            completion=completion,
         )
+
+    def _complete(
+        self, leaves: Leaves, camera: Camera, image: Array, suite: Sequence[Check], tolerance: Tolerance
+    ) -> tuple[Leaves, Completion | None]:
+        """Complete survivors by the joints that were not seen, and drop those that cannot be."""
+        unseen = np.asarray(np.isnan(image).any(axis=(1, 2)))
+        if not (self.infer and isinstance(self.body, FigureBody) and unseen[leaves.frame].any()):
+            return leaves, None
+        checks = [check for check in suite if check.name != "walking"]
+        completion = complete(leaves, camera, image, self.body.figure, checks, tolerance=tolerance.tangent)
+        return reject(leaves, completion)
 
     def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
         """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
@@ -78,6 +102,11 @@ class Grower:
     @cached_property
     def _suites(self) -> dict[Tolerance, tuple[Sequence[Check], Sequence[Check]]]:
         return {}
+
+
+def _keys(leaves: Leaves) -> NDArray[np.int64]:
+    """Return a number for each node, different in all frames."""
+    return leaves.frame.astype(np.int64) << leaves.level | leaves.code
 
 
 def is_exact(leaves: Leaves, physical: NDArray[np.int64], body: Body) -> NDArray[np.bool_]:

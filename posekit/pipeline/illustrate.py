@@ -77,7 +77,7 @@ def _plots(
     few = range(min(len(result.frames), 5))
     chosen = [result.frames[k] for k in (printed_frames or few)]
     first = next(frame for frame in result.frames if len(frame.joints))
-    save(plot_image(view, list(few)), folder / f"{name}.image.png")
+    save(plot_image(view, list(few), result=result), folder / f"{name}.image.png")
     save(plot_levels(chosen, printed=printed), folder / f"{name}.levels.png")
     save(plot_projections(first.joints[:PANELS]), folder / f"{name}.projections.png")
     if first.pruned is not None:

@@ -46,6 +46,7 @@ def recover(
     scale: Scale | None = None,
     proportions: str = "figure",
     nearer: Sequence[Mapping[str, str]] | None = None,
+    infer: bool = True,
     progress: Callable[[int], None] | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
@@ -76,6 +77,9 @@ def recover(
         neck and pelvis).
     nearer : sequence of mapping, optional
         Flips given by hand: segment to the name of its nearer end, one mapping for all frames or one a frame.
+    infer : bool
+        Whether joints that were not seen are completed: each posture then has a feasible position for them, and says
+        which joints were inferred and what else they can be. Otherwise they are NaN.
     progress : callable, optional
         Called with the number of frames done since the last call.
 
@@ -104,7 +108,7 @@ def recover(
     fit = _fit(view, body, scale, tolerance)
     records = camera_records(view, fit)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
-    grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand)
+    grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand, infer=infer)
     inexact_tolerance = MEASURED if fit.families is None else PHOTOGRAPH
     placed: dict[int, tuple[Batch, int]] = {}
     for part in _parts(fit):

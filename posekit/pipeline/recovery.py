@@ -15,6 +15,7 @@ from posekit.cameras import Array
 from posekit.figure import Configurations, Figure
 from posekit.files import Family, Inferred
 from posekit.grouping import group_postures
+from posekit.occlusion import Completion
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
@@ -40,6 +41,8 @@ class Batch:
     tolerance : Tolerance
     exact : bool array (F,)
         Where there is evidence that the image points are exact.
+    completion : Completion, optional
+        The survivors' joints that were not seen; of the leaves before the motion model.
     """
 
     leaves: Leaves
@@ -48,11 +51,17 @@ class Batch:
     body: Body
     tolerance: Tolerance
     exact: NDArray[np.bool_]
+    completion: Completion | None = None
 
     @cached_property
     def points(self) -> Array:
         """All survivors with their heads (N, 19, 3), camera frame, metres."""
-        return self.body.points(self.leaves)
+        points = self.body.points(self.leaves)
+        if self.completion is not None:
+            filled = self.completion.postures
+            joints = points[:, : len(JOINTS)]
+            points[:, : len(JOINTS)] = np.where(np.isnan(joints), filled, joints)
+        return points
 
     @cached_property
     def configurations(self) -> Configurations:
@@ -100,6 +109,20 @@ class Batch:
     def length_residual(self) -> Array:
         """How much too short each survivor's worst segment was (N,), metres."""
         return self.leaves.length_residual()
+
+
+def _inferred(completion: Completion, row: int) -> dict[str, Inferred]:
+    """Describe the joints of one survivor that were not placed by the image."""
+    return {
+        region.joint: Inferred(
+            kind=region.kind.label,
+            lower=region.lower,
+            upper=region.upper,
+            radius=region.radius,
+            fraction=region.fraction,
+        )
+        for region in completion.regions(row)
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -194,7 +217,12 @@ class FrameRecovery:
     @property
     def inferred(self) -> list[dict[str, Inferred]] | None:
         """What is known of joints that were not seen, by survivor; None where all were."""
-        if self.batch is None or not self.batch.body.inferred:
+        if self.batch is None:
+            return None
+        if self.batch.completion is not None:
+            rows = range(self._rows.start, self._rows.stop)
+            return [_inferred(self.batch.completion, row) for row in rows]
+        if not self.batch.body.inferred:
             return None
         columns = [JOINT[name] for name in self.batch.body.inferred]
         return [

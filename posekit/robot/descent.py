@@ -161,12 +161,14 @@ class _Block:
 
     def _linearise(self, rows: NDArray[np.intp], q: Array) -> _Equations:
         placed = self.kinematics.place(q, self.moving)
-        residual = ((placed.positions - self.target[rows]) * self.weight[rows]).reshape(len(rows), -1)
+        residual = ((placed.positions - self.target[rows]) * self.weight[rows]).reshape(
+            len(rows), 3 * placed.positions.shape[1]
+        )
         jacobian = placed.jacobians
         jacobian *= self.weight[rows][..., None]
         away = self.kinematics.space.difference(self.problem.reference[rows], q)[:, self.moving]
         cost = 0.5 * (np.einsum("ni,ni->n", residual, residual) + (away * away) @ self.pull)
-        normal, gradient = normal_equations(residual, jacobian.reshape(len(rows), -1, len(self.moving)))
+        normal, gradient = normal_equations(residual, jacobian.reshape(*residual.shape, len(self.moving)))
         return _Equations(cost, normal, gradient + self.pull * away)
 
     def _step(self, here: _Equations, q: Array, damping: Array) -> tuple[Array, Array]:

@@ -20,11 +20,14 @@ from posekit.robot.starts import Starts
 TOLERANCE = 1e-3
 """Metres: a posture is met when none of its known points is farther off."""
 
+PRECISION = 1e-3
+"""Metres: where a point is farther off, other starts are tried."""
+
 PULL = 1e-10
 """m^2/rad^2: strong enough to choose among postures that place the points alike, too weak to move a point."""
 
 JUMP = 2.0
-"""Times the last frame's largest distance, or tolerances, beyond which a frame is searched for anew."""
+"""Times the largest distance (or the precision) of the last search beyond which a frame is searched for anew."""
 
 FARTHEST = 1e6
 """Metres beyond which a target is taken for a mistake."""
@@ -103,21 +106,27 @@ class InverseKinematics:
         and continuous joints have none: their entries are not read.
     tolerance : float
         Metres; see `Reach`.
+    precision : float
+        Metres: where a point is farther off, other starts are tried. A looser one is quicker on postures that the
+        model cannot reach, but may leave a posture in a worse configuration than need be.
 
     Raises
     ------
     InputError
-        Where limits have another shape, are NaN, or lower is above upper; where the tolerance is not positive.
+        Where limits have another shape, are NaN, or lower is above upper; where tolerance or precision is not
+        positive.
     """
 
     kinematics: Kinematics
     lower: ArrayLike | None = None
     upper: ArrayLike | None = None
     tolerance: float = TOLERANCE
+    precision: float = PRECISION
 
     def __post_init__(self) -> None:
-        if not 0 < self.tolerance < np.inf:
-            raise InputError(f"tolerance is {self.tolerance:g} m; expected positive and finite")
+        for name, value in (("tolerance", self.tolerance), ("precision", self.precision)):
+            if not 0 < value < np.inf:
+                raise InputError(f"{name} is {value:g} m; expected positive and finite")
         _ = self._limits
 
     def solve(
@@ -125,7 +134,7 @@ class InverseKinematics:
     ) -> Solution:
         """Find configurations that place the points on their targets, inside the limits.
 
-        From `start` if there is one; else, and where that does not meet the tolerance, from the tables: trunk,
+        From `start` if there is one; else, and where that is not met to the precision, from the tables: trunk,
         limbs, then all joints together by damped least squares, other limbs and other trunks where needed. What
         the points do not determine (the axial rotation of a straight limb) stays near `start`, else near the
         neutral configuration. The same input gives the same answer.
@@ -161,7 +170,7 @@ class InverseKinematics:
         self.kinematics.space.check(given)
         problem = problem._replace(reference=np.clip(given, problem.lower, problem.upper))
         found = self._search.descend(problem, problem.reference)
-        unmet = np.flatnonzero(found.worst > self.tolerance)
+        unmet = np.flatnonzero(found.worst > self._search.tolerance)
         if unmet.size:
             found.improve(unmet, self._search.everywhere(problem.take(unmet)))
         return self._explain(problem, found)
@@ -175,7 +184,8 @@ class InverseKinematics:
     ) -> Solution:
         """Find configurations frame by frame, each from the one before; many sequences side by side.
 
-        The tables are used for a sequence's first frame, and where a frame is met much worse than the one before.
+        The tables are used for a sequence's first frame, and where frames are met ever worse than that: a joint may
+        have run into a limit that another way round avoids.
 
         Parameters
         ----------
@@ -203,20 +213,24 @@ class InverseKinematics:
         frames = _frames(which)
         reference = problem.reference.copy()
         parts: list[Found] = []
+        level = np.zeros(len(frames[0]) if frames else 0)
         for k, rows in enumerate(frames):
             here = problem.take(rows)
+            level = np.maximum(level[: len(rows)], self._search.tolerance)
             if k == 0:
                 found = self._search.everywhere(here)
+                again = np.arange(len(rows))
             else:
-                # Sequences that have ended stand last in the frame before: see _frames.
+                # Sequences that have ended stood last in the frame before: see _frames.
                 before = parts[-1].q[: len(rows)]
                 reference[rows] = before
                 here = here._replace(reference=before)
                 found = self._search.descend(here, before)
-                lost = found.worst > JUMP * np.maximum(self.tolerance, parts[-1].worst[: len(rows)])
-                again = np.flatnonzero(lost)
+                again = np.flatnonzero(found.worst > JUMP * level)
                 if again.size:
                     found.improve(again, self._search.everywhere(here.take(again)))
+            level = np.minimum(level, found.worst)
+            level[again] = found.worst[again]
             parts.append(found)
         order = np.argsort(np.concatenate(frames)) if frames else np.zeros(0, dtype=np.intp)
         joined = (
@@ -250,7 +264,8 @@ class InverseKinematics:
     @cached_property
     def _search(self) -> Search:
         tables = make_tables(self.kinematics, *self._limits)
-        return Search(starts=Starts(kinematics=self.kinematics, tables=tables), tolerance=self.tolerance)
+        starts = Starts(kinematics=self.kinematics, tables=tables)
+        return Search(starts=starts, tolerance=min(self.precision, self.tolerance))
 
     def _problem(self, targets: ArrayLike, weights: ArrayLike | None) -> Problem:
         """Check what is asked for."""

@@ -3,6 +3,7 @@
 import dataclasses
 from importlib import import_module
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from posekit.cameras import PinholeCamera
 from posekit.errors import FigureError, HeadError, InputError
 from posekit.figure import Figure, load_figure
-from posekit.files import LeeChenModel, OpenCVModel, View
+from posekit.files import LeeChenModel, OpenCVModel, View, read_result, write_result
 from posekit.head import HeadWarning
 from posekit.pipeline import (
     EXACT,
@@ -376,7 +377,7 @@ def beyond(joint: str) -> set[str]:
 
 @pytest.mark.parametrize("joint", ["right_wrist", "left_knee", "right_shoulder", "left_hip", "pelvis"])
 def test_a_missing_joint_leaves_the_postures_of_the_others(joint: str) -> None:
-    recovery = recover(without(SEQ1, joint))
+    recovery = recover(without(SEQ1, joint), infer=False)
     lost = sorted(JOINT[name] for name in beyond(joint))
     kept = sorted(set(range(14)) - set(lost))
     assert max(truth_at(recovery, SEQ1.truth)) < FOUND
@@ -395,12 +396,12 @@ def test_a_missing_joint_leaves_the_postures_of_the_others(joint: str) -> None:
 
 
 def test_what_hangs_on_an_unseen_torso_joint_has_no_q() -> None:
-    frame = recover(without(SEQ1, "right_wrist")).frames[0]
+    frame = recover(without(SEQ1, "right_wrist"), infer=False).frames[0]
     assert (frame.fk_distance < 1e-9).all()
     names = FIGURE.configuration_names
     unknown = {names[k] for k in np.flatnonzero(np.isnan(frame.q).any(axis=0))}
     assert unknown == {"right_shoulder_rotation", "right_elbow_flexion"}
-    shoulderless = recover(without(SEQ1, "right_shoulder")).frames[0]
+    shoulderless = recover(without(SEQ1, "right_shoulder"), infer=False).frames[0]
     assert np.isnan(shoulderless.q[:, 3:7]).all()
     assert np.isnan(shoulderless.fk_distance).all()
 
@@ -408,10 +409,52 @@ def test_what_hangs_on_an_unseen_torso_joint_has_no_q() -> None:
 def test_only_the_neck_is_one_posture() -> None:
     image = np.full_like(SEQ1.image, np.nan)
     image[:, 0] = SEQ1.image[:, 0]
-    recovery = recover(change(SEQ1, image=image))
+    recovery = recover(change(SEQ1, image=image), infer=False)
     assert counts(recovery) == [1] * 5
     assert {total(frame) for frame in recovery.frames} == {LEAVES}
     assert all(np.isnan(value).all() for value in recovery.frames[0].margins.values())
+
+
+@pytest.mark.parametrize(
+    "hidden", [("right_wrist",), ("left_elbow",), ("right_knee", "right_ankle"), ("pelvis",)]
+)
+def test_a_hidden_joint_is_inferred_and_the_truth_is_in_its_set(hidden: tuple[str, ...]) -> None:
+    view = SEQ1
+    for joint in hidden:
+        view = without(view, joint)
+    plain, recovery = recover(view, infer=False), recover(view)
+    for frame, bare, truth in zip(recovery.frames, plain.frames, SEQ1.truth, strict=True):
+        assert frame.inferred is not None
+        assert np.isfinite(frame.joints).all()
+        assert np.isfinite(frame.q).all()
+        assert total(frame) == LEAVES
+        inferred = set().union(*frame.inferred)
+        assert set(hidden) <= inferred
+        exact = [k for k in range(14) if JOINTS[k] not in inferred]
+        known = {joints[exact].tobytes() for joints in bare.joints}
+        assert {joints[exact].tobytes() for joints in frame.joints} <= known  # exact joints to the bit
+        true = np.abs(frame.joints[:, exact] - truth[exact]).max(axis=(1, 2)) < FOUND
+        holds = [
+            all(
+                (truth[JOINT[name]] >= one.lower - 0.03).all()
+                and (truth[JOINT[name]] <= one.upper + 0.03).all()
+                for name, one in joints.items()
+            )
+            for joints in frame.inferred
+        ]
+        assert (true & np.array(holds)).any()
+
+
+def test_what_was_inferred_is_written_and_nothing_where_all_was_seen(tmp_path: Path) -> None:
+    result = result_of(recover(without(SEQ1, "right_wrist")), unit="cm")
+    assert all(frame.inferred is None for frame in recover(SEQ1).frames)
+    for suffix in ("json", "npz"):
+        write_result(tmp_path / f"r.{suffix}", result)
+        back = read_result(tmp_path / f"r.{suffix}")
+        for one, other in zip(result.frames, back.frames, strict=True):
+            for mine, theirs in zip(one.inferred or [], other.inferred or [], strict=True):
+                assert mine["right_wrist"].kind == theirs["right_wrist"].kind == "sphere region"
+                np.testing.assert_allclose(mine["right_wrist"].upper, theirs["right_wrist"].upper, rtol=1e-14)
 
 
 # --- ranges, rules, margins -----------------------------------------------------------------------------

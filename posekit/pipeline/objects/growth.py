@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.pipeline.objects.plan import Plan
+from posekit.pipeline.objects.spread import Spread
 from posekit.pipeline.objects.tolerance import ObjectTolerance
 from posekit.tree import Check, Leaves
 
@@ -159,8 +160,9 @@ def grow(
     """
     spanned = plan.spanned
     place = spanned.place_image(image[list(plan.columns)][None])
-    checks = plan.checks(tolerance)
-    step = max(1, AT_ONCE // plan.hypotheses)
+    exact = judged == "exact"
+    step = max(1, AT_ONCE // plan.hypotheses) if exact else 1
+    checks: list[Check] = plan.checks(tolerance) if exact else []
     parts: list[tuple[Leaves, int]] = []
     count = 0
     for first in range(0, len(scales), step):
@@ -169,6 +171,9 @@ def grow(
         seen = np.broadcast_to(place, (n, *place.shape[1:]))
         root = np.zeros((n, 3))
         root[:, :2] = camera.unproject(seen[:, 0])
+        if not exact:
+            spread = Spread.of(spanned, camera.unproject(seen)[0], tolerance.point)
+            checks = plan.checks(tolerance, spread)
         leaves = spanned.tree.grow(camera, root, seen, checks, tolerance=tolerance.tangent)
         count += len(leaves.code)
         if count > MOST:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from posekit.linkage import Linkage, Midpoint, SpanningTree, span
 from posekit.linkage.consistency import components
 from posekit.pipeline.objects.articulated import ArticulatedObject
 from posekit.pipeline.objects.shape import shape_checks
+from posekit.pipeline.objects.spread import Loose, Spread
 from posekit.pipeline.objects.tolerance import ObjectTolerance
 from posekit.tree import Check
 from posekit.validators import linkage as validators
@@ -81,17 +82,36 @@ class Plan:
         closing = validators.closure(self.spanned)
         return None if len(closing) <= int(fitted) else max(max(check.points) for check in closing)
 
-    def checks(self, tolerance: ObjectTolerance) -> list[Check]:
-        """Make the checks: loops, shape, flips given by hand, limits of the robot."""
+    def checks(self, tolerance: ObjectTolerance, spread: Spread | None = None) -> list[Check]:
+        """Make the checks: loops, shape, flips given by hand, limits of the robot.
+
+        Parameters
+        ----------
+        tolerance : ObjectTolerance
+        spread : Spread, optional
+            How far depths may be off; absent where the image is exact.
+        """
         spanned = self.spanned
-        checks = [
-            *validators.closure(spanned, tolerance=tolerance.rigid),
+        closing = validators.closure(spanned, tolerance=tolerance.rigid)
+        others = [
             *shape_checks(spanned, tolerance=tolerance.rigid),
             *validators.nearer(self.nearer, joints=spanned.tree.joints, segments=self.linkage.segment_names),
         ]
-        if self.thing.limits is not None:
-            checks += self.thing.limits.checks(spanned.tree.joints, tolerance=tolerance.point)
-        return checks
+        off: float | Callable[[Sequence[int]], float] = tolerance.point
+        if spread is not None:
+            # A midpoint has the depths of its halves' ends, however far these are off.
+            closing = [
+                check if check.name == "midpoint" else Loose(check=check, spread=spread, distance=True)
+                for check in closing
+            ]
+            others = [Loose(check=check, spread=spread, distance=False) for check in others]
+            off = spread.off
+        limits = self.thing.limits
+        return [
+            *closing,
+            *others,
+            *([] if limits is None else limits.checks(spanned.tree.joints, tolerance=off)),
+        ]
 
     def place(self, points: Array) -> Array:
         """Put points of the seen part (N, p, 3) among all of the object's (N, P, 3), NaN elsewhere."""

@@ -24,7 +24,7 @@ SAME = 1e-9
 MOST_SEGMENTS = 15
 """Segments of loops whose flips are all tried; of more, the scale comes from the rigid triangles alone."""
 
-MOST_SCALES = 256
+MOST_SCALES = 128
 """The most scales of one frame that are taken, the best first."""
 
 

@@ -19,7 +19,8 @@ class ObjectTolerance:
     tangent : float
         By how much a segment may be too short for its image.
     point : float
-        How far a point may be off, for the limits of a robot and for its configurations.
+        How far a point may be off in the image. What that does to depths is accounted for where it is not
+        rounding alone (`posekit.pipeline.objects.spread`).
     """
 
     rigid: float
@@ -42,8 +43,8 @@ class ObjectTolerance:
 
     @staticmethod
     def measured(longest: float) -> ObjectTolerance:
-        """Return what image points that were picked by hand cost: some hundredths of the longest segment."""
-        return ObjectTolerance(rigid=0.05 * longest, tangent=0.02 * longest, point=0.03 * longest)
+        """Return what image points that were picked by hand cost: a hundredth of the longest segment each."""
+        return ObjectTolerance(rigid=0.01 * longest, tangent=0.02 * longest, point=0.01 * longest)
 
     def times(self, factor: float) -> ObjectTolerance:
         """Return the same in another unit."""

@@ -1,0 +1,104 @@
+"""Self-collision of any robot's configurations: verdicts in one call of Pinocchio's pool, pairs only on demand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import coal
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure.pool import collides, make_pool
+from posekit.validators.collision import CONTACT_TOLERANCE
+from posekit.validators.robot.contacts import Contacts, find_contacts
+from posekit.validators.robot.subject import Subject
+from posekit.validators.suite import Judgement
+
+PLACE = "nearest pair"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SelfCollision:
+    """The bodies of a subject, and the margin that they must keep.
+
+    Parameters
+    ----------
+    subject : Subject
+        With geometry and its pairs.
+    contact_margin : float
+        Metres; negative allows that much penetration, between primitive shapes only.
+
+    Raises
+    ------
+    InputError
+        Where the margin is negative and a pair has a mesh: coal knows no depth of meshes.
+    """
+
+    subject: Subject
+    contact_margin: float = 0.0
+
+    def __post_init__(self) -> None:
+        _ = self.margins
+
+    @cached_property
+    def margins(self) -> Array:
+        """The security margin of each pair (P,), metres: less than the contact margin by what is rounding noise."""
+        geometry = self.subject.geometry
+        meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in geometry.geometryObjects]
+        with_mesh = np.array([meshes[pair.first] or meshes[pair.second] for pair in geometry.collisionPairs], dtype=bool)
+        if with_mesh.any() and self.contact_margin < 0:
+            name = self.subject.pair_names[int(np.argmax(with_mesh))]
+            raise InputError(
+                f"--contact-margin {self.contact_margin:g} m: the pair {name} has a mesh, whose depth of penetration is "
+                "not known; expected zero or a positive length; give capsules (--bodies capsules) to allow depth"
+            )
+        return np.where(with_mesh, self.contact_margin, self.contact_margin - CONTACT_TOLERANCE)
+
+    def judge(self, q: Array, undecided: NDArray[np.bool_] | None = None) -> Judgement:
+        """Judge configurations (N, nq); those of `undecided` (N,) are left out.
+
+        There is one place, the nearest pair. Its value is a bound of the distance: at least the contact margin where
+        nothing collides, at most that where something does; `contacts` measures.
+        """
+        asked = slice(None) if undecided is None else ~undecided
+        hit = np.zeros(len(q), dtype=np.bool_)
+        value = np.full((len(q), 1), np.nan)
+        some = q[asked]
+        if len(some) and len(self.margins):
+            hit[asked] = collides(self._pool, some.T)
+        value[asked] = self.contact_margin
+        return Judgement(
+            check="collision",
+            where=(PLACE,),
+            unit=("m",),
+            value=value,
+            lower=np.broadcast_to(self.contact_margin, value.shape),
+            upper=np.broadcast_to(np.inf, value.shape),
+            margin=value - self.contact_margin,
+            violated=hit[:, None],
+        )
+
+    def contacts(self, q: Array, rows: NDArray[np.intp], *, nearest: bool = False) -> Contacts:
+        """List the pairs that collide in some configurations; with `nearest` the nearest pair of the others too."""
+        subject = self.subject
+        return find_contacts(
+            subject.model,
+            subject.geometry,
+            q,
+            rows,
+            margins=self.margins,
+            names=subject.pair_names,
+            nearest=nearest,
+        )
+
+    @cached_property
+    def _pool(self) -> pin.GeometryPool:
+        pool = make_pool(self.subject.model, self.subject.geometry)
+        for data in pool.getGeometryDatas():
+            for request, margin in zip(data.collisionRequests, self.margins.tolist(), strict=True):
+                request.security_margin = margin
+        return pool

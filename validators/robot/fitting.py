@@ -1,0 +1,189 @@
+"""Postures to configurations: the model with the postures' lengths, inverse kinematics with limits and without."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.robot.descent import Problem, descend
+from posekit.robot.ik import PULL, InverseKinematics
+from posekit.robot.kinematics import Kinematics
+from posekit.validators.robot.branches import Branches
+from posekit.validators.robot.subject import Subject
+
+EXACT = 1e-4
+"""Metres: a fit this close is the posture, and limits that cost no more than this are not the reason for a misfit."""
+
+STRICT = 1e-3
+"""Metres that the search from all starts is content with, where the first fit suffered from the limits."""
+
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """Configurations that come near postures.
+
+    Parameters
+    ----------
+    q : array (N, nq)
+        Inside the limits.
+    residual : array (N, P)
+        Distances of its points from the posture's, metres; NaN where the posture's are unknown.
+    free_q, free_residual : array (N, nq), (N, P)
+        The same without limits, of all branches the one that is least outside them.
+    suffers : bool array (N,)
+        Whether the limits keep some point farther off, by more than `EXACT`.
+    """
+
+    q: Array
+    residual: Array
+    free_q: Array
+    free_residual: Array
+    suffers: Bools
+
+    @property
+    def judged_q(self) -> Array:
+        """The configuration that stands for the posture: the free one where the limits keep the other off."""
+        return np.where(self.suffers[:, None], self.free_q, self.q)
+
+    @property
+    def judged_residual(self) -> Array:
+        """Its distances from the posture's points."""
+        return np.where(self.suffers[:, None], self.free_residual, self.residual)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitter:
+    """Fits one model, inside one set of limits.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        The model with the postures' lengths, and its points.
+    subject : Subject
+        Its limits.
+    tolerance : float
+        Metres: a fit inside the limits that is as close is not searched for anew, unless it suffers from them.
+    """
+
+    kinematics: Kinematics
+    subject: Subject
+    tolerance: float
+
+    def fit(self, targets: Array, sequence: NDArray[np.intp] | None = None) -> Fit:
+        """Fit postures.
+
+        A free fit starts from the limited one. Where it comes closer, it is turned into the branch that is least
+        outside the limits, and the limited search starts again from there; if it still does not come as close,
+        it starts from everywhere. Only what is left after that is said to suffer from the limits.
+
+        Parameters
+        ----------
+        targets : array (N, P, 3)
+            Metres; NaN is unknown.
+        sequence : int array (N,), optional
+            Which sequence in time a posture belongs to: then each starts from the one before.
+        """
+        solver = self._solver(max(self.tolerance, STRICT))
+        first = solver.solve(targets) if sequence is None else solver.solve_sequence(targets, sequence=sequence)
+        q, free_q = first.q.copy(), first.q.copy()
+        worst = _worst(self._residual(q, targets))
+        rows = np.flatnonzero(worst > EXACT)
+        for again in (self._from_free, self._from_everywhere):
+            if not rows.size:
+                break
+            free_q[rows] = self._free(targets[rows], q[rows])
+            rows = rows[self._suffers(q[rows], free_q[rows], targets[rows])]
+            if rows.size:
+                other = again(targets[rows], free_q[rows])
+                better = self._cost(other, targets[rows]) < self._cost(q[rows], targets[rows])
+                q[rows[better]] = other[better]
+        if rows.size:
+            free_q[rows] = self._free(targets[rows], q[rows])
+            rows = rows[self._suffers(q[rows], free_q[rows], targets[rows])]
+        suffers = np.zeros(len(q), dtype=np.bool_)
+        suffers[rows] = True
+        return Fit(
+            q=q,
+            residual=self._residual(q, targets),
+            free_q=free_q,
+            free_residual=self._residual(free_q, targets),
+            suffers=suffers,
+        )
+
+    def seen(self, targets: Array) -> Bools:
+        """Tell which limited joints move a known point (N, K): the others are not determined by the posture."""
+        known = np.isfinite(targets).all(axis=2)
+        moves = self.kinematics.moved_by[:, self.subject.velocity_index]
+        return np.asarray((known.astype(np.intp) @ moves.astype(np.intp)) > 0)
+
+    @cached_property
+    def branches(self) -> Branches:
+        """The model's other configurations for the same placement."""
+        return Branches(subject=self.subject)
+
+    def _solver(self, tolerance: float) -> InverseKinematics:
+        if tolerance not in self._solvers:
+            self._solvers[tolerance] = InverseKinematics(
+                kinematics=self.kinematics,
+                lower=self.subject.lower,
+                upper=self.subject.upper,
+                tolerance=tolerance,
+            )
+        return self._solvers[tolerance]
+
+    @cached_property
+    def _solvers(self) -> dict[float, InverseKinematics]:
+        return {}
+
+    def _free(self, targets: Array, q: Array) -> Array:
+        """Descend from q without limits, to the branch that is least outside them."""
+        unlimited = np.full(self.kinematics.space.nq, np.inf)
+        free = descend(self.kinematics, self._problem(targets, q, -unlimited, unlimited), q).q
+        return self.branches.nearest_to_limits(free)
+
+    def _from_free(self, targets: Array, free_q: Array) -> Array:
+        space = self.kinematics.space
+        lower, upper = np.full(space.nq, -np.inf), np.full(space.nq, np.inf)
+        lower[space.bounded_q] = self.subject.lower[space.bounded_q]
+        upper[space.bounded_q] = self.subject.upper[space.bounded_q]
+        start = np.clip(free_q, lower, upper)
+        return descend(self.kinematics, self._problem(targets, start, lower, upper), start).q
+
+    def _from_everywhere(self, targets: Array, free_q: Array) -> Array:
+        return self._solver(STRICT).solve(targets).q
+
+    def _problem(self, targets: Array, reference: Array, lower: Array, upper: Array) -> Problem:
+        return Problem(
+            targets=targets,
+            weights=np.ones(targets.shape[:2]),
+            lower=lower,
+            upper=upper,
+            reference=reference,
+            pull=PULL,
+        )
+
+    def _residual(self, q: Array, targets: Array) -> Array:
+        return np.asarray(np.linalg.norm(self.kinematics.positions(q) - targets, axis=2))
+
+    def _cost(self, q: Array, targets: Array) -> Array:
+        return np.asarray(np.nansum(self._residual(q, targets) ** 2, axis=1))
+
+    def _suffers(self, q: Array, free_q: Array, targets: Array) -> Bools:
+        gain = self._residual(q, targets) - self._residual(free_q, targets)
+        return np.asarray(_worst(gain) > EXACT)
+
+
+def with_kinematics(fitter: Fitter, kinematics: Kinematics, subject: Subject) -> Fitter:
+    """Return the same fitter for a model with other lengths."""
+    return replace(fitter, kinematics=kinematics, subject=subject)
+
+
+def _worst(distances: Array) -> Array:
+    """Return the largest known distance of each posture (N,); 0 where none is known."""
+    return np.asarray(np.where(np.isfinite(distances), distances, 0.0).max(axis=1, initial=0.0))
