@@ -32,6 +32,9 @@ JUMP = 2.0
 FARTHEST = 1e6
 """Metres beyond which a target is taken for a mistake."""
 
+SMALLEST = 1e-300
+"""Keeps weights that are all zero from being divided by zero."""
+
 AT_LIMIT = 1e-9
 """Radians or metres within which a joint stands at its limit."""
 
@@ -144,7 +147,8 @@ class InverseKinematics:
         targets : array (N, P, 3)
             Metres, the model's world; NaN is unknown. What cannot be reached is no error: see `Solution`.
         weights : array (P,) or (N, P), optional
-            Of squared distances; 1 unless told otherwise.
+            Of squared distances, relative to each other; a point of weight 0 is not looked at. All 1 unless told
+            otherwise.
         start : array (nq,) or (N, nq), optional
 
         Returns
@@ -290,7 +294,7 @@ class InverseKinematics:
         rest = np.clip(self.kinematics.neutral, lower, upper)
         return Problem(
             targets=goal,
-            weights=np.broadcast_to(each, goal.shape[:2]),
+            weights=np.broadcast_to(each / max(float(each.max(initial=0.0)), SMALLEST), goal.shape[:2]),
             lower=lower,
             upper=upper,
             reference=np.tile(rest, (len(goal), 1)),

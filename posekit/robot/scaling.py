@@ -14,8 +14,10 @@ from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.intake import nearest
 from posekit.robot.kinematics import Kinematics
-from posekit.robot.stretching import EXACT, Stretching
+from posekit.robot.stretching import EXACT, Stretching, shoulders_are_behind
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS, segment_name
+
+__all__ = ["Scaled", "model_lengths", "scaled", "segment_lengths", "shoulders_are_behind"]
 
 PASSES = 30
 STUCK = 1e-10
@@ -101,8 +103,8 @@ def scaled(
     geometry : pinocchio.GeometryModel, optional
         Scaled with it.
     behind : bool, optional
-        Whether the shoulders lie behind the line from neck to pelvis (see `posekit.robot.stretching.shoulders_are_behind`) or in front; on
-        the model's own side unless told otherwise.
+        Whether the shoulders lie behind the line from neck to pelvis or in front, which lengths do not tell (see
+        `shoulders_are_behind`); on the model's own side unless told otherwise.
 
     Returns
     -------

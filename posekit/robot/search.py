@@ -43,7 +43,7 @@ class Found(NamedTuple):
     q : array (N, nq)
     cost : array (N,)
     worst : array (N,)
-        The largest distance of a known point from its target, metres.
+        The largest distance of a known point of some weight from its target, metres.
     steps : int array (N,)
     settled : bool array (N,)
     """
@@ -133,7 +133,8 @@ class Search:
 
     def _found(self, descent: Descent, problem: Problem) -> Found:
         gap = np.linalg.norm(self.kinematics.positions(descent.q) - problem.targets, axis=2)
-        worst = np.where(np.isfinite(gap), gap, 0.0).max(axis=1, initial=0.0)
+        counts = np.isfinite(gap) & (problem.weights > 0)
+        worst = np.where(counts, gap, 0.0).max(axis=1, initial=0.0)
         return Found(descent.q, descent.cost, worst, descent.steps, descent.settled)
 
     def _trunk(self, problem: Problem) -> Array:

@@ -9,15 +9,20 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.files import ScaledOrthographicModel
 from posekit.files.object_view import ObjectView
-from posekit.linkage import Linkage, load_linkage
+from posekit.linkage import Linkage, load_linkage, span
 from posekit.pipeline import Scale
 from posekit.pipeline.objects import (
     ArticulatedObject,
     ObjectTolerance,
+    certify,
     load_object,
     object_lines,
     recover_object,
 )
+from posekit.pipeline.objects.certify import Certifier
+from posekit.pipeline.objects.draw import draw_configurations
+from posekit.pipeline.objects.spread import Spread
+from posekit.pipeline.objects.study import study_lines, study_object
 from posekit.pipeline.objects.triangles import Triangles, triangles
 from posekit.robot import load_robot
 from posekit.robot.kinematics import Kinematics, body_points
@@ -324,7 +329,7 @@ class TestShape:
         )
         thing = ArticulatedObject(linkage=linkage)
         frame = recover_object(view_of(thing, points[None]), thing, scale=VALUE).frames[0]
-        assert off(frame, points) < 1e-9 and len(frame) < 16
+        assert off(frame, points) < 1e-9 and len(frame) < 16 and frame.judged == "exact"
         assert any(reason.startswith("coplanar/") for reason in frame.rejected)
 
     def test_right_angles_and_lines_prune(self):
@@ -427,6 +432,81 @@ class TestMissing:
 
 
 class TestTolerance:
+    def truth_survives(self, thing, truth, frame):
+        """Tell whether a survivor has the true flips of the tree's segments, or none where they are level."""
+        tree = sorted({segment for segment in span(thing.linkage).segments if segment >= 0})
+        ends = np.array(thing.linkage.segments)
+        flips = np.sign(truth[ends[:, 1], 2] - truth[ends[:, 0], 2])
+        same = (frame.flips == flips) | (frame.flips == 0)
+        return bool(same[:, tree].all(axis=1).any())
+
+    @given(seed=st.integers(0, 10_000), segments=st.integers(2, 7), loops=st.integers(1, 3))
+    @settings(deadline=None, max_examples=30, derandomize=True)
+    def test_image_points_that_are_off_by_the_tolerance_never_cost_the_truth(self, seed, segments, loops):
+        thing, truth = drawn(seed, segments, loops)
+        view = view_of(thing, truth)
+        beside = 0.02
+        rng = np.random.default_rng(seed)
+        angle, radius = rng.uniform(0, 2 * np.pi, (2, *view.image.shape[:2]))
+        shift = np.stack([np.cos(angle), np.sin(angle)], axis=-1) * (radius / 2 / np.pi)[..., None]
+        noisy = ObjectView(
+            points=view.points,
+            camera=view.camera,
+            time=view.time,
+            image=view.image + shift * beside * SCALE,
+            unit=None,
+        )
+        allowed = ObjectTolerance(rigid=1e-9, tangent=2 * beside, point=beside)
+        frame = recover_object(noisy, thing, scale=VALUE, tolerance=allowed).frames[0]
+        assert self.truth_survives(thing, truth[0], frame)
+
+    @given(seed=st.integers(0, 10_000))
+    @settings(deadline=None, max_examples=20, derandomize=True)
+    def test_nor_that_of_what_is_flat_or_at_right_angles(self, seed):
+        rng = np.random.default_rng(seed)
+        flat = np.array([[0, 0, 0], [3, 0, 0], [3, 4, 0], [3, 8, 0], [1, 5, 0.0]])
+        turn = np.linalg.qr(rng.standard_normal((3, 3)))[0]
+        truth = (flat @ turn.T)[None]
+        linkage = Linkage.from_names(
+            name="sign",
+            segments={("a", "b"): 3.0, ("b", "c"): 4.0, ("c", "d"): 4.0, ("d", "e"): 13**0.5},
+            perpendicular=[("a-b", "b-c")],
+            collinear=[("b", "c", "d")],
+            coplanar=[("a", "b", "c", "d", "e")],
+        )
+        thing = ArticulatedObject(linkage=linkage)
+        view = view_of(thing, truth)
+        image = view.image + rng.uniform(-7, 7, view.image.shape)
+        noisy = ObjectView(points=view.points, camera=view.camera, time=view.time, image=image, unit=None)
+        allowed = ObjectTolerance(rigid=1e-9, tangent=0.08, point=0.04)
+        frame = recover_object(noisy, thing, scale=VALUE, tolerance=allowed).frames[0]
+        assert self.truth_survives(thing, truth[0], frame)
+
+    @pytest.mark.parametrize("name", ["panda", "ur5"])
+    def test_nor_that_of_a_robot(self, robots, name):
+        thing, _ = robots(name)
+        q = draw_configurations(robot_of(thing), 40, np.random.default_rng(9))
+        kinematics = Kinematics(model=robot_of(thing).model, points=body_points(thing.linkage.points))
+        truth = kinematics.positions(q)
+        view = view_of(thing, truth, scale=SCALE)
+        image = view.image + np.random.default_rng(0).uniform(-0.7, 0.7, view.image.shape)
+        noisy = ObjectView(points=view.points, camera=view.camera, time=view.time, image=image)
+        frames = recover_object(noisy, thing, certify=False).frames
+        assert {frame.judged for frame in frames} == {"measured"}
+        assert all(self.truth_survives(thing, one, frame) for one, frame in zip(truth, frames, strict=True))
+
+    def test_a_level_segment_may_be_off_by_much_and_a_steep_one_by_little(self):
+        thing = ArticulatedObject(
+            linkage=Linkage.from_names(name="arm", segments={("a", "b"): 1.0, ("b", "c"): 1.0})
+        )
+        spanned = span(thing.working)
+        spread = Spread.of(spanned, np.array([[0, 0], [1, 0], [1.1, 0]]), 0.01)
+        level, steep = spread.between(0, 1), spread.between(1, 2)
+        np.testing.assert_allclose(level, np.sqrt(1 - 0.98**2))
+        assert steep < 0.003 and spread.between(0, 2) == pytest.approx(level + steep)
+        assert spread.off((0, 2)) == pytest.approx((level + steep) / 2 + 0.01)
+        assert spread.off((0, 1, 2)) == pytest.approx(level + 0.01)
+
     def test_a_view_that_is_not_exact_is_judged_as_measured(self):
         thing, truth = drawn(21, 6, 3)
         view = view_of(thing, truth)
@@ -444,6 +524,54 @@ class TestTolerance:
     def test_bad_tolerances(self, value):
         with pytest.raises(InputError, match="expected zero or a positive length"):
             ObjectTolerance(rigid=value, tangent=0.0, point=0.0)
+
+
+class TestCertifier:
+    @pytest.mark.parametrize("name", ["panda", "ur5", "allegro"])
+    def test_the_truth_has_a_configuration(self, robots, name):
+        thing, _ = robots(name)
+        robot = robot_of(thing)
+        certifier = Certifier(robot, thing.linkage.points)
+        q = draw_configurations(robot, 40, np.random.default_rng(10))
+        points = certifier.kinematics.positions(q) + np.array([0.3, -0.2, 4.0])
+        found = certifier.certify(points, tolerance=1e-6)
+        assert all(found.certified) and not any(found.reasons)
+        np.testing.assert_allclose(certifier.kinematics.positions(found.q), points, atol=1e-6)
+        assert (found.q[:, 7:] >= robot.lower[7:]).all() and (found.q[:, 7:] <= robot.upper[7:]).all()
+
+    def test_what_cannot_be_reached_is_undecided_with_the_reason(self, robots):
+        thing, truth = robots("panda")
+        certifier = Certifier(robot_of(thing), thing.linkage.points)
+        stretched = truth[:1] * 1.2
+        found = certifier.certify(stretched, tolerance=1e-6)
+        assert found.certified == [False]
+        assert found.reasons[0].startswith(
+            "undecided: no configuration was found, with limits or without; panda_"
+        )
+        q = pin.neutral(robot_of(thing).model)[None].copy()
+        q[0, 10] = 0.4  # panda_joint4, whose limits are -3.07 and -0.07
+        q[0, 12] = 1.0
+        found = certifier.certify(certifier.kinematics.positions(q), tolerance=1e-6)
+        assert found.certified == [False]
+        assert (
+            "no configuration within the limits was found; without them panda_joint4 is" in found.reasons[0]
+        )
+
+    def test_only_so_many_are_looked_for(self, robots, monkeypatch):
+        thing, truth = robots("panda")
+        monkeypatch.setattr(certify, "MOST", 2)
+        found = Certifier(robot_of(thing), thing.linkage.points).certify(truth, tolerance=1e-6)
+        assert found.certified == [True, True, False] and np.isnan(found.q[2]).all()
+        assert "first 2 postures alone" in found.reasons[2]
+
+    def test_the_study_counts(self, robots):
+        thing, _ = robots("panda")
+        study = study_object(thing, count=4, seed=1)
+        assert study.flips == 64 and study.found.all() and study.sure.all()
+        assert (study.certified <= study.survivors).all() and (study.survivors <= 16).all()
+        assert study_lines("panda", study)[0].startswith("| panda | 64 | ")
+        with pytest.raises(InputError, match="has no robot"):
+            study_object(load_object("taylor_human"))
 
 
 class TestBadInput:

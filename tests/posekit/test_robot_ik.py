@@ -241,7 +241,10 @@ def test_weights_say_whose_miss_counts(rng: np.random.Generator) -> None:
     plain = solver("stick_figure").solve(targets, weights=weights).residual
     weights[wrist] = 1e-6
     light = solver("stick_figure").solve(targets, weights=weights).residual
+    weights[wrist] = 0.0
+    none = solver("stick_figure").solve(targets, weights=1e-9 * weights)
     others = np.arange(len(kinematics.points)) != wrist
+    assert (none.reach == Reach.MET).all() and none.residual[:, others].max() < MM
     assert light[:, others].max() < MM < plain[:, others].max()
 
 

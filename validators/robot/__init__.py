@@ -6,6 +6,7 @@ configurations in batches. `RobotValidator` puts them together, and `posekit.val
 
 from posekit.validators.robot.contacts import Contacts as Contacts
 from posekit.validators.robot.ranges import load_joint_limits as load_joint_limits
-from posekit.validators.robot.robot_validator import ROBOT_CHECKS as ROBOT_CHECKS
-from posekit.validators.robot.robot_validator import ROBOT_DEFAULT as ROBOT_DEFAULT
 from posekit.validators.robot.robot_validator import RobotValidator as RobotValidator
+from posekit.validators.robot.settings import ROBOT_CHECKS as ROBOT_CHECKS
+from posekit.validators.robot.settings import ROBOT_DEFAULT as ROBOT_DEFAULT
+from posekit.validators.robot.settings import RobotSettings as RobotSettings

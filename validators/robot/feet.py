@@ -16,7 +16,9 @@ from posekit.skeleton import SIDES
 LEG: Final = 0.491
 """Hip to ankle as a share of stature (Drillis & Contini 1966, in Winter 2009, fig. 4.1: 0.245 + 0.246)."""
 
-FOOT_LENGTH, FOOT_BREADTH, ANKLE_HEIGHT: Final = 0.152, 0.055, 0.039
+FOOT_LENGTH: Final = 0.152
+FOOT_BREADTH: Final = 0.055
+ANKLE_HEIGHT: Final = 0.039
 """The foot as shares of stature (the same source)."""
 
 HEEL: Final = 0.25
@@ -30,8 +32,8 @@ class Corner(NamedTuple):
     place: Array
 
 
-def find_soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> tuple[list[Corner], bool]:
-    """Return the corners of both feet, and whether they were made up.
+def find_soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> tuple[Corner, ...]:
+    """Return the corners of both feet.
 
     With bodies below the ankles they are the corners of those bodies' boxes; else a rectangle under each ankle as
     long and broad as a person's with such legs, forward being across hips and shanks. None where the model has
@@ -39,12 +41,12 @@ def find_soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> tu
     """
     needed = [f"{side}_{joint}" for side in SIDES for joint in ("hip", "knee", "ankle")]
     if any(name not in kinematics.names for name in needed):
-        return [], False
+        return ()
     below = [_below(kinematics, f"{side}_ankle") for side in SIDES]
     corners = [corner for joints in below for corner in _corners(geometry, joints)]
     if all(_corners(geometry, joints) for joints in below):
-        return corners, False
-    return _made_up(kinematics), True
+        return tuple(corners)
+    return tuple(_made_up(kinematics))
 
 
 def _below(kinematics: Kinematics, name: str) -> list[int]:

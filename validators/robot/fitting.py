@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -177,11 +177,6 @@ class Fitter:
     def _suffers(self, q: Array, free_q: Array, targets: Array) -> Bools:
         gain = self._residual(q, targets) - self._residual(free_q, targets)
         return np.asarray(_worst(gain) > EXACT)
-
-
-def with_kinematics(fitter: Fitter, kinematics: Kinematics, subject: Subject) -> Fitter:
-    """Return the same fitter for a model with other lengths."""
-    return replace(fitter, kinematics=kinematics, subject=subject)
 
 
 def _worst(distances: Array) -> Array:

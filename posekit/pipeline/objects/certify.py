@@ -21,6 +21,9 @@ MOST = 256
 """Postures of one frame whose configurations are looked for: some milliseconds each."""
 
 
+UNDECIDED = 32
+"""How many of those that are still undecided are tried once more."""
+
 SHAPES, NEAR, AGAIN = 2048, 48, 12
 """Random configurations that are compared with a posture by its distances, then laid on it, then started from."""
 
@@ -74,7 +77,7 @@ class Certifier:
                 solution = self._solvers[tolerance].solve(points[:MOST])
             q[:MOST] = solution.q
             distance[:MOST] = np.nanmax(solution.residual, axis=1)
-            self._try_again(points, q, distance, np.flatnonzero(distance > tolerance))
+            self._try_again(points, q, distance, np.flatnonzero(distance > tolerance)[:UNDECIDED])
             reasons[:MOST] = [self._reason(solution, k) for k in range(len(solution.q))]
         certified = (distance <= tolerance).tolist()
         reasons = ["" if sure else reason for sure, reason in zip(certified, reasons, strict=True)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -112,22 +113,30 @@ class Grown:
         base = 2 * 3 ** turns.shape[1] * self.hypothesis.astype(np.int64)
         return np.isin(base - turns @ powers, base + turns @ powers)
 
-    def exact(self, *, fitted: bool) -> bool:
+    def exact(self, *, fitted: Collection[str]) -> bool:
         """Tell whether there is evidence that the image is exact: loops closed that need not have.
 
         In a survivor, or in a branch that something else pruned after the last of its loops had closed.
 
         Parameters
         ----------
-        fitted : bool
-            Whether the scale was chosen so that loops close.
+        fitted : collection of str
+            The constraints that the scale was chosen by.
         """
         level = self.plan.evidence_level(fitted=fitted)
         if level is None:
             return False
         if any(len(leaves.code) for leaves, _ in self.parts):
             return True
-        others = ("closure", "midpoint", "no_solution", "coincident")
+        others = (
+            "closure",
+            "midpoint",
+            "coplanar",
+            "collinear",
+            "perpendicular",
+            "no_solution",
+            "coincident",
+        )
         return any(
             group.level >= level and group.check not in others and len(group.code) > 0
             for leaves, _ in self.parts

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -74,13 +74,26 @@ class Plan:
         """How many leaves the tree has before any is pruned."""
         return 1 << (len(self.spanned.nodes) - 1)
 
-    def evidence_level(self, *, fitted: bool) -> int | None:
-        """Return the level at which the last loop closes, or middle is met: exactly, only if the image is exact.
+    def evidence_level(self, *, fitted: Collection[str]) -> int | None:
+        """Return the level at which all loops have closed and all that is known of the shape holds.
 
-        None where there is no loop, or one alone and the scale was fitted so that it closes.
+        Exactly, they do so only if the image is exact.
+
+        Parameters
+        ----------
+        fitted : collection of str
+            The constraints that the scale was chosen by: a single loop that was made to close shows nothing.
+
+        Returns
+        -------
+        int or None
+            None where there is nothing that would show it.
         """
         closing = validators.closure(self.spanned)
-        return None if len(closing) <= int(fitted) else max(max(check.points) for check in closing)
+        if "closure" in fitted and len(closing) == 1:
+            closing = []
+        shape = [check for check in shape_checks(self.spanned, tolerance=0.0) if check.name not in fitted]
+        return max((max(check.points) for check in [*closing, *shape]), default=None)
 
     def checks(self, tolerance: ObjectTolerance, spread: Spread | None = None) -> list[Check]:
         """Make the checks: loops, shape, flips given by hand, limits of the robot.
@@ -101,10 +114,9 @@ class Plan:
         if spread is not None:
             # A midpoint has the depths of its halves' ends, however far these are off.
             closing = [
-                check if check.name == "midpoint" else Loose(check=check, spread=spread, distance=True)
-                for check in closing
+                check if check.name == "midpoint" else Loose(check=check, spread=spread) for check in closing
             ]
-            others = [Loose(check=check, spread=spread, distance=False) for check in others]
+            others = [Loose(check=check, spread=spread) for check in others]
             off = spread.off
         limits = self.thing.limits
         return [

@@ -169,7 +169,7 @@ def _grow(
     if given is not None:
         return grow(plan, image, aspect, scales, given, "given")
     grown = grow(plan, image, aspect, scales, exact, "exact")
-    fitted = "closure" in family.how
+    fitted = family.how.split("+")
     return grown if grown.exact(fitted=fitted) else grow(plan, image, aspect, scales, measured, "measured")
 
 

@@ -73,14 +73,12 @@ class Loose:
     Parameters
     ----------
     check : Check
+        Of the distance of two points, of a flip, or of a shape (`posekit.pipeline.objects.shape`).
     spread : Spread
-    distance : bool
-        Whether it judges the distance of its two points; else something that changes by no more than they move.
     """
 
     check: Check
     spread: Spread
-    distance: bool
 
     @property
     def name(self) -> str:
@@ -105,13 +103,26 @@ class Loose:
     def judge(self, points: Array) -> Findings:
         """Judge with the larger tolerance; see `posekit.tree.Check`."""
         findings = self.check.judge(points)
-        if not self.distance:
-            return replace(findings, tolerance=findings.tolerance + self.spread.off(self.points))
-        apart = points[:, 1] - points[:, 0]
-        beside, depth = np.hypot(apart[:, 0], apart[:, 1]), np.abs(apart[:, 2])
-        off = self.spread.between(*self.points)
-        farthest = np.hypot(beside + 2 * self.spread.beside, depth + off)
-        nearest = np.hypot(np.maximum(beside - 2 * self.spread.beside, 0.0), np.maximum(depth - off, 0.0))
-        now = np.hypot(beside, depth)
-        more = np.maximum(farthest - now, now - nearest)[:, None]
-        return replace(findings, tolerance=findings.tolerance + more)
+        return replace(findings, tolerance=findings.tolerance + self._more(points))
+
+    def _more(self, points: Array) -> Array:
+        """Return by how much the judged value may be off (N, 1)."""
+        spread, joints = self.spread, self.points
+        if self.name == "closure":
+            apart = points[:, 1] - points[:, 0]
+            beside, depth = np.hypot(apart[:, 0], apart[:, 1]), np.abs(apart[:, 2])
+            off = spread.between(*joints)
+            farthest = np.hypot(beside + 2 * spread.beside, depth + off)
+            nearest = np.hypot(np.maximum(beside - 2 * spread.beside, 0.0), np.maximum(depth - off, 0.0))
+            now = np.hypot(beside, depth)
+            return np.asarray(np.maximum(farthest - now, now - nearest)[:, None])
+        if self.name == "nearer":
+            # Which end of a segment of the tree is nearer was chosen, not measured.
+            chosen = spread.parents[joints[0]] == joints[1] or spread.parents[joints[1]] == joints[0]
+            return np.array([[0.0 if chosen else spread.between(*joints)]])
+        if self.name == "perpendicular":
+            a, b, c, d = joints
+            return np.array([[spread.between(a, b) + spread.between(c, d) + 4 * spread.beside]])
+        # The distance from the best plane or line, a root mean square, changes by no more than that of the shifts.
+        shifts = [np.sqrt(np.mean([spread.between(a, b) ** 2 for b in joints])) for a in joints]
+        return np.array([[spread.beside + min(shifts)]])

@@ -1,0 +1,196 @@
+"""The models of one robot: with its own lengths, and with those of the postures that are judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Final
+
+import pinocchio as pin
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.robot import Robot
+from posekit.robot.joint_map import JointMap, find_joint_map, load_joint_map
+from posekit.robot.kinematics import Kinematics
+from posekit.robot.pairs import set_pairs
+from posekit.robot.scaling import scaled
+from posekit.validators.robot.balance import Balance
+from posekit.validators.robot.collision import SelfCollision
+from posekit.validators.robot.feet import find_soles
+from posekit.validators.robot.fitting import Fitter
+from posekit.validators.robot.made_up import fitted_capsules
+from posekit.validators.robot.ranges import load_joint_limits
+from posekit.validators.robot.settings import BODIES_FROM, RobotSettings
+from posekit.validators.robot.subject import Subject
+
+PAIRS_FROM: Final = {
+    "visual": "all but neighbours and what touches in the neutral posture",
+    "capsules": "those that the stick figure's SRDF checks, but what touches in the neutral posture",
+    "neutral posture": "all but neighbours and what touches in the neutral posture",
+    "srdf": "the SRDF",
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judged:
+    """One model, and what judges its configurations; tables and pools are made once, when they are needed.
+
+    Parameters
+    ----------
+    subject : Subject
+    kinematics : Kinematics or None
+        The points of the joint map; None where the robot has none and only configurations are judged.
+    settings : RobotSettings
+    """
+
+    subject: Subject
+    kinematics: Kinematics | None
+    settings: RobotSettings
+
+    @cached_property
+    def fitter(self) -> Fitter:
+        """What makes configurations of postures."""
+        if self.kinematics is None:
+            raise InputError("the robot has no joint map; give one to judge postures")
+        return Fitter(kinematics=self.kinematics, subject=self.subject, tolerance=self.settings.rigid_tolerance)
+
+    @cached_property
+    def collision(self) -> SelfCollision:
+        """What judges collisions."""
+        return SelfCollision(subject=self.subject, contact_margin=self.settings.contact_margin)
+
+    @cached_property
+    def balance(self) -> Balance:
+        """What judges balance."""
+        corners = () if self.kinematics is None else find_soles(self.kinematics, self.subject.geometry)
+        return Balance(model=self.subject.model, corners=corners, up=self.settings.upward)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Models:
+    """A robot's models.
+
+    Parameters
+    ----------
+    robot : Robot
+    settings : RobotSettings
+    """
+
+    robot: Robot
+    settings: RobotSettings
+
+    @cached_property
+    def joint_map(self) -> JointMap:
+        """The joint map: the one given, or the built-in one whose frames the robot has."""
+        given = self.settings.joint_map
+        if isinstance(given, JointMap):
+            return given
+        return find_joint_map(self.robot.model) if given is None else load_joint_map(given)
+
+    @cached_property
+    def kinematics(self) -> Kinematics:
+        """The robot's points, with its own lengths."""
+        return self.joint_map.kinematics(self.robot.model)
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """The limits of q (nq,) that are judged by."""
+        return load_joint_limits(self.settings.ranges, self.robot.model)
+
+    @cached_property
+    def bodies(self) -> str:
+        """What collides: ``urdf``, ``visual`` or ``capsules``."""
+        if self.settings.bodies != "auto":
+            return self.settings.bodies
+        return "urdf" if self.robot.collision_pairs else "capsules"
+
+    @cached_property
+    def own(self) -> Judged:
+        """The model with its own lengths."""
+        lower, upper = self.limits
+        subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
+        needed = "balance" in self.settings.checks
+        return Judged(subject=subject, kinematics=self._mapped if needed else None, settings=self.settings)
+
+    def with_lengths(self, lengths: Mapping[str, float], behind: bool | None) -> Judged:
+        """Return the model with other segment lengths; the last one is kept."""
+        key = (behind, *sorted(lengths.items()))
+        if key not in self._kept:
+            self._kept.clear()
+            self._kept[key] = self._scaled(lengths, behind)
+        return self._kept[key]
+
+    @cached_property
+    def mapped(self) -> Judged:
+        """The model with its own lengths and its points."""
+        lower, upper = self.limits
+        subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
+        return Judged(subject=subject, kinematics=self.kinematics, settings=self.settings)
+
+    def describe(self) -> dict[str, Any]:
+        """List what decides the verdicts, as reports have it."""
+        settings: dict[str, Any] = {
+            "figure": self.robot.hash,
+            "robot": self.robot.name,
+            "checks": list(self.settings.checks),
+        }
+        if "collision" in self.settings.checks:
+            settings |= {
+                "bodies": BODIES_FROM[self.bodies],
+                "pairs_from": PAIRS_FROM[self.robot.pairs_from if self.bodies == "urdf" else self.bodies],
+                "pairs": list(self.own.subject.pair_names),
+            }
+        return settings
+
+    def _scaled(self, lengths: Mapping[str, float], behind: bool | None) -> Judged:
+        make_up = self.bodies == "capsules"
+        result = scaled(self.kinematics, lengths, None if make_up else self._geometry, behind=behind)
+        made_up = make_up and self.settings.wants_bodies
+        geometry = fitted_capsules(result.kinematics) if made_up else result.geometry
+        lower, upper = self.limits
+        subject = Subject(model=result.kinematics.model, lower=lower, upper=upper, geometry=geometry)
+        return Judged(subject=subject, kinematics=result.kinematics, settings=self.settings)
+
+    @cached_property
+    def _kept(self) -> dict[tuple[object, ...], Judged]:
+        return {}
+
+    @cached_property
+    def _mapped(self) -> Kinematics | None:
+        """Points for balance; a robot that no joint map fits has none, and then no feet."""
+        try:
+            return self.kinematics
+        except InputError:
+            if self.settings.joint_map is not None:
+                raise
+            return None
+
+    @cached_property
+    def _geometry(self) -> pin.GeometryModel | None:
+        """The bodies of the model with its own lengths."""
+        if not self.settings.wants_bodies:
+            return None
+        if self.bodies == "capsules":
+            geometry = fitted_capsules(self.kinematics)
+        elif self.bodies == "visual":
+            geometry = self._visuals()
+        else:
+            geometry = self.robot.geometry
+        if "collision" in self.settings.checks and (geometry is None or not len(geometry.collisionPairs)):
+            raise InputError(
+                f"{self.robot.source}: --bodies {self.bodies}: no pair of bodies can collide; expected two bodies at "
+                "least; take --bodies capsules, or leave the check collision out"
+            )
+        return geometry
+
+    def _visuals(self) -> pin.GeometryModel:
+        if self.robot.visuals is None:
+            raise InputError(
+                f"{self.robot.source}: --bodies visual: it was loaded without them; load it with visuals=True"
+            )
+        geometry = self.robot.visuals.copy()
+        geometry.removeAllCollisionPairs()
+        set_pairs(self.robot.model, geometry, None)
+        return geometry
