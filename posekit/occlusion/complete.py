@@ -20,7 +20,7 @@ from posekit.occlusion.settings import Sampling
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree import Check, Leaves
 
-ROWS_AT_ONCE = 300_000
+ROWS_AT_ONCE = 250_000
 """Placements of a limb judged together: enough to spread NumPy's overhead, few enough for the memory."""
 
 

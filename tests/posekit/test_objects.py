@@ -18,6 +18,7 @@ from posekit.pipeline.objects import (
     load_object,
     object_lines,
     recover_object,
+    tolerance_of,
 )
 from posekit.pipeline.objects.certify import Certifier
 from posekit.pipeline.objects.draw import draw_configurations
@@ -196,6 +197,8 @@ class TestLaws:
         assert all(1 <= len(frame) <= 8 and family_of(frame).mirrored == 0 for frame in frames)
         arm, truth = robots("panda")
         result = recover_object(view_of(arm, truth, scale=SCALE), arm, certify=False)
+        # Without the points on its axes, eight.
+        assert all(len(frame) <= 4 for frame in result.frames)
         assert all(family_of(frame).mirrored == len(frame) > 0 for frame in result.frames)
         assert any(
             "in 3 a posture and its mirror image both survive" in line for line in object_lines(result)
@@ -524,6 +527,16 @@ class TestTolerance:
     def test_bad_tolerances(self, value):
         with pytest.raises(InputError, match="expected zero or a positive length"):
             ObjectTolerance(rigid=value, tangent=0.0, point=0.0)
+
+    def test_tolerances_of_the_command_line(self, robots):
+        panda, _ = robots("panda")
+        assert tolerance_of(panda) is None
+        given_ = tolerance_of(panda, rigid=0.02)
+        assert given_ is not None and given_.rigid == 0.02 and given_.point == given_.tangent / 2 > 0
+        given_ = tolerance_of(panda, tangent=0.03)
+        assert given_ is not None and (given_.tangent, given_.point) == (0.03, 0.015)
+        with pytest.raises(InputError, match="lengths of linkage taylor_human are relative"):
+            tolerance_of(load_object("taylor_human"), rigid=0.02)
 
 
 class TestCertifier:

@@ -21,6 +21,12 @@ EXACT = 1e-4
 STRICT = 1e-3
 """Metres that the search from all starts is content with, where the first fit suffered from the limits."""
 
+SHAKES = 6
+"""Starts around the best fit so far, in each of two rounds."""
+
+SHAKEN = 0.5
+"""Radians or metres: standard deviation of the joints of such a start."""
+
 Bools = NDArray[np.bool_]
 
 
@@ -79,8 +85,8 @@ class Fitter:
         """Fit postures.
 
         A free fit starts from the limited one. Where it comes closer, it is turned into the branch that is least
-        outside the limits, and the limited search starts again from there; if it still does not come as close,
-        it starts from everywhere. Only what is left after that is said to suffer from the limits.
+        outside the limits, and the limited search starts again: from there, from places around, from everywhere,
+        from around again. Only what is left after that is said to suffer from the limits.
 
         Parameters
         ----------
@@ -94,18 +100,14 @@ class Fitter:
         q, free_q = first.q.copy(), first.q.copy()
         worst = _worst(self._residual(q, targets))
         rows = np.flatnonzero(worst > EXACT)
-        for again in (self._from_free, self._from_everywhere):
+        for again in (self._from_free, self._from_around, self._from_everywhere, self._from_around):
+            rows = self._free_fits(targets, q, free_q, rows)
             if not rows.size:
                 break
-            free_q[rows] = self._free(targets[rows], q[rows])
-            rows = rows[self._suffers(q[rows], free_q[rows], targets[rows])]
-            if rows.size:
-                other = again(targets[rows], free_q[rows])
-                better = self._cost(other, targets[rows]) < self._cost(q[rows], targets[rows])
-                q[rows[better]] = other[better]
-        if rows.size:
-            free_q[rows] = self._free(targets[rows], q[rows])
-            rows = rows[self._suffers(q[rows], free_q[rows], targets[rows])]
+            other = again(targets[rows], q[rows], free_q[rows])
+            better = self._cost(other, targets[rows]) < self._cost(q[rows], targets[rows])
+            q[rows[better]] = other[better]
+        rows = self._free_fits(targets, q, free_q, rows)
         suffers = np.zeros(len(q), dtype=np.bool_)
         suffers[rows] = True
         return Fit(
@@ -141,22 +143,41 @@ class Fitter:
     def _solvers(self) -> dict[float, InverseKinematics]:
         return {}
 
-    def _free(self, targets: Array, q: Array) -> Array:
-        """Descend from q without limits, to the branch that is least outside them."""
+    def _free_fits(self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Fit some rows without limits, in place, and return those that the limits keep off."""
+        if not rows.size:
+            return rows
         unlimited = np.full(self.kinematics.space.nq, np.inf)
-        free = descend(self.kinematics, self._problem(targets, q, -unlimited, unlimited), q).q
-        return self.branches.nearest_to_limits(free)
+        problem = self._problem(targets[rows], q[rows], -unlimited, unlimited)
+        free_q[rows] = self.branches.nearest_to_limits(descend(self.kinematics, problem, q[rows]).q)
+        gain = self._residual(q[rows], targets[rows]) - self._residual(free_q[rows], targets[rows])
+        return np.asarray(rows[_worst(gain) > EXACT])
 
-    def _from_free(self, targets: Array, free_q: Array) -> Array:
+    def _from_free(self, targets: Array, q: Array, free_q: Array) -> Array:
+        return self._inside(targets, free_q)
+
+    def _from_around(self, targets: Array, q: Array, free_q: Array) -> Array:
+        """Start from places around the best fit: the same steps from each posture, whatever else is in the batch."""
+        at = self.kinematics.space.bounded_q
+        steps = np.random.default_rng(0).normal(0.0, SHAKEN, (SHAKES, len(at)))
+        starts = np.repeat(q, SHAKES, axis=0)
+        starts[:, at] += np.tile(steps, (len(q), 1))
+        found = self._inside(np.repeat(targets, SHAKES, axis=0), starts)
+        cost = self._cost(found, np.repeat(targets, SHAKES, axis=0)).reshape(len(q), SHAKES)
+        best: Array = found.reshape(len(q), SHAKES, -1)[np.arange(len(q)), np.argmin(cost, axis=1)]
+        return best
+
+    def _from_everywhere(self, targets: Array, q: Array, free_q: Array) -> Array:
+        return self._solver(STRICT).solve(targets).q
+
+    def _inside(self, targets: Array, start: Array) -> Array:
+        """Descend inside the limits."""
         space = self.kinematics.space
         lower, upper = np.full(space.nq, -np.inf), np.full(space.nq, np.inf)
         lower[space.bounded_q] = self.subject.lower[space.bounded_q]
         upper[space.bounded_q] = self.subject.upper[space.bounded_q]
-        start = np.clip(free_q, lower, upper)
+        start = np.clip(start, lower, upper)
         return descend(self.kinematics, self._problem(targets, start, lower, upper), start).q
-
-    def _from_everywhere(self, targets: Array, free_q: Array) -> Array:
-        return self._solver(STRICT).solve(targets).q
 
     def _problem(self, targets: Array, reference: Array, lower: Array, upper: Array) -> Problem:
         return Problem(
@@ -173,10 +194,6 @@ class Fitter:
 
     def _cost(self, q: Array, targets: Array) -> Array:
         return np.asarray(np.nansum(self._residual(q, targets) ** 2, axis=1))
-
-    def _suffers(self, q: Array, free_q: Array, targets: Array) -> Bools:
-        gain = self._residual(q, targets) - self._residual(free_q, targets)
-        return np.asarray(_worst(gain) > EXACT)
 
 
 def _worst(distances: Array) -> Array:

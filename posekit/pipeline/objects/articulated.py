@@ -11,6 +11,7 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.intake import nearest, refusal, shown
 from posekit.linkage import Linkage, linkage_names, load_linkage
+from posekit.pipeline.objects.tolerance import ObjectTolerance
 from posekit.robot import Robot, load_robot, robot_names
 from posekit.robot.linkage import Carried, linkage_of
 from posekit.validators.robot_limits import RobotLimits
@@ -109,6 +110,42 @@ def load_object(name: str | Path) -> ArticulatedObject:
     )
     raise refusal(
         "--linkage", "", shown(text), "a linkage or a robot by name, a .toml or a .urdf file", remedy
+    )
+
+
+def tolerance_of(
+    thing: ArticulatedObject, *, rigid: float | None = None, tangent: float | None = None
+) -> ObjectTolerance | None:
+    """Make the tolerance of what the command line gives.
+
+    Parameters
+    ----------
+    thing : ArticulatedObject
+    rigid, tangent : float, optional
+        Metres; as for measured points where one is not given. Points may be off by half of `tangent`.
+
+    Returns
+    -------
+    ObjectTolerance or None
+        In the linkage's unit; None where neither is given.
+
+    Raises
+    ------
+    InputError
+        Where the linkage's lengths are relative: metres mean nothing then.
+    """
+    if rigid is None and tangent is None:
+        return None
+    unit = thing.linkage.unit
+    if unit is None:
+        raise InputError(
+            f"--rigid-tolerance, --tangent-tolerance: the lengths of linkage {thing.linkage.name} are relative; "
+            "leave the options out, or give unit in the linkage"
+        )
+    default = ObjectTolerance.measured(float(thing.linkage.lengths.max()))
+    least = default.tangent if tangent is None else tangent / unit
+    return ObjectTolerance(
+        rigid=default.rigid if rigid is None else rigid / unit, tangent=least, point=least / 2
     )
 
 
