@@ -50,6 +50,7 @@ class Grower:
         image = self.body.image(self.view.image[self.fit.frame[chosen]])
         tree = self.body.tree
         camera = self.fit.cameras(chosen)
+        motion = [check for check in suite if check.name == "walking"]
         with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
             leaves = tree.grow(
                 camera,
@@ -59,18 +60,14 @@ class Grower:
                 given=self.fit.head[chosen],
                 tolerance=tolerance.tangent,
             )
-        physical = leaves.counts()
-        exact = is_exact(leaves, physical, self.body)
+        exact = is_exact(leaves, self.body)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
-            physical = leaves.counts()
+        physical = leaves.counts()
+        leaves = tree.prune(leaves, motion)
         leaves, completion = self._complete(leaves, camera, image, suite, tolerance)
-        if completion is not None:
+        if not motion:  # a joint without a position is no matter of motion
             physical = leaves.counts()
-        before = leaves
-        leaves = tree.prune(leaves, [check for check in suite if check.name == "walking"])
-        if completion is not None and len(leaves.code) < len(before.code):
-            completion = completion.take(np.isin(_keys(before), _keys(leaves)))
         return Batch(
             leaves=leaves,
             physical=physical,
@@ -88,8 +85,7 @@ class Grower:
         unseen = np.asarray(np.isnan(image).any(axis=(1, 2)))
         if not (self.infer and isinstance(self.body, FigureBody) and unseen[leaves.frame].any()):
             return leaves, None
-        checks = [check for check in suite if check.name != "walking"]
-        completion = complete(leaves, camera, image, self.body.figure, checks, tolerance=tolerance.tangent)
+        completion = complete(leaves, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
         return reject(leaves, completion)
 
     def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
@@ -104,12 +100,7 @@ class Grower:
         return {}
 
 
-def _keys(leaves: Leaves) -> NDArray[np.int64]:
-    """Return a number for each node, different in all frames."""
-    return leaves.frame.astype(np.int64) << leaves.level | leaves.code
-
-
-def is_exact(leaves: Leaves, physical: NDArray[np.int64], body: Body) -> NDArray[np.bool_]:
+def is_exact(leaves: Leaves, body: Body) -> NDArray[np.bool_]:
     """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
 
     Some distances are not used to lift anything: four inside torso and hips. That they come out right to 1e-8 m
@@ -128,7 +119,7 @@ def is_exact(leaves: Leaves, physical: NDArray[np.int64], body: Body) -> NDArray
         seen |= known
     exact = np.zeros(leaves.n_frames, dtype=bool)
     exact[leaves.frame[fits & seen]] = True
-    empty = physical[:, -1] == 0
+    empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
     for group in leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
             exact[group.frame[empty[group.frame]]] = True

@@ -63,7 +63,7 @@ class Balance:
 
 
 def inside_hull(points: Array, place: Array) -> float:
-    """Return the distance of a place (2,) from the edge of the hull of points (M, 2): positive inside, else negative."""
+    """Return how far a place (2,) is inside the edge of the hull of points (M, 2): negative outside."""
     hull = convex_hull(points)
     ends = np.roll(hull, -1, axis=0)
     along = ends - hull

@@ -44,17 +44,27 @@ class SelfCollision:
     def __post_init__(self) -> None:
         _ = self.margins
 
+    @property
+    def _bodies(self) -> pin.GeometryModel:
+        if self.subject.geometry is None:
+            raise InputError(
+                "the model was loaded without collision bodies; expected some for the check collision"
+            )
+        return self.subject.geometry
+
     @cached_property
     def margins(self) -> Array:
         """The security margin of each pair (P,), metres: less than the contact margin by what is rounding noise."""
-        geometry = self.subject.geometry
+        geometry = self._bodies
         meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in geometry.geometryObjects]
-        with_mesh = np.array([meshes[pair.first] or meshes[pair.second] for pair in geometry.collisionPairs], dtype=bool)
+        with_mesh = np.array(
+            [meshes[pair.first] or meshes[pair.second] for pair in geometry.collisionPairs], dtype=np.bool_
+        )
         if with_mesh.any() and self.contact_margin < 0:
             name = self.subject.pair_names[int(np.argmax(with_mesh))]
             raise InputError(
-                f"--contact-margin {self.contact_margin:g} m: the pair {name} has a mesh, whose depth of penetration is "
-                "not known; expected zero or a positive length; give capsules (--bodies capsules) to allow depth"
+                f"--contact-margin {self.contact_margin:g} m: the pair {name} has a mesh, whose depth is not "
+                "known; expected zero or a positive length; give capsules (--bodies capsules) to allow depth"
             )
         return np.where(with_mesh, self.contact_margin, self.contact_margin - CONTACT_TOLERANCE)
 
@@ -87,7 +97,7 @@ class SelfCollision:
         subject = self.subject
         return find_contacts(
             subject.model,
-            subject.geometry,
+            self._bodies,
             q,
             rows,
             margins=self.margins,
@@ -97,7 +107,7 @@ class SelfCollision:
 
     @cached_property
     def _pool(self) -> pin.GeometryPool:
-        pool = make_pool(self.subject.model, self.subject.geometry)
+        pool = make_pool(self.subject.model, self._bodies)
         for data in pool.getGeometryDatas():
             for request, margin in zip(data.collisionRequests, self.margins.tolist(), strict=True):
                 request.security_margin = margin

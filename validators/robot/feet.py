@@ -75,7 +75,9 @@ def _corners(geometry: pin.GeometryModel | None, joints: Sequence[int]) -> list[
             body.geometry.computeLocalAABB()
             box = body.geometry.aabb_local
             low, high = np.asarray(box.min_).ravel(), np.asarray(box.max_).ravel()
-            grid = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(-1, 3)
+            grid = np.stack(np.meshgrid(*np.stack([low, high], axis=1), indexing="ij"), axis=-1).reshape(
+                -1, 3
+            )
             corners += [Corner(int(body.parentJoint), body.placement.act(place)) for place in grid]
     return corners
 

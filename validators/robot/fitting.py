@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.robot.descent import Problem, descend
+from posekit.robot.descent import STEPS, Problem, descend
 from posekit.robot.ik import PULL, InverseKinematics
 from posekit.robot.kinematics import Kinematics
 from posekit.validators.robot.branches import Branches
@@ -19,13 +19,16 @@ EXACT = 1e-4
 """Metres: a fit this close is the posture, and limits that cost no more than this are not the reason for a misfit."""
 
 STRICT = 1e-3
-"""Metres that the search from all starts is content with, where the first fit suffered from the limits."""
+"""Metres: the closest that the first search is asked to come."""
 
 SHAKES = 6
-"""Starts around the best fit so far, in each of two rounds."""
+"""Starts around the best fit so far, in each round."""
 
-SHAKEN = 0.5
-"""Radians or metres: standard deviation of the joints of such a start."""
+FEW_STEPS = 25
+"""Steps of the search from such a start: what comes near goes on from there in the next round."""
+
+ROUNDS = (0.5, 1.0, 0.5, 1.0, 0.5, 1.0, 0.5, 1.0)
+"""Standard deviation of the joints of such starts, radians or metres, round by round."""
 
 Bools = NDArray[np.bool_]
 
@@ -42,15 +45,20 @@ class Fit:
         Distances of its points from the posture's, metres; NaN where the posture's are unknown.
     free_q, free_residual : array (N, nq), (N, P)
         The same without limits, of all branches the one that is least outside them.
-    suffers : bool array (N,)
-        Whether the limits keep some point farther off, by more than `EXACT`.
+    kept_off : array (N,)
+        Metres by which the limits keep some point farther off; 0 where that is not more than `EXACT`.
     """
 
     q: Array
     residual: Array
     free_q: Array
     free_residual: Array
-    suffers: Bools
+    kept_off: Array
+
+    @property
+    def suffers(self) -> Bools:
+        """Whether the limits keep some point farther off (N,)."""
+        return np.asarray(self.kept_off > 0)
 
     @property
     def judged_q(self) -> Array:
@@ -85,8 +93,8 @@ class Fitter:
         """Fit postures.
 
         A free fit starts from the limited one. Where it comes closer, it is turned into the branch that is least
-        outside the limits, and the limited search starts again: from there, from places around, from everywhere,
-        from around again. Only what is left after that is said to suffer from the limits.
+        outside the limits, and the limited search starts again: from there, then from places around the best fit,
+        round after round. Only what is left after that is said to suffer from the limits.
 
         Parameters
         ----------
@@ -95,27 +103,29 @@ class Fitter:
         sequence : int array (N,), optional
             Which sequence in time a posture belongs to: then each starts from the one before.
         """
-        solver = self._solver(max(self.tolerance, STRICT))
-        first = solver.solve(targets) if sequence is None else solver.solve_sequence(targets, sequence=sequence)
+        first = (
+            self._solver.solve(targets)
+            if sequence is None
+            else self._solver.solve_sequence(targets, sequence=sequence)
+        )
         q, free_q = first.q.copy(), first.q.copy()
-        worst = _worst(self._residual(q, targets))
-        rows = np.flatnonzero(worst > EXACT)
-        for again in (self._from_free, self._from_around, self._from_everywhere, self._from_around):
-            rows = self._free_fits(targets, q, free_q, rows)
+        rows = np.flatnonzero(_worst(self._residual(q, targets)) > EXACT)
+        for start in range(-1, len(ROUNDS)):
+            rows = rows[self._refit_free(targets, q, free_q, rows) > 0]
             if not rows.size:
                 break
-            other = again(targets[rows], q[rows], free_q[rows])
-            better = self._cost(other, targets[rows]) < self._cost(q[rows], targets[rows])
+            few = targets[rows]
+            other = self._inside(few, free_q[rows]) if start < 0 else self._from_around(few, q[rows], start)
+            better = self._cost(other, few) < self._cost(q[rows], few)
             q[rows[better]] = other[better]
-        rows = self._free_fits(targets, q, free_q, rows)
-        suffers = np.zeros(len(q), dtype=np.bool_)
-        suffers[rows] = True
+        kept_off = np.zeros(len(q))
+        kept_off[rows] = self._refit_free(targets, q, free_q, rows)
         return Fit(
             q=q,
             residual=self._residual(q, targets),
             free_q=free_q,
             free_residual=self._residual(free_q, targets),
-            suffers=suffers,
+            kept_off=kept_off,
         )
 
     def seen(self, targets: Array) -> Bools:
@@ -129,55 +139,43 @@ class Fitter:
         """The model's other configurations for the same placement."""
         return Branches(subject=self.subject)
 
-    def _solver(self, tolerance: float) -> InverseKinematics:
-        if tolerance not in self._solvers:
-            self._solvers[tolerance] = InverseKinematics(
-                kinematics=self.kinematics,
-                lower=self.subject.lower,
-                upper=self.subject.upper,
-                tolerance=tolerance,
-            )
-        return self._solvers[tolerance]
-
     @cached_property
-    def _solvers(self) -> dict[float, InverseKinematics]:
-        return {}
+    def _solver(self) -> InverseKinematics:
+        return InverseKinematics(
+            kinematics=self.kinematics,
+            lower=self.subject.lower,
+            upper=self.subject.upper,
+            tolerance=max(self.tolerance, STRICT),
+        )
 
-    def _free_fits(self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]) -> NDArray[np.intp]:
-        """Fit some rows without limits, in place, and return those that the limits keep off."""
+    def _refit_free(self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]) -> Array:
+        """Fit some rows without limits, in place; return by how much the limits keep them off, metres, or 0."""
         if not rows.size:
-            return rows
+            return np.zeros(0)
         unlimited = np.full(self.kinematics.space.nq, np.inf)
         problem = self._problem(targets[rows], q[rows], -unlimited, unlimited)
         free_q[rows] = self.branches.nearest_to_limits(descend(self.kinematics, problem, q[rows]).q)
-        gain = self._residual(q[rows], targets[rows]) - self._residual(free_q[rows], targets[rows])
-        return np.asarray(rows[_worst(gain) > EXACT])
+        gain = _worst(self._residual(q[rows], targets[rows]) - self._residual(free_q[rows], targets[rows]))
+        return np.asarray(np.where(gain > EXACT, gain, 0.0))
 
-    def _from_free(self, targets: Array, q: Array, free_q: Array) -> Array:
-        return self._inside(targets, free_q)
-
-    def _from_around(self, targets: Array, q: Array, free_q: Array) -> Array:
+    def _from_around(self, targets: Array, q: Array, start: int) -> Array:
         """Start from places around the best fit: the same steps from each posture, whatever else is in the batch."""
         at = self.kinematics.space.bounded_q
-        steps = np.random.default_rng(0).normal(0.0, SHAKEN, (SHAKES, len(at)))
-        starts = np.repeat(q, SHAKES, axis=0)
+        steps = np.random.default_rng(start).normal(0.0, ROUNDS[start], (SHAKES, len(at)))
+        starts, goals = np.repeat(q, SHAKES, axis=0), np.repeat(targets, SHAKES, axis=0)
         starts[:, at] += np.tile(steps, (len(q), 1))
-        found = self._inside(np.repeat(targets, SHAKES, axis=0), starts)
-        cost = self._cost(found, np.repeat(targets, SHAKES, axis=0)).reshape(len(q), SHAKES)
-        best: Array = found.reshape(len(q), SHAKES, -1)[np.arange(len(q)), np.argmin(cost, axis=1)]
-        return best
+        found = self._inside(goals, starts, FEW_STEPS)
+        best = np.argmin(self._cost(found, goals).reshape(len(q), SHAKES), axis=1)
+        return np.asarray(found.reshape(len(q), SHAKES, -1)[np.arange(len(q)), best])
 
-    def _from_everywhere(self, targets: Array, q: Array, free_q: Array) -> Array:
-        return self._solver(STRICT).solve(targets).q
-
-    def _inside(self, targets: Array, start: Array) -> Array:
+    def _inside(self, targets: Array, start: Array, steps: int = STEPS) -> Array:
         """Descend inside the limits."""
         space = self.kinematics.space
         lower, upper = np.full(space.nq, -np.inf), np.full(space.nq, np.inf)
         lower[space.bounded_q] = self.subject.lower[space.bounded_q]
         upper[space.bounded_q] = self.subject.upper[space.bounded_q]
         start = np.clip(start, lower, upper)
-        return descend(self.kinematics, self._problem(targets, start, lower, upper), start).q
+        return descend(self.kinematics, self._problem(targets, start, lower, upper), start, steps).q
 
     def _problem(self, targets: Array, reference: Array, lower: Array, upper: Array) -> Problem:
         return Problem(

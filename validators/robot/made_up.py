@@ -105,7 +105,8 @@ def _parts(kinematics: Kinematics, data: pin.Data, segment: Segment, shape: Shap
     points = {point.name: point for point in kinematics.points}
     place = dict(zip(kinematics.names, kinematics.positions(kinematics.neutral[None])[0], strict=True))
     ends = [
-        int(model.frames[frames[points[name].sites[0].frame]].parentJoint) for name in (segment.start, segment.end)
+        int(model.frames[frames[points[name].sites[0].frame]].parentJoint)
+        for name in (segment.start, segment.end)
     ]
     up, down = (_ancestors(model, joint) for joint in ends)
     common = next(joint for joint in up if joint in down)

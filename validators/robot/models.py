@@ -15,15 +15,19 @@ from posekit.robot import Robot
 from posekit.robot.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robot.kinematics import Kinematics
 from posekit.robot.pairs import set_pairs
-from posekit.robot.scaling import scaled
+from posekit.robot.scaling import model_lengths, scaled
 from posekit.validators.robot.balance import Balance
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.feet import find_soles
 from posekit.validators.robot.fitting import Fitter
 from posekit.validators.robot.made_up import fitted_capsules
 from posekit.validators.robot.ranges import load_joint_limits
+from posekit.validators.robot.rigid_parts import rigid_segments
 from posekit.validators.robot.settings import BODIES_FROM, RobotSettings
 from posekit.validators.robot.subject import Subject
+
+SAME_LENGTH: Final = 1e-3
+"""Metres within which a length is the model's own."""
 
 PAIRS_FROM: Final = {
     "visual": "all but neighbours and what touches in the neutral posture",
@@ -54,7 +58,9 @@ class Judged:
         """What makes configurations of postures."""
         if self.kinematics is None:
             raise InputError("the robot has no joint map; give one to judge postures")
-        return Fitter(kinematics=self.kinematics, subject=self.subject, tolerance=self.settings.rigid_tolerance)
+        return Fitter(
+            kinematics=self.kinematics, subject=self.subject, tolerance=self.settings.rigid_tolerance
+        )
 
     @cached_property
     def collision(self) -> SelfCollision:
@@ -121,6 +127,15 @@ class Models:
             self._kept.clear()
             self._kept[key] = self._scaled(lengths, behind)
         return self._kept[key]
+
+    def has_lengths(self, lengths: Mapping[str, float]) -> bool:
+        """Tell whether lengths are the model's own, as far as no configuration changes them."""
+        own, rigid = model_lengths(self.kinematics), self._rigid_segments
+        return all(abs(lengths.get(name, own[name]) - own[name]) < SAME_LENGTH for name in rigid)
+
+    @cached_property
+    def _rigid_segments(self) -> tuple[str, ...]:
+        return rigid_segments(self.kinematics)
 
     @cached_property
     def mapped(self) -> Judged:

@@ -51,7 +51,9 @@ def _read(name: str, model: pin.Model) -> dict[str, tuple[float, float]]:
     if not name or not exists:
         extra = " (table1 is for the stick figure)" if name == "table1" else ""
         raise InputError(
-            one_line(f"--ranges {cut(name)}: no such table or file{extra}; expected urdf or the path of a TOML file")
+            one_line(
+                f"--ranges {cut(name)}: no such table or file{extra}; expected urdf or the path of a TOML file"
+            )
         )
     table = read_toml(name, limit=MAX_BYTES)
     if table.get("schema") != SCHEMA:
@@ -72,7 +74,9 @@ def _read(name: str, model: pin.Model) -> dict[str, tuple[float, float]]:
 def _range(source: str, joint: str, bounds: object, known: Sequence[str]) -> tuple[float, float]:
     field = f"limits.{joint}"
     if joint not in known:
-        raise refusal(source, field, "a joint that the robot has not", "one with limits", nearest(joint, known)[:200])
+        raise refusal(
+            source, field, "a joint that the robot has not", "one with limits", nearest(joint, known)[:200]
+        )
     numbers = [
         float(bound)
         for bound in (bounds if isinstance(bounds, list) else [])

@@ -20,7 +20,8 @@ def rigid_pairs(kinematics: Kinematics) -> NDArray[np.intp]:
     points = kinematics.positions(kinematics.generic)
     pairs = np.array(list(combinations(range(points.shape[1]), 2)), dtype=np.intp).reshape(-1, 2)
     distance = np.linalg.norm(points[:, pairs[:, 0]] - points[:, pairs[:, 1]], axis=2)
-    return pairs[np.ptp(distance, axis=0) < RIGID]
+    rigid: NDArray[np.intp] = pairs[np.ptp(distance, axis=0) < RIGID]
+    return rigid
 
 
 def judge_reach(kinematics: Kinematics, targets: Array, residual: Array, *, tolerance: float) -> Judgement:

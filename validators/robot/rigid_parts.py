@@ -6,9 +6,16 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.robot.kinematics import Kinematics
-from posekit.skeleton import JOINT, SEGMENTS, segment_name
+from posekit.skeleton import SEGMENT_NAMES
 from posekit.validators.robot.reach import rigid_pairs
 from posekit.validators.suite import Judgement
+
+
+def rigid_segments(kinematics: Kinematics) -> tuple[str, ...]:
+    """List the skeleton's segments whose length is the same in every configuration of a model."""
+    names = kinematics.names
+    rigid = {frozenset((names[a], names[b])) for a, b in rigid_pairs(kinematics)}
+    return tuple(name for name in SEGMENT_NAMES if frozenset(name.split("-")) in rigid)
 
 
 def judge_rigid_parts(kinematics: Kinematics, targets: Array, *, tolerance: float) -> Judgement:
@@ -25,15 +32,10 @@ def judge_rigid_parts(kinematics: Kinematics, targets: Array, *, tolerance: floa
     tolerance : float
         Metres by which a distance may be off.
     """
-    names = kinematics.names
-    segments = {frozenset(segment) for segment in SEGMENTS}
-    pairs = [
-        (int(a), int(b))
-        for a, b in rigid_pairs(kinematics)
-        if frozenset((JOINT.get(names[a], -1), JOINT.get(names[b], -2))) in segments
-    ]
+    names = rigid_segments(kinematics)
+    column = {name: k for k, name in enumerate(kinematics.names)}
+    a, b = ([column[name.split("-")[end]] for name in names] for end in (0, 1))
     own = kinematics.positions(kinematics.neutral[None])[0]
-    a, b = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
     value = np.linalg.norm(targets[:, a] - targets[:, b], axis=2)
     length = np.linalg.norm(own[a] - own[b], axis=1)
     lower = np.broadcast_to(length - tolerance, value.shape)
@@ -41,8 +43,8 @@ def judge_rigid_parts(kinematics: Kinematics, targets: Array, *, tolerance: floa
     margin = np.minimum(value - lower, upper - value)
     return Judgement(
         check="rigid_parts",
-        where=tuple(segment_name((JOINT[names[i]], JOINT[names[j]])) for i, j in pairs),
-        unit=("m",) * len(pairs),
+        where=names,
+        unit=("m",) * len(names),
         value=value,
         lower=lower,
         upper=upper,

@@ -29,6 +29,9 @@ CLEAR: Final = 0.5
 CLEAR_A_METRE: Final = 100.0
 """Degrees more for each metre of misfit: a centimetre turns a segment of 57 cm by one."""
 
+CLEAR_COST: Final = 1e-3
+"""Metres by which limits must keep a posture off to be called violated: the search may miss by less."""
+
 Bools = NDArray[np.bool_]
 
 
@@ -140,11 +143,10 @@ class RobotValidator:
     def _model_for(self, postures: Array, lengths: Mapping[str, float] | None, behind: bool | None) -> Judged:
         if self.settings.lengths == "model":
             return self.models.mapped
-        if lengths is None:
-            lengths = segment_lengths(postures)
-        if behind is None:
-            behind = shoulders_are_behind(postures)
-        return self.models.with_lengths(lengths, behind)
+        lengths = segment_lengths(postures) if lengths is None else lengths
+        if self.models.has_lengths(lengths):
+            return self.models.mapped
+        return self.models.with_lengths(lengths, shoulders_are_behind(postures) if behind is None else behind)
 
 
 def _of_configurations(judged: Judged, q: Array) -> list[Judgement]:
@@ -173,7 +175,11 @@ def _of_fits(judged: Judged, fit: Fit, *, seen: Bools, complete: Bools) -> list[
                 tolerance=settings.angle_tolerance,
                 seen=seen,
                 undecided=far,
-                slack=np.where(fit.suffers, CLEAR + CLEAR_A_METRE * misfit, 0.0),
+                slack=np.where(
+                    fit.kept_off > CLEAR_COST,
+                    CLEAR + CLEAR_A_METRE * misfit,
+                    np.where(fit.suffers, np.inf, 0.0),
+                ),
             )
         )
     if "collision" in settings.checks:

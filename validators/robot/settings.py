@@ -71,7 +71,10 @@ class RobotSettings:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "checks", check_robot_names(self.checks))
-        for what, value in (("rigid tolerance", self.rigid_tolerance), ("angle tolerance", self.angle_tolerance)):
+        for what, value in (
+            ("rigid tolerance", self.rigid_tolerance),
+            ("angle tolerance", self.angle_tolerance),
+        ):
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
         if not math.isfinite(self.contact_margin):
