@@ -9,12 +9,12 @@ from posekit.validators.joint_range import joint_range as joint_range
 from posekit.validators.ranges import Ranges as Ranges
 from posekit.validators.ranges import load_ranges as load_ranges
 from posekit.validators.rigid_parts import rigid_parts as rigid_parts
+from posekit.validators.robot.report import Report as Report
 from posekit.validators.suite import CHECKS as CHECKS
 from posekit.validators.suite import PHYSICAL as PHYSICAL
 from posekit.validators.suite import Judgement as Judgement
 from posekit.validators.suite import check_names as check_names
 from posekit.validators.suite import judge as judge
 from posekit.validators.suite import make_checks as make_checks
-from posekit.validators.validator import Report as Report
 from posekit.validators.validator import Validator as Validator
 from posekit.validators.walking import walking as walking

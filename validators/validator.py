@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.cameras import Array
-from posekit.errors import FigureError, InputError
-from posekit.figure import Figure, load_figure, with_head
+from posekit.errors import InputError
+from posekit.figure import Figure, with_head
+from posekit.robot import Robot
+from posekit.robot.joint_map import JointMap
+from posekit.robot.scaling import segment_lengths
 from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.tree import Check
 from posekit.validators.joint_range import TOLERANCE
 from posekit.validators.ranges import load_ranges
-from posekit.validators.suite import PHYSICAL, Judgement, check_names, judge, make_checks
+from posekit.validators.robot.figure import FigureConfigurations
+from posekit.validators.robot.load import STICK_FIGURE, load_subject
+from posekit.validators.robot.report import Report
+from posekit.validators.robot.robot_validator import RobotValidator, Verdict
+from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, Bodies, Lengths, RobotSettings
+from posekit.validators.suite import PHYSICAL, check_names, judge, make_checks
 from posekit.validators.walking import DEFAULT_RULES
 
-BUILT_IN = ("human", "stick_figure")
 RIGID_TOLERANCE = 0.03
 """Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
 
@@ -26,129 +35,145 @@ FARTHEST = 1e9
 """Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Report:
-    """Verdicts on N postures, with the findings behind them.
-
-    Parameters
-    ----------
-    judgements : list of Judgement
-        By validator.
-    complete : bool array (N,)
-        Whether all 14 joints are known.
-    q : array (N, nq)
-        The configuration of each posture.
-    fk_distance : array (N,)
-        Distance between the posture and its configuration, metres: the largest over the joints.
-    """
-
-    judgements: list[Judgement]
-    complete: NDArray[np.bool_]
-    q: Array
-    fk_distance: Array
-
-    @property
-    def invalid(self) -> NDArray[np.bool_]:
-        """Postures that some check rejects (N,)."""
-        invalid = np.zeros(len(self.complete), dtype=bool)
-        for judgement in self.judgements:
-            invalid |= judgement.violated.any(axis=1)
-        return invalid
-
-    @property
-    def valid(self) -> NDArray[np.bool_]:
-        """Postures with all joints that no check rejects, and on which every check decided something (N,)."""
-        return self._decided & ~self.invalid
-
-    @property
-    def undecided(self) -> NDArray[np.bool_]:
-        """Postures that nothing rejects, but with unknown joints, or that some check could not judge at all (N,)."""
-        return ~self._decided & ~self.invalid
-
-    @property
-    def _decided(self) -> NDArray[np.bool_]:
-        decided = self.complete.copy()
-        for judgement in self.judgements:
-            decided &= ~np.isnan(judgement.worst)
-        return decided
-
-    @property
-    def verdicts(self) -> list[str]:
-        """``valid``, ``invalid`` or ``undecided``, a posture each."""
-        return [
-            "invalid" if bad else "valid" if good else "undecided"
-            for bad, good in zip(self.invalid, self.valid, strict=True)
-        ]
-
-
 class Validator:
-    """Judges postures against a human figure.
+    """Judges postures against a human figure, or any robot.
 
     Parameters
     ----------
-    urdf : str or Figure
-        ``"human"`` (or ``"stick_figure"``), the built-in figure; the path of a figure's URDF; or a figure.
-    checks : sequence of str
-        Some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``.
+    urdf : str, path, Figure or Robot, optional
+        ``"stick_figure"`` (the default), the built-in figure; the path of a figure's URDF; or a figure: these are
+        judged in closed form. Or the name of a robot of example-robot-data (``"human"``, ``"g1"``, …), the path of its
+        URDF, or a `posekit.robot.Robot`: these are judged by inverse kinematics (docs, "Validate").
+    checks : sequence of str, optional
+        Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
+        otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
+        first four.
     ranges : str
-        ``urdf``, ``table1`` or the path of a TOML table.
+        ``urdf``, ``table1`` (figures alone) or the path of a TOML table.
     rules : sequence of int
         Rules of walking.
     rigid_tolerance : float
-        Metres by which distances inside torso and hips, and the lengths of the limbs, may be off.
+        Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off.
     angle_tolerance : float
-        Degrees by which the direction of a segment may be off.
+        Degrees by which the direction of a segment may be off, or a robot's joint outside its limits.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration.
+    lengths : {"model", "median", "each"}, optional
+        Whose segment lengths the model has: its own (figures unless told otherwise), the medians of the postures
+        (robots unless told otherwise), or each posture's own (robots alone, slow).
+    joint_map : str or JointMap, optional
+        Which frames of a robot stand for the joints; found by their names where not given.
+    bodies : {"auto", "urdf", "visual", "capsules"}
+        What collides, of a robot: its collision bodies, its visual bodies, or capsules that are made up; ``auto``
+        makes them up where no two collision bodies can touch.
+    srdf, package_dirs, untrusted
+        See `posekit.robot.load_robot`.
+    up : array (3,)
+        Against gravity, in the frame of the postures: for ``balance``.
 
     Examples
     --------
     >>> import numpy as np, posekit
     >>> standing = posekit.load_figure().neutral_points[:14]
+    >>> posekit.Validator().check(standing[None]).verdicts
+    ['valid']
     >>> posekit.Validator("human").check(standing[None]).verdicts
     ['valid']
     """
 
     def __init__(
         self,
-        urdf: str | Figure = "human",
+        urdf: str | Path | Figure | Robot | None = None,
         *,
-        checks: Sequence[str] = PHYSICAL,
+        checks: Sequence[str] | None = None,
         ranges: str = "urdf",
         rules: Sequence[int] = DEFAULT_RULES,
         rigid_tolerance: float = RIGID_TOLERANCE,
         angle_tolerance: float = TOLERANCE,
         contact_margin: float = 0.0,
+        lengths: Lengths | None = None,
+        joint_map: str | JointMap | None = None,
+        bodies: Bodies = "auto",
+        srdf: str | Path | None = None,
+        package_dirs: Sequence[str | Path] = (),
+        untrusted: bool | None = None,
+        up: ArrayLike = (0.0, 0.0, 1.0),
     ) -> None:
-        if isinstance(urdf, Figure):
-            self.figure = urdf
-        else:
-            if urdf not in BUILT_IN and not Path(urdf).is_file():
-                raise FigureError(
-                    f"--urdf {urdf}: no such file; expected a figure's URDF, or {BUILT_IN[0]} (built in)"
+        subject = load_subject(
+            STICK_FIGURE if urdf is None else urdf,
+            srdf=srdf,
+            package_dirs=package_dirs,
+            untrusted=untrusted,
+            visuals=bodies == "visual",
+        )
+        self.robot = subject if isinstance(subject, Robot) else None
+        self._figure = subject if isinstance(subject, Figure) else None
+        if isinstance(subject, Robot):
+            settings = RobotSettings(
+                checks=tuple(ROBOT_DEFAULT if checks is None else checks),
+                ranges=ranges,
+                joint_map=joint_map,
+                lengths=lengths or "median",
+                bodies=bodies,
+                rigid_tolerance=rigid_tolerance,
+                angle_tolerance=angle_tolerance,
+                contact_margin=contact_margin,
+                up=up,
+            )
+            self.checks, self.lengths = settings.checks, settings.lengths
+            self._robot = RobotValidator(robot=subject, settings=settings)
+            _ = self._robot.models.limits
+            return
+        self.lengths = lengths or "model"
+        for option, given, known in (
+            ("--lengths", self.lengths, LENGTHS[:2]),
+            ("--bodies", bodies, ("auto", "urdf")),
+            ("--joint-map", joint_map, (None,)),
+        ):
+            if given not in known:
+                raise InputError(
+                    f"{option} {given}: the stick figure has its own; expected a robot, as --urdf human"
                 )
-            self.figure = load_figure(None if urdf in BUILT_IN else urdf)
-        self.checks = check_names(checks)
+        self.checks = check_names(PHYSICAL if checks is None else checks)
         if not self.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
-        self._suite = make_checks(
-            self.figure,
-            self.checks,
-            ranges=load_ranges(ranges),
-            rigid_tolerance=rigid_tolerance,
-            rigid_mode="distances",
-            angle_tolerance=angle_tolerance,
-            limbs=True,
-            rules=rules,
-            contact_margin=contact_margin,
-            exact=True,
-        )
+        self._options: dict[str, Any] = {
+            "ranges": load_ranges(ranges),
+            "rigid_tolerance": rigid_tolerance,
+            "angle_tolerance": angle_tolerance,
+            "rules": rules,
+            "contact_margin": contact_margin,
+        }
+        self._suite = self._make_suite(subject)
 
-    def check(self, postures: ArrayLike, head: ArrayLike | None = None) -> Report:
-        """Judge postures.
+    @property
+    def figure(self) -> Figure:
+        """The stick figure that is judged by.
 
-        Rigid parts, collision, walking and projected ranges judge the posture as it is given; the URDF's
-        ranges judge the configuration made from it, and `Report.fk_distance` says how far the two are apart.
+        Raises
+        ------
+        InputError
+            Where it is a robot.
+        """
+        if self._figure is None:
+            raise InputError("the validator judges a robot; expected a stick figure; ask for .robot")
+        return self._figure
+
+    def check(
+        self,
+        postures: ArrayLike | None = None,
+        head: ArrayLike | None = None,
+        *,
+        q: ArrayLike | None = None,
+        sequence: ArrayLike | None = None,
+        lengths: Mapping[str, float] | None = None,
+        behind: bool | None = None,
+    ) -> Report:
+        """Judge postures, given by their joints or as configurations.
+
+        Of the stick figure rigid parts, collision, walking and projected ranges judge the posture as it is given; the
+        URDF's ranges judge the configuration made from it, and `Report.fk_distance` says how far the two are apart.
+        Of a robot all but rigid parts judge the configuration that comes nearest.
 
         Parameters
         ----------
@@ -156,6 +181,14 @@ class Validator:
             Joints in tree order, metres, any right-handed frame; NaN where unknown.
         head : array (N, 5, 3), optional
             Nose, eyes and ears; without them the neck is undecided and no arm collides with the head.
+        q : array (N, nq), optional
+            Configurations in Pinocchio's order, instead of postures; they are taken as they are.
+        sequence : int array (N,), optional
+            Which sequence in time each posture belongs to: a robot's fit then starts from the one before.
+        lengths : mapping, optional
+            Segment lengths in place of the postures' medians, metres: those of a whole file that is judged in parts.
+        behind : bool, optional
+            Likewise, whether the shoulders lie behind the line from neck to pelvis.
 
         Returns
         -------
@@ -164,22 +197,100 @@ class Validator:
         Raises
         ------
         InputError
-            Where a shape is wrong or a coordinate is no number, infinite or absurd.
+            Where a shape is wrong, a coordinate is no number, infinite or absurd, or q is no configuration.
         """
+        if (postures is None) == (q is None):
+            raise InputError("give either postures or q; expected one of the two")
+        if q is not None:
+            return self._check_configurations(q)
         joints = _points("postures", postures, len(JOINTS))
         points = with_head(joints)
         if head is not None:
             points[:, len(JOINTS) :] = _points("head", head, len(HEAD_POINTS), len(joints))
-        q, distance = self.figure.configurations(points)
+        if self._figure is None:
+            which = None if sequence is None else _sequence(sequence, len(joints))
+            return _report(self._robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
+        figure, suite = self._figure, self._suite
+        if self.lengths == "median" and len(joints):
+            figure = figure.scaled(lengths or segment_lengths(joints))
+            suite = self._make_suite(figure)
+        configurations, distance = figure.configurations(points)
         return Report(
-            judgements=judge(self._suite, points),
+            judgements=judge(suite, points),
             complete=np.asarray(np.isfinite(joints).all(axis=(1, 2))),
-            q=q,
+            q=configurations,
             fk_distance=distance,
         )
 
+    def describe(self) -> dict[str, Any]:
+        """List what decides the verdicts besides the options, as reports have it."""
+        if self._figure is None:
+            return self._robot.models.describe()
+        return {"figure": self._figure.hash, "checks": list(self.checks)}
 
-def _points(name: str, given: ArrayLike, count: int, postures: int | None = None) -> Array:
+    @property
+    def configuration_names(self) -> tuple[str, ...]:
+        """A name for each entry of q, in the order in which `check` takes it."""
+        return self.robot.configuration_names if self.robot is not None else self.figure.configuration_names
+
+    def _check_configurations(self, q: ArrayLike) -> Report:
+        if self._figure is None:
+            return _report(self._robot.judge_configurations(q))
+        checked, judgements = self._configurations.judge(q)
+        return Report(
+            judgements=judgements,
+            complete=np.ones(len(checked), dtype=np.bool_),
+            q=checked,
+            fk_distance=np.zeros(len(checked)),
+            colliders=(self._configurations.collision,) if "collision" in self.checks else (),
+        )
+
+    @cached_property
+    def _configurations(self) -> FigureConfigurations:
+        options = self._options
+        return FigureConfigurations(
+            figure=self.figure,
+            checks=self.checks,
+            ranges=options["ranges"],
+            suite=self._suite,
+            angle_tolerance=options["angle_tolerance"],
+            contact_margin=options["contact_margin"],
+        )
+
+    def _make_suite(self, figure: Figure) -> list[Check]:
+        return make_checks(
+            figure, self.checks, rigid_mode="distances", limbs=True, exact=True, **self._options
+        )
+
+
+def _report(verdict: Verdict) -> Report:
+    residual = verdict.residual
+    return Report(
+        judgements=verdict.judgements,
+        complete=verdict.complete,
+        q=verdict.q,
+        fk_distance=_largest(residual) if verdict.points else np.zeros(len(verdict.q)),
+        points=verdict.points,
+        residual=residual,
+        colliders=tuple(model.collision for model in verdict.models)
+        if "collision" in verdict.models[0].settings.checks
+        else (),
+    )
+
+
+def _largest(residual: Array) -> Array:
+    """Return the largest known distance (N,); NaN where none is known."""
+    return np.asarray(np.fmax.reduce(residual, axis=1))
+
+
+def _sequence(given: ArrayLike, count: int) -> NDArray[np.intp]:
+    which = np.asarray(given)
+    if which.shape != (count,) or which.dtype.kind not in "iu":
+        raise InputError(f"sequence: {which.dtype} of shape {which.shape}; expected whole numbers ({count},)")
+    return which.astype(np.intp)
+
+
+def _points(name: str, given: ArrayLike | None, count: int, postures: int | None = None) -> Array:
     """Make an array (N, count, 3) of what was given, or refuse it."""
     expected = f"({'N' if postures is None else postures}, {count}, 3)"
     try:

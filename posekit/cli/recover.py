@@ -119,7 +119,13 @@ def recover(
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
     from posekit import files, pipeline, validators
 
-    distinct(view, output, write_urdf)
+    distinct(view, output, write_urdf, nearer)
+    if linkage:
+        for name, given in (("--write-urdf", write_urdf), ("--group", group), ("--explain", explain)):
+            if given:
+                raise InputError(f"{name} is for persons; leave it out with --linkage")
+        _recover_object(view, output, linkage, scale, nearer, rigid_tolerance, tangent_tolerance)
+        return
     files.check_result_path(output)
     if write_urdf is not None and write_urdf.suffix.lower() != ".urdf":
         raise InputError(
@@ -155,6 +161,37 @@ def recover(
             "a noisy head a given root",
             err=True,
         )
+    typer.echo(f"written: {output}")
+
+
+def _recover_object(
+    view: Path, output: Path, linkage: str, scale: str, nearer: Path | None, rigid: str, tangent: str
+) -> None:
+    """Recover another articulated object than a person."""
+    from posekit import files, pipeline
+    from posekit.pipeline import objects
+
+    files.check_object_path(output)
+    thing = objects.load_object(linkage)
+    seen = files.read_object_view(view, thing.linkage)
+    tolerance = objects.tolerance_of(
+        thing,
+        rigid=files.parse_length(rigid, name="--rigid-tolerance") if rigid else None,
+        tangent=files.parse_length(tangent, name="--tangent-tolerance") if tangent else None,
+    )
+    per_unit = 1.0 if seen.unit is None else files.PER_METRE[seen.unit]
+    with progress("recovering", len(seen)) as done, about(view):
+        result = objects.recover_object(
+            seen,
+            thing,
+            scale=pipeline.parse_scale(scale, per_unit=per_unit) if scale else None,
+            nearer=None if nearer is None else files.read_nearer(nearer),
+            tolerance=tolerance,
+            progress=done,
+        )
+    files.write_object(output, result)
+    for line in objects.object_lines(result):
+        typer.echo(line)
     typer.echo(f"written: {output}")
 
 

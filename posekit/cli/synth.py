@@ -134,14 +134,44 @@ def mocap(
     _write(output, scene, noise, seed, uncalibrated=uncalibrated)
 
 
+@app.command(
+    "object",
+    epilog=examples("posekit synth object panda -o panda.json --frames 3 --seed 1"),
+)
+def articulated(
+    robot: Annotated[
+        str, typer.Argument(metavar="NAME|URDF", help="A robot: panda, ur5, allegro, or a URDF.")
+    ],
+    output: OutputView,
+    frames: Frames = 1,
+    noise: Noise = 0.0,
+    seed: Seed = 0,
+) -> None:
+    """Draw a robot within its limits, seen from anywhere by a camera of which nothing is known."""
+    import numpy as np
+
+    from posekit import files
+    from posekit.pipeline import objects
+
+    _check_name(output)
+    thing = objects.load_object(robot)
+    view = objects.draw_view(thing, frames, np.random.default_rng(seed), noise=noise, scale_known=False)
+    files.write_object_view(output, view)
+    typer.echo(f"written: {output} ({frames} frames of {', '.join(thing.linkage.points)})")
+
+
+def _check_name(output: Path) -> None:
+    if output.suffix.lower() != ".json":
+        raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
+
+
 def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated: bool = False) -> None:
     """Add noise, write the view, say so."""
     import numpy as np
 
     from posekit import files, pipeline
 
-    if output.suffix.lower() != ".json":
-        raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
+    _check_name(output)
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
     view = pipeline.view_of(scene)

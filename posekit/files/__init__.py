@@ -7,6 +7,14 @@ from posekit.files.camera_model import ScaledOrthographicModel as ScaledOrthogra
 from posekit.files.family import Family as Family
 from posekit.files.inferred import Inferred as Inferred
 from posekit.files.nearer import read_nearer as read_nearer
+from posekit.files.object_result import ObjectFrame as ObjectFrame
+from posekit.files.object_result import ObjectResult as ObjectResult
+from posekit.files.object_result import check_object_path as check_object_path
+from posekit.files.object_result import read_object as read_object
+from posekit.files.object_result import write_object as write_object
+from posekit.files.object_view import ObjectView as ObjectView
+from posekit.files.object_view import read_object_view as read_object_view
+from posekit.files.object_view import write_object_view as write_object_view
 from posekit.files.postures import Postures as Postures
 from posekit.files.postures import read_postures as read_postures
 from posekit.files.postures import write_postures as write_postures

@@ -5,23 +5,29 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.files.npz import suffix
 from posekit.files.reading import read_json
-from posekit.files.report_schema import SCHEMA, ReportFile, Verdict
+from posekit.files.report_columns import CheckCount, Columns, Place, joined
+from posekit.files.report_csv import csv_lines
+from posekit.files.report_schema import SCHEMA, VERDICTS, CheckFields, PostureFields, ReportFile, Verdict
+from posekit.files.report_table import markdown_lines
 from posekit.files.validation import validated
-from posekit.files.writing import check_target, json_pieces, write_text
+from posekit.files.writing import check_target, json_pieces, write_lines, write_text
 from posekit.intake.refusal import refusal, shown
 from posekit.tree.check import Findings
 
 NUMBERS = ("value", "lower", "upper", "margin")
-VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+MOST_PLACES = 500
+"""Places of one check that the summary of a JSON file counts, the most frequent first."""
+
+SUFFIXES = (".json", ".md", ".csv")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +55,16 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Worst:
+    """The place with the least margin of a posture, and that margin in its unit."""
+
+    check: str
+    where: str
+    margin: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class PostureReport:
     """The verdict on one posture.
 
@@ -60,11 +76,20 @@ class PostureReport:
         Metres from the posture to the forward kinematics of its configuration.
     findings : sequence of Finding
         What is behind the verdict.
+    index : int, optional
+        Which posture of the file, from 0, where not all are listed.
+    worst : Worst, optional
+        The place with the least margin; a centimetre counts as one degree.
+    residual : mapping, optional
+        Metres that each joint of a robot's fit is off, None where it is unknown.
     """
 
     verdict: Verdict
     fk_distance: float | None
     findings: Sequence[Finding]
+    index: int | None = None
+    worst: Worst | None = None
+    residual: Mapping[str, float | None] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,15 +101,33 @@ class Report:
     settings : mapping
         Everything that decided the verdicts, of plain values.
     postures : sequence of PostureReport
-        In the file's order.
+        In the file's order; all of them, or those that are listed.
+    checks : mapping, optional
+        By check: postures that it rejects and leaves undecided, and violations by place.
+    listed : str, optional
+        Which postures are listed, where not all are.
+    verdicts : str, optional
+        The first letter of every posture's verdict, where not all are listed.
+    columns : Columns, optional
+        All verdicts and violations, for tables and CSV; not in the JSON file.
     """
 
     settings: Mapping[str, Any]
     postures: Sequence[PostureReport]
+    checks: Mapping[str, CheckCount] | None = field(default=None, compare=False)
+    listed: str | None = None
+    verdicts: str | None = None
+    columns: Columns | None = field(default=None, compare=False, repr=False)
+
+    def __len__(self) -> int:
+        """Count the postures that were judged."""
+        return len(self.postures) if self.verdicts is None else len(self.verdicts)
 
     @property
     def summary(self) -> dict[str, int]:
         """How many postures have each verdict."""
+        if self.verdicts is not None:
+            return {verdict: self.verdicts.count(verdict[0]) for verdict in VERDICTS}
         counts = Counter(posture.verdict for posture in self.postures)
         return {verdict: counts[verdict] for verdict in VERDICTS}
 
@@ -101,12 +144,15 @@ class Judged:
         Its places.
     findings : Findings
         Value (N, K), bounds and tolerance.
+    undecided : bool array (N, K), optional
+        Where nothing is said though there is a value.
     """
 
     check: str
     unit: str
     where: Sequence[str]
     findings: Findings
+    undecided: NDArray[np.bool_] | None = None
 
 
 def make_report(
@@ -163,25 +209,28 @@ def make_report(
 
 def check_report_path(path: str | Path) -> None:
     """Refuse a report's name before the work that it is for is done."""
-    suffix(path, ".json")
+    suffix(path, *SUFFIXES)
     check_target(path)
 
 
 def write_report(path: str | Path, report: Report) -> None:
-    """Write a report as ``.json``, whole or not at all.
+    """Write a report, whole or not at all: ``.json``, ``.md`` (tables) or ``.csv`` (one row a posture).
 
     Raises
     ------
     InputError
-        Where the name does not end in .json or the file cannot be written.
+        Where the name ends otherwise or the file cannot be written.
     """
-    suffix(path, ".json")
-    head = {"schema": SCHEMA, "settings": dict(report.settings), "summary": report.summary}
-    write_text(path, json_pieces(head, "postures", _fields(report)))
+    kind = suffix(path, *SUFFIXES)
+    if kind == ".json":
+        write_text(path, json_pieces(_head(report), "postures", _fields(report)))
+        return
+    columns = columns_of(report)
+    write_lines(path, csv_lines(columns) if kind == ".csv" else markdown_lines(columns, report.settings))
 
 
 def read_report(path: str | Path) -> Report:
-    """Read a report.
+    """Read a report's JSON.
 
     Raises
     ------
@@ -190,21 +239,91 @@ def read_report(path: str | Path) -> Report:
     """
     suffix(path, ".json")
     file = validated(ReportFile, read_json(path), path)
-    names = [field.name for field in fields(Finding)]
     return Report(
         settings=file.settings,
-        postures=tuple(
-            PostureReport(
-                verdict=posture.verdict,
-                fk_distance=posture.fk_distance,
-                findings=tuple(
-                    Finding(**{name: getattr(finding, name) for name in names})
-                    for finding in posture.findings
-                ),
-            )
-            for posture in file.postures
-        ),
+        postures=tuple(_posture(posture) for posture in file.postures),
+        checks=None if file.checks is None else {name: _count(check) for name, check in file.checks.items()},
+        listed=file.listed,
+        verdicts=file.verdicts,
     )
+
+
+def columns_of(report: Report) -> Columns:
+    """Return a report's columns; of one without, what its listed postures tell."""
+    if report.columns is not None:
+        return report.columns
+    places: dict[Place, int] = {}
+    violations: list[tuple[int, int, float]] = []
+    worst: list[tuple[int, float]] = []
+    undecided: Counter[str] = Counter()
+    for k, posture in enumerate(report.postures):
+        for finding in posture.findings:
+            place = places.setdefault(Place(finding.check, finding.where, finding.unit), len(places))
+            if finding.verdict == "invalid":
+                violations.append((k, place, math.nan if finding.margin is None else finding.margin))
+            undecided[finding.check] += finding.verdict == "undecided"
+        least = posture.worst
+        at = None if least is None else Place(least.check, least.where, least.unit)
+        worst.append(
+            (-1, math.nan)
+            if at is None or least is None
+            else (places.setdefault(at, len(places)), least.margin)
+        )
+    checks = list(dict.fromkeys(place.check for place in places))
+    part = Columns(
+        places=tuple(places),
+        verdict=np.array([VERDICTS.index(posture.verdict) for posture in report.postures], dtype=np.int8),
+        fk_distance=np.array(
+            [math.nan if posture.fk_distance is None else posture.fk_distance for posture in report.postures]
+        ),
+        worst_place=np.array([place for place, _ in worst], dtype=np.int32),
+        worst_margin=np.array([margin for _, margin in worst]),
+        posture=np.array([k for k, _, _ in violations], dtype=np.int64),
+        place=np.array([place for _, place, _ in violations], dtype=np.int32),
+        margin=np.array([margin for _, _, margin in violations]),
+        undecided=undecided,
+        checks=checks,
+    )
+    return joined([part], part.places, checks)
+
+
+def _head(report: Report) -> dict[str, Any]:
+    head: dict[str, Any] = {"schema": SCHEMA, "settings": dict(report.settings), "summary": report.summary}
+    if report.checks is not None:
+        head["checks"] = {
+            name: {
+                "rejected": count.rejected,
+                "undecided": count.undecided,
+                "places": dict(list(count.places.items())[:MOST_PLACES]),
+            }
+            for name, count in report.checks.items()
+        }
+    if report.listed is not None:
+        head["listed"] = report.listed
+    if report.verdicts is not None:
+        head["verdicts"] = report.verdicts
+    return head
+
+
+def _posture(posture: PostureFields) -> PostureReport:
+    names = [entry.name for entry in fields(Finding)]
+    worst = posture.worst
+    return PostureReport(
+        verdict=posture.verdict,
+        fk_distance=posture.fk_distance,
+        findings=tuple(
+            Finding(**{name: getattr(finding, name) for name in names}) for finding in posture.findings
+        ),
+        index=posture.index,
+        worst=None
+        if worst is None
+        else Worst(check=worst.check, where=worst.where, margin=worst.margin, unit=worst.unit),
+        residual=posture.residual,
+    )
+
+
+def _count(check: CheckFields) -> CheckCount:
+    return CheckCount(rejected=check.rejected, undecided=check.undecided, places=check.places, worst=None)
 
 
 def _list_findings(rows: list[list[Finding]], check: Judged, every: bool) -> None:
@@ -215,6 +334,8 @@ def _list_findings(rows: list[list[Finding]], check: Judged, every: bool) -> Non
         return
     lower, upper = np.broadcast_to(found.lower, value.shape), np.broadcast_to(found.upper, value.shape)
     margin, violated, undecided = found.margin, found.violated, found.undecided
+    if check.undecided is not None:
+        undecided = undecided | check.undecided
     listed = np.ones(value.shape, dtype=bool)
     if not every:
         worst = np.where(undecided, np.inf, margin).argmin(axis=1)
@@ -229,7 +350,7 @@ def _list_findings(rows: list[list[Finding]], check: Judged, every: bool) -> Non
                 value=_number(value[at]),
                 lower=_number(lower[at]),
                 upper=_number(upper[at]),
-                margin=_number(margin[at]),
+                margin=None if undecided[at] else _number(margin[at]),
                 unit=check.unit,
                 verdict="invalid" if violated[at] else "undecided" if undecided[at] else "valid",
             )
@@ -246,8 +367,10 @@ def _finding(finding: Finding) -> dict[str, Any]:
 
 def _fields(report: Report) -> Iterator[dict[str, Any]]:
     for posture in report.postures:
-        yield {
-            "verdict": posture.verdict,
-            "fk_distance": _number(posture.fk_distance),
-            "findings": [_finding(finding) for finding in posture.findings],
-        }
+        entry: dict[str, Any] = {} if posture.index is None else {"index": posture.index}
+        entry |= {"verdict": posture.verdict, "fk_distance": _number(posture.fk_distance)}
+        if posture.worst is not None:
+            entry["worst"] = vars(posture.worst)
+        if posture.residual is not None:
+            entry["residual"] = {name: _number(value) for name, value in posture.residual.items()}
+        yield entry | {"findings": [_finding(finding) for finding in posture.findings]}

@@ -6,7 +6,7 @@ import json
 from typing import Any, Final
 
 from posekit.files import nearer as nearer_schema
-from posekit.files import postures_schema, report_schema, result_schema, view_schema
+from posekit.files import object_result_schema, postures_schema, report_schema, result_schema, view_schema
 from posekit.files.validation import FileModel
 from posekit.intake.refusal import nearest, refusal, shown
 
@@ -16,6 +16,7 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
     postures_schema.SCHEMA: postures_schema.PosturesFile,
     report_schema.SCHEMA: report_schema.ReportFile,
     nearer_schema.SCHEMA: nearer_schema.NearerFile,
+    object_result_schema.SCHEMA: object_result_schema.ObjectFile,
 }
 SCHEMAS: Final = tuple(_MODELS)
 """The names of the schemas, each with its version: ``posekit.view/1``."""

@@ -41,6 +41,8 @@ class CameraFit:
         For each frame why its root is not known, or an empty text.
     families : list of Family, optional
         For each uncalibrated frame the scales that it can have; None where the reason says why.
+    closed : bool
+        Whether scales were fitted to close the rigid parts.
     """
 
     camera: PinholeCamera | ScaledOrthographicCamera
@@ -50,6 +52,7 @@ class CameraFit:
     pose: HeadPose | None
     reasons: list[str]
     families: list[Family | None] | None = None
+    closed: bool = False
 
     def cameras(self, part: NDArray[np.intp]) -> Camera:
         """Return the camera of some hypotheses."""

@@ -69,6 +69,7 @@ def fit_scale(view: View, body: Body, scale: Scale | None, tolerance: Tolerance 
         pose=None,
         reasons=reasons,
         families=families,
+        closed=scale is not None and scale.how == "constraints",
     )
 
 

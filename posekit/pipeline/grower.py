@@ -60,7 +60,7 @@ class Grower:
                 given=self.fit.head[chosen],
                 tolerance=tolerance.tangent,
             )
-        exact = is_exact(leaves, self.body)
+        exact = is_exact(leaves, self.body, fitted=self.fit.closed)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts()
@@ -100,25 +100,26 @@ class Grower:
         return {}
 
 
-def is_exact(leaves: Leaves, body: Body) -> NDArray[np.bool_]:
+def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.bool_]:
     """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
 
     Some distances are not used to lift anything: four inside torso and hips. That they come out right to 1e-8 m
     is no accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible
-    there is no evidence, and a branch that happens to reach its rays must not stand for the truth.
+    there is no evidence, and a branch that happens to reach its rays must not stand for the truth. Where the scale was
+    `fitted` to close them, one of them alone is no evidence either.
     """
     if not body.evidence:
         return np.zeros(leaves.n_frames, dtype=bool)
     fits = np.ones(len(leaves.code), dtype=bool)
-    seen = np.zeros(len(leaves.code), dtype=bool)
+    seen = np.zeros(len(leaves.code), dtype=np.int8)
     points = body.points(leaves)
     for segment, length in body.evidence:
         known_length = np.linalg.norm(points[:, segment[0]] - points[:, segment[1]], axis=-1)
         known = np.isfinite(known_length)
         fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
-        seen |= known
+        seen += known
     exact = np.zeros(leaves.n_frames, dtype=bool)
-    exact[leaves.frame[fits & seen]] = True
+    exact[leaves.frame[fits & (seen > int(fitted))]] = True
     empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
     for group in leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):

@@ -160,7 +160,13 @@ def _column(figure: Figure, dof: str) -> int:
     return int(figure.angle_index[DOFS.index(dof)])
 
 
-KINDS: Final = ("beyond a limit", "bent the wrong way", "arm through the trunk", "limb stretched", "trunk stretched")
+KINDS: Final = (
+    "beyond a limit",
+    "bent the wrong way",
+    "arm through the trunk",
+    "limb stretched",
+    "trunk stretched",
+)
 """Kinds of illegal postures."""
 
 BEYOND: Final = (10.0, 60.0)
@@ -283,14 +289,18 @@ def excess(q: Array, figure: Figure) -> dict[str, Array]:
         for angles in ways:
             past = np.mod(angles - lower, 2 * np.pi)  # from the lower limit, upward
             width = upper - lower
-            outside.append(np.where(past <= width, 0.0, np.minimum(past - width, 2 * np.pi - past)).max(axis=1))
+            outside.append(
+                np.where(past <= width, 0.0, np.minimum(past - width, 2 * np.pi - past)).max(axis=1)
+            )
         found[part] = np.degrees(np.min(outside, axis=0))
     return found
 
 
 PELVIS: Final = ("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
 LIMBS: Final = tuple(
-    (f"{side}_{joint}", f"{side}_{hinge}") for side in SIDES for joint, hinge in (("shoulder", "elbow"), ("hip", "knee"))
+    (f"{side}_{joint}", f"{side}_{hinge}")
+    for side in SIDES
+    for joint, hinge in (("shoulder", "elbow"), ("hip", "knee"))
 )
 
 
@@ -311,7 +321,9 @@ def _beyond(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
     up = hinge or rng.random() < 0.5
     limit = figure.limits.upper[k] if up else figure.limits.lower[k]
     q[_column(figure, dof)] = limit + np.radians(amount if up else -amount)
-    return (_place(figure, q), f"{dof} {'+' if up else '-'}{amount:.0f}") if _is_clear(figure, q, dof) else None
+    return (
+        (_place(figure, q), f"{dof} {'+' if up else '-'}{amount:.0f}") if _is_clear(figure, q, dof) else None
+    )
 
 
 def _wrong_way(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
@@ -365,7 +377,9 @@ def penetration(points: Array, one: Capsule, other: Capsule) -> Array:
 
 STRETCHED: Final[Mapping[str, Mapping[tuple[str, str], tuple[str, ...]]]] = {
     "limb": {
-        (f"{side}_{joints[k]}", f"{side}_{joints[k + 1]}"): tuple(f"{side}_{joint}" for joint in joints[k + 1 :])
+        (f"{side}_{joints[k]}", f"{side}_{joints[k + 1]}"): tuple(
+            f"{side}_{joint}" for joint in joints[k + 1 :]
+        )
         for side in SIDES
         for joints in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
         for k in (0, 1)
@@ -374,7 +388,10 @@ STRETCHED: Final[Mapping[str, Mapping[tuple[str, str], tuple[str, ...]]]] = {
         **{
             (start, f"{side}_{joints[0]}"): tuple(f"{side}_{joint}" for joint in joints)
             for side in SIDES
-            for start, joints in (("neck", ("shoulder", "elbow", "wrist")), ("pelvis", ("hip", "knee", "ankle")))
+            for start, joints in (
+                ("neck", ("shoulder", "elbow", "wrist")),
+                ("pelvis", ("hip", "knee", "ankle")),
+            )
         },
         ("neck", "pelvis"): (
             "pelvis",

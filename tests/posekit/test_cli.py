@@ -19,6 +19,8 @@ from posekit.figure import load_figure
 from posekit.files import (
     ScaledOrthographicModel,
     View,
+    read_object,
+    read_object_view,
     read_postures,
     read_report,
     read_result,
@@ -26,6 +28,7 @@ from posekit.files import (
     write_view,
 )
 from posekit.head import HeadPoints
+from posekit.pipeline.objects import load_object
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 
@@ -845,7 +848,9 @@ def test_an_uncalibrated_view_by_scale_and_flips(run: Run, tmp_path: Path) -> No
 
 
 def test_synthetic_photographs_have_no_camera_and_are_recovered(run: Run) -> None:
-    assert run("synth", "random", "-o", "photo.json", "--frames", "4", "--uncalibrated", "--seed", "3").code == 0
+    assert (
+        run("synth", "random", "-o", "photo.json", "--frames", "4", "--uncalibrated", "--seed", "3").code == 0
+    )
     view = read_view("photo.json")
     assert isinstance(view.camera, ScaledOrthographicModel)
     assert np.isfinite(view.truth).all()
@@ -853,3 +858,24 @@ def test_synthetic_photographs_have_no_camera_and_are_recovered(run: Run) -> Non
     done = run("recover", "photo.json", "-o", "photo.npz")
     assert done.code == 0, done.err
     assert "scale by min" in done.out
+
+
+def test_another_object_is_drawn_and_recovered(run: Run) -> None:
+    assert run("synth", "object", "panda", "-o", "panda.json", "--frames", "2", "--seed", "1").code == 0
+    done = run("recover", "panda.json", "-o", "found.json", "--linkage", "panda", "--scale", "closure")
+    assert done.code == 0, done.err
+    view = read_object_view("panda.json", load_object("panda").linkage)
+    found = read_object("found.json")
+    for frame, truth in zip(found.frames, view.truth, strict=True):
+        goal = truth - truth[:1] * [0, 0, 1]
+        assert np.linalg.norm(frame.points - goal, axis=-1).max(axis=1).min() < 1e-6
+    for arguments, words in (
+        (("--linkage", "pandda"), "pandda"),
+        (("--linkage", "panda", "--scale", "0.001"), "needs"),
+        (("--linkage", "panda", "--group", "5cm"), "--group is for persons"),
+    ):
+        failed = run("recover", "panda.json", "-o", "no.json", *arguments)
+        assert failed.code == 2
+        assert words in failed.err
+        assert failed.err.count("\n") == 1
+        assert not Path("no.json").exists()

@@ -9,7 +9,10 @@ import pytest
 from posekit.errors import InputError
 from posekit.files import (
     SCHEMAS,
+    Family,
     LeeChenModel,
+    ObjectFrame,
+    ObjectResult,
     OpenCVModel,
     Report,
     Result,
@@ -19,6 +22,7 @@ from posekit.files import (
     read_nearer,
     schema,
     schema_text,
+    write_object,
     write_postures,
     write_report,
     write_result,
@@ -59,6 +63,33 @@ def write_all(folder, rng) -> dict[str, list]:
     joints[0, 1] = np.nan
     write_postures(folder / "postures.json", joints)
     write_report(folder / "report.json", Report(settings={}, postures=[]))
+    rod = ObjectFrame(
+        time=0.0,
+        judged="exact",
+        levels=(("a", 1), ("b", 2)),
+        points=np.array([[[0, 0, 0], [0.3, 0, 0.4]]]),
+        branches=("1",),
+        flips=np.array([[1]], dtype=np.int8),
+        scales=np.array([800.0]),
+        margins={"closure": np.array([np.nan])},
+        q=np.empty((1, 0)),
+        fk_distance=np.array([np.nan]),
+        certified=(None,),
+        reasons=("",),
+        rejected={"closure/a-b": 1},
+        family=Family(how="min", bound=790.0, segment="a-b", chosen=np.array([800.0])),
+    )
+    thing = ObjectResult(
+        linkage="rod",
+        points=("a", "b"),
+        segments=(("a", "b"),),
+        lengths=np.array([0.5]),
+        unit="m",
+        configuration_names=(),
+        settings={},
+        frames=[rod],
+    )
+    write_object(folder / "object.json", thing)
     near = {"schema": "posekit.nearer/1", "frames": [{"neck-pelvis": "neck"}]}
     (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
     assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]
@@ -70,7 +101,9 @@ def write_all(folder, rng) -> dict[str, list]:
 
 
 def test_each_is_versioned_and_closed():
-    assert SCHEMAS == tuple(f"posekit.{kind}/1" for kind in ("view", "result", "postures", "report", "nearer"))
+    assert SCHEMAS == tuple(
+        f"posekit.{kind}/1" for kind in ("view", "result", "postures", "report", "nearer", "object")
+    )
     for name in SCHEMAS:
         found = schema(name)
         assert found["title"] == name

@@ -53,13 +53,22 @@ class SelfCollision:
         return self.subject.geometry
 
     @cached_property
-    def margins(self) -> Array:
-        """The security margin of each pair (P,), metres: less than the contact margin by what is rounding noise."""
+    def has_meshes(self) -> bool:
+        """Whether some pair has a mesh: distances take a thousand times as long then."""
+        return bool(self._with_mesh.any())
+
+    @cached_property
+    def _with_mesh(self) -> NDArray[np.bool_]:
         geometry = self._bodies
         meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in geometry.geometryObjects]
-        with_mesh = np.array(
+        return np.array(
             [meshes[pair.first] or meshes[pair.second] for pair in geometry.collisionPairs], dtype=np.bool_
         )
+
+    @cached_property
+    def margins(self) -> Array:
+        """The security margin of each pair (P,), metres: less than the contact margin by what is rounding noise."""
+        with_mesh = self._with_mesh
         if with_mesh.any() and self.contact_margin < 0:
             name = self.subject.pair_names[int(np.argmax(with_mesh))]
             raise InputError(

@@ -20,7 +20,8 @@ OF_POSITIONS: Final = ("reach", "rigid-parts")
 """Checks of what was seen: a configuration has nothing to compare."""
 
 Bodies = Literal["auto", "urdf", "visual", "capsules"]
-Lengths = Literal["median", "each", "model"]
+Lengths = Literal["model", "median", "each"]
+LENGTHS: Final[tuple[Lengths, ...]] = ("model", "median", "each")
 BODIES_FROM: Final[Mapping[str, str]] = {
     "urdf": "the URDF's collision bodies",
     "visual": "the URDF's visual bodies",
@@ -43,9 +44,9 @@ class RobotSettings:
         ``urdf``, or the path of a TOML table of the robot's own joints.
     joint_map : str or JointMap, optional
         The joint map, its name or its file; found by the frames' names where not given.
-    lengths : {"median", "each", "model"}
-        The model's segment lengths are the medians of the postures that are judged together, each posture's own,
-        or the model's.
+    lengths : {"model", "median", "each"}
+        The model has its own segment lengths, the medians of the postures that are judged together, or each
+        posture's own.
     bodies : {"auto", "urdf", "visual", "capsules"}
         What collides; ``auto`` takes the URDF's bodies if there are pairs of them, else capsules that are made up.
     rigid_tolerance, angle_tolerance, contact_margin : float
@@ -80,7 +81,7 @@ class RobotSettings:
         if not math.isfinite(self.contact_margin):
             raise InputError(f"the contact margin is {self.contact_margin!r} m; expected a finite length")
         options: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-            ("--lengths", self.lengths, ("median", "each", "model")),
+            ("--lengths", self.lengths, LENGTHS),
             ("--bodies", self.bodies, ("auto", *BODIES_FROM)),
         )
         for option, given, known in options:

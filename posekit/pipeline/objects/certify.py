@@ -21,6 +21,9 @@ MOST = 256
 """Postures of one frame whose configurations are looked for: some milliseconds each."""
 
 
+ROUGH = 1e-3
+"""Metres that the solver's own search must come near to; what it found is then refined."""
+
 UNDECIDED = 32
 """How many of those that are still undecided are tried once more."""
 
@@ -67,47 +70,52 @@ class Certifier:
 
     def certify(self, points: Array, *, tolerance: float) -> Certificate:
         """Find configurations that place points (N, P, 3), metres, NaN unknown, within a tolerance in metres."""
-        if tolerance not in self._solvers:
-            self._solvers[tolerance] = InverseKinematics(kinematics=self.kinematics, tolerance=tolerance)
+        rough = max(tolerance, ROUGH)
+        if rough not in self._solvers:
+            self._solvers[rough] = InverseKinematics(kinematics=self.kinematics, tolerance=rough)
         n, nq = len(points), self.robot.model.nq
         q, distance = np.full((n, nq), np.nan), np.full(n, np.nan)
         reasons = [f"undecided: configurations of the first {MOST} postures alone were looked for"] * n
         if n:
             with np.errstate(over="ignore"):  # the damping after a step that made things far worse
-                solution = self._solvers[tolerance].solve(points[:MOST])
+                solution = self._solvers[rough].solve(points[:MOST])
             q[:MOST] = solution.q
             distance[:MOST] = np.nanmax(solution.residual, axis=1)
-            self._try_again(points, q, distance, np.flatnonzero(distance > tolerance)[:UNDECIDED])
+            rows = np.flatnonzero(distance > tolerance)
+            if rows.size:
+                self._descend(points, q, distance, rows, q[rows][:, None])
+            rows = np.flatnonzero(distance > tolerance)[:UNDECIDED]
+            if rows.size:
+                self._descend(points, q, distance, rows, self._starts(points[rows]))
             reasons[:MOST] = [self._reason(solution, k) for k in range(len(solution.q))]
         certified = (distance <= tolerance).tolist()
         reasons = ["" if sure else reason for sure, reason in zip(certified, reasons, strict=True)]
         return Certificate(q, distance, certified, reasons)
 
-    def _try_again(self, points: Array, q: Array, distance: Array, rows: NDArray[np.intp]) -> None:
-        """Start some rows from random configurations that are like them; what does better is taken over, in place."""
-        if not rows.size:
-            return
-        n, nq = len(rows), q.shape[1]
-        starts = self._starts(points[rows]).reshape(n * AGAIN, nq)
-        goals = np.repeat(points[rows], AGAIN, axis=0)
+    def _descend(
+        self, points: Array, q: Array, distance: Array, rows: NDArray[np.intp], starts: Array
+    ) -> None:
+        """Descend on some rows from several starts (n, k, nq); what does better is taken over, in place."""
+        n, k, nq = starts.shape
+        goals = np.repeat(points[rows], k, axis=0)
         space = self.kinematics.space
+        found = starts.reshape(n * k, nq)
         for _ in range(2):  # the second time what the points do not determine is drawn to where it is
             problem = Problem(
                 targets=goals,
                 weights=np.ones(goals.shape[:2]),
                 lower=space.lower,
                 upper=space.upper,
-                reference=starts,
+                reference=found,
                 pull=PULL,
             )
-            starts = descend(self.kinematics, problem, starts).q
-        apart = np.linalg.norm(self.kinematics.positions(starts) - goals, axis=2)
-        worst = np.nanmax(apart, axis=1).reshape(n, AGAIN)
-        best = worst.argmin(axis=1)
-        closer = worst[np.arange(n), best] < distance[rows]
-        chosen = starts.reshape(n, AGAIN, nq)[np.arange(n), best]
-        q[rows[closer]] = chosen[closer]
-        distance[rows[closer]] = worst[np.arange(n), best][closer]
+            found = descend(self.kinematics, problem, found).q
+        apart = np.linalg.norm(self.kinematics.positions(found) - goals, axis=2)
+        worst = np.nanmax(apart, axis=1).reshape(n, k)
+        best = (np.arange(n), worst.argmin(axis=1))
+        closer = worst[best] < distance[rows]
+        q[rows[closer]] = found.reshape(n, k, nq)[best][closer]
+        distance[rows[closer]] = worst[best][closer]
 
     def _starts(self, points: Array) -> Array:
         """Find configurations (N, AGAIN, nq) whose points lie best on postures (N, P, 3), the base laid."""

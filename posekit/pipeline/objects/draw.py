@@ -1,4 +1,4 @@
-"""Random configurations of a robot within its limits."""
+"""Random configurations of a robot within its limits, and pictures of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,14 @@ import numpy as np
 import pinocchio as pin
 
 from posekit.cameras import Array
-from posekit.robot import Robot
+from posekit.errors import InputError
+from posekit.files import ObjectView, ScaledOrthographicModel
+from posekit.pipeline.objects.articulated import ArticulatedObject
+from posekit.robot import Kinematics, Robot, body_points
 from posekit.robot.configuration_space import ConfigurationSpace
+
+PIXELS = 500.0
+"""Pixels a metre in the pictures."""
 
 
 def draw_configurations(robot: Robot, count: int, rng: np.random.Generator) -> Array:
@@ -35,3 +41,45 @@ def draw_configurations(robot: Robot, count: int, rng: np.random.Generator) -> A
         turned = rng.standard_normal((count, 4))
         q[:, at + 3 : at + 7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
     return q
+
+
+def draw_view(
+    thing: ArticulatedObject,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    noise: float = 0.0,
+    scale_known: bool = True,
+) -> ObjectView:
+    """Draw configurations within a robot's limits, each seen from anywhere by a scaled orthographic camera.
+
+    Parameters
+    ----------
+    thing : ArticulatedObject
+        With a robot.
+    count : int
+    rng : numpy.random.Generator
+    noise : float
+        Standard deviation of the image points, pixels.
+    scale_known : bool
+        Whether the view says the scale.
+
+    Raises
+    ------
+    InputError
+        Where the object has no robot.
+    """
+    if thing.robot is None:
+        raise InputError(
+            f"linkage {thing.linkage.name} has no robot to draw configurations of; give one with urdf"
+        )
+    q = draw_configurations(thing.robot, count, rng)
+    truth = Kinematics(model=thing.robot.model, points=body_points(thing.linkage.points)).positions(q)
+    image = truth[..., :2] * PIXELS
+    return ObjectView(
+        points=thing.linkage.points,
+        camera=ScaledOrthographicModel(scale=PIXELS if scale_known else None),
+        time=np.arange(count, dtype=np.float64),
+        image=image + noise * rng.normal(size=image.shape) if noise else image,
+        truth=truth,
+    )

@@ -7,17 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.errors import InputError
-from posekit.files import ScaledOrthographicModel
-from posekit.files.object_view import ObjectView
 from posekit.pipeline.objects.articulated import ArticulatedObject
-from posekit.pipeline.objects.draw import draw_configurations
+from posekit.pipeline.objects.draw import draw_view
 from posekit.pipeline.objects.recover import recover_object
 from posekit.pipeline.scale import Scale
-from posekit.robot.kinematics import Kinematics, body_points
-
-PIXELS = 500.0
-"""Pixels a metre in the views."""
 
 FOUND = 1e-5
 """Metres, of the object's longest segment, within which a survivor is the truth."""
@@ -63,20 +56,8 @@ def study_object(
     InputError
         Where the object has no robot.
     """
-    if thing.robot is None:
-        raise InputError(
-            f"linkage {thing.linkage.name} has no robot to draw configurations of; give one with urdf"
-        )
-    q = draw_configurations(thing.robot, count, np.random.default_rng(seed))
-    kinematics = Kinematics(model=thing.robot.model, points=body_points(thing.linkage.points))
-    truth = kinematics.positions(q)
-    view = ObjectView(
-        points=thing.linkage.points,
-        camera=ScaledOrthographicModel(scale=PIXELS),
-        time=np.arange(count, dtype=np.float64),
-        image=truth[..., :2] * PIXELS,
-        truth=truth,
-    )
+    view = draw_view(thing, count, np.random.default_rng(seed))
+    truth = view.truth
     result = recover_object(view, thing, scale=scale)
     depth = truth[:, :1] * np.array([0.0, 0.0, 1.0])
     near = FOUND * float(thing.working.lengths.max())

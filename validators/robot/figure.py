@@ -1,0 +1,104 @@
+"""Configurations of the stick figure, judged as those of any robot, under the names that its findings have."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.robot import check_configurations
+from posekit.skeleton import DOFS, urdf_joint_name
+from posekit.tree import Check
+from posekit.validators.ranges import Ranges
+from posekit.validators.robot.collision import SelfCollision
+from posekit.validators.robot.joint_range import judge_joint_range
+from posekit.validators.robot.subject import Subject
+from posekit.validators.suite import Judgement, judge
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FigureConfigurations:
+    """Judges configurations of a figure.
+
+    Parameters
+    ----------
+    figure : Figure
+    checks : sequence of str
+        Those of the stick figure. Rigid parts have nothing to say: the lengths are the figure's own.
+    ranges : Ranges
+        Projected ones judge the figure's joints at q.
+    suite : sequence of Check
+        The figure's checks of postures, for projected ranges and for walking.
+    angle_tolerance, contact_margin : float
+        Degrees; metres.
+    """
+
+    figure: Figure
+    checks: tuple[str, ...]
+    ranges: Ranges
+    suite: Sequence[Check]
+    angle_tolerance: float
+    contact_margin: float
+
+    def judge(self, q: ArrayLike, source: str = "q") -> tuple[Array, list[Judgement]]:
+        """Return the checked configurations (N, nq), and what is said about them.
+
+        Raises
+        ------
+        InputError
+            Where they are none of the figure's, or no check is left to judge them.
+        """
+        checked = check_configurations(self.figure.model, q, source)
+        if set(self.checks) == {"rigid-parts"}:
+            raise InputError(
+                "--checks: rigid-parts: a configuration's lengths are the figure's own, so nothing would be judged; "
+                "expected joint-range, collision or walking"
+            )
+        judgements: list[Judgement] = []
+        of_points = [check for check in self.suite if check.name == "walking" or self._projects(check)]
+        by_name = {}
+        if of_points:
+            points = self.figure.forward_kinematics(checked)
+            by_name = {judgement.check: judgement for judgement in judge(of_points, points)}
+        for name in self.checks:
+            if name == "collision":
+                judgements.append(self.collision.judge(checked))
+            elif name == "joint-range" and self.ranges.kind == "configuration":
+                judgements.append(self._joint_range(checked))
+            elif name.replace("-", "_") in by_name:
+                judgements.append(by_name[name.replace("-", "_")])
+        return checked, judgements
+
+    @cached_property
+    def subject(self) -> Subject:
+        """The figure's model, limits and bodies."""
+        figure = self.figure
+        if self.ranges.kind == "configuration" and self.ranges.limits:
+            limits = self.ranges.limits.items()
+            figure = figure.with_limits({dof: (np.radians(a), np.radians(b)) for dof, (a, b) in limits})
+        model = figure.model
+        return Subject(
+            model=model,
+            lower=np.where(model.lowerPositionLimit < -1e100, -np.inf, model.lowerPositionLimit),
+            upper=np.where(model.upperPositionLimit > 1e100, np.inf, model.upperPositionLimit),
+            geometry=figure.geometry,
+        )
+
+    @cached_property
+    def collision(self) -> SelfCollision:
+        """What judges collisions."""
+        return SelfCollision(subject=self.subject, contact_margin=self.contact_margin)
+
+    def _projects(self, check: Check) -> bool:
+        return check.name == "joint_range" and self.ranges.kind == "projected"
+
+    def _joint_range(self, q: Array) -> Judgement:
+        judgement = judge_joint_range(self.subject, q, tolerance=self.angle_tolerance)
+        dofs = {urdf_joint_name(dof): dof for dof in DOFS}
+        return replace(judgement, where=tuple(dofs[name] for name in judgement.where))

@@ -1,0 +1,122 @@
+"""What a validator returns: arrays over the postures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.validators.robot.collision import SelfCollision
+from posekit.validators.robot.contacts import Contacts
+from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE
+from posekit.validators.suite import Judgement
+
+VERDICTS = ("valid", "invalid", "undecided")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Report:
+    """Verdicts on N postures, with the findings behind them.
+
+    Parameters
+    ----------
+    judgements : list of Judgement
+        By validator.
+    complete : bool array (N,)
+        Whether all joints that the model has are known.
+    q : array (N, nq)
+        The configuration of each posture.
+    fk_distance : array (N,)
+        Distance between the posture and its configuration, metres: the largest over the joints.
+    points : tuple of str
+        The P points of a robot that were fitted to the posture's; none of a figure, or where q was given.
+    residual : array (N, P)
+        The distance of each from the posture's, metres; NaN where the posture's is unknown.
+    colliders : tuple of SelfCollision
+        Who knows which bodies touch: one for all postures, or one a posture.
+    """
+
+    judgements: list[Judgement]
+    complete: NDArray[np.bool_]
+    q: Array
+    fk_distance: Array
+    points: tuple[str, ...] = ()
+    residual: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    colliders: tuple[SelfCollision, ...] = ()
+
+    @cached_property
+    def invalid(self) -> NDArray[np.bool_]:
+        """Postures that some check rejects (N,)."""
+        invalid = np.zeros(len(self.complete), dtype=bool)
+        for judgement in self.judgements:
+            invalid |= judgement.violated.any(axis=1)
+        return invalid
+
+    @property
+    def valid(self) -> NDArray[np.bool_]:
+        """Postures with all joints that no check rejects, and on which every check decided something (N,)."""
+        return self._decided & ~self.invalid
+
+    @property
+    def undecided(self) -> NDArray[np.bool_]:
+        """Postures that nothing rejects, but with unknown joints, or that some check could not judge at all (N,)."""
+        return ~self._decided & ~self.invalid
+
+    @cached_property
+    def _decided(self) -> NDArray[np.bool_]:
+        decided = self.complete.copy()
+        for judgement in self.judgements:
+            decided &= ~np.isnan(judgement.worst)
+        return decided
+
+    @property
+    def verdicts(self) -> list[str]:
+        """``valid``, ``invalid`` or ``undecided``, a posture each."""
+        return [
+            "invalid" if bad else "valid" if good else "undecided"
+            for bad, good in zip(self.invalid, self.valid, strict=True)
+        ]
+
+    @cached_property
+    def worst(self) -> Array:
+        """The smallest margin of each posture over all checks (N,), degrees; a centimetre counts as one degree.
+
+        NaN where nothing was decided.
+        """
+        worst = np.full(len(self.complete), np.nan)
+        for judgement in self.judgements:
+            each = [1.0 if unit == "deg" else 1.0 / CENTIMETRES_A_DEGREE for unit in judgement.unit]
+            worst = np.fmin(worst, np.fmin.reduce(judgement.margin * each, axis=1, initial=np.nan))
+        return worst
+
+    def contacts(self, *, nearest: bool = False) -> Contacts:
+        """List the pairs of bodies that collide in each posture, with their distances.
+
+        Parameters
+        ----------
+        nearest : bool
+            List the nearest pair of postures without a collision too; with meshes that takes long.
+        """
+        hits = [judgement for judgement in self.judgements if judgement.check == "collision"]
+        if not self.colliders or not hits:
+            nothing = np.zeros(0, dtype=np.intp)
+            return Contacts(
+                posture=nothing, pair=nothing, distance=np.zeros(0), violated=nothing.astype(bool), names=()
+            )
+        asked = ~np.isnan(hits[0].value[:, 0]) if nearest else hits[0].violated[:, 0]
+        rows = np.flatnonzero(asked)
+        if len(self.colliders) == 1:
+            return self.colliders[0].contacts(self.q, rows, nearest=nearest)
+        parts = [
+            self.colliders[row].contacts(self.q, np.array([row]), nearest=nearest) for row in rows.tolist()
+        ]
+        return Contacts(
+            posture=np.concatenate([part.posture for part in parts] or [np.zeros(0, dtype=np.intp)]),
+            pair=np.concatenate([part.pair for part in parts] or [np.zeros(0, dtype=np.intp)]),
+            distance=np.concatenate([part.distance for part in parts] or [np.zeros(0)]),
+            violated=np.concatenate([part.violated for part in parts] or [np.zeros(0, dtype=bool)]),
+            names=self.colliders[0].subject.pair_names,
+        )
