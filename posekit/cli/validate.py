@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from posekit.cli.given import schema_of
 from posekit.cli.options import (
-    PHYSICAL,
     AngleTolerance,
-    Checks,
     ContactMargin,
-    RangesOption,
     Rules,
     about,
     distinct,
@@ -25,54 +23,167 @@ from posekit.cli.options import (
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
+    from posekit.cameras import Array
     from posekit.figure import Figure
+    from posekit.files import Postures
+    from posekit.files.postures_q import Configurations
 
 SOME_INVALID = 1
+UPS = {
+    f"{sign}{axis}": (k, -1.0 if sign == "-" else 1.0)
+    for k, axis in enumerate("xyz")
+    for sign in ("+", "-", "")
+}
 EXAMPLES = examples(
     "posekit validate postures.json -o report.json",
     "posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1",
+    "posekit validate dataset.npz --urdf human --fail-over 1% -o report.csv",
+    "posekit validate motion.npz --urdf g1 --checks joint-range,collision",
 )
+
+
+class _Input(NamedTuple):
+    """What a file holds: postures or configurations, frames in time, the direction up."""
+
+    postures: Postures | Configurations
+    clip: Any = None
+    up: Array | None = None
 
 
 def validate(
     postures: Annotated[
-        Path, typer.Argument(metavar="POSTURES", help="posekit.postures/1 (JSON, NPZ), or a result.")
+        Path,
+        typer.Argument(
+            metavar="POSTURES",
+            help="posekit.postures/1 or posekit.configurations/1 (JSON, NPZ), motion capture (NPZ), or a result.",
+        ),
     ],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="REPORT", help="The report: .json.")],
+    output: Annotated[
+        Path | None, typer.Option("-o", "--output", metavar="REPORT", help="The report: .json, .md or .csv.")
+    ] = None,
     urdf: Annotated[
         str,
         typer.Option(
             "--urdf",
             metavar="FILE|NAME",
-            help="human (built in), or a figure's URDF. Default: human; a result's own figure.",
+            help="stick_figure, a robot of example-robot-data (human, g1, talos, …), or a URDF. Default: the stick "
+            "figure; a result's own.",
         ),
     ] = "",
-    checks: Checks = PHYSICAL,
-    ranges: RangesOption = "urdf",
+    checks: Annotated[
+        str,
+        typer.Option(
+            "--checks",
+            metavar="LIST",
+            help="By commas. Stick figure: rigid-parts, joint-range, collision, walking (default: the first three); "
+            "robots: reach, rigid-parts, joint-range, collision, balance (the first four).",
+        ),
+    ] = "",
+    ranges: Annotated[
+        str,
+        typer.Option(
+            "--ranges",
+            metavar="NAME|FILE",
+            help="Joint ranges: urdf, table1 (stick figure), or a TOML file.",
+        ),
+    ] = "urdf",
     rules: Rules = "1,2",
     rigid_tolerance: Annotated[
         str,
         typer.Option(
             "--rigid-tolerance",
             metavar="LENGTH",
-            help="How far distances inside torso and hips may be off.",
+            help="How far distances inside rigid parts, and the fit of a robot, may be off.",
         ),
     ] = "3cm",
     angle_tolerance: AngleTolerance = None,
     contact_margin: ContactMargin = "0cm",
+    lengths: Annotated[
+        str,
+        typer.Option(
+            "--lengths",
+            metavar="model|median|each",
+            help="Whose segment lengths the model gets: none, the file's medians, each posture's own (robots, slow). "
+            "Default: model for the stick figure, median for robots.",
+        ),
+    ] = "",
+    joint_map: Annotated[
+        str,
+        typer.Option(
+            "--joint-map", metavar="FILE|NAME", help="Which frames of the robot stand for the joints."
+        ),
+    ] = "",
+    bodies: Annotated[
+        str,
+        typer.Option(
+            "--bodies",
+            metavar="auto|urdf|visual|capsules",
+            help="What collides, of a robot: its collision bodies, its visual ones, or capsules that are made up.",
+        ),
+    ] = "auto",
+    srdf: Annotated[
+        str, typer.Option("--srdf", metavar="FILE", help="The robot's SRDF: which pairs are not checked.")
+    ] = "",
+    package_dir: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--package-dir", metavar="DIR", help="Where its meshes' packages are; may be given again."
+        ),
+    ] = None,
+    trusted: Annotated[
+        bool | None,
+        typer.Option(
+            "--trusted/--untrusted",
+            help="Whether to load the URDF at once, or in a child process with limits first (default: the second, "
+            "for what is not built in).",
+        ),
+    ] = None,
+    sequence: Annotated[
+        bool,
+        typer.Option(
+            "--sequence", help="Frames in time: a robot's fit starts from the one before, clip by clip."
+        ),
+    ] = False,
+    distances: Annotated[
+        bool | None,
+        typer.Option(
+            "--distances/--no-distances",
+            help="Measure the nearest pair of bodies in every posture of a robot (default: where none is a mesh).",
+        ),
+    ] = None,
+    up: Annotated[
+        str,
+        typer.Option(
+            "--up",
+            metavar="AXIS",
+            help="Against gravity, for `balance`: +z, +y, … Default: +z, or the file's.",
+        ),
+    ] = "",
+    fail_over: Annotated[
+        str,
+        typer.Option(
+            "--fail-over",
+            metavar="N|P%",
+            help="How many postures, or what share, may be not valid; then exit 0.",
+        ),
+    ] = "0",
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
     ] = False,
 ) -> None:
     """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input."""
     from posekit import files, pipeline, validators
+    from posekit.files.report import columns_of
+    from posekit.files.report_table import summary_table
 
-    distinct(postures, output)
-    files.check_report_path(output)
-    given = files.read_postures(postures)
-    if not len(given.joints):
+    if output is not None:
+        distinct(postures, output)
+        files.check_report_path(output)
+    allowed = _allowed(fail_over)
+    given = _read(postures)
+    if not _count(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
-    figure: str | Figure = urdf or "human"
+    figure: str | Figure = urdf or "stick_figure"
     least = 0.001
     if schema_of(postures).startswith("posekit.result/"):
         own, least = pipeline.recovered_with(files.read_result(postures))
@@ -80,15 +191,22 @@ def validate(
     angle_tolerance = least if angle_tolerance is None else angle_tolerance
     validator = validators.Validator(
         figure,
-        checks=split(checks),
+        checks=split(checks) if checks else None,
         ranges=ranges,
         rules=rule_numbers(rules),
         rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
         angle_tolerance=angle_tolerance,
         contact_margin=signed_length(contact_margin, "--contact-margin"),
+        lengths=lengths or None,  # type: ignore[arg-type]
+        joint_map=joint_map or None,
+        bodies=bodies,  # type: ignore[arg-type]
+        srdf=srdf or None,
+        package_dirs=package_dir or (),
+        untrusted=None if trusted is None else not trusted,
+        up=_direction(up, given.up),
     )
     settings = {
-        "urdf": urdf or ("human" if figure == "human" else "as recovered"),
+        "urdf": urdf or ("stick_figure" if figure == "stick_figure" else "as recovered"),
         "ranges": ranges,
         "rules": rules,
         "rigid_tolerance": rigid_tolerance,
@@ -96,10 +214,77 @@ def validate(
         "contact_margin": contact_margin,
     }
     with about(postures):
-        report = pipeline.validate(validator, given, settings=settings, every=every)
-    files.write_report(output, report)
-    for line in pipeline.verdict_lines(report):
+        report = pipeline.validate(
+            validator,
+            given.postures,
+            settings=settings,
+            every=every,
+            sequence=_clips(given) if sequence else None,
+            distances=distances,
+        )
+    if output is not None:
+        files.write_report(output, report)
+    columns = columns_of(report)
+    for line in summary_table(columns):
         typer.echo(line)
-    typer.echo(f"written: {output}")
-    if report.summary["valid"] < len(report.postures):
+    if output is not None:
+        typer.echo(f"written: {output}")
+    not_valid = len(columns) - columns.summary["valid"]
+    if not_valid > allowed * (len(columns) if "%" in fail_over else 1):
         raise typer.Exit(SOME_INVALID)
+
+
+def _read(path: Path) -> _Input:
+    """Read a file of whatever holds postures."""
+    from posekit import files
+    from posekit.files.npz import open_npz
+    from posekit.files.postures_q import holds_configurations, read_configurations
+    from posekit.synthesis import read_capture
+
+    if path.suffix.lower() not in (".json", ".npz"):
+        return _Input(files.read_postures(path))
+    if holds_configurations(path):
+        return _Input(read_configurations(path))
+    if path.suffix.lower() == ".npz":
+        with open_npz(path) as archive:
+            is_capture = "clip_fps" in archive.names and "schema" not in archive.names
+        if is_capture:
+            capture = read_capture(path)
+            joints, head = capture.points[:, :14], capture.points[:, 14:]
+            return _Input(files.Postures(joints=joints, head=head), capture.clip, capture.up)
+    return _Input(files.read_postures(path))
+
+
+def _count(postures: Postures | Configurations) -> int:
+    from posekit.files import Postures
+
+    return len(postures.joints) if isinstance(postures, Postures) else len(postures)
+
+
+def _clips(given: _Input) -> Any:
+    """Return which sequence each posture belongs to: its clip, or one for all."""
+    import numpy as np
+
+    return np.zeros(_count(given.postures), dtype=np.intp) if given.clip is None else given.clip
+
+
+def _direction(text: str, of_file: Array | None) -> Any:
+    """Read the direction up."""
+    if not text:
+        return (0.0, 0.0, 1.0) if of_file is None else of_file
+    if text not in UPS:
+        raise InputError(f"--up: {text!r}; expected one of +x, -x, +y, -y, +z, -z")
+    axis, sign = UPS[text]
+    return tuple(sign if k == axis else 0.0 for k in range(3))
+
+
+def _allowed(text: str) -> float:
+    """Read how many postures, or what share of them, may be not valid."""
+    try:
+        number = float(text.removesuffix("%"))
+    except ValueError:
+        number = math.nan
+    share = text.endswith("%")
+    if not 0 <= number < math.inf or (share and number > 100) or (not share and number != int(number)):
+        raise InputError(f"--fail-over: {text!r}; expected a number of postures, as 10, or a share, as 1%")
+    return number / 100 if share else number

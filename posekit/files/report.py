@@ -82,6 +82,8 @@ class PostureReport:
         The place with the least margin; a centimetre counts as one degree.
     residual : mapping, optional
         Metres that each joint of a robot's fit is off, None where it is unknown.
+    undecided_by : sequence of str, optional
+        Of an undecided posture, the checks that say nothing, and ``joints`` where some are unknown.
     """
 
     verdict: Verdict
@@ -90,6 +92,7 @@ class PostureReport:
     index: int | None = None
     worst: Worst | None = None
     residual: Mapping[str, float | None] | None = None
+    undecided_by: Sequence[str] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -255,13 +258,11 @@ def columns_of(report: Report) -> Columns:
     places: dict[Place, int] = {}
     violations: list[tuple[int, int, float]] = []
     worst: list[tuple[int, float]] = []
-    undecided: Counter[str] = Counter()
     for k, posture in enumerate(report.postures):
         for finding in posture.findings:
             place = places.setdefault(Place(finding.check, finding.where, finding.unit), len(places))
             if finding.verdict == "invalid":
                 violations.append((k, place, math.nan if finding.margin is None else finding.margin))
-            undecided[finding.check] += finding.verdict == "undecided"
         least = posture.worst
         at = None if least is None else Place(least.check, least.where, least.unit)
         worst.append(
@@ -281,10 +282,16 @@ def columns_of(report: Report) -> Columns:
         posture=np.array([k for k, _, _ in violations], dtype=np.int64),
         place=np.array([place for _, place, _ in violations], dtype=np.int32),
         margin=np.array([margin for _, _, margin in violations]),
-        undecided=undecided,
+        silent=np.array([_silent(posture, checks) for posture in report.postures], dtype=np.int16),
         checks=checks,
     )
     return joined([part], part.places, checks)
+
+
+def _silent(posture: PostureReport, checks: Sequence[str]) -> int:
+    """Spell what is undecided about a posture as `Columns` has it."""
+    names = ("joints", *checks)
+    return sum(1 << names.index(name) for name in posture.undecided_by or () if name in names)
 
 
 def _head(report: Report) -> dict[str, Any]:
@@ -319,6 +326,7 @@ def _posture(posture: PostureFields) -> PostureReport:
         if worst is None
         else Worst(check=worst.check, where=worst.where, margin=worst.margin, unit=worst.unit),
         residual=posture.residual,
+        undecided_by=None if posture.undecided_by is None else tuple(posture.undecided_by),
     )
 
 
@@ -373,4 +381,6 @@ def _fields(report: Report) -> Iterator[dict[str, Any]]:
             entry["worst"] = vars(posture.worst)
         if posture.residual is not None:
             entry["residual"] = {name: _number(value) for name, value in posture.residual.items()}
+        if posture.undecided_by is not None:
+            entry["undecided_by"] = list(posture.undecided_by)
         yield entry | {"findings": [_finding(finding) for finding in posture.findings]}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -32,13 +32,14 @@ class Place(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One posture: its verdict, its worst margin and where that is, and the margin of every violation."""
+    """One posture: its verdict, its worst margin and where that is, its violations and their margins, the undecided."""
 
     posture: int
     verdict: Verdict
     fk_distance: float
     worst: tuple[Place, float] | None
     violations: list[tuple[Place, float]]
+    undecided_by: list[str]
 
 
 class CheckCount(NamedTuple):
@@ -66,8 +67,8 @@ class Columns:
     posture, place : int array (M,)
         Of each violation; postures in rising order.
     margin : array (M,)
-    undecided : mapping
-        By check: about how many postures it said nothing.
+    silent : int array (N,)
+        Bit 0: some joint is unknown; bit k + 1: the k-th check says nothing.
     checks : sequence of str
         The checks that were applied.
     """
@@ -80,7 +81,7 @@ class Columns:
     posture: NDArray[np.int64]
     place: NDArray[np.int32]
     margin: Array
-    undecided: Mapping[str, int] = field(default_factory=dict)
+    silent: NDArray[np.int16]
     checks: Sequence[str] = ()
 
     def __len__(self) -> int:
@@ -105,6 +106,7 @@ class Columns:
         verdicts, distances = self.verdict.tolist(), self.fk_distance.tolist()
         places, margins = self.worst_place.tolist(), self.worst_margin.tolist()
         where, by = self.place.tolist(), self.margin.tolist()
+        silent = (self.silent != 0).tolist()
         for k, verdict in enumerate(verdicts):
             some = range(starts[k], starts[k + 1])
             yield Row(
@@ -113,13 +115,19 @@ class Columns:
                 fk_distance=distances[k],
                 worst=None if places[k] < 0 else (self.places[places[k]], margins[k]),
                 violations=[(self.places[where[i]], by[i]) for i in some],
+                undecided_by=self.silent_checks(k) if silent[k] else [],
             )
+
+    def silent_checks(self, posture: int) -> list[str]:
+        """List what is not decided about a posture: ``joints`` that are unknown, and checks that say nothing."""
+        bits = int(self.silent[posture])
+        return [name for k, name in enumerate(("joints", *self.checks)) if bits >> k & 1]
 
     def by_check(self) -> dict[str, CheckCount]:
         """Count for each check what it rejected, where, and which violation was the worst."""
         of_check = np.array([place.check for place in self.places])[self.place] if len(self.place) else None
         counts = {}
-        for check in self.checks:
+        for k, check in enumerate(self.checks):
             mine = np.flatnonzero(of_check == check) if of_check is not None else np.zeros(0, dtype=np.intp)
             most = Counter(self.place[mine].tolist()).most_common()
             worst = None
@@ -129,7 +137,7 @@ class Columns:
                 worst = int(self.posture[at]), self.places[int(self.place[at])], float(self.margin[at])
             counts[check] = CheckCount(
                 rejected=len(np.unique(self.posture[mine])),
-                undecided=self.undecided.get(check, 0),
+                undecided=int(np.count_nonzero(self.silent >> (k + 1) & 1)),
                 places={self.places[place].where: count for place, count in most},
                 worst=worst,
             )
@@ -139,9 +147,6 @@ class Columns:
 def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[str]) -> Columns:
     """Put the columns of a file's batches together; postures are counted through."""
     firsts = np.cumsum([0, *(len(part) for part in parts)])
-    undecided: Counter[str] = Counter()
-    for part in parts:
-        undecided.update(part.undecided)
     empty: dict[str, NDArray[np.generic]] = {
         "verdict": np.zeros(0, dtype=np.int8),
         "fk_distance": np.zeros(0),
@@ -149,6 +154,7 @@ def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[s
         "worst_margin": np.zeros(0),
         "place": np.zeros(0, dtype=np.int32),
         "margin": np.zeros(0),
+        "silent": np.zeros(0, dtype=np.int16),
     }
     arrays = {
         name: np.concatenate([none, *(getattr(part, name) for part in parts)]) for name, none in empty.items()
@@ -157,7 +163,6 @@ def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[s
     return Columns(
         places=tuple(places),
         posture=np.concatenate([np.zeros(0, dtype=np.int64), *shifted]),
-        undecided=dict(undecided),
         checks=tuple(checks),
         **arrays,
     )

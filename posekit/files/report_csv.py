@@ -10,7 +10,17 @@ from typing import Final
 
 from posekit.files.report_columns import Columns
 
-HEAD: Final = ("posture", "verdict", "worst_margin", "unit", "check", "where", "fk_distance", "violations")
+HEAD: Final = (
+    "posture",
+    "verdict",
+    "worst_margin",
+    "unit",
+    "check",
+    "where",
+    "fk_distance",
+    "violations",
+    "undecided_by",
+)
 """The columns: `violations` are ``check/where=margin unit``, by semicolons."""
 
 
@@ -34,6 +44,7 @@ def csv_lines(columns: Columns) -> Iterator[str]:
             "" if place is None else place.where,
             _number(row.fk_distance),
             violations,
+            "; ".join(row.undecided_by),
         )
 
 

@@ -54,6 +54,10 @@ class PostureFields(FileModel):
         default=None,
         description="Metres that each joint of the robot's fit is off; null where it is unknown.",
     )
+    undecided_by: list[str] | None = Field(
+        default=None,
+        description="Of an undecided posture: checks that say nothing; joints, where some are unknown.",
+    )
 
 
 class SummaryFields(FileModel):

@@ -56,11 +56,12 @@ def markdown_lines(columns: Columns, settings: Mapping[str, Any]) -> list[str]:
             row.posture,
             row.verdict,
             "" if row.worst is None else _at(*row.worst),
-            "; ".join(_at(place, margin) for place, margin in row.violations),
+            "; ".join(_at(place, margin) for place, margin in row.violations)
+            or f"undecided: {', '.join(row.undecided_by)}",
         )
         for row in bad[:SHOWN]
     ]
-    return lines + _table(("posture", "verdict", "least margin", "violations"), rows)
+    return lines + _table(("posture", "verdict", "least margin", "why"), rows)
 
 
 def _most(check: str, count: CheckCount) -> str:

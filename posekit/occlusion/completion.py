@@ -148,6 +148,13 @@ class Completion:
         """Take some survivors."""
         return Completion(**{field.name: getattr(self, field.name)[rows] for field in fields(self)}).frozen()
 
+    def among(self, postures: Array, rows: Mask) -> Completion:
+        """Put the completions of some survivors among all of them (N, 14, 3), of which the others stay as they are."""
+        whole = Completion.of_exact(postures)
+        for field in fields(self):
+            getattr(whole, field.name)[rows] = getattr(self, field.name)
+        return whole.frozen()
+
     @property
     def inferred(self) -> Mask:
         """Which joints (N, 14) were not placed by the image."""

@@ -71,7 +71,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     )
     table = ["# posekit demo", "", *table_lines(head, rows)]
     given = read_postures(folder / "seq1.result.json")
-    report = validate(Validator("human"), given)
+    report = validate(Validator(), given)
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
     table += [

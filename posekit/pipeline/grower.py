@@ -17,8 +17,10 @@ from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch
 from posekit.pipeline.tolerance import EXACT, Tolerance
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, Leaves
+
+TRUNK = tuple(JOINT[name] for name in TORSO[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,12 +83,18 @@ class Grower:
     def _complete(
         self, leaves: Leaves, camera: Camera, image: Array, suite: Sequence[Check], tolerance: Tolerance
     ) -> tuple[Leaves, Completion | None]:
-        """Complete survivors by the joints that were not seen, and drop those that cannot be."""
-        unseen = np.asarray(np.isnan(image).any(axis=(1, 2)))
-        if not (self.infer and isinstance(self.body, FigureBody) and unseen[leaves.frame].any()):
+        """Complete survivors by the joints that were not seen, and drop those that cannot be.
+
+        Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said.
+        """
+        unseen: NDArray[np.bool_] = np.isnan(image).any(axis=2)
+        placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
+        worth = np.asarray((unseen.any(axis=1) & placed)[leaves.frame])
+        if not (self.infer and isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
-        completion = complete(leaves, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
-        return reject(leaves, completion)
+        part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
+        done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
+        return reject(leaves, done.among(leaves.postures(), worth))
 
     def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
         """Return the checks that prune, and those that tell every margin: made once for each tolerance."""

@@ -13,7 +13,9 @@ from posekit.robot.descent import STEPS, Problem, descend
 from posekit.robot.ik import PULL, InverseKinematics
 from posekit.robot.kinematics import Kinematics
 from posekit.validators.robot.branches import Branches
-from posekit.validators.robot.subject import Subject
+from posekit.validators.robot.flips import Flip, find_flips
+from posekit.validators.robot.joint_range import beyond_limits
+from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE, Subject
 
 EXACT = 1e-4
 """Metres: a fit this close is the posture, and limits that cost no more than this are not the reason for a misfit."""
@@ -21,13 +23,16 @@ EXACT = 1e-4
 STRICT = 1e-3
 """Metres: the closest that the first search is asked to come."""
 
-SHAKES = 6
+LESS = 0.01
+"""Degrees by which another way to bend must be less outside the limits to be preferred."""
+
+SHAKES = 12
 """Starts around the best fit so far, in each round."""
 
 FEW_STEPS = 25
 """Steps of the search from such a start: what comes near goes on from there in the next round."""
 
-ROUNDS = (0.5, 1.0, 0.5, 1.0, 0.5, 1.0, 0.5, 1.0)
+ROUNDS = (0.5, 1.0, 0.5, 1.0)
 """Standard deviation of the joints of such starts, radians or metres, round by round."""
 
 Bools = NDArray[np.bool_]
@@ -110,16 +115,18 @@ class Fitter:
         )
         q, free_q = first.q.copy(), first.q.copy()
         rows = np.flatnonzero(_worst(self._residual(q, targets)) > EXACT)
+        rows = self._refit_free(targets, q, free_q, rows)
         for start in range(-1, len(ROUNDS)):
-            rows = rows[self._refit_free(targets, q, free_q, rows) > 0]
             if not rows.size:
                 break
             few = targets[rows]
             other = self._inside(few, free_q[rows]) if start < 0 else self._from_around(few, q[rows], start)
             better = self._cost(other, few) < self._cost(q[rows], few)
             q[rows[better]] = other[better]
+            rows = rows[self._gain(targets, q, free_q, rows) > EXACT]
+        rows = self._refit_free(targets, q, free_q, rows)
         kept_off = np.zeros(len(q))
-        kept_off[rows] = self._refit_free(targets, q, free_q, rows)
+        kept_off[rows] = self._gain(targets, q, free_q, rows)
         return Fit(
             q=q,
             residual=self._residual(q, targets),
@@ -135,6 +142,11 @@ class Fitter:
         return np.asarray((known.astype(np.intp) @ moves.astype(np.intp)) > 0)
 
     @cached_property
+    def flips(self) -> tuple[Flip, ...]:
+        """The limbs that can be bent in two ways."""
+        return find_flips(self.kinematics)
+
+    @cached_property
     def branches(self) -> Branches:
         """The model's other configurations for the same placement."""
         return Branches(subject=self.subject)
@@ -148,15 +160,43 @@ class Fitter:
             tolerance=max(self.tolerance, STRICT),
         )
 
-    def _refit_free(self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]) -> Array:
-        """Fit some rows without limits, in place; return by how much the limits keep them off, metres, or 0."""
+    def _refit_free(
+        self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]
+    ) -> NDArray[np.intp]:
+        """Fit some rows without limits, in place; return those that come closer so than inside the limits."""
         if not rows.size:
-            return np.zeros(0)
+            return rows
+        free_q[rows] = self._without_limits(targets[rows], q[rows])
+        rows = rows[self._gain(targets, q, free_q, rows) > EXACT]
+        self._bend_otherwise(targets, free_q, rows)
+        return rows
+
+    def _gain(self, targets: Array, q: Array, free_q: Array, rows: NDArray[np.intp]) -> Array:
+        """Return by how much, at most, a point of a limited fit is farther off than the free fit's (R,), metres."""
+        few = targets[rows]
+        return _worst(self._residual(q[rows], few) - self._residual(free_q[rows], few))
+
+    def _bend_otherwise(self, targets: Array, free_q: Array, rows: NDArray[np.intp]) -> None:
+        """Take over, in place, free fits with a limb bent the other way: as near, and less outside the limits."""
+        for flip in self.flips:
+            if not rows.size:
+                return
+            few = targets[rows]
+            other = self._without_limits(few, flip.apply(free_q[rows]))
+            worse = _worst(self._residual(other, few) - self._residual(free_q[rows], few)) > EXACT
+            better = ~worse & (self._outside(other) < self._outside(free_q[rows]) - LESS)
+            free_q[rows[better]] = other[better]
+
+    def _without_limits(self, targets: Array, start: Array) -> Array:
+        """Descend without limits, to the branch that is least outside them."""
         unlimited = np.full(self.kinematics.space.nq, np.inf)
-        problem = self._problem(targets[rows], q[rows], -unlimited, unlimited)
-        free_q[rows] = self.branches.nearest_to_limits(descend(self.kinematics, problem, q[rows]).q)
-        gain = _worst(self._residual(q[rows], targets[rows]) - self._residual(free_q[rows], targets[rows]))
-        return np.asarray(np.where(gain > EXACT, gain, 0.0))
+        problem = self._problem(targets, start, -unlimited, unlimited)
+        return self.branches.nearest_to_limits(descend(self.kinematics, problem, start).q)
+
+    def _outside(self, q: Array) -> Array:
+        """Return by how much the joint that is farthest outside its limits is (N,), degrees; sliding ones as such."""
+        each = np.where(self.subject.slides, CENTIMETRES_A_DEGREE, 1.0)
+        return np.asarray((beyond_limits(self.subject, q) / each).max(axis=1, initial=0.0))
 
     def _from_around(self, targets: Array, q: Array, start: int) -> Array:
         """Start from places around the best fit: the same steps from each posture, whatever else is in the batch."""

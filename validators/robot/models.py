@@ -15,7 +15,7 @@ from posekit.robot import Robot
 from posekit.robot.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robot.kinematics import Kinematics
 from posekit.robot.pairs import set_pairs
-from posekit.robot.scaling import model_lengths, scaled
+from posekit.robot.scaling import BOUNDS, model_lengths, scaled
 from posekit.validators.robot.balance import Balance
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.feet import find_soles
@@ -132,6 +132,12 @@ class Models:
         """Tell whether lengths are the model's own, as far as no configuration changes them."""
         own, rigid = model_lengths(self.kinematics), self._rigid_segments
         return all(abs(lengths.get(name, own[name]) - own[name]) < SAME_LENGTH for name in rigid)
+
+    def can_have(self, lengths: Mapping[str, float]) -> bool:
+        """Tell whether the model can be scaled to such lengths: what has no size, or a giant's, is no body."""
+        own = model_lengths(self.kinematics)
+        ratios = [lengths.get(name, length) / length for name, length in own.items() if length > 0]
+        return all(BOUNDS[0] < ratio < BOUNDS[1] for ratio in ratios)
 
     @cached_property
     def _rigid_segments(self) -> tuple[str, ...]:

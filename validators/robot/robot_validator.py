@@ -146,6 +146,8 @@ class RobotValidator:
         lengths = segment_lengths(postures) if lengths is None else lengths
         if self.models.has_lengths(lengths):
             return self.models.mapped
+        if self.settings.lengths == "each" and not self.models.can_have(lengths):
+            return self.models.mapped  # no body: its rigid parts say so
         return self.models.with_lengths(lengths, shoulders_are_behind(postures) if behind is None else behind)
 
 

@@ -13,7 +13,7 @@ from posekit.pipeline.taylor.constrained import Constrained, constrained, constr
 from posekit.pipeline.taylor.proportions import TABLE_1
 from posekit.pipeline.taylor.study import Study, synthetic_study
 
-PICTURES = 150
+PICTURES = 100
 """Synthetic photographs: enough for a table in half a minute."""
 
 
