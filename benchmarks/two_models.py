@@ -62,7 +62,9 @@ def main() -> None:
     given = parser.parse_args()
     figure = load_figure()
     if given.capture is not None:
-        real(figure, read_capture(given.capture), given.every)
+        with tempfile.TemporaryDirectory() as folder:
+            held = write_held(figure, measure_counterparts(figure), Path(folder))
+            real(figure, read_capture(given.capture), given.every, held)
         return
     counterparts = measure_counterparts(figure)
     print("Joints of the human that do what the stick figure's do\n")
@@ -90,16 +92,22 @@ def spine_order(figure: Figure, seed: int) -> None:
     )
 
 
+def write_held(figure: Figure, counterparts: dict[str, Counterpart], folder: Path) -> str:
+    """Write the mapped ranges with a trunk that is rigid, as the stick figure's; return the file's name."""
+    path = folder / "held.toml"
+    limits = limits_on_human(figure_limits(figure), counterparts)
+    path.write_text(ranges_text(limits | dict.fromkeys(HELD, (0.0, 0.0))), encoding="utf-8")
+    return str(path)
+
+
 def synthetic(figure: Figure, counterparts: dict[str, Counterpart], n: int, seed: int) -> None:
     postures = labelled_postures(figure, n, np.random.default_rng(seed))
     ours = Validator(figure).check(postures.joints)
     angles = in_human_order(figure, postures.joints)
     with tempfile.TemporaryDirectory() as folder:
-        held = Path(folder) / "held.toml"
-        limits = limits_on_human(figure_limits(figure), counterparts)
-        held.write_text(ranges_text(limits | dict.fromkeys(HELD, (0.0, 0.0))), encoding="utf-8")
+        held = write_held(figure, counterparts, Path(folder))
         for name, ranges in (
-            ("mapped ranges, trunk held rigid", str(held)),
+            ("mapped ranges, trunk held rigid", held),
             ("mapped ranges", str(mapped_ranges())),
             ("its own limits", "urdf"),
         ):
@@ -201,10 +209,12 @@ class Tally:
     places: Counter[str] = field(default_factory=Counter)
     frames: list[str] = field(default_factory=list)
     why: list[str] = field(default_factory=list)
+    off: list[float] = field(default_factory=list)
 
     def add(self, action: str, report: Report) -> None:
         self.verdicts.setdefault(action, Counter()).update(report.verdicts)
         self.frames += report.verdicts
+        self.off += report.fk_distance.tolist()
         named = [(judgement, k) for judgement in report.judgements for k in range(len(judgement.where))]
         self.why += [
             ", ".join(judgement.where[k] for judgement, k in named if judgement.violated[row, k])
@@ -220,7 +230,7 @@ class Tally:
         return sum(counts[verdict] for counts in chosen) / sum(counts.total() for counts in chosen)
 
 
-def real(figure: Figure, capture: Capture, every: int) -> None:
+def real(figure: Figure, capture: Capture, every: int, held: str) -> None:
     judges = {
         "stick, table1": (None, "table1", STRICT),
         "stick, table1, 2 deg": (None, "table1", MEASURED.angle),
@@ -228,6 +238,8 @@ def real(figure: Figure, capture: Capture, every: int) -> None:
         "stick, urdf, 2 deg": (None, "urdf", MEASURED.angle),
         "human, mapped": (HUMAN, str(mapped_ranges()), STRICT),
         "human, mapped, 2 deg": (HUMAN, str(mapped_ranges()), MEASURED.angle),
+        "human, held rigid": (HUMAN, held, STRICT),
+        "human, held rigid, 2 deg": (HUMAN, held, MEASURED.angle),
         "human, own": (HUMAN, "urdf", STRICT),
         "human, own, 2 deg": (HUMAN, "urdf", MEASURED.angle),
     }
@@ -244,6 +256,8 @@ def real(figure: Figure, capture: Capture, every: int) -> None:
     print(f"One frame in {every}, all checks\n")
     tallies = {name: judge_capture(figure, capture, every, *judge) for name, judge in judges.items()}
     report(tallies)
+    middle, high, worst = 1000 * np.percentile(tallies["human, own"].off, [50, 95, 100])
+    print(f"The human's fit is off by {middle:.1f} mm (median), {high:.1f} (95 %), {worst:.1f} (worst)\n")
     crossed(tallies["stick, urdf"], tallies["human, mapped"])
 
 

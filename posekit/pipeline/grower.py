@@ -87,7 +87,7 @@ class Grower:
 
         Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said.
         """
-        unseen: NDArray[np.bool_] = np.isnan(image).any(axis=2)
+        unseen = np.asarray(np.isnan(image).any(axis=2))
         placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
         worth = np.asarray((unseen.any(axis=1) & placed)[leaves.frame])
         if not (self.infer and isinstance(self.body, FigureBody) and worth.any()):

@@ -1,5 +1,6 @@
 """Reports: each verdict with the findings that it rests on."""
 
+import csv
 import json
 
 import numpy as np
@@ -7,6 +8,9 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.files import Finding, Judged, PostureReport, Report, make_report, read_report, write_report
+from posekit.files.report import Worst, columns_of
+from posekit.files.report_columns import Columns, Place, joined
+from posekit.files.report_table import summary_table
 from posekit.tree.check import Findings
 
 VALUE = np.array([[0.5, 2.0, -1.0], [0.5, 0.4, 0.9], [np.nan, np.nan, np.nan]])
@@ -102,7 +106,7 @@ def test_what_does_not_fit_is_refused(tmp_path):
         make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[judged()])
     with pytest.raises(InputError, match='verdicts: got "true"; expected valid or invalid or undecided'):
         make_report(settings={}, verdicts=["true"], fk_distance=np.zeros(1), judged=[])
-    with pytest.raises(InputError, match=r'the suffix "\.npz"; expected \.json'):
+    with pytest.raises(InputError, match=r'the suffix "\.npz"; expected \.json or \.md or \.csv'):
         write_report(tmp_path / "r.npz", a_report())
     assert not list(tmp_path.iterdir())
 
@@ -136,3 +140,116 @@ def test_a_file_that_breaks_the_schema_is_one_clear_line(tmp_path, place, value,
     with pytest.raises(InputError) as caught:
         read_report(tmp_path / "r.json")
     assert text in str(caught.value)
+
+
+# --- tables, CSV, and reports that list a part ------------------------------------------------------------
+
+
+def test_a_report_of_a_part_is_read_back(tmp_path):
+    findings = a_report().postures[0].findings
+    posture = PostureReport(
+        verdict="invalid",
+        fk_distance=0.01,
+        findings=findings,
+        index=7,
+        worst=Worst(check="joint_range", where="b", margin=-1.0, unit="rad"),
+        residual={"neck": 0.01, "pelvis": None},
+    )
+    silent = PostureReport(
+        verdict="undecided", fk_distance=None, findings=(), index=8, undecided_by=("joints", "reach")
+    )
+    report = Report(settings={}, postures=(posture, silent), listed="the first 2 of 2", verdicts="vvvvvvviuv")
+    write_report(tmp_path / "r.json", report)
+    back = read_report(tmp_path / "r.json")
+    assert back == report
+    assert back.summary == {"valid": 8, "invalid": 1, "undecided": 1}
+    assert len(back) == 10
+
+
+def test_a_report_without_columns_has_those_that_its_findings_tell():
+    columns = columns_of(a_report())
+    assert columns.summary == {"valid": 1, "invalid": 1, "undecided": 1}
+    assert columns.letters == "ivu"
+    rows = list(columns.rows())
+    assert [[(place.where, margin) for place, margin in row.violations] for row in rows] == [
+        [("b", -1.0), ("c", -1.0)],
+        [],
+        [],
+    ]
+    count = columns.by_check()["joint_range"]
+    assert (count.rejected, count.places) == (1, {"b": 1, "c": 1})
+    assert count.worst is not None
+    assert count.worst[0] == 0
+
+
+@pytest.mark.parametrize("name", ["r.md", "r.csv"])
+def test_tables_are_written_of_any_report(tmp_path, name):
+    write_report(tmp_path / name, a_report())
+    text = (tmp_path / name).read_text(encoding="utf-8")
+    assert "invalid" in text
+    assert "undecided" in text
+    write_report(tmp_path / name, Report(settings={}, postures=()))
+    assert (tmp_path / name).stat().st_size > 0
+
+
+def test_a_name_cannot_break_out_of_its_cell(tmp_path):
+    finding = Finding(
+        check="c",
+        where='a|b,"c"\n=1',
+        value=2.0,
+        lower=None,
+        upper=1.0,
+        margin=-1.0,
+        unit="m",
+        verdict="invalid",
+    )
+    report = Report(
+        settings={"a\nb": "x\n# y"},
+        postures=[PostureReport(verdict="invalid", fk_distance=0.0, findings=[finding])],
+    )
+    write_report(tmp_path / "r.md", report)
+    lines = (tmp_path / "r.md").read_text(encoding="utf-8").splitlines()
+    assert not any(line.startswith("# y") for line in lines)
+    assert all(
+        line.replace("\\|", "").count("|") == line.replace("\\|", "").count(" |") + 1
+        for line in lines
+        if line.startswith("| 0 ")
+    )
+    write_report(tmp_path / "r.csv", report)
+    with (tmp_path / "r.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 1
+    assert rows[0]["violations"] == 'c/a|b,"c"\n=1=-1 m'
+
+
+def test_batches_are_counted_through():
+    places = [Place("joint_range", "knee", "deg"), Place("collision", "a-b", "m")]
+
+    def part(verdict, posture, place, margin):
+        n = len(verdict)
+        return Columns(
+            places=places,
+            verdict=np.array(verdict, dtype=np.int8),
+            fk_distance=np.zeros(n),
+            worst_place=np.full(n, -1, dtype=np.int32),
+            worst_margin=np.full(n, np.nan),
+            posture=np.array(posture, dtype=np.int64),
+            place=np.array(place, dtype=np.int32),
+            margin=np.array(margin, dtype=np.float64),
+            silent=np.array([2 if v == 2 else 0 for v in verdict], dtype=np.int16),
+            checks=("joint_range", "collision"),
+        )
+
+    first = part([0, 1, 2], [1, 1], [0, 1], [-3.0, -0.05])
+    second = part([1, 0], [0], [0], [-1.0])
+    columns = joined([first, second], places, ("joint_range", "collision"))
+    assert columns.letters == "viuiv"
+    assert columns.posture.tolist() == [1, 1, 3]
+    counts = columns.by_check()
+    assert (counts["joint_range"].rejected, counts["joint_range"].undecided) == (2, 1)
+    assert counts["collision"].rejected == 1
+    assert counts["joint_range"].worst == (1, places[0], -3.0)
+    table = "\n".join(summary_table(columns))
+    assert table.startswith("5 postures: 2 valid, 2 invalid, 1 undecided")
+    assert "joint_range/knee 2" in table
+    assert joined([], places, ()).summary == {"valid": 0, "invalid": 0, "undecided": 0}

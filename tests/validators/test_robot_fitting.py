@@ -1,6 +1,7 @@
 """Postures of any robot: what it can do is never rejected, what it cannot is named."""
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -100,7 +101,7 @@ def test_a_limit_that_is_broken_is_named_with_its_value(joint: str, angle: float
 
 @pytest.mark.parametrize("angle", [-0.05, -0.2, -0.4])
 def test_too_close_to_call_is_undecided_or_valid_but_not_invalid(angle: float) -> None:
-    """The limits then keep the ankle off by less than a millimetre, or the knee is outside by less than half a degree."""
+    """The limits keep the ankle off by less than a millimetre, or the knee is outside by less than half a degree."""
     report = validator("human").check(bent("human", right_knee_Z=angle, right_hip_Z=20.0))
     assert not report.invalid[0]
 
@@ -114,12 +115,12 @@ def test_beyond_that_it_is_invalid() -> None:
 def test_a_wider_tolerance_never_rejects_more() -> None:
     joints = np.concatenate([bent("human", right_knee_Z=angle) for angle in (-1.5, -4.0, -9.0, 20.0)])
     rejects = []
-    for tolerance in (0.0, 2.0, 5.0, 30.0):
+    for tolerance in (0.0, 5.0, 30.0):
         report = Validator(
             "human", lengths="model", checks=("joint-range",), angle_tolerance=tolerance
         ).check(joints)
         rejects.append(report.invalid)
-    for tighter, looser in zip(rejects, rejects[1:], strict=False):
+    for tighter, looser in pairwise(rejects):
         assert not (looser & ~tighter).any()
     assert rejects[0].sum() > rejects[-1].sum() == 0
 

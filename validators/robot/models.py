@@ -168,8 +168,9 @@ class Models:
     def _scaled(self, lengths: Mapping[str, float], behind: bool | None) -> Judged:
         make_up = self.bodies == "capsules"
         result = scaled(self.kinematics, lengths, None if make_up else self._geometry, behind=behind)
-        made_up = make_up and self.settings.wants_bodies
-        geometry = fitted_capsules(result.kinematics) if made_up else result.geometry
+        geometry = result.geometry
+        if make_up and self._geometry is not None:
+            geometry = fitted_capsules(result.kinematics)
         lower, upper = self.limits
         subject = Subject(model=result.kinematics.model, lower=lower, upper=upper, geometry=geometry)
         return Judged(subject=subject, kinematics=result.kinematics, settings=self.settings)
@@ -194,7 +195,8 @@ class Models:
         if not self.settings.wants_bodies:
             return None
         if self.bodies == "capsules":
-            geometry = fitted_capsules(self.kinematics)
+            # What is made up has no feet: for balance alone there is nothing to make.
+            geometry = fitted_capsules(self.kinematics) if "collision" in self.settings.checks else None
         elif self.bodies == "visual":
             geometry = self._visuals()
         else:

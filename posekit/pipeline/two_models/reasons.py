@@ -44,8 +44,10 @@ def reasons(postures: Labelled, stick: Report, human: Report, expected: Angles, 
             found.append(CAPSULES)
         elif postures.kind[k] == "trunk stretched":
             found.append(LONG_TRUNK)
-        elif (one == "valid") == (worst[k] <= 0):  # what the angles say in the human's order, it does not
-            found.append(SEARCH if one == "valid" else OTHER_JOINTS)
+        elif one == "valid" and worst[k] <= 0:
+            found.append(SEARCH)
+        elif other == "valid" and worst[k] > 0:
+            found.append(OTHER_JOINTS)
         else:
             why = ORDER if mapped and pelvis_alone[k] else OTHER_LIMIT
             found.append(why + LITTLE if other == "undecided" else why)

@@ -1,0 +1,107 @@
+"""Validating configurations against the bare calls behind it, and postures through inverse kinematics.
+
+    python benchmarks/validate.py [--configurations 100000] [--postures 500]
+
+Bare is one call of Pinocchio's `computeCollisionsInParallel` and one vectorised comparison with the limits, on the same
+configurations, as many threads, in the same run; the ways take turns, and the least time of each counts: what else runs
+on a shared machine only adds. A verdict has the margin of every joint; the pairs that touch, and the nearest pair, are
+asked for on top. Ratios are of one run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+
+from posekit.figure.pool import make_pool, n_threads
+from posekit.robot import load_robot
+from posekit.robot.joint_map import postures_of
+from posekit.validators import Validator
+
+REPEATS = 7
+
+
+def least(ways: dict[str, Callable[[], object]]) -> dict[str, float]:
+    """Time each way in turn, and return the least of each, seconds."""
+    seconds: dict[str, list[float]] = {name: [] for name in ways}
+    for _ in range(REPEATS):
+        for name, way in ways.items():
+            start = time.perf_counter()
+            way()
+            seconds[name].append(time.perf_counter() - start)
+    return {name: min(values) for name, values in seconds.items()}
+
+
+def configurations(name: str, bodies: str, n: int) -> None:
+    robot = load_robot(name)
+    validator = Validator(robot, checks=("joint-range", "collision"), bodies=bodies)  # type: ignore[arg-type]
+    subject = validator._robot.models.own.subject
+    model, geometry = subject.model, subject.geometry
+    q = np.tile(pin.neutral(model), (n, 1))
+    lower, upper = robot.lower[7:], robot.upper[7:]
+    q[:, 7:] = np.random.default_rng(0).uniform(lower - 0.01, upper + 0.01, (n, len(lower)))
+    columns, pool = np.asfortranarray(q.T), make_pool(model, geometry)
+
+    def bare() -> np.ndarray:
+        hit = np.asarray(pin.computeCollisionsInParallel(n_threads(), pool, columns, True)).astype(bool)
+        return hit | ((q[:, 7:] < lower) | (q[:, 7:] > upper)).any(axis=1)
+
+    expected, report = bare(), validator.check(q=q)
+    near = np.abs(report.worst) < 0.01  # the tolerance of the limits, and rounding
+    assert (report.invalid == expected)[~near].all(), "verdicts differ"
+    seconds = least({"bare": bare, "verdicts": lambda: validator.check(q=q).undecided})
+    start = time.perf_counter()
+    found = report.contacts()
+    contacts = time.perf_counter() - start
+    few = q[:1000]
+    some = validator.check(q=few)
+    start = time.perf_counter()
+    some.contacts(nearest=not validator._robot.models.own.collision.has_meshes)
+    nearest = time.perf_counter() - start
+    print(
+        f"{name:14} {len(subject.pair_names):4} pairs, {n} configurations, {report.invalid.mean():.0%} invalid: bare "
+        f"{seconds['bare'] / n * 1e6:.2f} us each, verdicts {seconds['verdicts'] / n * 1e6:.2f} us, ratio "
+        f"{seconds['verdicts'] / seconds['bare']:.2f}; naming {len(found)} contacts {contacts / n * 1e6:.1f} us each "
+        f"on top, the nearest pair of every one {nearest / len(few) * 1e6:.0f} us"
+    )
+
+
+def postures(name: str, n: int) -> None:
+    validator = Validator(name, lengths="model", bodies="capsules")
+    robot = validator.robot
+    assert robot is not None
+    q = np.tile(pin.neutral(robot.model), (n, 1))
+    q[:, 7:] = np.random.default_rng(1).uniform(robot.lower[7:], robot.upper[7:], (n, robot.model.nq - 7))
+    kinematics = validator._robot.models.kinematics
+    joints = postures_of(kinematics.positions(q), kinematics)[:, :14]
+    validator.check(joints[:1])
+    start = time.perf_counter()
+    report = validator.check(joints)
+    seconds = time.perf_counter() - start
+    limits = next(one for one in report.judgements if one.check == "joint_range")
+    worst = np.fmax.reduce(report.residual, axis=1)
+    print(
+        f"{name:14} {n} legal postures by their joints: {seconds / n * 1e3:.1f} ms each, "
+        f"{(worst < 1e-3).mean():.1%} within 1 mm, {limits.violated.any(axis=1).mean():.1%} rejected for limits, "
+        f"{np.isnan(limits.worst).mean():.1%} undecided"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--configurations", type=int, default=100_000)
+    parser.add_argument("--postures", type=int, default=500)
+    given = parser.parse_args()
+    configurations("stick_figure", "urdf", given.configurations)
+    configurations("human", "capsules", given.configurations)
+    configurations("talos", "urdf", given.configurations // 50)
+    for name in ("human", "talos", "simple_humanoid", "g1"):
+        postures(name, given.postures)
+
+
+if __name__ == "__main__":
+    main()
