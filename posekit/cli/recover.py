@@ -51,7 +51,7 @@ def recover(
             "--rigid-tolerance",
             metavar="LENGTH",
             help="How far distances inside torso and hips may be off. Default: exact where some torso fits "
-            "exactly, else 3cm.",
+            "exactly, else 3cm, or 10cm in an uncalibrated view.",
         ),
     ] = "",
     tangent_tolerance: Annotated[
@@ -59,7 +59,7 @@ def recover(
         typer.Option(
             "--tangent-tolerance",
             metavar="LENGTH",
-            help="How much too short for its image a segment may be. Default: as above, 1cm.",
+            help="How much too short for its image a segment may be. Default: as above, 1cm or 5cm.",
         ),
     ] = "",
     angle_tolerance: AngleTolerance = None,
@@ -94,7 +94,7 @@ def recover(
         typer.Option(
             "--nearer",
             metavar="FILE",
-            help="Which end of each segment is nearer, given by hand: JSON or TOML.",
+            help="Which end of each segment is nearer, given by hand: posekit.nearer/1.",
         ),
     ] = None,
     linkage: Annotated[
@@ -121,8 +121,19 @@ def recover(
 
     distinct(view, output, write_urdf, nearer)
     if linkage:
-        for name, given in (("--write-urdf", write_urdf), ("--group", group), ("--explain", explain)):
-            if given:
+        for name, given, default in (
+            ("--write-urdf", write_urdf, None),
+            ("--group", group, ""),
+            ("--explain", explain, False),
+            ("--checks", checks, PHYSICAL),
+            ("--ranges", ranges, "urdf"),
+            ("--rules", rules, "1,2"),
+            ("--contact-margin", contact_margin, "0cm"),
+            ("--angle-tolerance", angle_tolerance, None),
+            ("--proportions", proportions, "figure"),
+            ("--no-infer", infer, True),
+        ):
+            if given != default:
                 raise InputError(f"{name} is for persons; leave it out with --linkage")
         _recover_object(view, output, linkage, scale, nearer, rigid_tolerance, tangent_tolerance)
         return
@@ -140,7 +151,14 @@ def recover(
             checks=split(checks),
             ranges=table,
             rules=rule_numbers(rules),
-            tolerance=_tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
+            tolerance=_tolerance(
+                rigid_tolerance,
+                tangent_tolerance,
+                angle_tolerance,
+                pipeline.PHOTOGRAPH
+                if isinstance(seen.camera, files.ScaledOrthographicModel)
+                else pipeline.MEASURED,
+            ),
             contact_margin=signed_length(contact_margin, "--contact-margin"),
             group=files.parse_length(group, name="--group") if group else None,
             scale=how,
@@ -195,18 +213,19 @@ def _recover_object(
     typer.echo(f"written: {output}")
 
 
-def _tolerance(rigid: str, tangent: str, angle: float | None) -> Tolerance | None:
+def _tolerance(rigid: str, tangent: str, angle: float | None, otherwise: Tolerance) -> Tolerance | None:
+    """Make the tolerance of what was given, the rest as it is by default for such a view."""
     from posekit.files import parse_length
-    from posekit.pipeline import EXACT, MEASURED, Tolerance
+    from posekit.pipeline import EXACT, Tolerance
 
     if not rigid and not tangent and angle is None:
         return None
-    metres = parse_length(rigid, name="--rigid-tolerance") if rigid else MEASURED.rigid
+    metres = parse_length(rigid, name="--rigid-tolerance") if rigid else otherwise.rigid
     return Tolerance(
         rigid=metres,
-        tangent=parse_length(tangent, name="--tangent-tolerance") if tangent else MEASURED.tangent,
+        tangent=parse_length(tangent, name="--tangent-tolerance") if tangent else otherwise.tangent,
         placement=metres <= EXACT.rigid,
-        angle=MEASURED.angle if angle is None else angle,
+        angle=otherwise.angle if angle is None else angle,
     )
 
 

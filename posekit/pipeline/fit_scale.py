@@ -89,6 +89,8 @@ def _family(
     points = seen[[JOINT[point] for point in linkage.points]]
     solutions = Solutions(linkage=linkage, image=points)
     bound, segment = solutions.minimum_scale, solutions.bounding_segment
+    if bound == 0:
+        raise InputError("all joints are seen at one point, which fixes no scale; correct the image points")
     minima, curve = np.empty((0, 2)), np.empty((0, 2))
     if scale.how == "constraints":
         found = search(solutions, scale.weights)

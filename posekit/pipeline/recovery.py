@@ -288,7 +288,7 @@ class FrameRecovery:
     def rejected(self) -> dict[str, int]:
         """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
         if self.batch is None:
-            return {f"root/{self.reason}": 8192}
+            return {"root/not_known": 8192}
         lost: Counter[str] = Counter()
         for one in self.batch.rejected[self.index : self.index + self.hypotheses]:
             lost.update(one)

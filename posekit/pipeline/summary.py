@@ -36,16 +36,17 @@ def summary_lines(recovery: Recovery) -> list[str]:
 
 def _scale_lines(recovery: Recovery) -> list[str]:
     """Describe the scales of an uncalibrated view, and where its mirror images could not be told apart."""
-    families = [frame.family for frame in recovery.frames if frame.family is not None and len(frame)]
+    families = [frame.family for frame in recovery.frames if frame.family is not None]
     if not families:
         return []
     s = np.concatenate([family.chosen for family in families])
     segment, count = Counter(family.segment for family in families).most_common(1)[0]
+    found = sum(len(frame) > 0 for frame in recovery.frames)
     mirrored = sum(frame.mirrored > 0 for frame in recovery.frames)
     return [
         f"scale by {families[0].how}: {s.min():.6g} to {s.max():.6g} pixels a metre; the bound is set by {segment} in "
         f"{count} of {len(families)} frames",
-        f"mirror images told apart in {len(families) - mirrored} of {len(families)} frames"
+        f"mirror images told apart in {found - mirrored} of {found} frames with postures"
         + (f"; in {mirrored} a posture and its mirror image both survive" if mirrored else ""),
     ]
 
@@ -53,6 +54,8 @@ def _scale_lines(recovery: Recovery) -> list[str]:
 def _frame_line(k: int, frame: FrameRecovery) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
     judged = frame.judged or "-"
+    if frame.reason:
+        return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
 

@@ -228,7 +228,7 @@ class TestScale:
 
     def test_a_single_loop_that_was_made_to_close_is_no_evidence(self):
         thing, truth = drawn(11, 5, 1)
-        assert recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0].judged == "measured"
+        assert recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0].judged == "closed"
         assert recover_object(view_of(thing, truth), thing, scale=VALUE).frames[0].judged == "exact"
         thing, truth = drawn(11, 5, 2)
         assert recover_object(view_of(thing, truth), thing, scale=CLOSURE).frames[0].judged == "exact"
@@ -590,7 +590,7 @@ class TestCertifier:
 class TestBadInput:
     def test_too_many_survivors(self):
         thing, truth = drawn(1, 16, 0)
-        with pytest.raises(InputError, match=r"more than 16,384 of the 2\^16 flips survive; say which end"):
+        with pytest.raises(InputError, match=r"more than 16,384 postures at 1 scales; say which end"):
             recover_object(view_of(thing, truth), thing, scale=VALUE)
 
     def test_too_many_segments(self):

@@ -186,9 +186,8 @@ def grow(
         leaves = spanned.tree.grow(camera, root, seen, checks, tolerance=tolerance.tangent)
         count += len(leaves.code)
         if count > MOST:
-            free = len(spanned.nodes) - 1
             raise InputError(
-                f"linkage {plan.linkage.name}: more than {MOST:,} of the 2^{free} flips survive; say which end is "
+                f"linkage {plan.linkage.name}: more than {MOST:,} postures at {len(scales)} scales; say which end is "
                 "nearer of some segments (--nearer), or recover a part of the object"
             )
         parts.append((leaves, first))

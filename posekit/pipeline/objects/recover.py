@@ -17,7 +17,7 @@ from posekit.pipeline.objects.articulated import ArticulatedObject
 from posekit.pipeline.objects.certify import Certifier
 from posekit.pipeline.objects.growth import Grown, grow
 from posekit.pipeline.objects.plan import Plan
-from posekit.pipeline.objects.scales import family_of
+from posekit.pipeline.objects.scales import CLOSED, family_of
 from posekit.pipeline.objects.tolerance import ObjectTolerance
 from posekit.pipeline.scale import Scale
 
@@ -46,7 +46,8 @@ def recover_object(
     nearer : sequence of mapping, optional
         Flips given by hand: segment to the name of its nearer end, one mapping for all frames or one a frame.
     tolerance : ObjectTolerance, optional
-        In the linkage's unit. By default each frame is judged as exact where a loop closes exactly, else as measured.
+        In the linkage's unit. By default each frame is judged as exact where a loop closes exactly that need not
+        have, as closed where the scale was found so that it does, else as measured.
     certify : bool
         Whether to look for the configurations of a robot.
     progress : callable, optional
@@ -170,7 +171,11 @@ def _grow(
         return grow(plan, image, aspect, scales, given, "given")
     grown = grow(plan, image, aspect, scales, exact, "exact")
     fitted = family.how.split("+")
-    return grown if grown.exact(fitted=fitted) else grow(plan, image, aspect, scales, measured, "measured")
+    if grown.exact(fitted=fitted):
+        return grown
+    if (family.minima_residual[:1] <= CLOSED).any() and len(grown.postures):
+        return replace(grown, judged="closed")  # the scale was found so that they close, exact image or not
+    return grow(plan, image, aspect, scales, measured, "measured")
 
 
 def _frame(

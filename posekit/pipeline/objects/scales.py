@@ -24,6 +24,9 @@ SAME = 1e-9
 MOST_SEGMENTS = 15
 """Segments of loops whose flips are all tried; of more, the scale comes from the rigid triangles alone."""
 
+CLOSED = 1e-16
+"""Residual (dimensionless) of a minimum that leaves nothing: these alone are taken where there are any."""
+
 MOST_SCALES = 128
 """The most scales of one frame that are taken, the best first."""
 
@@ -75,7 +78,10 @@ def family_of(
     minima, curve_s, curve = np.empty((0, 2)), np.empty(0), np.empty(0)
     if way.how == "constraints":
         minima, curve_s, curve = _constrained(plan, solutions, way.weights)
-        chosen = _distinct(minima[:, 0])[:MOST_SCALES]
+        closed = minima[:, 1] <= CLOSED
+        chosen = _distinct(minima[closed if closed.any() else slice(None), 0])[:MOST_SCALES]
+        if not len(chosen):
+            how, chosen = f"min: {how} fixes no scale here", np.array([bound])
     elif way.how == "min":
         chosen = np.array([bound])
     else:
