@@ -31,6 +31,8 @@ EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
     "posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking",
     "posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain",
+    "posekit recover photo.json -o postures.json --scale closure",
+    "posekit recover panda.json -o found.json --linkage panda --scale closure",
 )
 
 

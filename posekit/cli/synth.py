@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from posekit.synthesis import Scene
 
 app = typer.Typer(
-    help="Make synthetic views with truth: a walker, random legal postures, or motion capture.",
+    help="Make synthetic views with truth: a walker, random legal postures, motion capture, or a robot.",
     epilog=examples("posekit synth walker -o walk.json", "posekit synth random -o random.json --frames 100"),
     rich_markup_mode=None,
 )
@@ -22,7 +22,7 @@ app = typer.Typer(
 Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")]
 Uncalibrated = Annotated[
     bool,
-    typer.Option("--uncalibrated", help="Forget the camera: write the pictures as photographs without one."),
+    typer.Option("--uncalibrated", help="Forget the camera: write the (perspective) pictures as photographs without one."),
 ]
 Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
 

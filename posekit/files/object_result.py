@@ -31,7 +31,7 @@ class ObjectFrame:
     time : float
         Seconds.
     judged : str or None
-        ``exact``, ``measured`` or ``given``.
+        ``exact``, ``closed``, ``measured`` or ``given``.
     reason : str
         Why nothing was grown.
     levels : tuple of (str, int)

@@ -58,7 +58,7 @@ class ObjectFrameRecord(FileModel):
 
     time: float = Field(description="Seconds.")
     judged: str | None = Field(
-        description="exact, measured or given: the tolerance; null where nothing was grown."
+        description="exact, closed, measured or given: the tolerance; null where nothing was grown."
     )
     reason: str = Field(default="", description="Why there is nothing.")
     levels: ObjectLevels
