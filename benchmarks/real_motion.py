@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from posekit.pipeline import MEASURED, Tolerance, recover, view_of
-from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.markdown import table_lines
+from posekit.pipeline.recovery import FrameRecovery
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.tree.bits import path_of

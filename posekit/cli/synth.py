@@ -22,7 +22,10 @@ app = typer.Typer(
 Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")]
 Uncalibrated = Annotated[
     bool,
-    typer.Option("--uncalibrated", help="Forget the camera: write the (perspective) pictures as photographs without one."),
+    typer.Option(
+        "--uncalibrated",
+        help="Forget the camera: write the (perspective) pictures as photographs without one.",
+    ),
 ]
 Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
 

@@ -18,6 +18,10 @@ from posekit.files.object_view import write_object_view as write_object_view
 from posekit.files.postures import Postures as Postures
 from posekit.files.postures import read_postures as read_postures
 from posekit.files.postures import write_postures as write_postures
+from posekit.files.postures_q import Configurations as Configurations
+from posekit.files.postures_q import holds_configurations as holds_configurations
+from posekit.files.postures_q import read_configurations as read_configurations
+from posekit.files.postures_q import write_configurations as write_configurations
 from posekit.files.reading import read_json as read_json
 from posekit.files.report import Finding as Finding
 from posekit.files.report import Judged as Judged

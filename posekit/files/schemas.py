@@ -6,7 +6,14 @@ import json
 from typing import Any, Final
 
 from posekit.files import nearer as nearer_schema
-from posekit.files import object_result_schema, postures_schema, report_schema, result_schema, view_schema
+from posekit.files import (
+    object_result_schema,
+    postures_q_schema,
+    postures_schema,
+    report_schema,
+    result_schema,
+    view_schema,
+)
 from posekit.files.validation import FileModel
 from posekit.intake.refusal import nearest, refusal, shown
 
@@ -17,6 +24,7 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
     report_schema.SCHEMA: report_schema.ReportFile,
     nearer_schema.SCHEMA: nearer_schema.NearerFile,
     object_result_schema.SCHEMA: object_result_schema.ObjectFile,
+    postures_q_schema.SCHEMA: postures_q_schema.ConfigurationsFile,
 }
 SCHEMAS: Final = tuple(_MODELS)
 """The names of the schemas, each with its version: ``posekit.view/1``."""

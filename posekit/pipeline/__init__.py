@@ -9,7 +9,6 @@ from posekit.pipeline.result import result_of as result_of
 from posekit.pipeline.scale import Scale as Scale
 from posekit.pipeline.scale import parse_scale as parse_scale
 from posekit.pipeline.summary import summary_lines as summary_lines
-from posekit.pipeline.summary import verdict_lines as verdict_lines
 from posekit.pipeline.taylor.reproduce import reproduce_taylor as reproduce_taylor
 from posekit.pipeline.tolerance import EXACT as EXACT
 from posekit.pipeline.tolerance import MEASURED as MEASURED

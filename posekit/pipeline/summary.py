@@ -6,7 +6,6 @@ from collections import Counter
 
 import numpy as np
 
-from posekit.files import Report
 from posekit.pipeline.recovery import FrameRecovery, Recovery
 
 SHOWN = 4
@@ -58,17 +57,3 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
         return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
-
-
-def verdict_lines(report: Report) -> list[str]:
-    """Count the verdicts of a report, and what is behind the invalid ones."""
-    reasons = Counter(
-        f"{finding.check}/{finding.where}"
-        for posture in report.postures
-        for finding in posture.findings
-        if finding.verdict == "invalid"
-    )
-    counts = ", ".join(f"{count} {verdict}" for verdict, count in report.summary.items())
-    lines = [f"{len(report.postures)} postures: {counts}"]
-    lines += [f"{count:>8}  {reason}" for reason, count in reasons.most_common(10)]
-    return lines

@@ -342,7 +342,9 @@ def test_joints_that_are_not_seen_are_unknown_in_the_result(run: Run, walk: dict
     assert run("recover", write(document), "-o", "inferred.json").code == 0
     frame = read_result("inferred.json").frames[0]
     assert frame.inferred is not None
-    assert all({"right_shoulder", "right_elbow", "right_wrist"} == set(joints) for joints in frame.inferred if joints)
+    assert all(
+        {"right_shoulder", "right_elbow", "right_wrist"} == set(joints) for joints in frame.inferred if joints
+    )
 
 
 def test_a_misprinted_eye_is_one_line_of_warning(run: Run, walk: dict[str, Any]) -> None:

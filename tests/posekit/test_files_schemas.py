@@ -22,6 +22,7 @@ from posekit.files import (
     read_nearer,
     schema,
     schema_text,
+    write_configurations,
     write_object,
     write_postures,
     write_report,
@@ -90,6 +91,7 @@ def write_all(folder, rng) -> dict[str, list]:
         frames=[rod],
     )
     write_object(folder / "object.json", thing)
+    write_configurations(folder / "configurations.json", rng.normal(size=(2, 3)), ["a", "b", "c"])
     near = {"schema": "posekit.nearer/1", "frames": [{"neck-pelvis": "neck"}]}
     (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
     assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]

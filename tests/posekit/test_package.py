@@ -98,4 +98,6 @@ def test_the_api_page_lists_every_module() -> None:
     assert spec.loader is not None
     page = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(page)
-    assert (ROOT / "docs" / "api.md").read_text(encoding="utf-8") == page.text(), "run: python docs/make_api.py"
+    assert (ROOT / "docs" / "api.md").read_text(encoding="utf-8") == page.text(), (
+        "run: python docs/make_api.py"
+    )

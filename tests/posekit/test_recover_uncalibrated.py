@@ -204,6 +204,8 @@ def test_the_family_is_written_and_read_back(tmp_path, suffix) -> None:
         for one, other in zip(result.frames, back.frames, strict=True):
             assert one.family is not None
             assert other.family is not None
+            assert one.scales is not None
+            assert other.scales is not None
             assert one.family.segment == other.family.segment
             np.testing.assert_allclose(one.family.chosen, other.family.chosen, rtol=1e-15)
             np.testing.assert_allclose(one.scales, other.scales, rtol=1e-15)
@@ -299,4 +301,4 @@ def test_what_cannot_be_asked(options: dict[str, Any], text: str) -> None:
 def test_a_calibrated_view_has_no_scale_and_no_other_proportions() -> None:
     for options in ({"scale": Scale()}, {"proportions": "taylor"}):
         with pytest.raises(InputError, match=r"^--(scale|proportions): .*leave the option out"):
-            recover(builtin_view("seq1"), **options)  # type: ignore[arg-type]
+            recover(builtin_view("seq1"), **options)

@@ -123,6 +123,7 @@ def test_collisions_are_pinocchios_one_by_one(name: str, count: int) -> None:
     q = random_q(name, count, 4)
     report = Validator(robot(name), checks=("collision",)).check(q=q)
     model, geometry = robot(name).model, robot(name).geometry
+    assert geometry is not None
     data, geometry_data = model.createData(), geometry.createData()
     contacts = report.contacts()
     for row in range(count):
@@ -242,7 +243,7 @@ def test_the_hull_is_scipys_and_the_margin_is_the_distance_to_its_edge(seed: int
 
 
 def standing(name: str) -> np.ndarray:
-    return pin.neutral(robot(name).model)[None]
+    return np.asarray(pin.neutral(robot(name).model))[None]
 
 
 def test_a_person_stands_until_the_centre_of_mass_leaves_the_feet() -> None:

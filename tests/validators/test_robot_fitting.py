@@ -59,7 +59,7 @@ def judged(report: Report, check: str) -> dict[str, tuple[float, float, bool]]:
 
 
 def rejected(report: Report, check: str) -> np.ndarray:
-    return next(one for one in report.judgements if one.check == check).violated.any(axis=1)
+    return np.asarray(next(one for one in report.judgements if one.check == check).violated.any(axis=1))
 
 
 @pytest.mark.parametrize(("name", "count"), [("human", 150), ("talos", 100), ("simple_humanoid", 100)])
