@@ -48,7 +48,7 @@ def view_of(truth: np.ndarray, scale: float | None = S, *, aspect: float = 1.0, 
     camera = ScaledOrthographicCamera(scale=S, aspect=aspect)
     return View(
         camera=ScaledOrthographicModel(scale=scale, aspect=aspect),
-        time=np.arange(len(truth)) * 0.1,
+        time=np.arange(len(truth), dtype=np.float64),
         image=camera.project(truth),
         truth=truth,
         **more,
