@@ -104,7 +104,8 @@ def write_all(folder, rng) -> dict[str, list]:
 
 def test_each_is_versioned_and_closed():
     assert SCHEMAS == tuple(
-        f"posekit.{kind}/1" for kind in ("view", "result", "postures", "report", "nearer", "object")
+        f"posekit.{kind}/1"
+        for kind in ("view", "result", "postures", "report", "nearer", "object", "configurations")
     )
     for name in SCHEMAS:
         found = schema(name)
