@@ -83,7 +83,7 @@ class Body(Protocol):
 
     @property
     def evidence(self) -> Sequence[tuple[tuple[int, int], float]]:
-        """Distances (m) between two joints that are not used to lift anything: they show that points are exact."""
+        """Distances (m) between two of the tree's joints that lift nothing: they show that points are exact."""
         ...
 
     def image(self, seen: Array) -> Array:

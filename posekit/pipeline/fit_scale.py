@@ -11,7 +11,7 @@ from posekit.linkage import Family as Solutions
 from posekit.linkage import Minima, search
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
-from posekit.pipeline.scale import Scale
+from posekit.pipeline.scale import Scale, way_of
 from posekit.pipeline.tolerance import EXACT, PHOTOGRAPH, Tolerance
 from posekit.skeleton import HEAD, JOINT
 
@@ -50,7 +50,7 @@ def fit_scale(view: View, body: Body, scale: Scale | None, tolerance: Tolerance 
                 raise InputError(
                     f"{body.tree.joints[0]}, from which the tree grows, is not seen; add it, or drop the frame"
                 )
-            families.append(_family(points, body, _choice(model, scale), tolerance, view.unit))
+            families.append(_family(points, body, way_of(model.scale, scale), tolerance, view.unit))
         except PosekitError as error:
             reasons[k] = f"frames[{k}]: {error}"
             families.append(None)
@@ -71,13 +71,6 @@ def fit_scale(view: View, body: Body, scale: Scale | None, tolerance: Tolerance 
         families=families,
         closed=scale is not None and scale.how == "constraints",
     )
-
-
-def _choice(model: ScaledOrthographicModel, scale: Scale | None) -> tuple[str, Scale]:
-    """Return how the scale is found, by name, and the way itself."""
-    if scale is not None:
-        return "+".join(scale.weights) or scale.how, scale
-    return ("min", Scale()) if model.scale is None else ("view", Scale(how="value", value=model.scale))
 
 
 def _family(

@@ -120,9 +120,10 @@ def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.
         return np.zeros(leaves.n_frames, dtype=bool)
     fits = np.ones(len(leaves.code), dtype=bool)
     seen = np.zeros(len(leaves.code), dtype=np.int8)
-    points = body.points(leaves)
+    nodes = np.arange(len(leaves.code))
     for segment, length in body.evidence:
-        known_length = np.linalg.norm(points[:, segment[0]] - points[:, segment[1]], axis=-1)
+        ends = leaves.positions(segment, nodes)
+        known_length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
         known = np.isfinite(known_length)
         fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
         seen += known

@@ -18,10 +18,14 @@ from posekit.grouping import group_postures
 from posekit.occlusion import Completion
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
+from posekit.pipeline.mirror import mirrored
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
+
+LEVEL = 5e-10
+"""Metres of depth up to which neither end of a segment is nearer: rounding."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +86,7 @@ class Batch:
     def mirrored(self) -> NDArray[np.bool_]:
         """Survivors (N,) whose mirror image survives too: the same picture with near and far exchanged throughout."""
         leaves = self.leaves
-        depths = leaves.postures()[..., 2]
-        parents = np.array(leaves.parents[1:])
-        turns = np.sign(np.round(depths[:, 1:] - depths[:, parents], 9))
-        powers = 3 ** np.arange(len(parents), dtype=np.int64)
-        own, other = (np.nan_to_num(side * turns).astype(np.int64) @ powers for side in (1, -1))
-        span = np.int64(3) ** len(parents)
-        return np.isin(leaves.frame * (2 * span) + other, leaves.frame * (2 * span) + own)
+        return mirrored(leaves.postures()[..., 2], leaves.parents, leaves.frame, level=LEVEL)
 
     @cached_property
     def motion(self) -> NDArray[np.int64]:

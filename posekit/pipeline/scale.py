@@ -82,6 +82,13 @@ def parse_scale(text: str, *, per_unit: float = 1.0) -> Scale:
     )
 
 
+def way_of(known: float | None, scale: Scale | None) -> tuple[str, Scale]:
+    """Return how a scale is found, by name, and the way itself: as was asked, else the view's own, else the least."""
+    if scale is not None:
+        return "+".join(scale.weights) or scale.how, scale
+    return ("min", Scale()) if known is None else ("view", Scale(how="value", value=known))
+
+
 def _is_number(text: str) -> bool:
     try:
         float(text)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import InputError
+from posekit.pipeline.mirror import mirrored
 from posekit.pipeline.objects.plan import Plan
 from posekit.pipeline.objects.spread import Spread
 from posekit.pipeline.objects.tolerance import ObjectTolerance
@@ -106,12 +107,7 @@ class Grown:
     @property
     def mirrored(self) -> NDArray[np.bool_]:
         """Survivors (N,) whose mirror image, near and far exchanged throughout, survives too."""
-        depths, parents = self.postures[..., 2], np.array(self.plan.spanned.tree.parents[1:])
-        apart = depths[:, 1:] - depths[:, parents]
-        turns = np.where(np.abs(apart) <= LEVEL, 0, np.sign(apart)).astype(np.int64)
-        powers = 3 ** np.arange(turns.shape[1], dtype=np.int64)
-        base = 2 * 3 ** turns.shape[1] * self.hypothesis.astype(np.int64)
-        return np.isin(base - turns @ powers, base + turns @ powers)
+        return mirrored(self.postures[..., 2], self.plan.spanned.tree.parents, self.hypothesis, level=LEVEL)
 
     def exact(self, *, fitted: Collection[str]) -> bool:
         """Tell whether there is evidence that the image is exact: loops closed that need not have.

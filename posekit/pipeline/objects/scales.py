@@ -13,7 +13,7 @@ from posekit.linkage import search
 from posekit.linkage.family import Family as Solutions
 from posekit.pipeline.objects.plan import Plan
 from posekit.pipeline.objects.triangles import Triangles
-from posekit.pipeline.scale import Scale
+from posekit.pipeline.scale import Scale, way_of
 
 ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""
@@ -74,7 +74,7 @@ def family_of(
         raise InputError(
             f"linkage {plan.linkage.name}: all its segments are seen end on; the image fixes no scale"
         )
-    how, way = _choice(camera, scale)
+    how, way = way_of(camera.scale, scale)
     minima, curve_s, curve = np.empty((0, 2)), np.empty(0), np.empty(0)
     if way.how == "constraints":
         minima, curve_s, curve = _constrained(plan, solutions, way.weights)
@@ -113,13 +113,6 @@ def family_of(
         curve_s=curve_s * back,
         curve_residual=curve,
     )
-
-
-def _choice(camera: ScaledOrthographicModel, scale: Scale | None) -> tuple[str, Scale]:
-    """Return how the scale is found, by name, and the way itself."""
-    if scale is not None:
-        return "+".join(scale.weights) or scale.how, scale
-    return ("min", Scale()) if camera.scale is None else ("view", Scale(how="value", value=camera.scale))
 
 
 def _constrained(
