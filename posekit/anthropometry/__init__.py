@@ -1,0 +1,1 @@
+"""How long a person's segments are: from stature, from named proportions, from recordings of the person."""

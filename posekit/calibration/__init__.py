@@ -1,0 +1,1 @@
+"""Cameras as other tools write them, and guesses where none is known."""
