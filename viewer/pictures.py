@@ -13,7 +13,7 @@ from PIL import Image
 
 from posekit.cameras import Array
 from posekit.errors import ViewerError
-from posekit.files.writing import replacing, write_text
+from posekit.intake.writing import replacing, write_text
 from posekit.viewer.browser.browser import TIMEOUT
 from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size

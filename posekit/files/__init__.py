@@ -45,6 +45,6 @@ from posekit.files.units import parse_length as parse_length
 from posekit.files.view import View as View
 from posekit.files.view_file import read_view as read_view
 from posekit.files.view_file import write_view as write_view
-from posekit.files.writing import make_folder as make_folder
-from posekit.files.writing import write_json as write_json
-from posekit.files.writing import write_lines as write_lines
+from posekit.intake.writing import make_folder as make_folder
+from posekit.intake.writing import write_json as write_json
+from posekit.intake.writing import write_lines as write_lines

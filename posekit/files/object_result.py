@@ -16,8 +16,8 @@ from posekit.files.object_result_schema import SCHEMA, ObjectFile, ObjectFrameRe
 from posekit.files.reading import read_json
 from posekit.files.units import PER_METRE, Unit
 from posekit.files.validation import validated
-from posekit.files.writing import check_target, json_pieces, write_text
 from posekit.intake.refusal import refusal
+from posekit.intake.writing import check_target, json_pieces, write_text
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ from posekit.files.object_view_schema import SCHEMA, ObjectViewFile
 from posekit.files.reading import read_json
 from posekit.files.units import PER_METRE, Unit
 from posekit.files.validation import validated
-from posekit.files.writing import json_pieces, write_text
 from posekit.intake.refusal import nearest, refusal, shown
+from posekit.intake.writing import json_pieces, write_text
 from posekit.linkage import Linkage
 
 Array = NDArray[np.float64]

@@ -19,8 +19,8 @@ from posekit.files.result_npz import MAX_PADDED, result_in
 from posekit.files.result_schema import SCHEMA as RESULT_SCHEMA
 from posekit.files.units import Unit, from_metres, to_metres
 from posekit.files.validation import validated
-from posekit.files.writing import json_pieces, replacing, write_text
 from posekit.intake.refusal import nearest, refusal, shown
+from posekit.intake.writing import json_pieces, replacing, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS
 
 Array = NDArray[np.float64]

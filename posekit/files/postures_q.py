@@ -14,8 +14,8 @@ from posekit.files.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix,
 from posekit.files.postures_q_schema import SCHEMA, ConfigurationsFile
 from posekit.files.reading import read_json
 from posekit.files.validation import validated
-from posekit.files.writing import json_pieces, replacing, write_text
 from posekit.intake.refusal import nearest, refusal, shown
+from posekit.intake.writing import json_pieces, replacing, write_text
 
 Array = NDArray[np.float64]
 

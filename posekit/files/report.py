@@ -19,8 +19,8 @@ from posekit.files.report_csv import csv_lines
 from posekit.files.report_schema import SCHEMA, VERDICTS, CheckFields, PostureFields, ReportFile, Verdict
 from posekit.files.report_table import markdown_lines
 from posekit.files.validation import validated
-from posekit.files.writing import check_target, json_pieces, write_lines, write_text
 from posekit.intake.refusal import refusal, shown
+from posekit.intake.writing import check_target, json_pieces, write_lines, write_text
 from posekit.tree.check import Findings
 
 NUMBERS = ("value", "lower", "upper", "margin")

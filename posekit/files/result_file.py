@@ -8,7 +8,7 @@ from posekit.files.npz import suffix
 from posekit.files.result import Result
 from posekit.files.result_json import read_result_json, write_result_json
 from posekit.files.result_npz import read_result_npz, write_result_npz
-from posekit.files.writing import check_target
+from posekit.intake.writing import check_target
 
 
 def read_result(path: str | Path) -> Result:

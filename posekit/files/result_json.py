@@ -16,8 +16,8 @@ from posekit.files.result import Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
-from posekit.files.writing import json_pieces, write_text
 from posekit.intake.refusal import refusal
+from posekit.intake.writing import json_pieces, write_text
 
 Array = NDArray[np.float64]
 

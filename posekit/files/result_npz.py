@@ -28,8 +28,8 @@ from posekit.files.reading import parse_json
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultDetails
 from posekit.files.units import PER_METRE, UNITS, Unit, from_metres, to_metres
-from posekit.files.writing import replacing
 from posekit.intake.refusal import refusal, shown
+from posekit.intake.writing import replacing
 from posekit.skeleton import JOINTS
 
 Array = NDArray[Any]

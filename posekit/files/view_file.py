@@ -16,8 +16,8 @@ from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.files.view import View
 from posekit.files.view_schema import SCHEMA, LeeChenCamera, OpenCVCamera, ScaledOrthographicCamera, ViewFile
-from posekit.files.writing import json_pieces, write_text
 from posekit.intake.refusal import refusal
+from posekit.intake.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 Array = NDArray[np.float64]

@@ -340,7 +340,7 @@ def test_padding_is_bounded_but_never_held(tmp_path, rng, monkeypatch):
 
 
 def test_a_result_too_large_for_json_says_npz(tmp_path, rng, monkeypatch):
-    monkeypatch.setattr("posekit.files.writing.MAX_BYTES", 10_000)
+    monkeypatch.setattr("posekit.intake.writing.MAX_BYTES", 10_000)
     with pytest.raises(InputError, match=r"name it \.npz"):
         write_result(tmp_path / "r.json", a_result(rng, (20,)))
     assert not list(tmp_path.iterdir())

@@ -11,7 +11,7 @@ import numpy as np
 from posekit.files.postures import Postures
 from posekit.files.result import Result
 from posekit.files.view import View
-from posekit.files.writing import write_text
+from posekit.intake.writing import write_text
 from posekit.viewer.page.data import page_data
 from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.scene import Scene

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from posekit.errors import ViewerError
 from posekit.files.npz import suffix
-from posekit.files.writing import replacing
+from posekit.intake.writing import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from posekit.errors import InputError
-from posekit.files.reading import MAX_BYTES
+from posekit.intake.json_file import MAX_BYTES
 from posekit.intake.refusal import cut, refusal
 
 
@@ -83,7 +83,7 @@ def check_target(path: str | Path) -> None:
 def write_text(path: str | Path, pieces: Iterable[str]) -> None:
     """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all.
 
-    The bound is that of `posekit.files.read_json`: what is written can be read again.
+    The bound is that of `posekit.intake.read_json`: what is written can be read again.
     """
     written = 0
     with replacing(path) as file:
