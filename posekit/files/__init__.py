@@ -36,6 +36,7 @@ from posekit.files.result import ResultFrame as ResultFrame
 from posekit.files.result_file import check_result_path as check_result_path
 from posekit.files.result_file import read_result as read_result
 from posekit.files.result_file import write_result as write_result
+from posekit.files.root import Root as Root
 from posekit.files.schemas import SCHEMAS as SCHEMAS
 from posekit.files.schemas import schema as schema
 from posekit.files.schemas import schema_text as schema_text

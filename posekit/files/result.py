@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
+from posekit.files.root import Root
 from posekit.files.units import Unit
 from posekit.intake.refusal import refusal
 from posekit.skeleton import JOINTS
@@ -57,6 +58,8 @@ class ResultFrame:
         The scales that an uncalibrated frame can have.
     scales : array (N,), optional
         The scale that each survivor of such a frame was recovered at, pixels a metre.
+    root : Root, optional
+        How the neck's depth was found, where the frame is calibrated and it was not given.
     inferred : sequence of N mappings, optional
         By survivor, then by joint that was not seen: what is known of its position (`posekit.files.Inferred`).
     """
@@ -75,6 +78,7 @@ class ResultFrame:
     pruned: Sequence[Mapping[str, Any]] | None = None
     family: Family | None = None
     scales: Array | None = None
+    root: Root | None = None
     inferred: Sequence[Mapping[str, Inferred]] | None = None
 
     def __post_init__(self) -> None:

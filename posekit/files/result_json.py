@@ -14,6 +14,7 @@ from posekit.files.inferred import Inferred
 from posekit.files.reading import read_json
 from posekit.files.result import Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
+from posekit.files.root import Root
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
 from posekit.intake.refusal import refusal
@@ -98,6 +99,8 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
         }
         if frame.family is not None:
             fields["family"] = frame.family.fields(unit)
+        if frame.root is not None:
+            fields["root"] = frame.root.fields(unit)
         if frame.pruned is not None:
             fields["pruned"] = [dict(entry) for entry in frame.pruned]
         yield fields
@@ -165,6 +168,7 @@ def _frame(
         pruned=frame.pruned,
         family=None if frame.family is None else Family.of(frame.family.model_dump(), unit),
         scales=_scales(postures, unit) if frame.family is not None else None,
+        root=None if frame.root is None else Root.of(frame.root.model_dump(), unit),
         inferred=[_inferred(posture, unit) for posture in postures] if inferred else None,
     )
 

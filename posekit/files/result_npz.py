@@ -27,6 +27,7 @@ from posekit.files.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz,
 from posekit.files.reading import parse_json
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultDetails
+from posekit.files.root import Root
 from posekit.files.units import PER_METRE, UNITS, Unit, from_metres, to_metres
 from posekit.intake.refusal import refusal, shown
 from posekit.intake.writing import replacing
@@ -78,6 +79,9 @@ def write_result_npz(path: str | Path, result: Result) -> None:
             for frame, missing in zip(frames, unknown, strict=True)
         ]
         arrays["scales"] = Ragged(rows=scales, fill=np.nan)
+    if any(frame.root is not None for frame in frames):
+        roots = [None if frame.root is None else frame.root.fields(unit) for frame in frames]
+        arrays["roots"] = np.array(json.dumps(roots, allow_nan=False))
     if any(frame.inferred is not None for frame in frames):
         inferred = [
             None
@@ -128,7 +132,7 @@ def result_in(archive: Archive) -> Result:
     levels = _levels(archive, len(time))
     rejected = _rejected(archive, len(time))
     pruned = _json(archive, "pruned") if "pruned" in archive.names else [None] * len(time)
-    families, inferred = _details(archive, count, unit)
+    families, roots, inferred = _details(archive, count, unit)
     scales = _ragged_floats(archive, "scales", count, ()) if families is not None else None
     settings = _json(archive, "settings")
     if not isinstance(settings, dict):
@@ -157,6 +161,7 @@ def result_in(archive: Archive) -> Result:
                 scales=None
                 if scales is None or families is None or families[index] is None
                 else scales[index] * PER_METRE[unit],
+                root=None if roots is None else roots[index],
                 inferred=None if inferred is None else inferred[index],
             )
             for index in range(len(time))
@@ -200,9 +205,12 @@ def _json(archive: Archive, name: str) -> Any:
 
 def _details(
     archive: Archive, count: Array, unit: Unit
-) -> tuple[list[Family | None] | None, list[list[dict[str, Inferred]] | None] | None]:
-    """Read families and inferred joints, which are kept as JSON text."""
-    given = {name: _json(archive, name) for name in ("families", "inferred") if name in archive.names}
+) -> tuple[
+    list[Family | None] | None, list[Root | None] | None, list[list[dict[str, Inferred]] | None] | None
+]:
+    """Read families, roots and inferred joints, which are kept as JSON text."""
+    kept = ("families", "roots", "inferred")
+    given = {name: _json(archive, name) for name in kept if name in archive.names}
     try:
         details = ResultDetails.model_validate(given)
     except ValidationError as error:
@@ -210,8 +218,8 @@ def _details(
         raise refusal(
             archive.path, str(where[0]), shown(where), "what posekit writes", "write the file again"
         ) from None
-    families, inferred = details.families, details.inferred
-    for name, entries in (("families", families), ("inferred", inferred)):
+    families, roots, inferred = details.families, details.roots, details.inferred
+    for name, entries in (("families", families), ("roots", roots), ("inferred", inferred)):
         if entries is not None and len(entries) != len(count):
             raise refusal(
                 archive.path, name, f"{len(entries)} entries", f"{len(count)}, one a frame", "write it again"
@@ -220,6 +228,9 @@ def _details(
         None
         if families is None
         else [None if family is None else Family.of(family.model_dump(), unit) for family in families],
+        None
+        if roots is None
+        else [None if root is None else Root.of(root.model_dump(), unit) for root in roots],
         None
         if inferred is None
         else [

@@ -127,6 +127,45 @@ class ResultFamily(FileModel):
     mirrored: Count = Field(description="How many survivors have their mirror image among the survivors.")
 
 
+class ResultDepthMinimum(FileModel):
+    """One local minimum of the rigid parts' misfit along the neck's ray."""
+
+    depth: float
+    residual: float
+
+
+class ResultDepthCurve(FileModel):
+    """The rigid parts' misfit against the neck's depth, the least over all branches."""
+
+    depth: Annotated[list[float], Field(max_length=100_000), FailFast()]
+    residual: Annotated[list[float], Field(max_length=100_000), FailFast()]
+
+
+class ResultRoot(FileModel):
+    """Where the body was put in depth; depths are the neck's z in the camera frame, in `unit`."""
+
+    method: str = Field(
+        description="given, head or torso (perspective-n-point), or search along the neck's ray."
+    )
+    chosen: Annotated[list[float], Field(max_length=100_000), FailFast()] = Field(
+        description="The depths that postures were recovered at."
+    )
+    residual: Maybe = Field(
+        description="Reprojection error in pixels, or for a search the least misfit in `unit`."
+    )
+    residual_unit: str = Field(description="px, or a unit of length.")
+    deviation: Maybe = Field(description="Standard deviation of the depth, to first order.")
+    lower: Maybe = Field(description="Least feasible depth.")
+    upper: Maybe = Field(description="Greatest feasible depth.")
+    segment: str = Field(description="The segment that sets the greatest: farther away it is too short.")
+    intervals: Annotated[
+        list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=100_000), FailFast()
+    ] = Field(description="Where the rigid parts can close within the tolerance.")
+    minima: Annotated[list[ResultDepthMinimum], Field(max_length=100_000), FailFast()]
+    curve: ResultDepthCurve
+    note: str = Field(description="Why another method was not used, where that needs saying.")
+
+
 class ResultFrameFields(FileModel):
     """One frame."""
 
@@ -136,15 +175,19 @@ class ResultFrameFields(FileModel):
     postures: Annotated[list[ResultPosture], FailFast()]
     rejected: Annotated[dict[str, Count], FEW] = Field(description="Pruned branches, by what killed them.")
     family: ResultFamily | None = Field(default=None, description="Uncalibrated: the scales it can have.")
+    root: ResultRoot | None = Field(
+        default=None, description="Calibrated, neck not given: how its depth was found."
+    )
     pruned: Annotated[list[Any], AfterValidator(_objects)] | None = Field(
         default=None, description="Detail on pruned branches, an object each."
     )
 
 
 class ResultDetails(FileModel):
-    """What an NPZ keeps as JSON text: the families of its frames, and what was inferred in their postures."""
+    """What an NPZ keeps as JSON text: families and roots of its frames, and what was inferred in postures."""
 
     families: list[ResultFamily | None] | None = None
+    roots: list[ResultRoot | None] | None = None
     inferred: list[list[dict[str, ResultInferred]] | None] | None = None
 
 

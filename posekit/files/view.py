@@ -12,7 +12,7 @@ from posekit.files.camera_model import CameraModel, ScaledOrthographicModel
 from posekit.files.units import Unit
 from posekit.files.view_schema import HEAD_NAMES
 from posekit.intake.refusal import nearest, refusal, shown
-from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 Array = NDArray[np.float64]
 
@@ -37,6 +37,8 @@ class View:
         orthographic.
     head_image : array (F, 5, 2), optional
         Head points as seen, in the order of `posekit.skeleton.HEAD_POINTS`.
+    confidence : array (F, 19), optional
+        How sure the image points are, joints and head points, as the detector says it: mostly 0 to 1.
     root : array (F, 3), optional
         The neck, OpenCV camera frame, metres.
     truth : array (F, 14, 3), optional
@@ -65,6 +67,7 @@ class View:
     time: Array
     image: Array
     head_image: Array = field(default_factory=_no_frames)
+    confidence: Array = field(default_factory=_no_frames)
     root: Array = field(default_factory=_no_frames)
     truth: Array = field(default_factory=_no_frames)
     lengths: Mapping[str, float] = field(default_factory=dict)
@@ -78,6 +81,7 @@ class View:
             "time": (frames,),
             "image": (frames, len(JOINTS), 2),
             "head_image": (frames, len(HEAD_POINTS), 2),
+            "confidence": (frames, len(POINTS)),
             "root": (frames, 3),
             "truth": (frames, len(JOINTS), 3),
         }
@@ -128,7 +132,9 @@ def _check_points(name: str, values: Array) -> None:
     """Refuse infinite numbers, and points of which only a part is known."""
     unknown = np.isnan(values)
     bad = np.isinf(values)
-    if values.ndim > 1:
+    if name == "confidence":
+        bad |= values < 0
+    elif values.ndim > 1:
         bad |= unknown ^ unknown.all(axis=-1, keepdims=True)
     if bad.any():
         where = tuple(int(index) for index in np.argwhere(bad)[0])

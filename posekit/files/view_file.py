@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from posekit.files.view import View
 from posekit.files.view_schema import SCHEMA, LeeChenCamera, OpenCVCamera, ScaledOrthographicCamera, ViewFile
 from posekit.intake.refusal import refusal
 from posekit.intake.writing import json_pieces, write_text
-from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
 
 Array = NDArray[np.float64]
 
@@ -54,6 +55,7 @@ def read_view(path: str | Path) -> View:
         time=np.array([frame.time for frame in frames], dtype=np.float64),
         image=image,
         head_image=head_image,
+        confidence=_gather_numbers([frame.confidence for frame in frames], POINTS),
         root=to_metres(roots, unit),
         truth=to_metres(_gather([frame.truth for frame in frames], JOINTS, 3), unit),
         lengths={
@@ -96,6 +98,8 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
         frame: dict[str, Any] = {"time": float(view.time[index]), "image": _known(image[index], JOINTS)}
         if head := _known(head_image[index], HEAD_POINTS):
             frame["head_image"] = head
+        if sure := _known_numbers(view.confidence[index], POINTS):
+            frame["confidence"] = sure
         if not np.isnan(root[index, 0]):
             frame["root"] = root[index].tolist()
         if joints := _known(truth[index], JOINTS):
@@ -117,6 +121,17 @@ def _gather(frames: list[dict[str, list[float]] | None], names: tuple[str, ...],
     unknown = [np.nan] * axes
     rows = [[(points or {}).get(name, unknown) for name in names] for points in frames]
     return np.array(rows, dtype=np.float64)
+
+
+def _gather_numbers(frames: list[dict[str, float] | None], names: tuple[str, ...]) -> Array:
+    """Make the array (F, len(names)) of numbers by name, NaN where a name is absent."""
+    rows = [[(numbers or {}).get(name, np.nan) for name in names] for numbers in frames]
+    return np.array(rows, dtype=np.float64)
+
+
+def _known_numbers(numbers: Array, names: tuple[str, ...]) -> dict[str, float]:
+    """Return the numbers that are known, by name."""
+    return {name: value for name, value in zip(names, numbers.tolist(), strict=True) if not math.isnan(value)}
 
 
 def _known(points: Array, names: tuple[str, ...]) -> dict[str, list[float]]:

@@ -10,7 +10,7 @@ from pydantic import ConfigDict, FailFast, Field, model_validator
 from posekit.files.camera_model import check_intrinsics, check_rotation
 from posekit.files.units import Unit
 from posekit.files.validation import FileModel, checked, named, refuse
-from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 SCHEMA = "posekit.view/1"
 HEAD_NAMES = ("neck", *HEAD_POINTS)
@@ -25,10 +25,12 @@ Point2 = Annotated[list[float], Field(min_length=2, max_length=2)]
 Point3 = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix3 = Annotated[list[Point3], Field(min_length=3, max_length=3)]
 Positive = Annotated[float, Field(gt=0)]
+Confidence = Annotated[float, Field(ge=0)]
 Pixels = Annotated[int, Field(gt=0, le=10**6)]
 
 Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
+Sure = Annotated[dict[str, Confidence], named(POINTS, "joint or head point"), _keys(POINTS)]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]
 Lengths = Annotated[dict[str, Positive], named(SEGMENT_NAMES, "segment"), _keys(SEGMENT_NAMES)]
@@ -89,6 +91,9 @@ class FrameFields(FileModel):
         "unless the camera is scaled-orthographic."
     )
     head_image: HeadImage | None = Field(default=None, description="Where each point of the head is seen.")
+    confidence: Sure | None = Field(
+        default=None, description="How sure each image point is, as its detector says it: mostly 0 to 1."
+    )
     root: Point3 | None = Field(default=None, description="The neck, OpenCV camera frame, in `unit`.")
     truth: Joints | None = Field(default=None, description="Joints, OpenCV camera frame, in `unit`.")
 
@@ -105,6 +110,7 @@ class ViewFile(FileModel):
         "head_points": "a head point is [x, y, z]; leave out one that is not known",
         "image": "an image point is [u, v]; leave out a joint that is not seen",
         "head_image": "an image point is [u, v]; leave out one that is not seen",
+        "confidence": "a confidence is a number from 0; leave out one that is not known",
         "truth": "a joint is [x, y, z]; leave out one that is not known",
         "root": "the root is [x, y, z]; leave it out where it is not known",
         "K": "K is three rows of three numbers, in pixels",
