@@ -1,0 +1,90 @@
+"""Options that say how a detector's file is to be read: shared by `recover`, `convert` and `inspect`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Format = Annotated[
+    str,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="The format of what is read, where its structure does not tell: openpose, coco, mediapipe, trc, …",
+    ),
+]
+Skeleton = Annotated[
+    str,
+    typer.Option(
+        "--skeleton",
+        metavar="NAME|FILE",
+        help="What the points are: a built-in skeleton map, as body_25b, or a posekit.skeleton_map/1 TOML.",
+    ),
+]
+Person = Annotated[
+    str,
+    typer.Option(
+        "--person",
+        metavar="WHO",
+        help="largest, surest, first, a track's number from `posekit inspect`, or all. Default: the only one, else "
+        "largest.",
+    ),
+]
+SwapSides = Annotated[
+    bool, typer.Option("--swap-sides", help="Exchange left and right: the file has them the wrong way round.")
+]
+CameraFile = Annotated[
+    str,
+    typer.Option(
+        "--camera",
+        metavar="FILE[:NAME]",
+        help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP; NAME where it has several cameras. Without "
+        "any camera the view is scaled orthographic.",
+    ),
+]
+FieldOfView = Annotated[
+    float | None,
+    typer.Option(
+        "--fov", metavar="DEGREES", help="A guess instead of a calibration: the horizontal field of view."
+    ),
+]
+Focal35 = Annotated[
+    float | None,
+    typer.Option("--focal35", metavar="MM", help="A guess: the focal length in 35 mm equivalents."),
+]
+Exif = Annotated[
+    Path | None,
+    typer.Option("--exif", metavar="JPEG", help="A guess: the focal length that the photograph itself says."),
+]
+Size = Annotated[
+    str,
+    typer.Option(
+        "--size", metavar="WxH", help="The picture's width and height, where the file does not say."
+    ),
+]
+Rate = Annotated[
+    float | None,
+    typer.Option("--fps", metavar="RATE", help="Frames a second, where the file does not say. Default: 30."),
+]
+MinConfidence = Annotated[
+    float,
+    typer.Option("--min-confidence", min=0.0, help="Points that are less sure than this count as not seen."),
+]
+Stature = Annotated[
+    str, typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths.")
+]
+LengthsFile = Annotated[
+    Path | None,
+    typer.Option("--lengths", metavar="FILE", help="The person's segment lengths: posekit.lengths/1."),
+]
+Calibrate = Annotated[
+    Path | None,
+    typer.Option(
+        "--calibrate",
+        metavar="FILE",
+        help="A recording of the same person, from which lengths are estimated: motion capture, or key points of "
+        "the same camera (with --stature).",
+    ),
+]

@@ -1,0 +1,82 @@
+"""How a detector's file is to be read: who, with which camera, with which lengths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from posekit.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """What a user says about a detector's file.
+
+    Parameters
+    ----------
+    format : str
+        Of the file; empty where its structure tells.
+    skeleton : str
+        A skeleton map by name or file; empty for the format's own.
+    person : str
+        ``largest``, ``surest``, ``first``, a track's number, ``all``; empty for the only one, else the largest.
+    swap_sides : bool
+        Whether left and right are exchanged.
+    camera : str
+        A calibration file, with the camera's name after a colon where it has several; empty for none.
+    fov, focal35 : float, optional
+        Guesses: the horizontal field of view in degrees, or the focal length in 35 mm equivalents.
+    exif : path, optional
+        A photograph that says its focal length.
+    size : (int, int), optional
+        Width and height of the picture, pixels.
+    rate : float, optional
+        Frames a second.
+    minimum_confidence : float
+        Points that are less sure count as not seen.
+    stature : float, optional
+        Metres.
+    lengths, calibrate : path, optional
+        The person's lengths, or a recording of the person that gives them.
+    proportions : str
+        By which proportions a stature gives lengths.
+
+    Raises
+    ------
+    InputError
+        Where two say the same thing differently.
+    """
+
+    format: str = ""
+    skeleton: str = ""
+    person: str = ""
+    swap_sides: bool = False
+    camera: str = ""
+    fov: float | None = None
+    focal35: float | None = None
+    exif: Path | None = None
+    size: tuple[int, int] | None = None
+    rate: float | None = None
+    minimum_confidence: float = 0.0
+    stature: float | None = None
+    lengths: Path | None = None
+    calibrate: Path | None = None
+    proportions: str = "figure"
+
+    def __post_init__(self) -> None:
+        cameras = {
+            "--camera": self.camera or None,
+            "--fov": self.fov,
+            "--focal35": self.focal35,
+            "--exif": self.exif,
+        }
+        _one_of(cameras, "one camera")
+        _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
+        if self.rate is not None and not 0 < self.rate < float("inf"):
+            raise InputError(f"--fps: {self.rate!r}; expected a positive number of frames a second")
+
+
+def _one_of(given: dict[str, object], what: str) -> None:
+    named = [name for name, value in given.items() if value is not None]
+    if len(named) > 1:
+        raise InputError(f"{named[1]}: {named[0]} is given too; expected {what}; leave out all but one")
