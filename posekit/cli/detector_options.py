@@ -40,8 +40,8 @@ CameraFile = Annotated[
     typer.Option(
         "--camera",
         metavar="FILE[:NAME]",
-        help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP; NAME where it has several cameras. Without "
-        "any camera the view is scaled orthographic.",
+        help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP, NPZ; or the photograph, whose EXIF "
+        "gives a guess. NAME where it has several cameras. Without any camera the view is scaled orthographic.",
     ),
 ]
 FieldOfView = Annotated[
@@ -53,10 +53,6 @@ FieldOfView = Annotated[
 Focal35 = Annotated[
     float | None,
     typer.Option("--focal35", metavar="MM", help="A guess: the focal length in 35 mm equivalents."),
-]
-Exif = Annotated[
-    Path | None,
-    typer.Option("--exif", metavar="JPEG", help="A guess: the focal length that the photograph itself says."),
 ]
 Size = Annotated[
     str,

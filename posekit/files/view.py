@@ -47,6 +47,10 @@ class View:
         Lengths in metres of the segments that differ from the figure's, by `posekit.skeleton.SEGMENT_NAMES`.
     stature : float, optional
         Height of the person, metres.
+    deviation : float, optional
+        Standard deviation of each coordinate of the image points, pixels.
+    derived : tuple of str
+        Joints of `image` that no detector saw: they were put between others that it saw.
     head_points : mapping of str to array (3,), optional
         The rigid head's points in the head's frame, metres: the neck and `HEAD_POINTS`, or some of them.
     unit : {"m", "cm", "mm"}
@@ -72,6 +76,8 @@ class View:
     truth: Array = field(default_factory=_no_frames)
     lengths: Mapping[str, float] = field(default_factory=dict)
     stature: float | None = None
+    deviation: float | None = None
+    derived: tuple[str, ...] = ()
     head_points: Mapping[str, Array] | None = None
     unit: Unit = "m"
 
@@ -112,6 +118,11 @@ class View:
             _check_name("lengths", name, SEGMENT_NAMES)
             _check_length(f"lengths.{name}", length)
         object.__setattr__(self, "lengths", {name: float(length) for name, length in self.lengths.items()})
+        if self.deviation is not None:
+            _check_length("deviation", self.deviation, "a positive number of pixels")
+        for name in self.derived:
+            _check_name("derived", name, JOINTS)
+        object.__setattr__(self, "derived", tuple(self.derived))
         if self.stature is not None:
             _check_length("stature", self.stature)
         if self.head_points is None:
@@ -152,6 +163,6 @@ def _check_name(field_name: str, name: str, names: tuple[str, ...]) -> None:
         raise refusal("view", field_name, shown(name), "a known name", nearest(name, names))
 
 
-def _check_length(field_name: str, value: float) -> None:
+def _check_length(field_name: str, value: float, expected: str = "a positive length in metres") -> None:
     if not (np.isfinite(value) and value > 0):
-        raise refusal("view", field_name, shown(float(value)), "a positive length in metres", "correct it")
+        raise refusal("view", field_name, shown(float(value)), expected, "correct it")

@@ -62,6 +62,8 @@ def read_view(path: str | Path) -> View:
             name: float(to_metres(value, unit))
             for name, value in ((figure.lengths or {}) if figure else {}).items()
         },
+        deviation=file.deviation,
+        derived=tuple(file.derived or ()),
         stature=float(to_metres(figure.stature, unit)) if figure and figure.stature else None,
         head_points={name: to_metres(point, unit) for name, point in figure.head_points.items()}
         if figure and figure.head_points is not None
@@ -112,6 +114,10 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
     }
     if figure := _figure_fields(view, unit):
         head_of_file["figure"] = figure
+    if view.deviation is not None:
+        head_of_file["deviation"] = view.deviation
+    if view.derived:
+        head_of_file["derived"] = list(view.derived)
     validated(ViewFile, {**head_of_file, "frames": frames}, path)
     write_text(path, json_pieces(head_of_file, "frames", frames))
 

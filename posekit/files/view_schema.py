@@ -31,6 +31,7 @@ Pixels = Annotated[int, Field(gt=0, le=10**6)]
 Image = Annotated[dict[str, Point2], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadImage = Annotated[dict[str, Point2], named(HEAD_POINTS, "head point"), _keys(HEAD_POINTS)]
 Sure = Annotated[dict[str, Confidence], named(POINTS, "joint or head point"), _keys(POINTS)]
+Derived = Annotated[list[Literal[JOINTS]], Field(max_length=len(JOINTS))]  # type: ignore[valid-type]
 Joints = Annotated[dict[str, Point3], named(JOINTS, "joint"), _keys(JOINTS)]
 HeadPoints = Annotated[dict[str, Point3], named(HEAD_NAMES, "head point"), _keys(HEAD_NAMES)]
 Lengths = Annotated[dict[str, Positive], named(SEGMENT_NAMES, "segment"), _keys(SEGMENT_NAMES)]
@@ -110,6 +111,8 @@ class ViewFile(FileModel):
         "head_points": "a head point is [x, y, z]; leave out one that is not known",
         "image": "an image point is [u, v]; leave out a joint that is not seen",
         "head_image": "an image point is [u, v]; leave out one that is not seen",
+        "deviation": "give it in pixels, or leave it out",
+        "derived": "name joints, or leave it out",
         "confidence": "a confidence is a number from 0; leave out one that is not known",
         "truth": "a joint is [x, y, z]; leave out one that is not known",
         "root": "the root is [x, y, z]; leave it out where it is not known",
@@ -137,6 +140,13 @@ class ViewFile(FileModel):
     unit: Unit
     camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera = Field(discriminator="model")
     figure: FigureFields | None = None
+    deviation: Positive | None = Field(
+        default=None, description="Standard deviation of each coordinate of the image points, pixels."
+    )
+    derived: Derived | None = Field(
+        default=None,
+        description="Joints of `image` that no detector saw: they were put between others that it saw.",
+    )
     frames: Annotated[list[FrameFields], Field(min_length=1), FailFast()]
 
     @model_validator(mode="after")

@@ -6,6 +6,7 @@ from posekit.pipeline.recovery import FrameRecovery as FrameRecovery
 from posekit.pipeline.recovery import Recovery as Recovery
 from posekit.pipeline.reproduce import reproduce_lee_chen as reproduce_lee_chen
 from posekit.pipeline.result import result_of as result_of
+from posekit.pipeline.rooting import Rooting as Rooting
 from posekit.pipeline.scale import Scale as Scale
 from posekit.pipeline.scale import parse_scale as parse_scale
 from posekit.pipeline.summary import summary_lines as summary_lines

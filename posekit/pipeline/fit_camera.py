@@ -13,6 +13,9 @@ from posekit.errors import HeadError, InputError
 from posekit.figure import Figure
 from posekit.files import Family, LeeChenModel, OpenCVModel, View
 from posekit.head import HeadPoints, HeadPose, calibrate, solve_pose
+from posekit.pipeline.rooting import Rooting, place_roots
+from posekit.pipeline.tolerance import Tolerance
+from posekit.placement import Placement
 from posekit.skeleton import HEAD, HEAD_POINTS
 
 ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
@@ -23,7 +26,8 @@ ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 class CameraFit:
     """The camera of F frames, and where it sees the root and the head, in H hypotheses.
 
-    A calibrated frame is one hypothesis, an uncalibrated one as many as scales were taken for it.
+    A calibrated frame is one hypothesis, or as many as depths were taken for its neck; an uncalibrated one as many as
+    scales were.
 
     Parameters
     ----------
@@ -41,6 +45,8 @@ class CameraFit:
         For each frame why its root is not known, or an empty text.
     families : list of Family, optional
         For each uncalibrated frame the scales that it can have; None where the reason says why.
+    placements : list of Placement or None, optional
+        For each calibrated frame how its neck was placed; None where it was given or six head points told.
     closed : bool
         Whether scales were fitted to close the rigid parts.
     """
@@ -52,6 +58,7 @@ class CameraFit:
     pose: HeadPose | None
     reasons: list[str]
     families: list[Family | None] | None = None
+    placements: list[Placement | None] | None = None
     closed: bool = False
 
     def cameras(self, part: NDArray[np.intp]) -> Camera:
@@ -61,14 +68,28 @@ class CameraFit:
                 scale=np.asarray(self.camera.scale)[part], aspect=self.camera.aspect
             )
         K = self.camera.K
-        return self.camera if K.ndim == 2 else PinholeCamera(K=K[part], distortion=self.camera.distortion)
+        if K.ndim == 2:
+            return self.camera
+        return PinholeCamera(K=K[self.frame[part]], distortion=self.camera.distortion)
 
 
-def fit_camera(view: View, figure: Figure) -> CameraFit:
+def fit_camera(
+    view: View, figure: Figure, rooting: Rooting | None = None, tolerance: Tolerance | None = None
+) -> CameraFit:
     """Find the camera from the head (§2.1), or the head from a known camera.
 
     A root that the view gives comes before the head's neck; the head then turns with the recovered rotation
-    about that root.
+    about that root. Where neither tells it, and the camera is known, the neck is placed (`posekit.placement`).
+
+    Parameters
+    ----------
+    view : View
+    figure : Figure
+        The person's.
+    rooting : Rooting, optional
+        How to place the neck; a method other than ``auto`` is used even where six head points are seen.
+    tolerance : Tolerance, optional
+        What may be off, where it is not to be derived from the deviation of the image points.
 
     Raises
     ------
@@ -81,6 +102,10 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
     head_points = HeadPoints.from_mapping(points)
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
     seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= len(names)
+    rooting = rooting or Rooting()
+    # A neck that was put between the shoulders is no point of the head.
+    if "neck" in view.derived or rooting.method != "auto":
+        seen[:] = False
     pose: HeadPose | None = None
     model = view.camera
     if isinstance(model, LeeChenModel):
@@ -104,16 +129,55 @@ def fit_camera(view: View, figure: Figure) -> CameraFit:
             np.nan
         )  # a given root is of no use where f, which the head would tell, is not known
     _check_root(np.where(np.isnan(root), np.nan, view.root), view, camera)
-    for k in np.flatnonzero(np.isnan(root).any(axis=1)):
-        why = (
-            pose.reasons[k]
-            if pose is not None and pose.reasons[k]
-            else "its root is not given and its head is not seen"
-        )
+    if isinstance(model, LeeChenModel) and model.f is None:
+        placements = _unplaced(root, pose, reasons)
+    else:
+        placements = _placed(view, camera, figure, root, rooting, tolerance, reasons)
+    necks = [root[k : k + 1] if one is None or reasons[k] else one.necks for k, one in enumerate(placements)]
+    frame = np.repeat(np.arange(n), [len(each) for each in necks])
+    return CameraFit(
+        camera=camera,
+        frame=frame,
+        root=np.concatenate(necks),
+        head=head[frame],
+        pose=pose,
+        reasons=reasons,
+        placements=placements if any(placements) else None,
+    )
+
+
+def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Placement | None]:
+    """Say of frames without a neck why: where the head that would tell f is not seen, nothing can be placed."""
+    for k in np.flatnonzero(np.isnan(root).any(axis=1)).tolist():
+        why = (pose and pose.reasons[k]) or "its head is not seen, and so its camera is not known"
         reasons[k] = f"frames[{k}]: {why}"
-    if n and all(reasons):
-        raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or root")
-    return CameraFit(camera=camera, frame=np.arange(n), root=root, head=head, pose=pose, reasons=reasons)
+    if reasons and all(reasons):
+        raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or f")
+    return [None] * len(reasons)
+
+
+def _placed(
+    view: View,
+    camera: PinholeCamera,
+    figure: Figure,
+    root: Array,
+    rooting: Rooting,
+    tolerance: Tolerance | None,
+    reasons: list[str],
+) -> list[Placement | None]:
+    """Place the necks that are not known by now, and say of the others that they need not be."""
+    placements: list[Placement | None] = [None] * len(reasons)
+    unknown = np.flatnonzero(np.isnan(root).any(axis=1))
+    if not len(unknown):
+        return placements
+    found = place_roots(view, camera, figure, unknown, rooting, tolerance)
+    for k, placement in zip(unknown.tolist(), found, strict=True):
+        placements[k] = placement
+        if not len(placement.necks):
+            reasons[k] = f"frames[{k}]: {placement.reason}"
+    if all(reasons):
+        raise InputError(reasons[0])
+    return placements
 
 
 def _check_root(root: Array, view: View, camera: PinholeCamera) -> None:

@@ -21,6 +21,7 @@ from posekit.pipeline.fit_scale import fit_scale
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
+from posekit.pipeline.rooting import Rooting, tolerance_of
 from posekit.pipeline.scale import Scale
 from posekit.pipeline.taylor.body import TaylorBody
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
@@ -47,6 +48,7 @@ def recover(
     proportions: str = "figure",
     nearer: Sequence[Mapping[str, str]] | None = None,
     infer: bool = True,
+    rooting: Rooting | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
@@ -80,6 +82,8 @@ def recover(
     infer : bool
         Whether joints that were not seen are completed: each posture then has a feasible position for them, and says
         which joints were inferred and what else they can be. Otherwise they are NaN.
+    rooting : Rooting, optional
+        How the neck is found in a calibrated view that neither gives it nor shows a head of six points.
     progress : callable, optional
         Called with the number of frames done since the last call.
 
@@ -105,11 +109,10 @@ def recover(
     table = load_ranges(ranges) if isinstance(ranges, str) else ranges
     body = body_of(view, figure or load_figure(), proportions)
     judges = Judges(checks=names, ranges=table, rules=tuple(rules), contact_margin=contact_margin)
-    fit = _fit(view, body, scale, tolerance)
+    fit = _fit(view, body, scale, tolerance, rooting)
     records = camera_records(view, fit)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
     grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand, infer=infer)
-    inexact_tolerance = MEASURED if fit.families is None else PHOTOGRAPH
     placed: dict[int, tuple[Batch, int]] = {}
     for part in _parts(fit):
         batch = grower.grow(part, tolerance or EXACT)
@@ -117,8 +120,8 @@ def recover(
         if tolerance is None:
             exact = set(fit.frame[part[batch.exact]].tolist())
             inexact = part[[k not in exact for k in fit.frame[part].tolist()]]
-            if len(inexact):
-                _place(placed, grower.grow(inexact, inexact_tolerance), fit.frame[inexact])
+            for rows, allowed in _by_tolerance(fit, inexact):
+                _place(placed, grower.grow(rows, allowed), fit.frame[rows])
         if progress is not None:
             progress(len(np.unique(fit.frame[part])))
     hypotheses = np.bincount(fit.frame, minlength=len(view.time))
@@ -132,6 +135,7 @@ def recover(
                 index=index,
                 hypotheses=int(hypotheses[k]),
                 family=None if fit.families is None else fit.families[k],
+                placement=None if fit.placements is None else fit.placements[k],
                 reason=fit.reasons[k],
                 group_within=group,
                 camera=records[k],
@@ -180,12 +184,32 @@ def body_of(view: View, figure: Figure, proportions: str) -> Body:
     raise InputError(f"--proportions: {proportions!r}; expected {' or '.join(get_args(Proportions))}")
 
 
-def _fit(view: View, body: Body, scale: Scale | None, tolerance: Tolerance | None) -> CameraFit:
+def _fit(
+    view: View, body: Body, scale: Scale | None, tolerance: Tolerance | None, rooting: Rooting | None
+) -> CameraFit:
     if isinstance(view.camera, ScaledOrthographicModel):
+        if rooting is not None and rooting != Rooting():
+            raise InputError(
+                "--root: the view's camera is not known, and so no depth is; leave the option out"
+            )
         return fit_scale(view, body, scale, tolerance)
     if scale is not None:
         raise InputError("--scale: the view's camera is calibrated; leave the option out")
-    return fit_camera(view, body.figure)
+    return fit_camera(view, body.figure, rooting, tolerance)
+
+
+def _by_tolerance(fit: CameraFit, rows: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Tolerance]]:
+    """Yield hypotheses of frames that are not exact with what they are judged with."""
+    if fit.families is not None:
+        allowed = [PHOTOGRAPH] * len(rows)
+    else:
+        placements = fit.placements or [None] * len(fit.reasons)
+        by_frame = [
+            MEASURED if one is None or not len(one.necks) else tolerance_of(one) for one in placements
+        ]
+        allowed = [by_frame[k] for k in fit.frame[rows].tolist()]
+    for one in dict.fromkeys(allowed):
+        yield rows[[each == one for each in allowed]], one
 
 
 def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:

@@ -13,13 +13,15 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure import Configurations, Figure
-from posekit.files import Family, Inferred
+from posekit.files import Family, Inferred, Root
 from posekit.grouping import group_postures
 from posekit.occlusion import Completion
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.mirror import mirrored
+from posekit.pipeline.rooting import root_of, tolerance_of
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.placement import Placement
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
@@ -164,6 +166,8 @@ class FrameRecovery:
         How many there are: one, or for an uncalibrated frame as many as scales were taken.
     family : Family, optional
         The scales that an uncalibrated frame can have.
+    placement : Placement, optional
+        How the neck of a calibrated frame was placed, where it was not given.
     reason : str
         Why nothing was grown.
     group_within : float or None
@@ -175,6 +179,7 @@ class FrameRecovery:
     index: int
     hypotheses: int = 1
     family: Family | None = None
+    placement: Placement | None = None
     reason: str = ""
     group_within: float | None = None
     camera: Mapping[str, Any] = field(default_factory=dict)
@@ -299,9 +304,20 @@ class FrameRecovery:
 
     @property
     def judged(self) -> str | None:
-        """``exact``, ``measured``, ``photograph``, or ``given`` tolerances; None where nothing was grown."""
+        """How the frame was judged; None where nothing was grown.
+
+        As ``exact``, ``measured``, a ``photograph``, ``noisy`` (what the deviation of its image points leads to), or
+        with tolerances that were ``given``.
+        """
         names = {None: None, EXACT: "exact", MEASURED: "measured", PHOTOGRAPH: "photograph"}
+        if self.placement is not None and self.tolerance == tolerance_of(self.placement):
+            return "noisy"
         return names.get(self.tolerance, "given")
+
+    @property
+    def root(self) -> Root | None:
+        """How the neck's depth was found; None where it was given, or the camera is not known."""
+        return None if self.placement is None else root_of(self.placement)
 
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""

@@ -55,6 +55,7 @@ def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> 
         pruned=[_plain(asdict(branch)) for branch in frame.pruned()] if explain else None,
         family=None if frame.family is None else replace(frame.family, mirrored=frame.mirrored),
         scales=frame.scales,
+        root=frame.root,
         inferred=frame.inferred,
     )
 

@@ -1,1 +1,5 @@
 """Where the body is: the depth of the neck from the head, from the rigid torso, or searched along its ray."""
+
+from posekit.placement.place import Method as Method
+from posekit.placement.place import place as place
+from posekit.placement.placement import Placement as Placement

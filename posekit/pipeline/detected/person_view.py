@@ -30,6 +30,7 @@ def person_view(
     *,
     rate: float | None = None,
     minimum_confidence: float = 0.0,
+    deviation: float | None = None,
     lengths: Mapping[str, float] | None = None,
     stature: float | None = None,
     unit: Unit = "m",
@@ -51,6 +52,8 @@ def person_view(
         Frames a second, where the file has no times.
     minimum_confidence : float
         Points that are less sure count as not seen; those without a confidence are kept.
+    deviation : float, optional
+        Standard deviation of each coordinate of the points, pixels.
     lengths, stature, unit
         As the view shall say them.
 
@@ -79,7 +82,7 @@ def person_view(
     sure = keypoints.landmark_confidence
     found[sure < minimum_confidence] = np.nan
     sure = np.where(np.isnan(found[..., 0]), np.nan, sure)
-    _complete(found, sure, person)
+    derived = _complete(found, sure, person)
     count = len(keypoints.pictures)
     points = np.full((count, len(POINTS), 2), np.nan)
     confidence = np.full((count, len(POINTS)), np.nan)
@@ -107,6 +110,8 @@ def person_view(
         image=points[kept, : len(JOINTS)],
         head_image=points[kept][:, HEAD],
         confidence=confidence[kept],
+        deviation=deviation,
+        derived=derived,
         lengths=lengths or {},
         stature=stature,
         unit=unit,
@@ -120,8 +125,9 @@ def times(keypoints: KeyPoints, rate: float | None) -> Array:
     return np.arange(len(keypoints.pictures)) / (rate or RATE)
 
 
-def _complete(found: Array, sure: Array, person: Figure) -> None:
-    """Put neck and pelvis into landmarks (D, 21, 2) that lack them, and their confidence (D, 21)."""
+def _complete(found: Array, sure: Array, person: Figure) -> tuple[str, ...]:
+    """Put neck and pelvis into landmarks (D, 21, 2) that lack them, and their confidence (D, 21); say which."""
+    derived = []
     shoulders, hips = (found[:, LANDMARK[name]] for name in MIDDLES)
     fraction = pelvis_fraction(person)
     places = {"neck": shoulders, "pelvis": shoulders + fraction * (hips - shoulders)}
@@ -129,8 +135,11 @@ def _complete(found: Array, sure: Array, person: Figure) -> None:
     certain = {"neck": both[:, 0], "pelvis": both.mean(axis=1)}
     for name, place in places.items():
         lacking = np.isnan(found[:, LANDMARK[name], 0])
+        if np.isfinite(place[lacking]).any():
+            derived.append(name)
         found[lacking, LANDMARK[name]] = place[lacking]
         sure[lacking, LANDMARK[name]] = certain[name][lacking]
+    return tuple(derived)
 
 
 def pelvis_fraction(person: Figure) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,11 +24,9 @@ class Source:
     swap_sides : bool
         Whether left and right are exchanged.
     camera : str
-        A calibration file, with the camera's name after a colon where it has several; empty for none.
+        A calibration file or a photograph, with the camera's name after a colon where it has several; empty for none.
     fov, focal35 : float, optional
         Guesses: the horizontal field of view in degrees, or the focal length in 35 mm equivalents.
-    exif : path, optional
-        A photograph that says its focal length.
     size : (int, int), optional
         Width and height of the picture, pixels.
     rate : float, optional
@@ -54,7 +53,6 @@ class Source:
     camera: str = ""
     fov: float | None = None
     focal35: float | None = None
-    exif: Path | None = None
     size: tuple[int, int] | None = None
     rate: float | None = None
     minimum_confidence: float = 0.0
@@ -68,7 +66,6 @@ class Source:
             "--camera": self.camera or None,
             "--fov": self.fov,
             "--focal35": self.focal35,
-            "--exif": self.exif,
         }
         _one_of(cameras, "one camera")
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
@@ -76,7 +73,7 @@ class Source:
             raise InputError(f"--fps: {self.rate!r}; expected a positive number of frames a second")
 
 
-def _one_of(given: dict[str, object], what: str) -> None:
+def _one_of(given: Mapping[str, object], what: str) -> None:
     named = [name for name, value in given.items() if value is not None]
     if len(named) > 1:
         raise InputError(f"{named[1]}: {named[0]} is given too; expected {what}; leave out all but one")
