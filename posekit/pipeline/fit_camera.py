@@ -132,6 +132,8 @@ def fit_camera(
     if isinstance(model, LeeChenModel) and model.f is None:
         placements = _unplaced(root, pose, reasons)
     else:
+        for k in np.flatnonzero(seen & np.isnan(root).any(axis=1)).tolist():
+            reasons[k] = f"frames[{k}]: {pose.reasons[k] if pose is not None else ''}"
         placements = _placed(view, camera, figure, root, rooting, tolerance, reasons)
     necks = [root[k : k + 1] if one is None or reasons[k] else one.necks for k, one in enumerate(placements)]
     frame = np.repeat(np.arange(n), [len(each) for each in necks])
@@ -152,7 +154,9 @@ def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Pl
         why = (pose and pose.reasons[k]) or "its head is not seen, and so its camera is not known"
         reasons[k] = f"frames[{k}]: {why}"
     if reasons and all(reasons):
-        raise HeadError(f"{reasons[0]}; give six head points in head_image (with the neck in image), or f")
+        raise HeadError(
+            f"{reasons[0]}; give six head points in head_image (with the neck in image), or f and root"
+        )
     return [None] * len(reasons)
 
 
@@ -167,16 +171,14 @@ def _placed(
 ) -> list[Placement | None]:
     """Place the necks that are not known by now, and say of the others that they need not be."""
     placements: list[Placement | None] = [None] * len(reasons)
-    unknown = np.flatnonzero(np.isnan(root).any(axis=1))
-    if not len(unknown):
-        return placements
-    found = place_roots(view, camera, figure, unknown, rooting, tolerance)
+    unknown = np.flatnonzero(np.isnan(root).any(axis=1) & [not reason for reason in reasons])
+    found = place_roots(view, camera, figure, unknown, rooting, tolerance) if len(unknown) else []
     for k, placement in zip(unknown.tolist(), found, strict=True):
         placements[k] = placement
         if not len(placement.necks):
             reasons[k] = f"frames[{k}]: {placement.reason}"
-    if all(reasons):
-        raise InputError(reasons[0])
+    if reasons and all(reasons):
+        raise InputError(f"{reasons[0]}; or give root")
     return placements
 
 

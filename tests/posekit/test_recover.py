@@ -206,16 +206,13 @@ def test_a_root_comes_before_the_heads_neck() -> None:
     np.testing.assert_allclose(head, recover(SEQ1).fit.head - SEQ1.truth[:, :1], rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize(("camera", "give_root"), [("f", False), ("no f", False), ("no f", True)])
-def test_a_frame_without_head_and_root_is_skipped_with_its_reason(camera: str, give_root: bool) -> None:
-    """Without f a root is not enough: only the head would tell f."""
+@pytest.mark.parametrize("give_root", [False, True])
+def test_a_frame_without_a_head_is_skipped_where_only_the_head_tells_f(give_root: bool) -> None:
     head_image, root = SEQ1.head_image.copy(), np.full((5, 3), np.nan)
     head_image[2, HEAD_POINTS.index("nose")] = np.nan
     if give_root:
         root[2] = SEQ1.truth[2, 0]
-    view = change(
-        SEQ1, head_image=head_image, root=root, camera=LeeChenModel(f=0.05 if camera == "f" else None)
-    )
+    view = change(SEQ1, head_image=head_image, root=root, camera=LeeChenModel(f=None))
     recovery = recover(view, group=0.05)
     frame = recovery.frames[2]
     assert frame.reason.startswith("frames[2]: 5 of 6 head points are known")
@@ -231,6 +228,19 @@ def test_a_frame_without_head_and_root_is_skipped_with_its_reason(camera: str, g
     assert "frames[2]" in "\n".join(summary_lines(recovery))
 
 
+def test_where_f_is_known_a_frame_without_head_and_root_is_placed_exactly() -> None:
+    head_image = SEQ1.head_image.copy()
+    head_image[2, HEAD_POINTS.index("nose")] = np.nan
+    recovery = recover(change(SEQ1, head_image=head_image, camera=LeeChenModel(f=0.05)))
+    frame = recovery.frames[2]
+    assert frame.judged == "exact"
+    assert frame.root is not None
+    assert frame.root.method in ("torso", "search")
+    assert frame.root.lower < SEQ1.truth[2, 0, 2] < frame.root.upper
+    assert max(truth_at(recovery, SEQ1.truth)) < FOUND
+    assert [one.root is None for one in recovery.frames] == [True, True, False, True, True]
+
+
 def test_a_root_and_f_together_need_no_head() -> None:
     head_image, root = SEQ1.head_image.copy(), np.full((5, 3), np.nan)
     head_image[2], root[2] = np.nan, SEQ1.truth[2, 0]
@@ -238,19 +248,20 @@ def test_a_root_and_f_together_need_no_head() -> None:
     assert max(truth_at(recovery, SEQ1.truth)) < FOUND
 
 
-@pytest.mark.parametrize(
-    ("f", "text"),
-    [
-        (0.05, "frames[0]: its root is not given and its head is not seen; give six head points"),
-        (None, "frames[0]: 1 of 6 head points are known"),
-    ],
-)
-def test_a_view_without_any_neck_is_refused(f: float | None, text: str) -> None:
-    view = change(SEQ1, camera=LeeChenModel(f=f), head_image=np.full((5, 5, 2), np.nan))
+def test_a_view_without_any_head_is_refused_where_only_the_head_tells_f() -> None:
+    view = change(SEQ1, camera=LeeChenModel(f=None), head_image=np.full((5, 5, 2), np.nan))
     with pytest.raises(HeadError) as caught:
         recover(view)
-    assert str(caught.value).startswith(text)
-    assert "or root" in str(caught.value)
+    assert str(caught.value).startswith("frames[0]: 1 of 6 head points are known")
+    assert "f and root" in str(caught.value)
+
+
+def test_a_view_of_which_only_the_neck_is_seen_is_refused() -> None:
+    image = np.full_like(SEQ1.image, np.nan)
+    image[:, 0] = SEQ1.image[:, 0]
+    blind = change(SEQ1, camera=LeeChenModel(f=0.05), image=image, head_image=np.full((5, 5, 2), np.nan))
+    with pytest.raises(InputError, match=r"frames.0.: no joint beside the neck is seen.*give root"):
+        recover(blind)
 
 
 def test_a_head_point_that_does_not_fit_is_named() -> None:
@@ -598,7 +609,10 @@ def test_a_segment_a_little_too_short_becomes_a_tangent_with_its_residual() -> N
     elbow, wrist = SEQ1.truth[0, JOINT["right_elbow"]], SEQ1.truth[0, JOINT["right_wrist"]]
     ray = wrist / np.linalg.norm(wrist)
     length = float(np.linalg.norm(elbow - (elbow @ ray) * ray)) - short
-    arrays = {name: getattr(SEQ1, name)[:1] for name in ("time", "image", "head_image", "root", "truth")}
+    arrays = {
+        name: getattr(SEQ1, name)[:1]
+        for name in ("time", "image", "head_image", "confidence", "root", "truth")
+    }
     view = change(SEQ1, lengths={segment: length}, **arrays)
     with pytest.raises(InputError, match=f"the segment {segment} is at least .* too short"):
         recover(view, tolerance=EXACT, checks=())

@@ -33,6 +33,8 @@ class Source:
         Frames a second.
     minimum_confidence : float
         Points that are less sure count as not seen.
+    deviation : float, optional
+        Standard deviation of each coordinate of the points, pixels.
     stature : float, optional
         Metres.
     lengths, calibrate : path, optional
@@ -56,6 +58,7 @@ class Source:
     size: tuple[int, int] | None = None
     rate: float | None = None
     minimum_confidence: float = 0.0
+    deviation: float | None = None
     stature: float | None = None
     lengths: Path | None = None
     calibrate: Path | None = None

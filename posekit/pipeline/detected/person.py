@@ -1,0 +1,90 @@
+"""Whose body it is: the lengths that a user gives, in whichever way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from posekit.anthropometry import (
+    SegmentLengths,
+    lengths_from_postures,
+    lengths_from_proportions,
+    lengths_from_views,
+    read_lengths,
+)
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure, load_figure
+from posekit.files import CameraModel, OpenCVModel
+from posekit.keypoints import KeyPoints, choose, read_keypoints
+from posekit.motion import postures_of, read_motion
+from posekit.pipeline.detected.kinds import Kind, kind_of
+from posekit.pipeline.detected.source import Source
+from posekit.skeleton import JOINTS
+
+BUILT_IN: Final = (
+    "lengths of the built-in figure (Lee & Chen 1985, Table A.1), not this person's: give --stature"
+)
+DEFAULT_PROPORTIONS: Final = "drillis-contini"
+
+
+def person(source: Source, camera: CameraModel) -> tuple[Figure, SegmentLengths | None, str]:
+    """Make the person's figure.
+
+    Returns
+    -------
+    Figure
+    SegmentLengths or None
+        Where the user said something about the person.
+    str
+        Where the lengths come from, in a line.
+
+    Raises
+    ------
+    InputError, FigureError
+        Where a file cannot be read, or what it says makes no body.
+    """
+    lengths = _lengths(source, camera)
+    figure = load_figure()
+    if lengths is None:
+        return figure, None, BUILT_IN
+    off = max(lengths.deviation.values(), default=0.0)
+    uncertain = f", uncertain by up to {off * 100:.1f} cm" if off > 0 else ""
+    return figure.scaled(lengths.lengths), lengths, f"lengths: {lengths.source}{uncertain}"
+
+
+def _lengths(source: Source, camera: CameraModel) -> SegmentLengths | None:
+    if source.lengths is not None:
+        return read_lengths(source.lengths)
+    if source.calibrate is not None:
+        return _from_recording(source.calibrate, source, camera)
+    if source.stature is None:
+        return None
+    name = DEFAULT_PROPORTIONS if source.proportions in ("figure", "taylor") else source.proportions
+    return lengths_from_proportions(name, source.stature)
+
+
+def _from_recording(path: Path, source: Source, camera: CameraModel) -> SegmentLengths:
+    """Estimate the lengths from motion capture, or from key points of the same kind of camera."""
+    kind = kind_of(path).kind
+    if kind is Kind.MOTION:
+        return lengths_from_postures(postures_of(read_motion(path)).joints)
+    if kind is not Kind.KEY_POINTS:
+        raise InputError(
+            f"--calibrate: {path} is {kind.value}; expected motion capture or a detector's file of the same person"
+        )
+    one = choose(read_keypoints(path), source.person if source.person not in ("", "all") else "largest")
+    focal = float(np.sqrt(camera.K[0, 0] * camera.K[1, 1])) if isinstance(camera, OpenCVModel) else None
+    if source.stature is None:
+        raise InputError(
+            "--calibrate: pictures tell proportions, not the size; expected a height too; give --stature"
+        )
+    return lengths_from_views(limbs(one), stature=source.stature, focal=focal).lengths
+
+
+def limbs(keypoints: KeyPoints) -> Array:
+    """Return the twelve joints of arms and legs (T, 12, 2), in tree order without neck and pelvis."""
+    columns = [k for k, name in enumerate(JOINTS) if name not in ("neck", "pelvis")]
+    return keypoints.landmarks[:, columns]
