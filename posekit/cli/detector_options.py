@@ -68,6 +68,23 @@ MinConfidence = Annotated[
     float,
     typer.Option("--min-confidence", min=0.0, help="Points that are less sure than this count as not seen."),
 ]
+Deviation = Annotated[
+    float | None,
+    typer.Option(
+        "--deviation",
+        metavar="PX",
+        help="Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 2.",
+    ),
+]
+Proportions = Annotated[
+    str,
+    typer.Option(
+        "--proportions",
+        metavar="NAME",
+        help="By which proportions a stature gives lengths: drillis-contini, winter, de-leva, table-a1. In "
+        "uncalibrated views also taylor (his 12 points, no neck and pelvis).",
+    ),
+]
 Stature = Annotated[
     str, typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths.")
 ]

@@ -2,11 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from posekit.cli.detector_options import (
+    Calibrate,
+    CameraFile,
+    Deviation,
+    FieldOfView,
+    Focal35,
+    Format,
+    LengthsFile,
+    MinConfidence,
+    Person,
+    Proportions,
+    Rate,
+    Size,
+    Skeleton,
+    Stature,
+    SwapSides,
+)
+from posekit.cli.detector_source import source_of
 from posekit.cli.options import (
     PHYSICAL,
     AngleTolerance,
@@ -25,19 +45,28 @@ from posekit.cli.options import (
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.pipeline import Recovery, Tolerance
+    from posekit.files import View
+    from posekit.pipeline import Recovery, Rooting, Tolerance
+    from posekit.validators import Ranges
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
     "posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking",
     "posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain",
     "posekit recover photo.json -o postures.json --scale closure",
+    "posekit recover keypoints/ -o postures.npz --camera calibration.toml:cam_01 --stature 175cm",
     "posekit recover panda.json -o found.json --linkage panda --scale closure",
 )
 
 
 def recover(
-    view: Annotated[Path, typer.Argument(metavar="VIEW", help="A posekit.view/1 file.")],
+    view: Annotated[
+        Path,
+        typer.Argument(
+            metavar="VIEW|KEYPOINTS",
+            help="A posekit.view/1 file, or a detector's file or folder of key points, in any format that is read.",
+        ),
+    ],
     output: Annotated[
         Path, typer.Option("-o", "--output", metavar="RESULT", help="The result: .json or .npz.")
     ],
@@ -83,14 +112,7 @@ def recover(
             "perpendicular, collinear, with weights if wanted (closure:1,coplanar:0.5). Default: the view's, else min.",
         ),
     ] = "",
-    proportions: Annotated[
-        str,
-        typer.Option(
-            "--proportions",
-            metavar="NAME",
-            help="Uncalibrated views: relative lengths of the figure, or of taylor (12 points, no neck, no pelvis).",
-        ),
-    ] = "figure",
+    proportions: Proportions = "figure",
     nearer: Annotated[
         Path | None,
         typer.Option(
@@ -114,12 +136,45 @@ def recover(
             help="Complete joints that were not seen, each with the set of its positions.",
         ),
     ] = True,
+    root: Annotated[
+        str,
+        typer.Option(
+            "--root",
+            metavar="HOW",
+            help="Calibrated views without a root: find the neck's depth by auto, head, torso or search.",
+        ),
+    ] = "auto",
+    deviation: Deviation = None,
+    truth: Annotated[
+        Path | None,
+        typer.Option(
+            "--truth",
+            metavar="FILE",
+            help="Motion capture of the same seconds: survivors are compared with it.",
+        ),
+    ] = None,
+    format: Format = "",
+    skeleton: Skeleton = "",
+    person: Person = "",
+    swap_sides: SwapSides = False,
+    camera: CameraFile = "",
+    fov: FieldOfView = None,
+    focal35: Focal35 = None,
+    size: Size = "",
+    fps: Rate = None,
+    min_confidence: MinConfidence = 0.0,
+    stature: Stature = "",
+    lengths: LengthsFile = None,
+    calibrate: Calibrate = None,
     explain: Annotated[
         bool, typer.Option("--explain", help="List every pruned branch with the finding that killed it.")
     ] = False,
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
     from posekit import files, pipeline, validators
+    from posekit.pipeline.detected.compare import compare
+    from posekit.pipeline.detected.conversion import of_person
+    from posekit.pipeline.detected.given_views import given_views
 
     distinct(view, output, write_urdf, nearer)
     if linkage:
@@ -144,44 +199,99 @@ def recover(
         raise InputError(
             f"--write-urdf {write_urdf}: expected a name that ends in .urdf; its .srdf is put beside it"
         )
-    seen = files.read_view(view)
-    table = validators.load_ranges(ranges)
-    how = pipeline.parse_scale(scale, per_unit=files.PER_METRE[seen.unit]) if scale else None
-    with progress("recovering", len(seen.time)) as done, about(view):
-        recovery = pipeline.recover(
-            seen,
-            checks=split(checks),
-            ranges=table,
-            rules=rule_numbers(rules),
-            tolerance=_tolerance(
-                rigid_tolerance,
-                tangent_tolerance,
-                angle_tolerance,
-                pipeline.PHOTOGRAPH
-                if isinstance(seen.camera, files.ScaledOrthographicModel)
-                else pipeline.MEASURED,
-            ),
-            contact_margin=signed_length(contact_margin, "--contact-margin"),
-            group=files.parse_length(group, name="--group") if group else None,
-            scale=how,
-            proportions=proportions,
-            infer=infer,
-            nearer=None if nearer is None else files.read_nearer(nearer),
-            progress=done,
-        )
-    if write_urdf is not None:
-        recovery.figure.write(write_urdf)
-    files.write_result(output, pipeline.result_of(recovery, unit=seen.unit, explain=explain))
-    summarize(recovery)
-    empty = sum(not len(frame) for frame in recovery.frames)
-    if empty:
-        typer.echo(
-            f"posekit: warning: {empty} of {len(recovery.frames)} frames have no posture; the table says what rejected "
-            "most; noisy points need more tolerance (--rigid-tolerance, --angle-tolerance, --tangent-tolerance), and "
-            "a noisy head a given root",
-            err=True,
-        )
-    typer.echo(f"written: {output}")
+    source = source_of(
+        format=format,
+        skeleton=skeleton,
+        person=person,
+        swap_sides=swap_sides,
+        camera=camera,
+        fov=fov,
+        focal35=focal35,
+        size=size,
+        fps=fps,
+        min_confidence=min_confidence,
+        deviation=deviation,
+        stature=stature,
+        lengths=lengths,
+        calibrate=calibrate,
+        proportions=proportions,
+    )
+    asked = Asked(
+        checks=split(checks),
+        ranges=validators.load_ranges(ranges),
+        rules=rule_numbers(rules),
+        rigid=rigid_tolerance,
+        tangent=tangent_tolerance,
+        angle=angle_tolerance,
+        contact_margin=signed_length(contact_margin, "--contact-margin"),
+        group=files.parse_length(group, name="--group") if group else None,
+        scale=scale,
+        proportions=proportions if proportions in ("figure", "taylor") else "figure",
+        nearer=None if nearer is None else files.read_nearer(nearer),
+        infer=infer,
+        rooting=pipeline.Rooting(method=root, deviation=deviation),  # type: ignore[arg-type]
+        explain=explain,
+    )
+    people = given_views(view, source, truth)
+    for one in people:
+        alone = len(people) == 1
+        for line in one.says:
+            typer.echo(line)
+        recovery = asked.recover(one.view, view)
+        if write_urdf is not None:
+            recovery.figure.write(of_person(write_urdf, one, alone=alone))
+        path = of_person(output, one, alone=alone)
+        files.write_result(path, pipeline.result_of(recovery, unit=one.view.unit, explain=explain))
+        summarize(recovery)
+        if truth is not None:
+            for line in compare(recovery, one.view.truth).lines:
+                typer.echo(line)
+        typer.echo(f"written: {path}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What the options ask of every view."""
+
+    checks: tuple[str, ...]
+    ranges: Ranges
+    rules: tuple[int, ...]
+    rigid: str
+    tangent: str
+    angle: float | None
+    contact_margin: float
+    group: float | None
+    scale: str
+    proportions: str
+    nearer: Sequence[Mapping[str, str]] | None
+    infer: bool
+    rooting: Rooting
+    explain: bool
+
+    def recover(self, seen: View, path: Path) -> Recovery:
+        """Recover a view that comes from `path`."""
+        from posekit import files, pipeline
+
+        uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
+        otherwise = pipeline.PHOTOGRAPH if uncalibrated else pipeline.MEASURED
+        with progress("recovering", len(seen.time)) as done, about(path):
+            return pipeline.recover(
+                seen,
+                checks=self.checks,
+                ranges=self.ranges,
+                rules=self.rules,
+                tolerance=_tolerance(self.rigid, self.tangent, self.angle, otherwise),
+                contact_margin=self.contact_margin,
+                group=self.group,
+                scale=pipeline.parse_scale(self.scale, per_unit=files.PER_METRE[seen.unit])
+                if self.scale
+                else None,
+                proportions=self.proportions,
+                infer=self.infer,
+                nearer=self.nearer,
+                rooting=pipeline.Rooting(method=self.rooting.method) if uncalibrated else self.rooting,
+                progress=done,
+            )
 
 
 def _recover_object(
@@ -237,3 +347,11 @@ def summarize(recovery: Recovery) -> None:
 
     for line in summary_lines(recovery):
         typer.echo(line)
+    empty = sum(not len(frame) for frame in recovery.frames)
+    if empty:
+        typer.echo(
+            f"posekit: warning: {empty} of {len(recovery.frames)} frames have no posture; the table says what rejected "
+            "most; noisy points need more tolerance (--rigid-tolerance, --angle-tolerance, --tangent-tolerance), and "
+            "a noisy head a given root",
+            err=True,
+        )

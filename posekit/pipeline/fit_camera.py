@@ -171,7 +171,8 @@ def _placed(
 ) -> list[Placement | None]:
     """Place the necks that are not known by now, and say of the others that they need not be."""
     placements: list[Placement | None] = [None] * len(reasons)
-    unknown = np.flatnonzero(np.isnan(root).any(axis=1) & [not reason for reason in reasons])
+    without = np.asarray(np.isnan(root).any(axis=1))
+    unknown = np.flatnonzero(without & np.array([not reason for reason in reasons]))
     found = place_roots(view, camera, figure, unknown, rooting, tolerance) if len(unknown) else []
     for k, placement in zip(unknown.tolist(), found, strict=True):
         placements[k] = placement

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.files import View
 from posekit.keypoints import KeyPoints, check_sides, choose, list_people, read_keypoints, swap
@@ -59,7 +60,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
     chosen: list[int | str] = [source.person or "largest"]
     if source.person == "all":
         chosen = [one.person for one in people]
-    figure, lengths, of_lengths = person(source, sighted.camera)
+    figure, of_lengths = person(source, sighted.camera, found.layout)
     opened = []
     for who in chosen:
         one = choose(sighted.keypoints, who)
@@ -71,8 +72,6 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             rate=source.rate,
             minimum_confidence=source.minimum_confidence,
             deviation=source.deviation,
-            lengths=None if lengths is None else lengths.lengths,
-            stature=source.stature,
         )
         _warn_of_sides(one, source)
         others = f" of {len(people)} people" if len(people) > 1 else ""
@@ -88,13 +87,11 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
 
 def _warn_of_sides(one: KeyPoints, source: Source) -> None:
     """Warn where left and right seem to be exchanged."""
-    sides = check_sides(one)
-    if not sides.suspected:
-        return
-    remedy = "leave --swap-sides out" if source.swap_sides else "check a picture, and give --swap-sides"
-    warnings.warn(f"{one.source}: {sides.says}; {remedy}", UserWarning, stacklevel=3)
+    for line in check_sides(one).warnings:
+        remedy = "; leave --swap-sides out" if source.swap_sides else " (--swap-sides)"
+        warnings.warn(f"{line}{remedy if 'exchange' in line else ''}", UserWarning, stacklevel=3)
 
 
-def _mean(values: np.ndarray) -> float:
+def _mean(values: Array) -> float:
     known = values[np.isfinite(values)]
     return float(known.mean()) if len(known) else float("nan")

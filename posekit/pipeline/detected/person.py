@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +25,7 @@ from posekit.motion import postures_of, read_motion
 from posekit.pipeline.detected.kinds import Kind, kind_of
 from posekit.pipeline.detected.source import Source
 from posekit.skeleton import JOINTS
+from posekit.skeleton_map import SkeletonMap
 
 BUILT_IN: Final = (
     "lengths of the built-in figure (Lee & Chen 1985, Table A.1), not this person's: give --stature"
@@ -30,16 +33,11 @@ BUILT_IN: Final = (
 DEFAULT_PROPORTIONS: Final = "drillis-contini"
 
 
-def person(source: Source, camera: CameraModel) -> tuple[Figure, SegmentLengths | None, str]:
-    """Make the person's figure.
+def person(source: Source, camera: CameraModel, layout: SkeletonMap) -> tuple[Figure, str]:
+    """Make the person's figure, and say in a line where its lengths come from.
 
-    Returns
-    -------
-    Figure
-    SegmentLengths or None
-        Where the user said something about the person.
-    str
-        Where the lengths come from, in a line.
+    Where the detector has no neck, the figure's is between its shoulders too (`middle_neck`): the two then mean the
+    same point.
 
     Raises
     ------
@@ -47,12 +45,32 @@ def person(source: Source, camera: CameraModel) -> tuple[Figure, SegmentLengths 
         Where a file cannot be read, or what it says makes no body.
     """
     lengths = _lengths(source, camera)
-    figure = load_figure()
-    if lengths is None:
-        return figure, None, BUILT_IN
-    off = max(lengths.deviation.values(), default=0.0)
-    uncertain = f", uncertain by up to {off * 100:.1f} cm" if off > 0 else ""
-    return figure.scaled(lengths.lengths), lengths, f"lengths: {lengths.source}{uncertain}"
+    figure, says = load_figure(), BUILT_IN
+    if lengths is not None:
+        off = max(lengths.deviation.values(), default=0.0)
+        uncertain = f", uncertain by up to {off * 100:.1f} cm" if off > 0 else ""
+        figure, says = figure.scaled(lengths.lengths), f"lengths: {lengths.source}{uncertain}"
+    if "neck" not in layout.landmarks:
+        figure = figure.scaled(middle_neck(figure.lengths))
+    return figure, says
+
+
+def middle_neck(lengths: Mapping[str, float]) -> dict[str, float]:
+    r"""Return a figure's lengths with its neck in the middle between its shoulders.
+
+    With shoulders w apart and c from the pelvis joint, the neck is w / 2 from each and :math:`\sqrt{c^2 - w^2 / 4}`
+    from the pelvis joint; c is the mean of both sides, as a middle asks for.
+    """
+    half = lengths["right_shoulder-left_shoulder"] / 2
+    to_pelvis = (lengths["right_shoulder-pelvis"] + lengths["left_shoulder-pelvis"]) / 2
+    return {
+        **lengths,
+        "neck-right_shoulder": half,
+        "neck-left_shoulder": half,
+        "right_shoulder-pelvis": to_pelvis,
+        "left_shoulder-pelvis": to_pelvis,
+        "neck-pelvis": math.sqrt(to_pelvis**2 - half**2),
+    }
 
 
 def _lengths(source: Source, camera: CameraModel) -> SegmentLengths | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
@@ -31,8 +30,6 @@ def person_view(
     rate: float | None = None,
     minimum_confidence: float = 0.0,
     deviation: float | None = None,
-    lengths: Mapping[str, float] | None = None,
-    stature: float | None = None,
     unit: Unit = "m",
 ) -> View:
     """Make a view of one person's key points.
@@ -54,8 +51,8 @@ def person_view(
         Points that are less sure count as not seen; those without a confidence are kept.
     deviation : float, optional
         Standard deviation of each coordinate of the points, pixels.
-    lengths, stature, unit
-        As the view shall say them.
+    unit : {"m", "cm", "mm"}
+        Of the view's file.
 
     Returns
     -------
@@ -112,8 +109,7 @@ def person_view(
         confidence=confidence[kept],
         deviation=deviation,
         derived=derived,
-        lengths=lengths or {},
-        stature=stature,
+        lengths=person.lengths,
         unit=unit,
     )
 

@@ -78,9 +78,9 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled
         )
     true = np.full((len(view), len(JOINTS), 3), np.nan)
     since = time - time[0]
-    step = float(np.median(np.diff(since))) if len(since) > 1 else np.inf
+    steps = [float(np.median(np.diff(each))) for each in (since, view.time) if len(each) > 1]
     nearest = np.abs(since[None] - view.time[:, None]).argmin(axis=1)
-    matched = np.abs(since[nearest] - view.time) <= 0.51 * step
+    matched = np.abs(since[nearest] - view.time) <= 0.51 * min(steps, default=np.inf)
     true[matched] = joints[nearest[matched]]
     if not np.isfinite(true).any():
         raise InputError(

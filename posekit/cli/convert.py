@@ -1,0 +1,124 @@
+"""`posekit convert`: from one format to another."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posekit.cli.detector_options import (
+    Calibrate,
+    CameraFile,
+    Deviation,
+    FieldOfView,
+    Focal35,
+    Format,
+    LengthsFile,
+    MinConfidence,
+    Person,
+    Proportions,
+    Rate,
+    Size,
+    Skeleton,
+    Stature,
+    SwapSides,
+)
+from posekit.cli.detector_source import source_of
+from posekit.cli.options import about, distinct, examples
+
+EXAMPLES = examples(
+    "posekit convert keypoints/ view.json --camera calibration.toml:cam_01 --stature 175cm",
+    "posekit convert keypoints/ people.json --to coco",
+    "posekit convert postures.json walk.bvh",
+    "posekit convert postures.json survivors.csv --posture all",
+    "posekit convert trial.c3d trial.trc",
+)
+
+
+def convert(
+    given: Annotated[Path, typer.Argument(metavar="IN", help="A file or folder of any format that is read.")],
+    output: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The end of its name says the format, unless --to does.")
+    ],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            metavar="NAME",
+            help="The format to write: view, postures, one of key points (openpose, coco, …) or of motion (trc, c3d, "
+            "csv, npz, parquet, mot, bvh, glb, urdf).",
+        ),
+    ] = "",
+    posture: Annotated[
+        str,
+        typer.Option(
+            "--posture",
+            metavar="WHICH",
+            help="Of a result: first (whose lengths fit best), a number from 1, or all (csv, npz, parquet, glb).",
+        ),
+    ] = "first",
+    view: Annotated[
+        Path | None,
+        typer.Option(
+            "--view",
+            metavar="VIEW",
+            help="What a result was recovered from: puts it into its camera's world.",
+        ),
+    ] = None,
+    up: Annotated[
+        str,
+        typer.Option("--up", metavar="AXIS", help="The axis that shall point up, as +z. Default: by custom."),
+    ] = "",
+    format: Format = "",
+    skeleton: Skeleton = "",
+    person: Person = "",
+    swap_sides: SwapSides = False,
+    camera: CameraFile = "",
+    fov: FieldOfView = None,
+    focal35: Focal35 = None,
+    size: Size = "",
+    fps: Rate = None,
+    min_confidence: MinConfidence = 0.0,
+    deviation: Deviation = None,
+    stature: Stature = "",
+    lengths: LengthsFile = None,
+    calibrate: Calibrate = None,
+    proportions: Proportions = "figure",
+) -> None:
+    """Convert a file: key points to views, results and motion capture to what other programs open."""
+    from posekit import files
+    from posekit.pipeline.detected.conversion import Conversion
+    from posekit.pipeline.detected.conversion import convert as run
+
+    distinct(given, output, view)
+    job = Conversion(
+        given=given,
+        output=output,
+        to=to,
+        posture=posture,
+        view=None if view is None else files.read_view(view),
+        up=up,
+        source=source_of(
+            format=format,
+            skeleton=skeleton,
+            person=person,
+            swap_sides=swap_sides,
+            camera=camera,
+            fov=fov,
+            focal35=focal35,
+            size=size,
+            fps=fps,
+            min_confidence=min_confidence,
+            deviation=deviation,
+            stature=stature,
+            lengths=lengths,
+            calibrate=calibrate,
+            proportions=proportions,
+        ),
+    )
+    with about(given):
+        lines = run(job)
+    for line in lines:
+        typer.echo(line)
+    typer.echo(f"written: {output}")

@@ -1,0 +1,36 @@
+"""`posekit inspect`: what is in a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posekit.cli.detector_options import Format, Size, Skeleton, SwapSides
+from posekit.cli.detector_source import source_of
+from posekit.cli.options import examples
+
+EXAMPLES = examples(
+    "posekit inspect keypoints/",
+    "posekit inspect predictions.json --skeleton coco_17 --size 1920x1080",
+    "posekit inspect trial.trc",
+    "posekit inspect postures.json",
+)
+
+
+def inspect(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="A file or folder of any format that posekit reads.")
+    ],
+    format: Format = "",
+    skeleton: Skeleton = "",
+    size: Size = "",
+    swap_sides: SwapSides = False,
+) -> None:
+    """Say what is in a file: its format, who is in it, which joints are missing, and how sure they are."""
+    from posekit.pipeline.detected.inspection import inspect as describe
+
+    source = source_of(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides)
+    for line in describe(file, source):
+        typer.echo(line)

@@ -1,0 +1,66 @@
+"""The views that a command is given: a view file's own, or those of people whom a detector saw, with their truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from posekit.errors import InputError
+from posekit.files import read_view
+from posekit.motion import postures_of, read_motion
+from posekit.pipeline.detected.kinds import Kind, kind_of
+from posekit.pipeline.detected.opening import Opened, open_views
+from posekit.pipeline.detected.source import Source
+from posekit.pipeline.detected.truth import with_truth
+from posekit.skeleton import JOINT
+
+
+def given_views(path: Path, source: Source, truth: Path | None = None) -> list[Opened]:
+    """Open a view, or key points as views: one, or one a person.
+
+    Parameters
+    ----------
+    path : Path
+    source : Source
+        How key points are to be read; a view says all of that itself.
+    truth : Path, optional
+        Motion capture of the same seconds.
+
+    Raises
+    ------
+    InputError
+        Where the file is neither, cannot be read, or the truth does not belong to it.
+    """
+    what = kind_of(path, source.format)
+    if what.kind is Kind.VIEW:
+        said = replace(source, proportions="figure", deviation=None)
+        if said != Source():
+            raise InputError(
+                f"{path}: a view says camera, person and lengths itself; expected a detector's file for --format, "
+                "--skeleton, --person, --swap-sides, --camera, --fov, --focal35, --size, --fps, --min-confidence, "
+                "--stature, --lengths and --calibrate; leave them out"
+            )
+        opened = [Opened(person=0, view=read_view(path), says=())]
+    elif what.kind is Kind.KEY_POINTS:
+        if truth is not None and source.rate is None:
+            source = replace(source, rate=read_motion(truth).rate)
+        opened = open_views(path, source)
+    else:
+        raise InputError(f"{path}: {what.kind.value}; expected a view or key points")
+    return opened if truth is None else [_with_truth(one, truth) for one in opened]
+
+
+def _with_truth(one: Opened, truth: Path) -> Opened:
+    """Give a view the joints that its truth itself has: what would be derived is no truth."""
+    motion = read_motion(truth)
+    found = postures_of(motion)
+    joints = found.joints.copy()
+    joints[:, [JOINT[name] for name in found.derived]] = np.nan
+    view, told = with_truth(one.view, joints, motion.time)
+    says = (
+        f"truth {motion.source}: {told.frames} of {len(view)} frames; its axes {told.turn} are the camera's world; it "
+        f"misses the key points by {told.error:.1f} px (median)"
+    )
+    return replace(one, view=view, says=(*one.says, says))

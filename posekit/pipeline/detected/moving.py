@@ -1,0 +1,242 @@
+"""What moves in a file: postures over time in a world with an up, and the figure's angles where they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit import files
+from posekit.anthropometry import lengths_from_postures
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure, load_figure
+from posekit.files import OpenCVModel, Result, View
+from posekit.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
+from posekit.motion.motion_axes import up_rotation
+from posekit.pipeline.detected.kinds import Kind, What
+from posekit.pipeline.detected.ranking import rank_by_fit
+from posekit.pipeline.validate import recovered_with
+from posekit.skeleton import POINTS
+from posekit.skeleton_map import SkeletonMap, load_skeleton_map
+
+RATE: Final = 30.0
+"""Frames a second of postures without times."""
+
+CAMERA_UP: Final = "-y"
+"""What is up in the camera frame of a camera that is held level."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moving:
+    """Postures over time, N rows.
+
+    Parameters
+    ----------
+    points : array (N, 19, 3)
+        Joints and head points, metres, in a world where `up` is up; NaN where not known.
+    time : array (N,)
+        Seconds.
+    frame, survivor : int array (N,)
+        The frame of each row, and which of its survivors it is.
+    up : str
+        ``+x`` … ``-z``.
+    figure : Figure
+        The person's.
+    says : tuple of str
+        What was done, a line each.
+    values : mapping
+        More numbers (N,) by name.
+    branches : tuple of str
+        The branch code of each row; empty where there is none.
+    """
+
+    points: Array
+    time: Array
+    frame: NDArray[np.intp]
+    survivor: NDArray[np.intp]
+    up: str
+    figure: Figure
+    says: tuple[str, ...] = ()
+    values: dict[str, Array]
+    branches: tuple[str, ...] = ()
+
+    def turned(self, up: str) -> Array:
+        """Return the points with another axis up (N, 19, 3)."""
+        return self.points @ up_rotation(self.up, up).T
+
+    def motion(self, source: str) -> Motion:
+        """Return the points as a motion: one row a frame."""
+        known = np.flatnonzero(np.isfinite(self.points[..., 0]).any(axis=0))
+        names = tuple(POINTS[k] for k in known)
+        return Motion(
+            names=names,
+            points=self.points[:, known],
+            time=self.time,
+            rate=self.rate,
+            up=self.up,
+            source=source,
+        )
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        steps = np.diff(np.unique(self.time))
+        return float(1 / np.median(steps)) if len(steps) else RATE
+
+    def configurations(self, up: str = "+z") -> tuple[Array, float]:
+        """Return the figure's configurations (N, nq), `up` up, and how far their joints are from the points at most."""
+        found = self.figure.configurations(self.turned(up))
+        return found.q, float(np.nanmax(found.distance, initial=0.0))
+
+    def table(self) -> SurvivorTable:
+        """Return all rows as a table of survivors."""
+        return SurvivorTable(
+            frame=self.frame,
+            time=self.time,
+            survivor=self.survivor,
+            joints=self.points[:, :14],
+            values=self.values,
+            branches=self.branches,
+        )
+
+
+def moving(path: Path, what: What, *, posture: str, view: View | None, skeleton: str = "") -> Moving:
+    """Read what moves in a file.
+
+    Parameters
+    ----------
+    path : path
+    what : What
+        What the file is.
+    posture : str
+        Of a result: ``first``, the number of a survivor from 1, or ``all``.
+    view : View, optional
+        What a result was recovered from: its camera's place in the world turns and moves the postures there.
+    skeleton : str
+        Of motion capture: a skeleton map by name or file.
+
+    Raises
+    ------
+    InputError
+        Where nothing in it moves, or it cannot be read.
+    """
+    if what.kind is Kind.RESULT:
+        return _of_result(files.read_result(path), posture, view)
+    if what.kind is Kind.VIEW:
+        return _of_truth(files.read_view(path), str(path))
+    if what.kind is Kind.MOTION:
+        layout = load_skeleton_map(skeleton) if skeleton else None
+        return _of_motion(read_motion(path, what.formats[0] if what.formats else None), layout)
+    if what.kind is Kind.POSTURES:
+        given = files.read_postures(path)
+        head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
+        points = np.concatenate([given.joints, head], axis=1)
+        up = guess_up(given.joints, str(path))
+        return _recorded(points, np.arange(len(points)) / RATE, up)
+    raise InputError(
+        f"{path}: {what.kind.value}, in which nothing moves; expected a result, postures or motion"
+    )
+
+
+def _of_result(result: Result, posture: str, view: View | None) -> Moving:
+    figure, _ = recovered_with(result)
+    rows: list[tuple[int, int]] = []
+    empty = 0
+    for k, frame in enumerate(result.frames):
+        order = rank_by_fit(frame.joints, frame.length_residual, figure.lengths)
+        if not len(order):
+            empty += 1
+        elif posture == "first":
+            rows.append((k, int(order[0])))
+        elif posture == "all":
+            rows += [(k, row) for row in range(len(order))]
+        else:
+            rows.append((k, _number(posture, len(order), k)))
+    if not rows:
+        raise InputError("result: no frame has a posture; nothing to convert")
+    joints = np.stack([result.frames[k].joints[row] for k, row in rows])
+    points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
+    says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
+    up = CAMERA_UP
+    if view is not None:
+        points = _in_world(points, view)
+        up = guess_up(points[:, :14])
+        says.append(f"in the camera's world, where {up} is up")
+    else:
+        says.append("in the camera's frame, as if it were held level; with --view, in its world")
+    names = list(dict.fromkeys(name for frame in result.frames for name in frame.margins))
+    values = {
+        f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
+    }
+    values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
+    return Moving(
+        points=points,
+        time=np.array([result.frames[k].time for k, _ in rows]),
+        frame=np.array([k for k, _ in rows]),
+        survivor=np.array([row for _, row in rows]),
+        up=up,
+        figure=figure,
+        says=tuple(says),
+        values=values,
+        branches=tuple(result.frames[k].branches[row] for k, row in rows),
+    )
+
+
+def _number(posture: str, count: int, frame: int) -> int:
+    if not posture.isdigit() or not 1 <= int(posture) <= count:
+        raise InputError(
+            f"--posture: {posture!r}; expected first, all, or a number from 1 to {count}, as frame {frame + 1} has"
+        )
+    return int(posture) - 1
+
+
+def _in_world(points: Array, view: View) -> Array:
+    model = view.camera
+    if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
+        raise InputError("--view: its camera has no place in a world; expected R and t; leave the option out")
+    return np.asarray((points - model.t) @ model.R)
+
+
+def _of_truth(view: View, source: str) -> Moving:
+    known = np.isfinite(view.truth).any(axis=(1, 2))
+    if not known.any():
+        raise InputError(
+            f"{source}: a view without truth: pictures do not move in space; expected a result; recover it first"
+        )
+    points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
+    up = CAMERA_UP
+    if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
+        points = _in_world(points, view)
+        up = guess_up(points[:, :14], source)
+    return _recorded(points, view.time[known], up)
+
+
+def _of_motion(motion: Motion, layout: SkeletonMap | None) -> Moving:
+    found = postures_of(motion, layout)
+    points = np.concatenate([found.joints, found.head], axis=1)
+    says = [f"skeleton map {found.layout.name}"]
+    if found.derived:
+        says.append(f"{' and '.join(found.derived)} placed from shoulders and hips")
+    up = motion.up or guess_up(found.joints, motion.source)
+    if not motion.up:
+        says.append(f"{up} is taken as up, along which heads are above ankles")
+    return _recorded(points, motion.time, up, says)
+
+
+def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> Moving:
+    """Make it of postures that were measured, with a figure of their own lengths."""
+    return Moving(
+        points=points,
+        time=time,
+        frame=np.arange(len(points)),
+        survivor=np.zeros(len(points), dtype=np.intp),
+        up=up,
+        figure=load_figure().scaled(lengths_from_postures(points[:, :14]).lengths),
+        says=tuple(says),
+        values={},
+    )

@@ -1,0 +1,189 @@
+"""From key points to views: neck and pelvis are put where they project to, nothing missing becomes a point."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import posekit
+from posekit.cameras import Array, PinholeCamera
+from posekit.errors import InputError
+from posekit.files import OpenCVModel, ScaledOrthographicModel, View
+from posekit.keypoints import KeyPoints
+from posekit.pipeline import view_of
+from posekit.pipeline.detected.person_view import pelvis_fraction, person_view
+from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
+from posekit.skeleton_map import load_skeleton_map
+from posekit.synthesis import random_views
+
+FIGURE = posekit.load_figure()
+LIMBS = [k for k, name in enumerate(JOINTS) if name not in ("neck", "pelvis")]
+
+
+def views(count: int = 20, seed: int = 3) -> View:
+    return view_of(random_views(FIGURE, count, np.random.default_rng(seed)))
+
+
+def seen(view: View, layout: str = "coco_17") -> KeyPoints:
+    return view_keypoints(view, "coco", layout)
+
+
+def test_limbs_and_head_keep_their_pixels_and_the_rest_is_derived() -> None:
+    view = views()
+    again = person_view(seen(view), view.camera, FIGURE)
+    np.testing.assert_array_equal(again.image[:, LIMBS], view.image[:, LIMBS])
+    np.testing.assert_array_equal(again.head_image, view.head_image)
+    assert again.derived == ("neck", "pelvis")
+    assert len(again) == len(view)
+
+
+def test_derived_joints_are_within_centimetres_of_where_they_are() -> None:
+    """Perspective alone moves the middle of the shoulders; a bent spine moves the pelvis."""
+    view = views(200)
+    assert isinstance(view.camera, OpenCVModel)
+    again = person_view(seen(view), view.camera, FIGURE)
+    f = view.camera.K[0, 0]
+    for name, most in (("neck", 0.01), ("pelvis", 0.11)):
+        j = JOINT[name]
+        true = view.image[:, j]
+        if name == "neck":
+            shoulders = [JOINT["right_shoulder"], JOINT["left_shoulder"]]
+            middle = view.truth[:, shoulders].mean(axis=1)
+            true = PinholeCamera(K=view.camera.K, distortion=view.camera.distortion).project(middle)
+        off = np.linalg.norm(again.image[:, j] - true, axis=1) * view.truth[:, j, 2] / f
+        assert np.median(off) < most / 2
+        assert np.quantile(off, 0.95) < most
+
+
+def test_the_pelvis_is_at_its_fraction_of_a_straight_spine() -> None:
+    fraction = pelvis_fraction(FIGURE)
+    joints = FIGURE.neutral_points
+    shoulders = (joints[JOINT["right_shoulder"]] + joints[JOINT["left_shoulder"]]) / 2
+    hips = (joints[JOINT["right_hip"]] + joints[JOINT["left_hip"]]) / 2
+    expected = (shoulders[2] - joints[JOINT["pelvis"], 2]) / (shoulders[2] - hips[2])
+    assert fraction == pytest.approx(expected, abs=0.01)
+
+
+@settings(deadline=None, derandomize=True, max_examples=60)
+@given(missing=st.sets(st.integers(0, 16)), frame=st.integers(0, 4))
+def test_a_missing_point_is_missing_and_never_at_the_origin(missing: set[int], frame: int) -> None:
+    view = views(5)
+    keypoints = seen(view)
+    points = keypoints.points.copy()
+    points[frame, sorted(missing)] = np.nan
+    lost = KeyPoints(
+        format="coco",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=keypoints.frame,
+        points=points,
+    )
+    names = [keypoints.layout.points[k] for k in missing]
+    shoulders = not any("shoulder" in name for name in names)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore" if not shoulders else "error")
+        again = person_view(lost, view.camera, FIGURE)
+    assert len(again) == 5 - (not shoulders)
+    if not shoulders:
+        return
+    for name in names:
+        row = (
+            again.image[frame, JOINT[name]]
+            if name in JOINT
+            else again.head_image[frame, HEAD_POINTS.index(name)]
+        )
+        assert np.isnan(row).all()
+    assert np.isnan(again.image[frame, JOINT["pelvis"]]).all() == any("hip" in name for name in names)
+
+
+def test_confidences_are_kept_and_unsure_points_left_out() -> None:
+    view = views(3)
+    keypoints = seen(view)
+    confidence = np.full(keypoints.points.shape[:2], 0.9)
+    confidence[:, keypoints.layout.points.index("left_wrist")] = 0.1
+    sure = KeyPoints(
+        format="coco",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=keypoints.frame,
+        points=keypoints.points,
+        confidence=confidence,
+    )
+    everything = person_view(sure, view.camera, FIGURE)
+    assert everything.confidence[:, JOINT["left_wrist"]] == pytest.approx(0.1)
+    assert everything.confidence[:, JOINT["neck"]] == pytest.approx(0.9)
+    some = person_view(sure, view.camera, FIGURE, minimum_confidence=0.3)
+    assert np.isnan(some.image[:, JOINT["left_wrist"]]).all()
+    assert np.isnan(some.confidence[:, JOINT["left_wrist"]]).all()
+    assert np.isfinite(some.image[:, JOINT["left_elbow"]]).all()
+
+
+def test_an_uncalibrated_camera_needs_no_neck() -> None:
+    view = views(2)
+    points = seen(view).points.copy()
+    points[0, load_skeleton_map("coco_17").points.index("left_shoulder")] = np.nan
+    again = person_view(changed(seen(view), points), ScaledOrthographicModel(scale=None), FIGURE)
+    assert len(again) == 2
+
+
+def test_frames_without_the_person_are_left_out_with_a_warning_and_times_stay() -> None:
+    view = views(4)
+    keypoints = seen(view)
+    gone = KeyPoints(
+        format="coco",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=np.array([0, 1, 3]),
+        points=keypoints.points[[0, 1, 3]],
+    )
+    with pytest.warns(UserWarning, match=r"1 of 4 pictures are left out.*000002"):
+        again = person_view(gone, view.camera, FIGURE, rate=10.0)
+    np.testing.assert_allclose(again.time, [0.0, 0.1, 0.3], rtol=0, atol=1e-12)
+
+
+def test_bad_key_points_are_refused() -> None:
+    view = views(2)
+    keypoints = seen(view)
+    nothing = np.full_like(keypoints.points, np.nan)
+    with pytest.raises(InputError, match=r"both shoulders.* in none of 2 pictures"):
+        person_view(changed(keypoints, nothing), view.camera, FIGURE)
+    twice = KeyPoints(
+        format="coco",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=np.array([0, 0]),
+        points=keypoints.points,
+    )
+    with pytest.raises(InputError, match=r"000000: more than one person.*--person"):
+        person_view(twice, view.camera, FIGURE)
+    fractions = KeyPoints(
+        format="mediapipe",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=keypoints.frame,
+        points=keypoints.points / 2000,
+        normalised=True,
+    )
+    with pytest.raises(InputError, match=r"fractions of the picture.*--size"):
+        person_view(fractions, view.camera, FIGURE)
+
+
+def changed(keypoints: KeyPoints, points: Array) -> KeyPoints:
+    return KeyPoints(
+        format="coco",
+        source="a.json",
+        layout=keypoints.layout,
+        pictures=keypoints.pictures,
+        frame=keypoints.frame,
+        points=points,
+    )
