@@ -14,6 +14,7 @@ from posekit.figure import Figure
 from posekit.figure.frames import hips_frame, torso_frame
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
+from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Ranges
 
@@ -33,7 +34,8 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
     With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
     laid onto the posture, and the limbs' directions are the posture's. Shoulder and hip are judged when
     elbow and knee are known, with the axial rotation free, and again, with it, when wrist and ankle are.
-    With ``projected`` they judge the posture itself.
+    With ``projected`` they judge the posture itself. Anatomical ranges are of kind ``configuration`` with couplings:
+    the limbs are judged by `AnatomicalLimb`.
 
     Parameters
     ----------
@@ -56,7 +58,13 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             joints = tuple(f"{side}_{joint}" for joint in limb)
-            checks += [Limb(figure=figure, limb=part, tolerance=tolerance) for part in (joints[:2], joints)]
+            for part in (joints[:2], joints):
+                if ranges.anatomy is None:
+                    checks.append(Limb(figure=figure, limb=part, tolerance=tolerance))
+                else:
+                    checks.append(
+                        AnatomicalLimb(figure=figure, anatomy=ranges.anatomy, limb=part, tolerance=tolerance)
+                    )
     return checks
 
 

@@ -12,6 +12,8 @@ from typing import Literal
 from posekit.errors import InputError
 from posekit.intake import cut, one_line, parse_toml, read_text
 from posekit.skeleton import DOFS
+from posekit.validators.anatomical import Anatomy
+from posekit.validators.anatomical_table import parse_anatomy
 
 SCHEMA = "posekit.ranges/1"
 MAX_BYTES = 1_000_000
@@ -45,6 +47,8 @@ class Ranges:
         Fraction of a segment below which its projection has no direction to measure.
     knee_flexed : float
         Degrees of knee flexion above which the hip's wider range applies.
+    anatomy : Anatomy, optional
+        Ranges with a mean and a spread for each end, and couplings (of kind configuration): `limits` are its own.
     """
 
     name: str
@@ -52,13 +56,17 @@ class Ranges:
     limits: Mapping[str, Range] = field(default_factory=dict)
     shortest_projection: float = 0.1
     knee_flexed: float = 5.0
+    anatomy: Anatomy | None = None
 
 
 URDF_RANGES = Ranges(name="urdf", kind="configuration")
 
+NAMED = ("table1", "anatomical")
+"""Tables that come with the package."""
+
 
 def load_ranges(name: str) -> Ranges:
-    """Load ranges by name (`urdf`, `table1`) or from a TOML file.
+    """Load ranges by name (`urdf`, `table1`, `anatomical`) or from a TOML file.
 
     Raises
     ------
@@ -67,9 +75,9 @@ def load_ranges(name: str) -> Ranges:
     """
     if name == "urdf":
         return URDF_RANGES
-    if name == "table1":
-        text = (resources.files("posekit.urdf") / "ranges" / "table1.toml").read_text(encoding="utf-8")
-        return _parse(text, "table1")
+    if name in NAMED:
+        text = (resources.files("posekit.urdf") / "ranges" / f"{name}.toml").read_text(encoding="utf-8")
+        return _parse(text, name)
     try:
         exists = Path(name).exists()
     except (OSError, ValueError):
@@ -77,7 +85,8 @@ def load_ranges(name: str) -> Ranges:
     if not name or not exists:
         raise InputError(
             one_line(
-                f"--ranges {cut(name)}: no such table or file; expected urdf, table1 or the path of a TOML file"
+                f"--ranges {cut(name)}: no such table or file; expected urdf, {', '.join(NAMED)} or the path "
+                "of a TOML file"
             )
         )
     return _parse(read_text(name, limit=MAX_BYTES), name)
@@ -89,8 +98,13 @@ def _parse(text: str, source: str) -> Ranges:
     if schema != SCHEMA:
         raise InputError(f"{source}: schema is {schema!r}; expected {SCHEMA!r} in the first line")
     kind = table.pop("kind", None)
+    if kind == "anatomical":
+        anatomy = parse_anatomy(table, source)
+        return Ranges(name=source, kind="configuration", limits=anatomy.limits(), anatomy=anatomy)
     if kind not in ("configuration", "projected"):
-        raise InputError(f"{source}: kind is {kind!r}; expected 'configuration' or 'projected'")
+        raise InputError(
+            f"{source}: kind is {kind!r}; expected 'configuration' or 'projected', or 'anatomical'"
+        )
     shortest = _number(table.pop("shortest_projection", 0.1), f"{source}: shortest_projection")
     flexed = _number(table.pop("knee_flexed", 5.0), f"{source}: knee_flexed")
     if not 0 <= shortest < 1:

@@ -23,6 +23,7 @@ from posekit.cli.detector_options import (
     Skeleton,
     Stature,
     SwapSides,
+    Unit,
 )
 from posekit.cli.detector_source import source_of
 from posekit.cli.options import about, distinct, examples
@@ -70,6 +71,10 @@ def convert(
         str,
         typer.Option("--up", metavar="AXIS", help="The axis that shall point up, as +z. Default: by custom."),
     ] = "",
+    clip: Annotated[
+        str, typer.Option("--clip", metavar="NAME", help="Of motion capture with several clips: which.")
+    ] = "",
+    unit: Unit = "",
     format: Format = "",
     skeleton: Skeleton = "",
     person: Person = "",
@@ -99,6 +104,8 @@ def convert(
         posture=posture,
         view=None if view is None else files.read_view(view),
         up=up,
+        clip=clip,
+        unit=unit,
         source=source_of(
             format=format,
             skeleton=skeleton,

@@ -85,6 +85,14 @@ Proportions = Annotated[
         "uncalibrated views also taylor (his 12 points, no neck and pelvis).",
     ),
 ]
+Unit = Annotated[
+    str,
+    typer.Option(
+        "--unit",
+        metavar="NAME",
+        help="Of motion capture: m, cm, mm or in, where the file's is wrong or not said.",
+    ),
+]
 Stature = Annotated[
     str, typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths.")
 ]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.detector_options import Format, Size, Skeleton, SwapSides
+from posekit.cli.detector_options import Format, Size, Skeleton, SwapSides, Unit
 from posekit.cli.detector_source import source_of
 from posekit.cli.options import examples
 
@@ -27,10 +27,11 @@ def inspect(
     skeleton: Skeleton = "",
     size: Size = "",
     swap_sides: SwapSides = False,
+    unit: Unit = "",
 ) -> None:
     """Say what is in a file: its format, who is in it, which joints are missing, and how sure they are."""
     from posekit.pipeline.detected.inspection import inspect as describe
 
     source = source_of(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides)
-    for line in describe(file, source):
+    for line in describe(file, source, unit=unit):
         typer.echo(line)

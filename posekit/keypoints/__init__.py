@@ -6,7 +6,9 @@ from posekit.keypoints.keypoints import KeyPoints as KeyPoints
 from posekit.keypoints.persons import Person as Person
 from posekit.keypoints.persons import choose as choose
 from posekit.keypoints.persons import list_people as list_people
+from posekit.keypoints.reading import chosen as chosen
 from posekit.keypoints.reading import formats as formats
+from posekit.keypoints.reading import is_format as is_format
 from posekit.keypoints.reading import read_keypoints as read_keypoints
 from posekit.keypoints.reading import suiting as suiting
 from posekit.keypoints.reading import write_keypoints as write_keypoints

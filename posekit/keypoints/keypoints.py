@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,11 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.intake import refusal
-from posekit.skeleton_map import SkeletonMap
+from posekit.skeleton_map import LANDMARKS, SkeletonMap
+from posekit.skeleton_map.skeleton_map import plain
+
+FARTHEST: Final = 1e6
+"""Pixels from the origin: no picture is so large, and a larger number is damage."""
 
 
 def _nothing() -> Array:
@@ -48,13 +53,16 @@ class KeyPoints:
         Points that were placed though hidden.
     score : array (D,)
         The detection's; NaN where there is none.
+    sequence : bool
+        Whether the pictures are of one film; in a collection of photographs nobody is followed.
     normalised : bool
         Whether the points are fractions of the picture, whose size is not known.
 
     Raises
     ------
     InputError
-        Where shapes do not fit, a coordinate is infinite, or a point is known in part.
+        Where shapes do not fit, a coordinate is infinite or beyond `FARTHEST`, a point is known in part, or a size,
+        a time, a confidence or a person's number is impossible.
     """
 
     format: str
@@ -69,6 +77,7 @@ class KeyPoints:
     confidence: Array = field(default_factory=_nothing)
     occluded: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
     score: Array = field(default_factory=_nothing)
+    sequence: bool = True
     normalised: bool = False
 
     def __post_init__(self) -> None:
@@ -100,20 +109,38 @@ class KeyPoints:
 
     def _check(self) -> None:
         unknown = np.isnan(self.points)
-        bad = np.isinf(self.points) | (unknown ^ unknown.all(axis=-1, keepdims=True))
+        with np.errstate(invalid="ignore"):
+            bad = (np.abs(self.points) > FARTHEST) | (unknown ^ unknown.all(axis=-1, keepdims=True))
         if bad.any():
             row, point, _ = (int(k) for k in np.argwhere(bad)[0])
             raise refusal(
                 self.source,
                 f"{self.pictures[int(self.frame[row])]}: {self.layout.points[point]}",
                 str(self.points[row, point].tolist()),
-                "two finite numbers, or a missing point",
+                f"two numbers up to {FARTHEST:,.0f}, or a missing point",
                 "correct it",
             )
         if len(self.frame) and (
             (np.diff(self.frame) < 0).any() or self.frame[0] < 0 or self.frame[-1] >= len(self.pictures)
         ):
             raise InputError(f"{self.source}: detections are not in the order of their pictures")
+        for name, values, impossible, expected in (
+            ("size", self.size, (self.size <= 0) | np.isinf(self.size), "a positive width and height"),
+            ("time", self.time, np.isinf(self.time), "seconds"),
+            ("confidence", self.confidence, np.isinf(self.confidence), "a finite number"),
+            ("score", self.score, np.isinf(self.score), "a finite number"),
+            ("person", self.person, self.person < -1, "a number from 0, or -1 for unknown"),
+        ):
+            if impossible.any():
+                where = tuple(int(k) for k in np.argwhere(impossible)[0])
+                of = where[0] if name in ("size", "time") else int(self.frame[where[0]])
+                raise refusal(
+                    self.source,
+                    f"{self.pictures[of]}: {name}",
+                    str(values[where].item()),
+                    expected,
+                    "correct it",
+                )
 
     @property
     def landmarks(self) -> Array:
@@ -124,3 +151,36 @@ class KeyPoints:
     def landmark_confidence(self) -> Array:
         """How sure the landmarks are (D, 21); a mean's is the mean of its points'."""
         return self.layout.gather(self.confidence[..., None])[..., 0]
+
+    def in_layout(self, layout: SkeletonMap) -> KeyPoints:
+        """Put the points into another format's layout.
+
+        Points of the layout that are a landmark, or have the same name here, are filled; the others are missing, and
+        points that the layout has not are lost.
+
+        Parameters
+        ----------
+        layout : SkeletonMap
+            With points of its own.
+        """
+        if layout.points == self.layout.points and layout.landmarks == self.layout.landmarks:
+            return self
+        values = np.concatenate(
+            [self.points, self.confidence[..., None], self.occluded[..., None].astype(np.float64)], axis=-1
+        )
+        own = {plain(name): k for k, name in enumerate(self.layout.points)}
+        moved = np.full((len(self), len(layout.points), 4), np.nan)
+        for k, name in enumerate(layout.points):
+            if plain(name) in own:
+                moved[:, k] = values[:, own[plain(name)]]
+        landmarks = layout.scatter(self.layout.gather(values))
+        placed = layout.scatter(np.ones((1, len(LANDMARKS), 1)))[0, :, 0] == 1
+        moved[:, placed] = landmarks[:, placed]
+        moved[np.isnan(moved[..., 0])] = np.nan
+        return replace(
+            self,
+            layout=layout,
+            points=moved[..., :2],
+            confidence=moved[..., 2],
+            occluded=moved[..., 3] > 0,
+        )

@@ -77,10 +77,13 @@ def sight(camera: PinholeCamera, figure: Figure, image: Array, tangent: Array) -
     is bounded nearer than at the tangent, by where the child's nearer solution reaches its own bound. This is what
     Taylor's bound (2000, eq. 3) becomes in perspective: there every segment bounds the scale alone, here a chain does.
     """
-    with np.errstate(all="ignore"):  # far outside the image the distortion's polynomial overflows to NaN
+    with np.errstate(
+        all="ignore"
+    ):  # absurd pixels overflow, and far outside the image a distortion has no ray
         normalized = camera.normalize(image)
-    rays = np.concatenate([normalized, np.ones_like(normalized[..., :1])], axis=-1)
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        rays = np.concatenate([normalized, np.ones_like(normalized[..., :1])], axis=-1)
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        rays[~(np.linalg.norm(rays, axis=-1) > 0.5)] = np.nan
     lengths = dict(figure.lengths)
     farthest = np.where(np.isnan(rays[..., 0]), np.nan, np.inf)
     bounding = np.full(farthest.shape, -1, dtype=np.intp)

@@ -49,8 +49,8 @@ class _Segment(NamedTuple):
         for end in (foot - half, foot + half):
             possible = reach & (end > 0) & (end <= farthest * (1 + SLACK))
             both.append(np.where(possible, end, np.nan))
-        # A joint that was not seen excludes nothing: it stands at the start, and no distance reads it.
-        return np.where(seen, both[0], start), np.where(seen, both[1], start)
+        # A joint that was not seen excludes nothing: it has one end, at the start, and no distance reads it.
+        return np.where(seen, both[0], start), np.where(seen, both[1], np.nan)
 
 
 class _Distance(NamedTuple):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Literal, get_args
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,6 +33,12 @@ REACH = 0.05
 
 MOST = 12
 """The most necks a frame."""
+
+DETECTED_DEVIATION: Final = 5.0
+"""Pixels: a detector's points, of a person some 700 pixels tall (docs, "Where the body is": 4 keep all, 3 do not)."""
+
+DETECTED_OFFSET: Final = 0.01
+"""Metres by which the trunk of a person differs from a rigid one, and a detector's joints from the figure's."""
 
 
 def place(
@@ -69,10 +75,12 @@ def place(
         The neck where it is known, camera frame, metres; NaN elsewhere.
     method : {"auto", "head", "torso", "search"}
     deviation : float, array (19,) or (F, 19)
-        Standard deviation of each coordinate of each image point, joints then head points, pixels.
+        Standard deviation of each coordinate of each image point, joints then head points, pixels; for a detector's
+        `DETECTED_DEVIATION`.
     offset : float or array (19,)
         Standard deviation, in metres, of what a point's image shows from the figure's own point: of a neck that is
-        really the middle of the shoulders. The neck's own also stands for a head that nods.
+        really the middle of the shoulders. The neck's own also stands for a head that nods. For detections of a person
+        `DETECTED_OFFSET`.
     tolerance, tangent : float, optional
         Metres by which the distances inside torso and hips may be off, and a segment too short for its image; by
         default what the deviations lead to (`posekit.placement.allowance`). A tree that grows from these necks wants
@@ -152,21 +160,28 @@ def _choose(
             notes.append(_outside(part, depths, frame, z))
             continue
         necks = _necks(given, seen, closure, depths, left, frame)
-        told = part.part, float(part.rms[frame]), float(np.nanmax(part.deviation[frame])) * z
         return replace(
             searched,
             **necks,
-            method=told[0],
-            residual=told[1],
+            method=part.part,
+            estimate=float(part.distance[frame, 0]) * z,
+            residual=float(part.rms[frame]),
             unit="px",
-            deviation=told[2],
+            deviation=float(np.nanmax(part.deviation[frame])) * z,
             notes=tuple(notes),
         )
     if method in ("head", "torso"):
         return replace(searched, reason=notes[-1])
     necks = _necks(given, seen, closure, depths, depths.intervals, frame)
-    least = float(depths.residual.min(initial=np.inf)) if depths.known else np.nan
-    return replace(searched, **necks, method="search", residual=least, notes=tuple(notes))
+    best = searched.minima[0] if len(searched.minima) else (np.nan, np.nan)
+    return replace(
+        searched,
+        **necks,
+        method="search",
+        estimate=float(best[0]),
+        residual=float(best[1]),
+        notes=tuple(notes),
+    )
 
 
 def _necks(
@@ -197,7 +212,7 @@ def _as_given(
     """Keep a root that is given, and say where it stands to the search's depths."""
     root = given.root[frame]
     if depths is None:
-        return Placement(method="given", necks=root[None], misfit=np.array([np.nan]))
+        return Placement(method="given", necks=root[None], misfit=np.array([np.nan]), estimate=float(root[2]))
     z = float(seen.rays[frame, 0, 2])
     at = float(seen.rays[frame, 0] @ root)
     misfit = closure.least(np.array([frame]), np.array([at])) if depths.known else np.array([np.nan])
@@ -207,6 +222,7 @@ def _as_given(
         _searched(depths, z, allowed, frame),
         method="given",
         necks=root[None].copy(),
+        estimate=float(root[2]),
         misfit=misfit,
         residual=float(misfit[0]),
         notes=notes,
@@ -262,7 +278,10 @@ def _why(seen: Sight, frame: int) -> str:
     if np.isnan(upper):
         return "the neck, from which the tree grows, is not seen"
     if np.isinf(upper):
-        return "no joint beside the neck is seen: nothing tells how far away it is; add shoulders and pelvis"
+        return (
+            "nothing bounds how far away the neck is: no other joint is seen elsewhere in the image; add shoulders and "
+            "pelvis"
+        )
     return (
         f"{seen.segment(frame)} is too short for its image at any distance: the neck would be within {upper:.3g} m of "
         "the camera; check the image points, K and the unit of the lengths"

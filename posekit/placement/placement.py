@@ -28,6 +28,9 @@ class Placement:
         The neck, camera frame, metres: the tree's roots, nearest first.
     misfit : array (n,)
         How far the rigid parts are from closing there, metres; NaN where that is not known.
+    estimate : float
+        The one depth that the method would tell: of the part's best pose, of the search's best minimum, or as given.
+        It is not always one of the necks'.
     residual, unit : float, str
         Of the method: the reprojection error of the part in ``px``, or the least misfit of the search in ``m``.
     deviation : float
@@ -59,6 +62,7 @@ class Placement:
     method: Found
     necks: Array = field(default_factory=lambda: np.empty((0, 3)))
     misfit: Array = field(default_factory=lambda: np.empty(0))
+    estimate: float = np.nan
     residual: float = np.nan
     unit: Literal["px", "m"] = "m"
     deviation: float = np.nan

@@ -24,6 +24,9 @@ SETTLED = 1e-10
 FLOOR = 1e-12
 """Pixels: a deviation of zero is taken as this where residuals are weighed."""
 
+SIDEWAYS, SPREAD = 1e3, 1e-9
+"""Normalised image coordinates beyond which a point is not in a picture, and spread below which points are one."""
+
 TINY = 1e-12
 """Added to the squares of a flat part of size 1, and the least scale: points in one line have a start too."""
 
@@ -99,10 +102,8 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     """
     with np.errstate(all="ignore"):
         normalized = camera.normalize(image)
-    seen = np.asarray(np.isfinite(normalized).all(axis=-1))
     total = len(image)
-    number = np.flatnonzero(seen.sum(axis=1) >= LEAST)
-    seen = seen[number]
+    number, seen = _usable(normalized)
     weight = seen / np.maximum(seen.sum(axis=1, keepdims=True), 1)
     centre = weight @ points
     body = np.where(seen[..., None], points - centre[:, None], 0.0)
@@ -158,6 +159,15 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
         covariance=spread(covariance, np.nan),
         freedom=freedom,
     )
+
+
+def _usable(normalized: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Return the frames that have enough points, in more than one place, and which points these see (n, P)."""
+    seen = np.asarray(np.isfinite(normalized).all(axis=-1) & (np.abs(normalized) < SIDEWAYS).all(axis=-1))
+    low = np.where(seen[..., None], normalized, np.inf).min(axis=1)
+    high = np.where(seen[..., None], normalized, -np.inf).max(axis=1)
+    usable = (seen.sum(axis=1) >= LEAST) & ((high - low).max(axis=1) > SPREAD)
+    return np.flatnonzero(usable), seen[usable]
 
 
 def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:

@@ -7,7 +7,6 @@ The twin, for a camera that is known, of the search over the scale of one that i
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.placement.body import Sight
 from posekit.placement.closure import Closure, Rows
+from posekit.placement.minima import Samples, minima_of
 
 CELLS = 96
 """Cells of the grid over the angle whose cosine is the distance over its bound."""
@@ -22,26 +22,7 @@ CELLS = 96
 PART = 64
 """Frames that are sampled at once."""
 
-WORTH = 0.6
-"""Misfit, in neck-pelvis lengths, above which a sampled minimum is not refined."""
-
-STEEP = 3.0
-"""Neck-pelvis lengths a radian by which a misfit may fall inside a cell: there it is looked at closer."""
-
-FINER = 12
-"""Into how many cells such a cell is cut, twice."""
-
-GOLDEN = (np.sqrt(5.0) - 1) / 2
-STEPS = 52
-"""Golden sections: a cell to 1e-12 of a radian."""
-
 HALVINGS = 48
-
-ASIDE = 1e-7
-"""Radians to both sides of a minimum at which the misfit must not be less."""
-
-ROUNDING = 1e-13
-"""Metres that rounding leaves of a misfit a few metres away."""
 
 SAME = 1e-9
 """Relative difference in distance between two minima that are one."""
@@ -86,14 +67,6 @@ class Depths:
                 value.flags.writeable = False
 
 
-class Minima(NamedTuple):
-    """Local minima of single branches: frame, distance and misfit of each (K,), frame by frame, best first."""
-
-    frame: Rows
-    distance: Array
-    misfit: Array
-
-
 def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[Depths]]:
     """Search the distance of the neck in some frames.
 
@@ -129,8 +102,9 @@ def _search(closure: Closure, sight: Sight, frames: Rows, tolerance: Array) -> l
     distance[:, -1] = closure.nearest
     misfit = closure.all(frames, distance)
     envelope = misfit.min(axis=-1)
-    minima = _minima(closure, frames, upper, psi, misfit)
-    nodes, values = _nodes(distance, envelope, minima)
+    minima = minima_of(closure, frames, upper, psi, misfit)
+    gaps = _gaps(closure, frames, distance, misfit <= tolerance[:, None, None], tolerance)
+    nodes, values = _nodes(distance, envelope, minima, gaps)
     edges = _intervals(closure, frames, nodes, values, tolerance)
     depths = []
     for k, frame in enumerate(frames):
@@ -168,83 +142,6 @@ def _angles(closure: Closure, frames: Rows, upper: Array) -> Array:
     return np.sort(np.concatenate([even, breaks, between], axis=1), axis=1)
 
 
-def _minima(closure: Closure, frames: Rows, upper: Array, psi: Array, misfit: Array) -> Minima:
-    """Bracket the local minima of every branch on the grid, look closer where one may hide, and refine them."""
-    known = (closure.known[frames] > 0)[:, None, None]
-    found = [_brackets(psi, np.where(known & (misfit <= WORTH * closure.unit), misfit, np.inf))]
-    step = np.diff(psi, axis=1)[..., None]
-    hidden = known & (np.minimum(misfit[:, 1:], misfit[:, :-1]) <= STEEP * closure.unit * step)
-    row, cell, branch = np.nonzero(hidden)
-    low, high = psi[row, cell], psi[row, cell + 1]
-    for _ in range(2):
-        nodes = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, FINER + 1)
-        values = closure.one(frames[row, None], branch[:, None], upper[row, None] * np.cos(nodes))
-        inside = _brackets(nodes, values[..., None])
-        found.append(_Brackets(row[inside.row], branch[inside.row], *inside[2:]))
-        again = np.minimum(values[:, 1:], values[:, :-1]) <= STEEP * closure.unit * np.diff(nodes, axis=1)
-        k, cell = np.nonzero(again)
-        row, branch, low, high = row[k], branch[k], nodes[k, cell], nodes[k, cell + 1]
-    row, branch, low, high, middle, value = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    brackets = _Brackets(row, branch, low, high, middle, value)
-    best, least = _golden(closure, frames[row], upper[row], brackets)
-    distance = upper[row] * np.cos(best)
-    # What falls on beyond its bracket, or below which another branch runs, is no minimum of the envelope.
-    true = least <= closure.least(frames[row], distance) + ROUNDING
-    for angle in (best - ASIDE, best + ASIDE):
-        true &= least <= closure.one(frames[row], branch, upper[row] * np.cos(angle)) + ROUNDING
-    order = np.flatnonzero(true)[np.lexsort((least[true], row[true]))]
-    return Minima(row[order], distance[order], least[order])
-
-
-class _Brackets(NamedTuple):
-    """Angles (K,) between which a branch of a frame has a local minimum, and the best that is known there."""
-
-    row: Rows
-    branch: Rows
-    low: Array
-    high: Array
-    middle: Array
-    value: Array
-
-
-def _brackets(psi: Array, misfit: Array) -> _Brackets:
-    """Find samples (n, G, B) that are no larger than those beside them."""
-    beside = np.full((len(psi), 1, misfit.shape[2]), np.inf)
-    lowest = misfit <= np.concatenate([beside, misfit[:, :-1]], axis=1)
-    lowest &= misfit <= np.concatenate([misfit[:, 1:], beside], axis=1)
-    row, cell, branch = np.nonzero(lowest & np.isfinite(misfit))
-    return _Brackets(
-        row,
-        branch,
-        psi[row, np.maximum(cell - 1, 0)],
-        psi[row, np.minimum(cell + 1, psi.shape[1] - 1)],
-        psi[row, cell],
-        misfit[row, cell, branch],
-    )
-
-
-def _golden(closure: Closure, frame: Rows, upper: Array, brackets: _Brackets) -> tuple[Array, Array]:
-    """Shrink brackets by golden sections (Kiefer 1953); return the best angle (K,) and the misfit there."""
-    _, branch, low, high, best, least = brackets
-
-    def value(angle: Array) -> Array:
-        return closure.one(frame, branch, upper * np.cos(angle))
-
-    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    f_inner, f_outer = value(inner), value(outer)
-    for _ in range(STEPS):
-        # Where a branch ends inside the bracket both may be infinite: keep the side of the best that is known.
-        left = np.where(np.isinf(f_inner) & np.isinf(f_outer), best < inner, f_inner < f_outer)
-        high, low = np.where(left, outer, high), np.where(left, low, inner)
-        probe = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
-        f_probe = value(probe)
-        inner, outer = np.where(left, probe, outer), np.where(left, inner, probe)
-        f_inner, f_outer = np.where(left, f_probe, f_outer), np.where(left, f_inner, f_probe)
-        better = f_probe < least
-        best, least = np.where(better, probe, best), np.where(better, f_probe, least)
-    return best, least
-
-
 def _distinct(distance: Array, misfit: Array) -> tuple[Array, Array]:
     """Drop minima that another, better one is at: they are sorted by misfit."""
     kept: list[int] = []
@@ -254,13 +151,44 @@ def _distinct(distance: Array, misfit: Array) -> tuple[Array, Array]:
     return distance[kept], misfit[kept]
 
 
-def _nodes(distance: Array, envelope: Array, minima: Minima) -> tuple[list[Array], list[Array]]:
-    """Put the minima among the samples: for each frame distances, ascending, and the misfit there."""
+def _gaps(
+    closure: Closure, frames: Rows, distance: Array, within: NDArray[np.bool_], tolerance: Array
+) -> Samples:
+    """Find gaps between one branch that leaves the tolerance and another that enters it, inside one cell.
+
+    Returns samples, unsorted: the ends of each gap, and its middle.
+    """
+    inside = np.asarray(within.any(axis=-1))
+    torn = inside[:, :-1] & inside[:, 1:] & ~(within[:, :-1] & within[:, 1:]).any(axis=-1)
+    row, cell = np.nonzero(torn)
+    far, near, limit = distance[row, cell], distance[row, cell + 1], tolerance[row]
+    ends = []
+    for start, other, branches in ((far, near, within[row, cell]), (near, far, within[row, cell + 1])):
+        good, bad = start, other
+        for _ in range(HALVINGS):
+            middle = (good + bad) / 2
+            still = ((closure.all(frames[row], middle[:, None])[:, 0] <= limit[:, None]) & branches).any(
+                axis=-1
+            )
+            good, bad = np.where(still, middle, good), np.where(still, bad, middle)
+        ends.append(good)
+    gap = ends[0] > ends[1]
+    row, high, low = row[gap], ends[0][gap], ends[1][gap]
+    at = np.concatenate([high, low, (high + low) / 2])
+    row = np.tile(row, 3)
+    return Samples(row, at, closure.least(frames[row], at))
+
+
+def _nodes(
+    distance: Array, envelope: Array, minima: Samples, gaps: Samples
+) -> tuple[list[Array], list[Array]]:
+    """Put the minima and the gaps among the samples: for each frame distances, ascending, and the misfit there."""
     nodes, values = [], []
     for k in range(len(distance)):
         own = slice(*np.searchsorted(minima.frame, [k, k + 1]))
-        at = np.concatenate([distance[k], minima.distance[own]])
-        value = np.concatenate([envelope[k], minima.misfit[own]])
+        torn = gaps.frame == k
+        at = np.concatenate([distance[k], minima.distance[own], gaps.distance[torn]])
+        value = np.concatenate([envelope[k], minima.misfit[own], gaps.misfit[torn]])
         order = np.lexsort((value, at))
         nodes.append(at[order])
         values.append(value[order])

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final
 
 from posekit.intake import nearest, parse_toml, read_toml, refusal, shown
-from posekit.skeleton_map.skeleton_map import LANDMARKS, SkeletonMap
+from posekit.skeleton_map.skeleton_map import LANDMARKS, SkeletonMap, other_side, plain
 
 SCHEMA: Final = "posekit.skeleton_map/1"
 MAX_BYTES: Final = 1_000_000
@@ -16,6 +17,7 @@ MAX_POINTS: Final = 1000
 FIELDS: Final = ("schema", "source", "points", "landmarks")
 
 
+@cache
 def skeleton_map_names() -> tuple[str, ...]:
     """Return the names of the built-in maps."""
     folder = resources.files("posekit.urdf") / "skeleton_maps"
@@ -38,8 +40,7 @@ def load_skeleton_map(name: str | Path) -> SkeletonMap:
     ('right_wrist',)
     """
     if str(name) in skeleton_map_names():
-        text = (resources.files("posekit.urdf") / "skeleton_maps" / f"{name}.toml").read_text("utf-8")
-        return parse_skeleton_map(parse_toml(text, str(name)), str(name))
+        return _built_in(str(name))
     path = Path(name)
     if path.suffix.lower() != ".toml":
         raise refusal(
@@ -50,6 +51,12 @@ def load_skeleton_map(name: str | Path) -> SkeletonMap:
             nearest(str(name), skeleton_map_names()),
         )
     return parse_skeleton_map(read_toml(path, limit=MAX_BYTES), str(path))
+
+
+@cache
+def _built_in(name: str) -> SkeletonMap:
+    text = (resources.files("posekit.urdf") / "skeleton_maps" / f"{name}.toml").read_text("utf-8")
+    return parse_skeleton_map(parse_toml(text, name), name)
 
 
 def parse_skeleton_map(table: dict[str, Any], source: str) -> SkeletonMap:
@@ -76,13 +83,27 @@ def parse_skeleton_map(table: dict[str, Any], source: str) -> SkeletonMap:
             f"up to {MAX_POINTS} names, in the format's order",
             "leave it out where files name their points",
         )
-    if len(set(points)) != len(points):
-        twice = next(name for name in points if points.count(name) > 1)
-        raise refusal(source, "points", f"{shown(twice)} twice", "each name once", "rename one of the two")
+    known = [plain(point) for point in points]
+    if len(set(known)) != len(known) or "" in known:
+        same = next(
+            point for point, name in zip(points, known, strict=True) if not name or known.count(name) > 1
+        )
+        raise refusal(
+            source, "points", shown(same), "names that differ in their letters and digits", "rename it"
+        )
     entries = table.get("landmarks")
     if not isinstance(entries, dict) or not entries:
         raise refusal(source, "landmarks", shown(entries), "a table", "name the points under [landmarks]")
     landmarks = {name: _parts(name, entry, points, source) for name, entry in entries.items()}
+    for name, parts in landmarks.items():
+        if other_side(name) != name and landmarks.get(other_side(name)) == parts:
+            raise refusal(
+                source,
+                f"landmarks.{name}",
+                f"{shown(list(parts))}, as {other_side(name)}",
+                "points of its own for each side",
+                "correct one of the two",
+            )
     return SkeletonMap(
         name=source,
         points=tuple(points),
@@ -100,6 +121,8 @@ def _parts(name: str, entry: object, points: list[str], source: str) -> tuple[st
         raise refusal(
             source, field, shown(entry), "a point's name, or a list of names for their mean", "correct it"
         )
+    if len(set(parts)) != len(parts):
+        raise refusal(source, field, shown(parts), "each name once", "remove the repeated one")
     for part in parts:
         if points and part not in points:
             raise refusal(source, field, shown(part), "one of the points", nearest(part, points))

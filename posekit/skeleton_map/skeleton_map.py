@@ -79,6 +79,27 @@ class SkeletonMap:
                 values[..., self.points.index(parts[0]), :] = landmarks[..., LANDMARK[landmark], :]
         return values
 
+    def over(self, names: Sequence[str]) -> SkeletonMap:
+        """Lay the map over the points of a file that names them itself, in the file's order.
+
+        Parameters
+        ----------
+        names : sequence of str (K,)
+            The file's names; compared without case and punctuation.
+
+        Returns
+        -------
+        SkeletonMap
+            Its `points` are the file's names; landmarks whose points are not all there are left out.
+        """
+        there = {plain(name): name for name in reversed(names)}
+        landmarks = {
+            landmark: tuple(there[plain(part)] for part in parts)
+            for landmark, parts in self.landmarks.items()
+            if all(plain(part) in there for part in parts)
+        }
+        return SkeletonMap(name=self.name, points=tuple(names), landmarks=landmarks, source=self.source)
+
     def swapped(self) -> SkeletonMap:
         """Exchange left and right, for files that have them the wrong way round."""
         return SkeletonMap(

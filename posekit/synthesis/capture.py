@@ -32,10 +32,14 @@ class Capture:
         The world's up, a unit vector.
     source : str
         What to call it in errors.
+    derived : tuple of str
+        The joints that no point of the file is, placed from shoulders and hips.
+    up_from : str
+        Who says which way is up: ``file``, ``stated`` or ``guessed``.
 
     See Also
     --------
-    posekit.synthesis.read_capture : reads one from an NPZ and checks it.
+    posekit.synthesis.read_capture : reads one from a file and checks it.
     """
 
     points: Array
@@ -45,6 +49,8 @@ class Capture:
     fps: Array
     up: Array
     source: str
+    derived: tuple[str, ...] = ()
+    up_from: str = "file"
 
     def __post_init__(self) -> None:
         for array in (self.points, self.clip, self.fps, self.up):

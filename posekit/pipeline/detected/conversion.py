@@ -13,8 +13,10 @@ from posekit.calibration import read_cameras, write_cameras
 from posekit.errors import InputError
 from posekit.files import Postures, View
 from posekit.intake import refusal
-from posekit.keypoints import KeyPoints, choose, formats, write_keypoints
+from posekit.keypoints import KeyPoints, choose, formats, is_format, write_keypoints
 from posekit.motion import (
+    UPS,
+    Motion,
     motion_format,
     motion_formats,
     with_up,
@@ -24,7 +26,7 @@ from posekit.motion import (
 )
 from posekit.motion.glb import write_postures_glb
 from posekit.pipeline.detected.kinds import Kind, kind_of
-from posekit.pipeline.detected.moving import Moving, moving
+from posekit.pipeline.detected.moving import Moving, moving, one_clip
 from posekit.pipeline.detected.opening import Opened, open_views, read_detections
 from posekit.pipeline.detected.source import Source
 from posekit.pipeline.detected.view_keypoints import view_keypoints
@@ -53,6 +55,8 @@ class Conversion:
         What a result was recovered from.
     up : str
         The axis that shall point up; the format's custom if empty.
+    clip, unit : str
+        Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
     """
 
     given: Path
@@ -62,6 +66,8 @@ class Conversion:
     posture: str = "first"
     view: View | None = None
     up: str = ""
+    clip: str = ""
+    unit: str = ""
 
 
 def convert(job: Conversion) -> list[str]:
@@ -79,16 +85,26 @@ def convert(job: Conversion) -> list[str]:
         cameras = read_cameras(job.given)
         write_cameras(job.output, cameras)
         return [f"{len(cameras)} cameras: {', '.join(cameras)}"]
-    if what.kind is Kind.VIEW and job.to in formats():
+    if what.kind is Kind.VIEW and is_format(job.to):
         return _write_key_points(job, view_keypoints(files.read_view(job.given), job.to, job.source.skeleton))
-    found = moving(job.given, what, posture=job.posture, view=job.view, skeleton=job.source.skeleton)
+    if what.kind is Kind.MOTION and _carries_points(job):
+        return _points(job, one_clip(job.given, what, clip=job.clip, unit=job.unit))
+    found = moving(
+        job.given,
+        what,
+        posture=job.posture,
+        view=job.view,
+        skeleton=job.source.skeleton,
+        clip=job.clip,
+        unit=job.unit,
+    )
     return [*found.says, *_write_moving(job, found)]
 
 
 def _key_points(job: Conversion) -> list[str]:
     """Write key points as a view, or in another detector's format."""
     to = job.to or ("view" if job.output.suffix.lower() == ".json" else "")
-    if to in formats():
+    if is_format(to):
         found = read_detections(job.given, job.source)
         one = job.source.person not in ("", "all")
         return _write_key_points(job, choose(found, job.source.person) if one else found)
@@ -134,14 +150,31 @@ def _write_moving(job: Conversion, found: Moving) -> list[str]:
     if several:
         return _write_survivors(job, found, name)
     if chosen.write_points is not None:
-        motion = found.motion(str(job.given))
-        up = job.up or CUSTOM.get(name, "") or found.up
-        write_motion(job.output, with_up(motion, up), name)
-        return [f"{len(motion)} frames of {len(motion.names)} points, {up} up"]
+        return _points(job, found.motion(str(job.given)))
     q, off = found.configurations()
     write_configurations(job.output, found.figure, q, found.time, name)
     return [
         f"{len(q)} frames of joint angles; the figure's joints are within {off * 100:.2g} cm of the postures'"
+    ]
+
+
+def _carries_points(job: Conversion) -> bool:
+    """Tell whether the output has any points, and not only a body's joints or angles."""
+    if job.to == "postures" or (not job.to and job.output.suffix.lower() == ".json"):
+        return False
+    return motion_format(job.to or _by_suffix(job.output)).write_points is not None
+
+
+def _points(job: Conversion, motion: Motion) -> list[str]:
+    """Write points, all that there are."""
+    name = job.to or _by_suffix(job.output)
+    up = job.up or CUSTOM.get(name, "") or motion.up
+    if up not in ("", *UPS):
+        raise refusal("--up", "", up, ", ".join(UPS), "name an axis")
+    turned = with_up(motion, up) if up else motion
+    write_motion(job.output, turned, name)
+    return [
+        f"{len(motion)} frames of {len(motion.names)} points, {turned.up or 'an axis that is not said'} up"
     ]
 
 

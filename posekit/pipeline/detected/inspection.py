@@ -25,7 +25,7 @@ MOST_PEOPLE = 12
 """People that are listed."""
 
 
-def inspect(path: Path, source: Source) -> list[str]:
+def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     """Describe a file in some lines.
 
     Raises
@@ -38,8 +38,8 @@ def inspect(path: Path, source: Source) -> list[str]:
     if what.kind is Kind.KEY_POINTS:
         return lines + _key_points(read_detections(path, source))
     if what.kind is Kind.MOTION:
-        layout = source.skeleton
-        return lines + _motion(read_motion(path, what.formats[0] if what.formats else None), layout)
+        motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None)
+        return lines + _motion(motion, source.skeleton)
     if what.kind is Kind.CAMERA:
         return lines + [_camera(camera) for camera in read_cameras(path).values()]
     if what.kind is Kind.VIEW:

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.files.npz import open_npz
 from posekit.files.result_npz import MAX_PADDED
 from posekit.intake import read_toml, refusal
-from posekit.keypoints import Given, formats
+from posekit.keypoints import Given, formats, is_format
 from posekit.motion import motion_formats
 
 CAMERA_ENDS: Final = (".yml", ".yaml", ".xml", ".txt", ".jpg", ".jpeg")
@@ -93,7 +93,7 @@ def kind_of(path: str | Path, format: str = "") -> What:
 
 
 def _said(path: Path, format: str) -> What:
-    if format in formats():
+    if is_format(format):
         return What(kind=Kind.KEY_POINTS, formats=(format,))
     if format in motion_formats():
         return What(kind=Kind.MOTION, formats=(format,))
@@ -132,5 +132,9 @@ def _motions(path: Path) -> list[str]:
     """List the formats of motion by the end of the name, and by the content where several share it."""
     named = [one for one in motion_formats().values() if path.suffix.lower() in one.suffixes]
     if path.is_dir():
-        named = [one for one in motion_formats().values() if not one.suffixes]
+        return [
+            one.name
+            for one in motion_formats().values()
+            if not one.suffixes and one.suits and one.suits(path)
+        ]
     return [one.name for one in named if one.suits is None or one.suits(path)]

@@ -105,7 +105,31 @@ class Moving:
         )
 
 
-def moving(path: Path, what: What, *, posture: str, view: View | None, skeleton: str = "") -> Moving:
+def one_clip(path: Path, what: What, *, clip: str = "", unit: str = "") -> Motion:
+    """Read motion, and of several clips the one that is named.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, or has several clips and none is named.
+    """
+    motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None)
+    if not clip and len(motion.clips) > 1:
+        names = ", ".join(motion.clips[:8])
+        raise InputError(f"{path}: {len(motion.clips)} clips ({names}, …); expected one; choose with --clip")
+    return motion.of_clip(clip) if clip else motion
+
+
+def moving(
+    path: Path,
+    what: What,
+    *,
+    posture: str = "first",
+    view: View | None = None,
+    skeleton: str = "",
+    clip: str = "",
+    unit: str = "",
+) -> Moving:
     """Read what moves in a file.
 
     Parameters
@@ -119,6 +143,8 @@ def moving(path: Path, what: What, *, posture: str, view: View | None, skeleton:
         What a result was recovered from: its camera's place in the world turns and moves the postures there.
     skeleton : str
         Of motion capture: a skeleton map by name or file.
+    clip, unit : str
+        Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
 
     Raises
     ------
@@ -131,7 +157,7 @@ def moving(path: Path, what: What, *, posture: str, view: View | None, skeleton:
         return _of_truth(files.read_view(path), str(path))
     if what.kind is Kind.MOTION:
         layout = load_skeleton_map(skeleton) if skeleton else None
-        return _of_motion(read_motion(path, what.formats[0] if what.formats else None), layout)
+        return _of_motion(one_clip(path, what, clip=clip, unit=unit), layout)
     if what.kind is Kind.POSTURES:
         given = files.read_postures(path)
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
@@ -236,7 +262,7 @@ def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> 
         frame=np.arange(len(points)),
         survivor=np.zeros(len(points), dtype=np.intp),
         up=up,
-        figure=load_figure().scaled(lengths_from_postures(points[:, :14]).lengths),
+        figure=load_figure().scaled(lengths_from_postures(points[:, :14]).lengths.lengths),
         says=tuple(says),
         values={},
     )

@@ -88,7 +88,7 @@ def _from_recording(path: Path, source: Source, camera: CameraModel) -> SegmentL
     """Estimate the lengths from motion capture, or from key points of the same kind of camera."""
     kind = kind_of(path).kind
     if kind is Kind.MOTION:
-        return lengths_from_postures(postures_of(read_motion(path)).joints)
+        return lengths_from_postures(postures_of(read_motion(path)).joints).lengths
     if kind is not Kind.KEY_POINTS:
         raise InputError(
             f"--calibrate: {path} is {kind.value}; expected motion capture or a detector's file of the same person"

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.files import LeeChenModel, OpenCVModel, View
-from posekit.keypoints import KeyPoints, formats
+from posekit.keypoints import KeyPoints, chosen
 from posekit.skeleton import HEAD, JOINT, JOINTS
 from posekit.skeleton_map import LANDMARK, LANDMARKS, load_skeleton_map
+
+UNNAMED: Final = "coco_17"
+"""The names that points are given in a format whose files name them as their users like."""
 
 
 def view_keypoints(view: View, format: str, skeleton: str = "") -> KeyPoints:
@@ -33,7 +38,11 @@ def view_keypoints(view: View, format: str, skeleton: str = "") -> KeyPoints:
         raise InputError(
             "camera.model is lee-chen, whose image points are lengths; expected pixels: an opencv camera"
         )
-    layout = load_skeleton_map(skeleton or formats()[format].skeletons[0])
+    one, layout = chosen(format)
+    if skeleton:
+        layout = load_skeleton_map(skeleton)
+    elif layout is None:
+        layout = load_skeleton_map(one.skeletons[0] if one.skeletons else UNNAMED)
     points = _landmarks(np.concatenate([view.image, view.head_image], axis=1))
     sure = _landmarks(view.confidence[..., None])
     size = view.camera.size if isinstance(view.camera, OpenCVModel) else None

@@ -1,0 +1,230 @@
+"""Joint ranges against real motion: what each table accepts, what it leaves, and how wide the anatomical one must be.
+
+    python benchmarks/ranges.py CAPTURE.npz [--views 320] [--seed 0]
+
+The capture is an NPZ as `posekit synth mocap` reads it; lengths are each clip's medians. Acceptance is of the true
+joint positions, all frames, angles within a thousandth of a degree. The number of spreads is chosen on half of the
+clips (every other one), as the least that accepts 99.5 % of their frames, and reported on the other half. Survivors
+are those of `benchmarks/real_motion.py`: each frame seen by a virtual camera of its own. Prints Markdown tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from real_motion import CHECKS, Tally, true_code  # type: ignore[import-not-found]  # the script beside this one
+
+from posekit.figure import Figure, load_figure
+from posekit.pipeline import MEASURED, recover, view_of
+from posekit.pipeline.markdown import table_lines
+from posekit.skeleton import DOFS
+from posekit.synthesis import Capture, Scene, mocap_scenes, read_capture
+from posekit.synthesis.mocap import clip_lengths
+from posekit.validators import Ranges, joint_range, load_ranges
+from posekit.validators.anatomical import Anatomy
+from posekit.validators.anatomical_plausibility import plausibility
+
+TABLES = ("table1", "urdf", "anatomical")
+SPREADS = tuple(np.round(np.arange(0.0, 3.01, 0.1), 1).tolist())
+WANTED = 0.995
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Clip:
+    """One clip's complete frames and its person."""
+
+    name: str
+    action: str
+    points: NDArray[np.float64]
+    figure: Figure
+
+    def rejected(self, ranges: Ranges) -> tuple[NDArray[np.bool_], dict[str, NDArray[np.bool_]]]:
+        """Judge the true joints: which frames are rejected, and at which places."""
+        places: dict[str, NDArray[np.bool_]] = {}
+        for check in joint_range(self.figure, ranges):
+            violated = check.judge(self.points[:, list(check.points)]).violated
+            for k, where in enumerate(check.where):
+                places[where] = places.get(where, np.zeros(len(self.points), dtype=bool)) | violated[:, k]
+        return np.logical_or.reduce(list(places.values())), places
+
+
+def clips_of(capture: Capture) -> list[Clip]:
+    clips = []
+    for index, name in enumerate(capture.names):
+        points = capture.points[capture.frames_of(index, complete=True)]
+        figure = load_figure().scaled(clip_lengths(points))
+        clips.append(Clip(name=name, action=capture.actions[index], points=points, figure=figure))
+    return clips
+
+
+def anatomy_of(ranges: Ranges) -> Anatomy:
+    if ranges.anatomy is None:
+        raise SystemExit(f"{ranges.name} is no anatomical table")
+    return ranges.anatomy
+
+
+def widened(spreads: float) -> Ranges:
+    """Return the anatomical ranges with another number of spreads."""
+    table = load_ranges("anatomical")
+    anatomy = replace(anatomy_of(table), spreads=spreads)
+    return replace(table, limits=anatomy.limits(), anatomy=anatomy)
+
+
+def accepted(clips: Sequence[Clip], ranges: Ranges) -> float:
+    return 1.0 - float(np.concatenate([clip.rejected(ranges)[0] for clip in clips]).mean())
+
+
+def evaluate(scenes: Sequence[Scene], ranges: Ranges) -> Tally:
+    tally = Tally()
+    for scene in scenes:
+        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED)
+        for label, frame, truth in zip(scene.labels, recovery.frames, scene.joints_cam, strict=True):
+            tally.add(label, frame, truth)
+    return tally
+
+
+def row(tally: Tally) -> list[str]:
+    found = [f for every in tally.retained.values() for f in every]
+    counts = np.array(tally.survivors)
+    median, high = np.percentile(counts, [50, 95])
+    return [f"{np.mean(found):.1%}", f"{counts.mean():.1f}", f"{median:.0f}", f"{high:.0f}"]
+
+
+def acceptance(clips: Sequence[Clip]) -> None:
+    tables = {name: load_ranges(name) for name in TABLES}
+    actions = sorted({clip.action for clip in clips})
+    groups = {"all": list(clips)} | {a: [clip for clip in clips if clip.action == a] for a in actions}
+    rows = [
+        [action, str(sum(len(clip.points) for clip in group))]
+        + [f"{accepted(group, tables[name]):.2%}" for name in TABLES]
+        for action, group in groups.items()
+    ]
+    print("Accepted, true joints, all frames\n")
+    print("\n".join(table_lines(["action", "frames", *TABLES], rows)))
+    print("What rejects (a frame counts at every place)\n")
+    for name in TABLES:
+        places: Counter[str] = Counter()
+        for clip in clips:
+            places.update({where: int(bad.sum()) for where, bad in clip.rejected(tables[name])[1].items()})
+        print(f"- {name}: " + ", ".join(f"{where} {count}" for where, count in places.most_common() if count))
+    print()
+
+
+def cross_validation(clips: Sequence[Clip]) -> None:
+    halves = {"odd clips": clips[0::2], "even clips": clips[1::2]}
+    curve = {name: np.array([accepted(half, widened(k)) for k in SPREADS]) for name, half in halves.items()}
+    rows = []
+    for fitted, other in (("odd clips", "even clips"), ("even clips", "odd clips")):
+        enough = np.flatnonzero(curve[fitted] >= WANTED)
+        k = int(enough[0]) if len(enough) else len(SPREADS) - 1
+        rows.append([fitted, f"{SPREADS[k]:g}", f"{curve[fitted][k]:.2%}", other, f"{curve[other][k]:.2%}"])
+    print("Spreads chosen on half of the clips\n")
+    print("\n".join(table_lines(["fitted on", "spreads", "accepted there", "reported on", "accepted"], rows)))
+
+
+def curve(clips: Sequence[Clip], scenes: Sequence[Scene]) -> None:
+    rows = []
+    for k in (0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0):
+        ranges = widened(k)
+        rows.append([f"{k:g}", f"{accepted(clips, ranges):.2%}", *row(evaluate(scenes, ranges))])
+    table = load_ranges("anatomical")
+    uncoupled = replace(table, anatomy=replace(anatomy_of(table), couplings=()))
+    label = f"{anatomy_of(table).spreads:g}, no couplings"
+    rows.append([label, f"{accepted(clips, uncoupled):.2%}", *row(evaluate(scenes, uncoupled))])
+    head = ["spreads", "frames accepted", "truth among survivors", "survivors, mean", "median", "95 %"]
+    print("Spreads against acceptance and survivors\n")
+    print("\n".join(table_lines(head, rows)))
+
+
+def views(scenes: Sequence[Scene]) -> None:
+    tallies = {name: evaluate(scenes, load_ranges(name)) for name in TABLES}
+    print(f"Survivors of {sum(map(len, scenes))} views, measured tolerance, all physical checks\n")
+    head = ["ranges", "truth among survivors", "survivors, mean", "median", "95 %"]
+    print("\n".join(table_lines(head, [[name, *row(tally)] for name, tally in tallies.items()])))
+    print("Truth among survivors by action\n")
+    rows = [
+        [action, str(len(found))] + [f"{np.mean(tallies[name].retained[action]):.1%}" for name in TABLES]
+        for action, found in sorted(tallies["table1"].retained.items())
+    ]
+    print("\n".join(table_lines(["action", "views", *TABLES], rows)))
+    print("What kills the truth\n")
+    for name in TABLES:
+        killers = tallies[name].killers.most_common()
+        print(f"- {name}: " + ", ".join(f"{reason} {count}" for reason, count in killers))
+    print()
+
+
+def ranking(scenes: Sequence[Scene]) -> None:
+    """Say how far up plausibility alone puts the truth among the survivors."""
+    ranges = load_ranges("anatomical")
+    above: list[float] = []
+    first: dict[str, list[float]] = defaultdict(list)
+    for scene in scenes:
+        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED)
+        for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
+            code = true_code(frame, truth)
+            if code not in frame.branches:
+                continue
+            score = plausibility(frame.q[:, recovery.figure.angle_index], anatomy_of(ranges)).sum(axis=1)
+            mine = score[frame.branches.index(code)]
+            above.append(
+                float((score > mine + 1e-9).sum() + 0.5 * (np.abs(score - mine) <= 1e-9).sum() - 0.5)
+            )
+            first["share"].append(above[-1] / max(len(frame) - 1, 1))
+    share = np.array(first["share"])
+    print(
+        f"Plausibility alone: {np.median(above):.1f} survivors in the middle (mean {np.mean(above):.1f}) are more "
+        f"plausible than the truth, ties counted half; mean place {share.mean():.2f} of the way down (chance: 0.50)\n"
+    )
+
+
+def speed(clips: Sequence[Clip]) -> None:
+    points = np.concatenate([np.concatenate([clip.points for clip in clips])] * 5)
+    figure = load_figure()
+    best: dict[str, float] = {}
+    for _ in range(5):
+        for name in TABLES:
+            checks = joint_range(figure, load_ranges(name), tolerance=MEASURED.angle)
+            start = time.perf_counter()
+            for check in checks:
+                check.judge(points[:, list(check.points)])
+            best[name] = min(best.get(name, np.inf), time.perf_counter() - start)
+    angles = np.random.default_rng(0).uniform(-1, 1, (len(points), len(DOFS)))
+    anatomy = anatomy_of(load_ranges("anatomical"))
+    start = time.perf_counter()
+    plausibility(angles, anatomy)
+    seconds = time.perf_counter() - start
+    print(f"Time of the checks on {len(points)} postures, urdf = 1: ", end="")
+    print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in TABLES), end="; ")
+    print(f"plausibility {seconds / best['urdf']:.2f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("capture", type=Path, nargs="?")
+    parser.add_argument("--views", type=int, default=320)
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    if given.capture is None:
+        print("no capture given: python benchmarks/ranges.py CAPTURE.npz")
+        return
+    capture = read_capture(given.capture)
+    clips = clips_of(capture)
+    scenes = mocap_scenes(capture, given.views, np.random.default_rng(given.seed))
+    acceptance(clips)
+    cross_validation(clips)
+    curve(clips, scenes)
+    views(scenes)
+    ranking(scenes)
+    speed(clips)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""As how many independent frames those of a recording count, for each segment."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from posekit.cameras import Array
+
+FADED: Final = 0.05
+"""Correlation at which neighbours count as strangers."""
+SCATTER: Final = 1.07
+"""Standard deviation of that variance in a sample of one, relative: what it scatters by in T frames is over sqrt(T)."""
+
+
+def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Array:
+    r"""Estimate how many independent, directions a segment has shown.
+
+    Two things make them fewer than frames. Neighbours in a film are alike (`unlike_neighbours`). And a segment that
+    keeps to one direction, as the shoulders of somebody who walks by, shows one however long it is filmed: where the
+    squared cosine varies less than is usual, any two frames are correlated by what is missing, and n
+    frames so correlated by r count as :math:`n / (1 + (n - 1) r)`.
+
+    Parameters
+    ----------
+    squared_cosine : array (T, M)
+        Of M segments' angle to the line of sight, in T frames in order; NaN is missing.
+    noise : array (T, M)
+        Variance of each by the noise of the key points.
+    usual : array (M,)
+        Variance of independent ones: `posekit.anthropometry.foreshortening.cosine_variance`.
+
+    Returns
+    -------
+    array (M,)
+        0 where a segment was never seen, else 1 to T.
+    """
+    known = np.isfinite(squared_cosine)
+    count = known.sum(axis=0)
+    blur = np.where(known, noise, 0.0).sum(axis=0) / np.maximum(count, 1)
+    neighbours, variance = unlike_neighbours(squared_cosine, blur)
+    missing = 1 - variance / usual - 2 * SCATTER / np.sqrt(np.maximum(neighbours, 1))
+    shared = np.clip(missing, 0.0, 1.0)
+    return np.where(count > 0, np.maximum(neighbours / (1 + (neighbours - 1) * shared), 1.0), 0.0)
+
+
+def unlike_neighbours(values: Array, noise: Array) -> tuple[Array, Array]:
+    r"""Count frames less those that repeat their neighbours.
+
+    :math:`T / (1 + 2 \sum_k \rho_k)` with the autocorrelation :math:`\rho_k` at k frames apart, summed until it fades
+    (Geyer 1992).
+
+    Parameters
+    ----------
+    values : array (T, M)
+        M series over T frames in order; NaN is missing.
+    noise : array (M,)
+        Variance by noise, which neighbours do not share.
+
+    Returns
+    -------
+    count : array (M,)
+        0 where nothing is known, else 1 to T.
+    variance : array (M,)
+        Of the values, without the noise.
+    """
+    known = np.isfinite(values)
+    count = known.sum(axis=0)
+    mean = np.where(known, values, 0.0).sum(axis=0) / np.maximum(count, 1)
+    off = np.where(known, values - mean, 0.0)
+    raw = (off * off).sum(axis=0) / np.maximum(count - 1, 1)
+    variance = np.maximum(raw - noise, 0.0)
+    some = variance > 1e-12
+    total = np.ones(len(count))
+    alike = some
+    for lag in range(1, len(values) // 2):
+        pairs = (known[lag:] & known[:-lag]).sum(axis=0)
+        covariance = (off[lag:] * off[:-lag]).sum(axis=0) / np.maximum(pairs, 1)
+        correlation = np.divide(covariance, variance, out=np.zeros_like(variance), where=some)
+        alike = alike & (correlation >= FADED) & (pairs > 0)
+        if not alike.any():
+            break
+        total += 2 * np.where(alike, np.minimum(correlation, 1.0), 0.0)
+    least = np.minimum(count, 1)
+    return np.where(some, np.clip(count / total, least, count), least).astype(np.float64), variance

@@ -1,0 +1,34 @@
+"""Which rows of a table are the same."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+
+
+def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Find rows (N, K) that are equal to the last bit.
+
+    Rows are told apart by one number each, a fixed mixture of their entries, and then compared: should different rows
+    ever share that number, all rows are taken for different.
+
+    Returns
+    -------
+    one : int array (U,)
+        A row of each kind.
+    which : int array (N,)
+        The kind of each row.
+    """
+    filled = np.where(np.isnan(table), UNKNOWN, table)
+    mixture = filled @ np.random.default_rng(0).standard_normal(table.shape[1])
+    _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
+    which = which.reshape(-1)
+    if (filled[one[which]] == filled).all():
+        return one, which
+    return np.arange(len(table)), np.arange(len(table))
+
+
+UNKNOWN = 1e9
+"""Stands for NaN, which equals nothing."""

@@ -1,0 +1,84 @@
+"""Where the root is known to be before the image is looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.cameras import Array, Camera, PinholeCamera
+from posekit.errors import InputError
+
+LEAST = 1e-6
+"""Metres: least standard deviation that a root is given; a root that is known exactly is known to a micrometre."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RootPrior:
+    """The neck of F frames from elsewhere than its image point: a marker, a depth camera, the frame before.
+
+    Parameters
+    ----------
+    mean : array (F, 3)
+        Camera frame, metres; NaN where nothing is known.
+    covariance : array (F, 3, 3)
+        Square metres, symmetric, not negative; zero for a root that is known exactly.
+
+    Raises
+    ------
+    InputError
+        Where a shape is wrong or a covariance is none.
+    """
+
+    mean: Array
+    covariance: Array
+
+    def __post_init__(self) -> None:
+        mean, covariance = np.array(self.mean, dtype=np.float64), np.array(self.covariance, dtype=np.float64)
+        if mean.ndim != 2 or mean.shape[1] != 3:
+            raise InputError(f"the root's mean has shape {mean.shape}; expected (F, 3), metres")
+        if covariance.shape != (len(mean), 3, 3):
+            raise InputError(f"the root's covariance has shape {covariance.shape}; expected ({len(mean)}, 3, 3)")
+        known = np.isfinite(mean).all(axis=1)
+        part = covariance[known]
+        if not np.isfinite(part).all() or np.abs(part - part.transpose(0, 2, 1)).max(initial=0.0) > 1e-9:
+            raise InputError("the root's covariance must be finite and symmetric where the root is known")
+        if len(part) and float(np.linalg.eigvalsh(part).min()) < -1e-12:
+            raise InputError("the root's covariance has a negative variance; expected square metres, zero or more")
+        for name, value in (("mean", mean), ("covariance", covariance)):
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    @staticmethod
+    def along_ray(camera: Camera, mean: Array, *, depth: Array | float, lateral: Array | float = 0.0) -> RootPrior:
+        """Make the prior of roots (F, 3) whose depth is known to `depth` and whose place beside the ray to `lateral`.
+
+        Parameters
+        ----------
+        camera : Camera
+        mean : array (F, 3)
+            Camera frame, metres.
+        depth, lateral : float or array (F,)
+            Standard deviations along the ray and across it, metres.
+        """
+        mean = np.asarray(mean, dtype=np.float64)
+        along, across = (np.broadcast_to(np.asarray(value, dtype=np.float64), len(mean)) for value in (depth, lateral))
+        if not (np.isfinite(along) & (along >= 0) & np.isfinite(across) & (across >= 0)).all():
+            raise InputError("the root's standard deviations must be finite, zero or more, metres")
+        if isinstance(camera, PinholeCamera):
+            ray = mean / np.linalg.norm(mean, axis=1, keepdims=True)
+        else:
+            ray = np.broadcast_to(np.array([0.0, 0.0, 1.0]), mean.shape)
+        outer = ray[:, :, None] * ray[:, None, :]
+        across_squared, along_squared = across[:, None, None] ** 2, along[:, None, None] ** 2
+        covariance = across_squared * (np.eye(3) - outer) + along_squared * outer
+        return RootPrior(mean=mean, covariance=covariance)
+
+    def whitening(self) -> Array:
+        """Return W (F, 3, 3) with W' W the inverse covariance; zero where nothing is known."""
+        known = np.isfinite(self.mean).all(axis=1)
+        W = np.zeros((len(self.mean), 3, 3))
+        if known.any():
+            values, vectors = np.linalg.eigh(self.covariance[known])
+            W[known] = vectors.transpose(0, 2, 1) / np.sqrt(np.maximum(values, LEAST**2))[:, :, None]
+        return W

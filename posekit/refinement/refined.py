@@ -1,0 +1,112 @@
+"""What refinement returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.refinement.covariance import covariances
+from posekit.refinement.problem import Problem
+from posekit.refinement.start import state_of
+from posekit.refinement.survival import chi2_survival
+from posekit.skeleton import SEGMENTS
+
+LEVEL = 1e-3
+"""Probability with which noise alone gives a posture that is rejected."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Refined:
+    """The most likely postures of N survivors.
+
+    Parameters
+    ----------
+    figure : Figure
+    frame : int array (N,)
+        The frame of each survivor.
+    joints : array (N, 14, 3)
+        Camera frame, metres; a joint that was not seen stands where its prior left it, and its covariance says so.
+        NaN where a survivor could not be placed.
+    head : array (N, 5, 3)
+        The head's points, likewise; NaN where the head was not seen.
+    chi2 : array (N,)
+        Sum of squares of all residuals over their standard deviations; infinite where a joint is behind the camera.
+    dof : int array (N,)
+        Residuals less what they determine, plus one for every limit that is felt and every segment that is held at a
+        right angle to its ray by an image beyond its reach.
+    start_chi2 : array (N,)
+        The same before refinement; never less.
+    steps : int array (N,)
+    converged : bool array (N,)
+        Whether a minimum was reached.
+    """
+
+    figure: Figure
+    frame: NDArray[np.intp]
+    joints: Array
+    head: Array
+    chi2: Array
+    dof: NDArray[np.intp]
+    start_chi2: Array
+    steps: NDArray[np.intp]
+    converged: NDArray[np.bool_]
+    problem: Problem
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return len(self.frame)
+
+    def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Refined:
+        """Return some survivors, by index or mask."""
+        chosen = np.arange(len(self))[np.asarray(rows)]
+        arrays = {
+            item.name: getattr(self, item.name)[chosen]
+            for item in fields(self)
+            if isinstance(getattr(self, item.name), np.ndarray)
+        }
+        return replace(self, problem=self.problem.take(chosen), **arrays)
+
+    @cached_property
+    def p(self) -> Array:
+        """The probability that noise alone gives a chi2 as large (N,); zero where it is infinite or NaN."""
+        known = np.isfinite(self.chi2)
+        return np.where(known, chi2_survival(np.where(known, self.chi2, 0.0), self.dof), 0.0)
+
+    def explained(self, level: float = LEVEL) -> NDArray[np.bool_]:
+        """Return which survivors (N,) the noise can explain: those with p of at least `level`."""
+        if not 0 <= level < 1:
+            raise InputError(f"level is {level!r}; expected a probability, zero or more and less than one")
+        return np.asarray(self.p >= level)
+
+    @cached_property
+    def lengths(self) -> Array:
+        """The 17 lengths (N, 17), metres, in the order of `posekit.skeleton.SEGMENT_NAMES`."""
+        start, end = np.array(SEGMENTS).T
+        return np.asarray(np.linalg.norm(self.joints[:, start] - self.joints[:, end], axis=-1))
+
+    @cached_property
+    def q(self) -> Array:
+        """Configurations (N, nq) in Pinocchio's order, in closed form."""
+        return self.figure.inverse_kinematics(np.concatenate([self.joints, self.head], axis=1))
+
+    @cached_property
+    def covariance(self) -> Array:
+        """The covariance of every joint (N, 14, 3, 3), square metres, to first order: see `covariances`."""
+        return covariances(self.problem, state_of(self.problem.anatomy, self.joints, self.head))
+
+    @property
+    def deviation(self) -> Array:
+        """The standard deviation of every joint (N, 14), metres: the root of its covariance's trace."""
+        return np.asarray(np.sqrt(np.trace(self.covariance, axis1=2, axis2=3)))

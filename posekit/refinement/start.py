@@ -1,0 +1,103 @@
+"""Where the search starts: postures as states, and limbs laid on their rays again when the trunk has moved."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.figure.frames import fit_rotation
+from posekit.refinement.anatomy import END, LIMBS, MIDDLE, START, Anatomy
+from posekit.refinement.optics import Optics
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import dot
+from posekit.refinement.state import State, place
+
+HANGING = 2
+"""The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
+
+
+def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> State:
+    """Turn postures (N, 14, 3) and heads (N, 5, 3) into states: the figure's trunk laid onto theirs, their directions.
+
+    What is NaN is put in its neutral place; the neck must be known.
+    """
+    n = len(postures)
+    offsets = postures[:, :6] - postures[:, :1]
+    shape = np.repeat(anatomy.shape[:, None], n, axis=1)
+    b, a, right_y, right_z, left_y, left_z, h, hip_right, hip_left = anatomy.shape
+    torso = _laid(np.array([[a, right_y, right_z], [a, left_y, left_z], [0.0, 0.0, -b]]), offsets[:, 1:4])
+    torso = np.where(np.isnan(torso), np.eye(3), torso)
+    hips = _laid(np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]]), offsets[:, 4:6] - offsets[:, 3:4])
+    hips = np.where(np.isnan(hips), torso, hips)
+    skull = torso
+    if head is not None:
+        skull = _laid(anatomy.head, head - postures[:, :1])
+        skull = np.where(np.isnan(skull), torso, skull)
+    directions = np.empty((4, 2, 3, n))
+    for limb, joints in enumerate(LIMBS):
+        hanging = -(torso if limb < 2 else hips)[:, :, HANGING].T
+        for segment in range(2):
+            along = (postures[:, joints[segment + 1]] - postures[:, joints[segment]]).T
+            far = np.sqrt(dot(along, along))
+            known = far > 0
+            directions[limb, segment] = np.where(known, along / np.where(known, far, 1.0), hanging)
+    return State(
+        root=postures[:, 0].T.copy(),
+        torso=_batch_last(torso),
+        hips=_batch_last(hips),
+        head=_batch_last(skull),
+        directions=directions,
+        shape=shape,
+        limbs=np.repeat(anatomy.limbs[:, :, None], n, axis=2),
+    )
+
+
+def _laid(own: Array, seen: Array) -> Array:
+    """Lay a part's points (P, 3) onto seen ones (N, P, 3), the unknown left out; NaN where none is known."""
+    known = np.isfinite(seen).all(axis=2)
+    rotation = fit_rotation(own, np.where(known[..., None], seen, 0.0))
+    rotation[~known.any(axis=1)] = np.nan
+    return rotation
+
+
+def _batch_last(array: Array) -> Array:
+    return np.ascontiguousarray(np.moveaxis(array, 0, -1))
+
+
+def sides(optics: Optics, state: State) -> NDArray[np.bool_]:
+    """Return whether limbs' segments point away from the camera (4, 2, N): their ends lie behind the ray's middle."""
+    if not optics.perspective:
+        return np.asarray(state.directions[:, :, 2] > 0)
+    joints = place(state).joints
+    ends = np.stack([joints[list(MIDDLE)], joints[list(END)]], axis=1)
+    return dot(state.directions, ends) > 0
+
+
+def relift(problem: Problem, state: State, far: NDArray[np.bool_]) -> State:
+    """Lay the limbs of postures on their rays again, each segment to the side `far` (4, 2, N) that it had.
+
+    Where the ray is out of reach, the segment points to the nearest place on it. Where a joint was not seen, or its
+    ray is behind, the segment keeps its direction.
+    """
+    joints = place(state).joints
+    directions = state.directions.copy()
+    start = joints[list(START)]
+    for segment, ends in enumerate((MIDDLE, END)):
+        seen = problem.weight[list(ends)] > 0
+        length = state.limbs[:, segment]
+        along = _lifted(problem.optics, problem.image[list(ends)], start, length, far[:, segment])
+        good = seen & np.isfinite(along).all(axis=1)
+        directions[:, segment] = np.where(good[:, None], along, directions[:, segment])
+        start = start + length[:, None] * directions[:, segment]
+    return state._replace(directions=directions)
+
+
+def _lifted(optics: Optics, image: Array, start: Array, length: Array, far: NDArray[np.bool_]) -> Array:
+    """Return the directions (4, 3, N) from starts (4, 3, N) to where rays meet the segments' spheres."""
+    ray, foot = optics.rays(image, start)
+    apart = foot - start
+    height = np.sqrt(dot(apart, apart))
+    half = np.sqrt(np.maximum(length * length - height * height, 0.0))
+    along = apart + np.where(far, half, -half)[:, None] * ray
+    return np.asarray(along / np.sqrt(dot(along, along))[:, None])

@@ -1,0 +1,167 @@
+"""The anatomical table: every number has a source, limits are means and spreads, and bad files say what is wrong."""
+
+import re
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from posekit.errors import InputError
+from posekit.skeleton import DOFS
+from posekit.validators import Ranges, load_ranges
+from posekit.validators.anatomical import ANGLES, Anatomy
+from posekit.validators.anatomical_table import MAX_COUPLINGS
+
+TEXT = (resources.files("posekit.urdf") / "ranges" / "anatomical.toml").read_text(encoding="utf-8")
+TABLE = load_ranges("anatomical")
+assert TABLE.anatomy is not None
+ANATOMY: Anatomy = TABLE.anatomy
+
+
+def load(folder: Path, text: str) -> Ranges:
+    path = folder / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    return load_ranges(str(path))
+
+
+def test_it_limits_all_22_angles_and_is_no_default() -> None:
+    assert (TABLE.name, TABLE.kind) == ("anatomical", "configuration")
+    assert set(TABLE.limits) == set(DOFS)
+    assert load_ranges("urdf").anatomy is None
+    assert load_ranges("table1").anatomy is None
+
+
+@pytest.mark.parametrize("dof", DOFS)
+def test_a_limit_is_the_mean_and_so_many_spreads_outward(dof: str) -> None:
+    motion = ANATOMY.motion(dof)
+    for k, (end, outward) in enumerate(((motion.lower, -1), (motion.upper, 1))):
+        spread = np.sqrt(end.spread**2 + motion.zero.spread**2)
+        expected = end.mean + motion.zero.mean + outward * ANATOMY.spreads * spread
+        assert TABLE.limits[dof][k] == pytest.approx(expected)
+    wider = replace(ANATOMY, spreads=ANATOMY.spreads + 1).limits()[dof]
+    assert wider[0] < TABLE.limits[dof][0] < TABLE.limits[dof][1] < wider[1]
+
+
+def test_both_sides_are_alike() -> None:
+    for dof in DOFS:
+        if dof.startswith("right_"):
+            assert TABLE.limits[dof] == TABLE.limits[dof.replace("right_", "left_")]
+
+
+def test_every_number_has_a_source_and_every_source_is_used() -> None:
+    ends = [end for motion in ANATOMY.motions.values() for end in (motion.lower, motion.upper)]
+    ends += [motion.zero for motion in ANATOMY.motions.values() if motion.zero.mean]
+    assert all(end.source for end in ends)
+    assert all(coupling.source for coupling in ANATOMY.couplings)
+    used = {key for end in ends for key in end.source} | {k for c in ANATOMY.couplings for k in c.source}
+    assert used == set(ANATOMY.sources)
+
+
+def test_the_clinics_zero_is_added_to_ends_and_couplings() -> None:
+    # Standing, the hips lie before the pelvis joint: what flexes the trunk extends the hip by as much.
+    pelvis, hip = ANATOMY.motions["pelvis.flexion"], ANATOMY.motions["hip.flexion"]
+    assert pelvis.zero.mean == -hip.zero.mean > 0
+    assert pelvis.end("upper")[0] == pytest.approx(pelvis.upper.mean + pelvis.zero.mean)
+    (coupling,) = ANATOMY.couplings_of("hip.flexion")
+    mean, spread = ANATOMY.coupled(coupling, np.array([-5.0, 0.0, 12.0, 24.0, 200.0]))
+    np.testing.assert_allclose(mean, np.array([61.0, 61.0, 75.5, 90.0, 122.6]) + hip.zero.mean)
+    assert spread == pytest.approx(np.hypot(coupling.spread, hip.zero.spread))
+
+
+def test_the_table_as_a_file_is_the_table_by_name(tmp_path: Path) -> None:
+    table = load(tmp_path, TEXT)
+    assert table.anatomy == ANATOMY
+    assert table.limits == TABLE.limits
+    assert table.name.endswith("mine.toml")
+
+
+def changed(old: str, new: str) -> str:
+    assert TEXT.count(old) >= 1, old
+    return TEXT.replace(old, new, 1)
+
+
+NECK = "[neck.flexion]\nlower = { mean = -75.5, spread = 8.5,"
+COUPLING = 'angle = "hip.flexion"'
+WRONG = {
+    "no spreads": (changed("spreads = ", "# spreads = "), "spreads: None; expected a finite number"),
+    "negative spreads": (changed("spreads = 1.0", "spreads = -1.0"), "spreads is -1; expected 0 to 10"),
+    "endless spreads": (changed("spreads = 1.0", "spreads = inf"), "spreads: inf; expected a finite"),
+    "a missing angle": (changed("[neck.flexion]", "[neck.extra]"), "'neck.extra' is not an angle"),
+    "a missing joint": (
+        TEXT.replace("[neck.rotation]", "[neck.bending2]").split("[neck.bending2]")[0]
+        + TEXT[TEXT.index("[pelvis.flexion]") :],
+        "missing neck.rotation",
+    ),
+    "a number for an angle": (
+        changed("[neck.flexion]\nlower", "[neck]\nflexion = 3\nlower"),
+        "neck.flexion: 3",
+    ),
+    "a joint that is no table": (
+        changed("spreads = 1.0", "spreads = 1.0\nneck2 = 3"),
+        "'neck2': expected a table",
+    ),
+    "no upper": (changed("upper = { mean = 60.0", "uper = { mean = 60.0"), "neck.flexion: missing upper"),
+    "a further key": (changed(NECK, NECK.replace("mean", "men = 1, mean")), "unknown 'men'"),
+    "a spread of zero": (changed("spread = 8.5", "spread = 0.0"), "expected a positive standard deviation"),
+    "a negative spread": (changed("spread = 8.5", "spread = -1"), "expected a positive standard deviation"),
+    "NaN": (changed("mean = -75.5", "mean = nan"), "neck.flexion.lower.mean: nan; expected a finite number"),
+    "a truth value": (changed("mean = -75.5", "mean = true"), "neck.flexion.lower.mean: True"),
+    "a huge number": (changed("mean = -75.5", "mean = 1" + "0" * 400), "neck.flexion.lower.mean: inf"),
+    "radians squared": (changed("mean = -75.5", "mean = -7550"), "expected degrees from -360 to 360"),
+    "swapped ends": (changed("mean = -75.5", "mean = 75.5"), "lower mean 75.5 is not below upper mean 60"),
+    "more than a turn": (changed("mean = -75.5", "mean = -359"), "expected at most a full turn"),
+    "a source that is none": (
+        changed('source = "aaos"', 'source = "hearsay"'),
+        "'hearsay' is not in [sources]",
+    ),
+    "a source that is a number": (changed('source = "aaos"', "source = 3"), "expected one or more keys"),
+    "sources that are numbers": (changed("[sources]", "[sources]\nx = 1"), "sources: expected a table"),
+    "a coupling of an unknown angle": (
+        changed(COUPLING, 'angle = "ankle.flexion"'),
+        "angle is 'ankle.flexion'",
+    ),
+    "a coupling across limbs": (changed('of = "knee.flexion"', 'of = "elbow.flexion"'), "of 'elbow.flexion'"),
+    "a coupling to itself": (changed('of = "knee.flexion"', 'of = "hip.flexion"'), "of 'hip.flexion'"),
+    "a coupling without end": (
+        changed('end = "upper"\nof = "knee', 'end = "left"\nof = "knee'),
+        "end is 'left'",
+    ),
+    "a coupling of one point": (
+        changed("[[0.0, 61.0], [24.0, 90.0], [60.0, 122.6]]", "[[0.0, 61.0]]"),
+        "expected two or more",
+    ),
+    "a point of three numbers": (changed("[0.0, 61.0]", "[0.0, 61.0, 1.0]"), "points: [0.0, 61.0, 1.0]"),
+    "points out of order": (changed("[24.0, 90.0]", "[0.0, 90.0]"), "knee.flexion does not ascend"),
+    "a point that is text": (changed("[24.0, 90.0]", '[24.0, "x"]'), "points: x; expected a finite number"),
+    "a coupling that is no table": (
+        changed("spreads = 1.0", "spreads = 1.0\ncoupling = 3").split("[[coupling]]")[0],
+        "coupling: expected [[coupling]] tables",
+    ),
+    "too many couplings": (
+        TEXT + TEXT[TEXT.index("[[coupling]]") :] * MAX_COUPLINGS,
+        f"at most {MAX_COUPLINGS}",
+    ),
+    "a line break in a name": (changed("[neck.flexion]", '[neck."a\\nb"]'), "is not an angle"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_file_with(tmp_path: Path, name: str) -> None:
+    text, match = WRONG[name]
+    with pytest.raises(InputError, match=re.escape(match)) as error:
+        load(tmp_path, text)
+    assert "\n" not in str(error.value)
+    assert "mine.toml" in str(error.value)
+
+
+def test_a_table_without_couplings_or_sources_is_a_table(tmp_path: Path) -> None:
+    bare = 'schema = "posekit.ranges/1"\nkind = "anatomical"\nspreads = 2\n' + "".join(
+        f"[{angle}]\nlower = {{ mean = -30, spread = 5 }}\nupper = {{ mean = 40, spread = 10 }}\n"
+        for angle in ANGLES
+    )
+    table = load(tmp_path, bare)
+    assert set(table.limits.values()) == {(-40.0, 60.0)}
+    assert table.anatomy is not None
+    assert table.anatomy.couplings == ()

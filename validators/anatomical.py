@@ -1,0 +1,132 @@
+"""Ranges of motion as studies give them: a mean and a spread for each end of each angle, and couplings of angles.
+
+What a person can do ends somewhere, and people differ in where. An end is a mean over people with a standard deviation;
+a limit is the mean moved outward by a stated number of spreads. A coupling is an end of one angle that depends on
+another, piecewise linearly (hamstrings: hip flexion on knee flexion).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.skeleton import DOFS
+
+ANGLES = tuple(dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS))
+"""The 12 angles that differ by more than their side: ``"hip.flexion"``."""
+
+DERIVED = ("shoulder.elevation", "shoulder.plane", "shoulder.turn")
+"""What `posekit.validators.anatomical_shoulder` makes of the shoulder's three angles."""
+
+Side = Literal["lower", "upper"]
+
+OUTWARD: Mapping[str, int] = {"lower": -1, "upper": 1}
+
+
+@dataclass(frozen=True, kw_only=True)
+class End:
+    """One end of an angle, degrees.
+
+    Parameters
+    ----------
+    mean, spread : float
+        Over people; the spread is one standard deviation.
+    source : tuple of str
+        Keys into `Anatomy.sources`.
+    """
+
+    mean: float
+    spread: float
+    source: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Motion:
+    """The range of one angle, in the clinic's degrees, and where the clinic's zero is on the figure."""
+
+    lower: End
+    upper: End
+    zero: End = End(mean=0.0, spread=0.0)
+
+    def end(self, side: Side) -> tuple[float, float]:
+        """Return mean and spread of an end in the figure's degrees; the zero's own spread counts too."""
+        end = self.lower if side == "lower" else self.upper
+        return end.mean + self.zero.mean, math.hypot(end.spread, self.zero.spread)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling:
+    """An end of one angle as a function of another.
+
+    Parameters
+    ----------
+    angle : str
+        The angle that is bounded: one of `ANGLES`, or ``shoulder.elevation`` or ``shoulder.turn``.
+    side : {"lower", "upper"}
+    of : str
+        The angle on which the end depends.
+    points : tuple of (float, float)
+        Knots (`of`, mean end) in the clinic's degrees, in ascending order; constant beyond the outer ones.
+    spread : float
+        One standard deviation of the end over people.
+    source : tuple of str
+    """
+
+    angle: str
+    side: Side
+    of: str
+    points: tuple[tuple[float, float], ...]
+    spread: float
+    source: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Anatomy:
+    """Ranges of motion of all angles, their couplings, and how many spreads beyond the means is still possible.
+
+    Parameters
+    ----------
+    motions : mapping
+        Each of `ANGLES`.
+    couplings : tuple of Coupling
+    spreads : float
+        The k of mean + k spread.
+    sources : mapping
+        What each key of a source stands for.
+    """
+
+    motions: Mapping[str, Motion]
+    couplings: tuple[Coupling, ...]
+    spreads: float
+    sources: Mapping[str, str]
+
+    def limits(self) -> dict[str, tuple[float, float]]:
+        """Return the limits (lower, upper), degrees, of the 22 angles of `posekit.skeleton.DOFS`, couplings aside."""
+        return {dof: (self._limit(dof, "lower"), self._limit(dof, "upper")) for dof in DOFS}
+
+    def couplings_of(self, angle: str, side: Side | None = None) -> tuple[Coupling, ...]:
+        """Return the couplings that bound an angle."""
+        return tuple(c for c in self.couplings if c.angle == angle and side in (None, c.side))
+
+    def coupled(self, coupling: Coupling, of: Array) -> tuple[Array, float]:
+        """Return mean (of `of`'s shape) and spread of a coupled end where the other angle is `of`, figure's degrees."""
+        angle, other = self._zero(coupling.angle), self._zero(coupling.of)
+        knots = np.array(coupling.points)
+        mean = np.interp(of - other.mean, knots[:, 0], knots[:, 1]) + angle.mean
+        return mean, math.hypot(coupling.spread, angle.spread)
+
+    def motion(self, dof: str) -> Motion:
+        """Return the motion of an angle, with or without its side."""
+        return self.motions[dof.removeprefix("right_").removeprefix("left_")]
+
+    def _limit(self, dof: str, side: Side) -> float:
+        mean, spread = self.motion(dof).end(side)
+        return mean + OUTWARD[side] * self.spreads * spread
+
+    def _zero(self, angle: str) -> End:
+        return self.motions[angle].zero if angle in self.motions else End(mean=0.0, spread=0.0)

@@ -1,0 +1,95 @@
+"""Checks of the limbs by anatomical ranges: some way to write the limb is inside all limits and couplings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.figure import Figure
+from posekit.figure.frames import hips_frame, torso_frame
+from posekit.skeleton import HIPS, JOINT, TORSO
+from posekit.tree import Findings
+from posekit.validators.anatomical import Anatomy
+from posekit.validators.anatomical_limb import judged_names, limb_walls
+
+UNSEEN = 45.0
+"""Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
+
+TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
+HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AnatomicalLimb:
+    """Shoulder and elbow, or hip and knee; with two joints only what the upper segment's direction tells.
+
+    All ways to write the limb are tried: both branches of the ball joint, both signs of the hinge. The limb is legal
+    when in one of them every angle is within its limits, the narrowest of its own range and its couplings, up to the
+    tolerance. That one is reported, else the one that is least outside. An arm's direction is judged by its elevation,
+    how far it is raised in its plane, instead of by flexion and abduction, where the table bounds that. As in
+    `posekit.validators.joint_range.Limb` the axial rotation of a limb that is almost straight has its tolerance
+    divided by the sine of the bend, and is undecided beyond `UNSEEN`.
+
+    Parameters
+    ----------
+    figure : Figure
+    anatomy : Anatomy
+    limb : tuple of str
+        ``("right_shoulder", "right_elbow", "right_wrist")``, or the first two.
+    tolerance : float
+        Degrees by which the direction of a segment may be off.
+    """
+
+    figure: Figure
+    anatomy: Anatomy
+    limb: tuple[str, ...]
+    tolerance: float
+    name: str = "joint_range"
+    unit: str = "deg"
+
+    @cached_property
+    def where(self) -> tuple[str, ...]:
+        """The angles judged."""
+        names = judged_names(self.anatomy, self._joint, 2 if len(self.limb) == 2 else 4)
+        side = self.limb[0].split("_")[0]
+        return tuple(f"{side}_{name}" for name in names)
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The rigid part the limb hangs on, then the limb's joints."""
+        return self._parent + tuple(JOINT[joint] for joint in self.limb)
+
+    @property
+    def _joint(self) -> str:
+        return self.limb[0].split("_")[1]
+
+    @property
+    def _parent(self) -> tuple[int, ...]:
+        return TORSO_POINTS if self._joint == "shoulder" else HIPS_POINTS
+
+    def judge(self, points: Array) -> Findings:
+        """Judge the limb's angles; see `posekit.tree.Check`."""
+        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
+        R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
+        end = limb[2] if len(limb) == 3 else None
+        angles = np.degrees(self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end))
+        walls = limb_walls(self.anatomy, self._joint, angles if end is not None else angles[:, :2])
+        lower, upper = walls.limits(self.anatomy.spreads)
+        value = walls.values
+        tolerance = np.full((len(value), value.shape[2]), self.tolerance, dtype=np.float64)
+        if end is not None:
+            bend = np.abs(np.sin(np.radians(angles[:, 3])))
+            least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
+            tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
+            value[tolerance[:, 2] > UNSEEN, :, 2] = np.nan
+        beyond = np.maximum(lower - value, value - upper) - tolerance[:, None]
+        worst = np.fmax.reduce(beyond, axis=2)
+        best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)[:, None, None]
+        judged = list(walls.judged)
+        value, lower, upper = (
+            np.take_along_axis(each, best, axis=1)[:, 0, judged] for each in (value, lower, upper)
+        )
+        return Findings(value=value, lower=lower, upper=upper, tolerance=tolerance[:, judged])

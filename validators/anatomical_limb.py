@@ -1,0 +1,193 @@
+"""Walls around a limb's angles, in every way to write the limb: limits for verdicts, spreads for plausibility.
+
+A wall is one end of one angle: a mean, that may depend on other angles, and a spread over people. A limb can be written
+in several ways (both branches of the ball joint, both signs of the hinge); walls are set up for each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.validators.anatomical import DERIVED, OUTWARD, Anatomy, Side
+from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
+
+BALL = ("flexion", "abduction", "rotation")
+HINGES: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
+ENDS: tuple[Side, Side] = ("lower", "upper")
+ELEVATION, PLANE, TURN = DERIVED
+
+
+def writings(angles: Array) -> Array:
+    r"""Write limbs in all ways: from four angles (N, 4), or the first two (N, 2), to (N, W, 4) or (N, W, 2), degrees.
+
+    :math:`(\alpha, \beta, \gamma) \to (\alpha + 180, 180 - \beta, \gamma + 180)` is the same rotation;
+    :math:`(\gamma, \varepsilon) \to (\gamma + 180, -\varepsilon)` gives the lower segment the same direction.
+    """
+    a, b = angles[:, 0], angles[:, 1]
+    if angles.shape[1] == 2:
+        return np.stack([angles, np.stack([a + 180, 180 - b], axis=-1)], axis=1)
+    g, e = angles[:, 2], angles[:, 3]
+    return np.stack(
+        [
+            angles,
+            np.stack([a, b, g + 180, -e], axis=-1),
+            np.stack([a + 180, 180 - b, g + 180, e], axis=-1),
+            np.stack([a + 180, 180 - b, g, -e], axis=-1),
+        ],
+        axis=1,
+    )
+
+
+def turned_near(angles: Array, middle: Array | float) -> Array:
+    """Add full turns so that angles lie within half a turn of a middle, degrees."""
+    return np.asarray(middle + np.mod(angles - middle + 180.0, 360.0) - 180.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wall:
+    """One end of one judged angle in all writings.
+
+    Parameters
+    ----------
+    place : int
+        Which angle.
+    side : {"lower", "upper"}
+    mean : float or array broadcastable to (N, W)
+        Degrees.
+    spread : float
+        One standard deviation over people, degrees.
+    """
+
+    place: int
+    side: Side
+    mean: Array | float
+    spread: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LimbWalls:
+    """A limb's angles in all writings, and the walls around them.
+
+    Parameters
+    ----------
+    names : tuple of str (K,)
+        The angles, ``"hip.flexion"``: of the ball joint three, or two, then the hinge's; of shoulders the elevation.
+    values : array (N, W, K)
+        Degrees.
+    walls : tuple of Wall
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    walls: tuple[Wall, ...]
+
+    @property
+    def judged(self) -> tuple[int, ...]:
+        """The places that have a wall."""
+        return tuple(sorted({wall.place for wall in self.walls}))
+
+    def limits(self, spreads: float) -> tuple[Array, Array]:
+        """Return lower and upper limits (N, W, K), the narrowest of the walls, moved outward by so many spreads."""
+        lower, upper = np.full(self.values.shape, -np.inf), np.full(self.values.shape, np.inf)
+        for wall in self.walls:
+            column = (..., wall.place)
+            bound = wall.mean + OUTWARD[wall.side] * spreads * wall.spread
+            if wall.side == "lower":
+                lower[column] = np.maximum(lower[column], bound)
+            else:
+                upper[column] = np.minimum(upper[column], bound)
+        return lower, upper
+
+    def excess(self) -> Array:
+        """Return how many spreads each angle is beyond the mean of its ends, the worst of its walls (N, W, K); >= 0."""
+        worst = np.zeros(self.values.shape)
+        for wall in self.walls:
+            column = (..., wall.place)
+            beyond = OUTWARD[wall.side] * (self.values[column] - wall.mean) / wall.spread
+            worst[column] = np.fmax(worst[column], beyond)
+        return worst
+
+
+def judged_names(anatomy: Anatomy, joint: str, count: int) -> tuple[str, ...]:
+    """Name the angles of a limb that are judged where `count` of its four angles are known: 2 or 4.
+
+    An arm's direction is judged by its elevation where the table bounds that, instead of by flexion and abduction.
+    """
+    names = (*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion")[:count]
+    if not _by_elevation(anatomy, joint):
+        return names
+    return (*names[2:], ELEVATION)
+
+
+def limb_walls(anatomy: Anatomy, joint: str, angles: Array) -> LimbWalls:
+    """Set up the walls of a limb.
+
+    Parameters
+    ----------
+    anatomy : Anatomy
+    joint : {"shoulder", "hip"}
+    angles : array (N, 4) or (N, 2)
+        In one of its writings, degrees: ball joint and hinge, or the first two of the ball joint.
+
+    Returns
+    -------
+    LimbWalls
+        Each angle turned to within half a turn of the middle of its range.
+    """
+    by_elevation = _by_elevation(anatomy, joint)
+    written = writings(angles)
+    if by_elevation:  # elevation and turn are the same in both branches of the ball joint
+        written = written[:, : written.shape[1] // 2]
+    names = [*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion"][: angles.shape[1]]
+    ends = {(name, side): anatomy.motions[name].end(side) for name in names for side in ENDS}
+    columns = [
+        turned_near(written[..., k], (ends[name, "lower"][0] + ends[name, "upper"][0]) / 2)
+        for k, name in enumerate(names)
+    ]
+    readings = dict(zip(names, columns, strict=True))
+    replaced = {(name, side) for name in names[:2] for side in ENDS} if by_elevation else set()
+    if joint == "shoulder":
+        elevation, plane = elevation_and_plane(angles[:, 0], angles[:, 1])
+        readings[PLANE] = np.broadcast_to(plane[:, None], columns[0].shape)
+        readings[ELEVATION] = np.broadcast_to(elevation[:, None], columns[0].shape)
+        columns.append(readings[ELEVATION])
+        names.append(ELEVATION)
+        replaced |= {("shoulder.rotation", c.side) for c in anatomy.couplings_of(TURN)}
+    walls = [
+        Wall(place=names.index(name), side=side, mean=mean, spread=spread)
+        for (name, side), (mean, spread) in ends.items()
+        if (name, side) not in replaced
+    ]
+    for coupling in anatomy.couplings:
+        if coupling.of in readings and coupling.angle in readings:
+            mean, spread = anatomy.coupled(coupling, readings[coupling.of])
+            walls.append(
+                Wall(place=names.index(coupling.angle), side=coupling.side, mean=mean, spread=spread)
+            )
+    if "shoulder.rotation" in readings:
+        walls += _turn_walls(anatomy, angles, readings)
+    return LimbWalls(names=tuple(names), values=np.stack(columns, axis=-1), walls=tuple(walls))
+
+
+def _by_elevation(anatomy: Anatomy, joint: str) -> bool:
+    return joint == "shoulder" and bool(anatomy.couplings_of(ELEVATION, "upper"))
+
+
+def _turn_walls(anatomy: Anatomy, angles: Array, readings: Mapping[str, Array]) -> list[Wall]:
+    """Bound the rotation by the turn: with flexion and abduction given, the two differ by an offset."""
+    couplings = anatomy.couplings_of(TURN)
+    bounds = [anatomy.coupled(coupling, readings[ELEVATION]) for coupling in couplings]
+    rotation = readings["shoulder.rotation"]
+    # The other branch has half a turn more of rotation, and half a turn less of offset: the turn is the same.
+    branch = np.array([0.0, 0.0, 180.0, 180.0])[: rotation.shape[1]]
+    offset = turn_offset(angles[:, 0], angles[:, 1])[:, None] + branch
+    middle = sum((mean for mean, _ in bounds), start=np.zeros(rotation.shape)) / max(len(bounds), 1)
+    shift = rotation - turned_near(rotation + offset, middle)
+    return [
+        Wall(place=2, side=coupling.side, mean=mean + shift, spread=spread)
+        for coupling, (mean, spread) in zip(couplings, bounds, strict=True)
+    ]
