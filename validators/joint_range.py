@@ -5,18 +5,21 @@ Two kinds: the URDF's own angles (this file), or the paper's projected angles (`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from posekit.cameras import Array
 from posekit.figure import Figure
+from posekit.figure.angles import Limits
+from posekit.figure.closed_form import ClosedForm
 from posekit.figure.frames import hips_frame, torso_frame
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
 from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
-from posekit.validators.ranges import URDF_RANGES, Ranges
+from posekit.validators.ranges import URDF_RANGES, Range, Ranges
 
 TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
@@ -47,14 +50,17 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
     """
     if ranges.kind == "projected":
         return projected_angles(figure, ranges, tolerance=tolerance)
-    if ranges.limits:
+    ik = figure.ik
+    if ranges.anatomy is not None:
+        ik = _limited(
+            ik, ranges.limits
+        )  # the figure itself is left alone: rewriting a URDF takes milliseconds
+    elif ranges.limits:
         figure = figure.with_limits(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
         )
-    checks: list[Check] = [
-        Neck(figure=figure, tolerance=tolerance),
-        Pelvis(figure=figure, tolerance=tolerance),
-    ]
+        ik = figure.ik
+    checks: list[Check] = [Neck(ik=ik, tolerance=tolerance), Pelvis(ik=ik, tolerance=tolerance)]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             joints = tuple(f"{side}_{joint}" for joint in limb)
@@ -68,12 +74,17 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
     return checks
 
 
-def _findings(figure: Figure, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
+def _limited(ik: ClosedForm, limits: Mapping[str, Range]) -> ClosedForm:
+    lower, upper = np.radians(np.array([limits[dof] for dof in DOFS])).T
+    return replace(ik, limits=Limits(sign=ik.limits.sign, lower=lower, upper=upper))
+
+
+def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
     rows = [DOFS.index(dof) for dof in where]
     return Findings(
         value=np.degrees(angles),
-        lower=np.degrees(figure.limits.lower[rows]),
-        upper=np.degrees(figure.limits.upper[rows]),
+        lower=np.degrees(ik.limits.lower[rows]),
+        upper=np.degrees(ik.limits.upper[rows]),
         tolerance=tolerance,
     )
 
@@ -82,7 +93,7 @@ def _findings(figure: Figure, where: tuple[str, ...], angles: Array, tolerance: 
 class Neck:
     """Flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
 
-    figure: Figure
+    ik: ClosedForm
     tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("neck.flexion", "neck.bending", "neck.rotation")
@@ -92,15 +103,15 @@ class Neck:
     def judge(self, points: Array) -> Findings:
         """Judge the neck's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        angles = self.figure.ik.neck(R_torso, points[:, 0], points[:, 4:])
-        return _findings(self.figure, self.where, angles, self.tolerance)
+        angles = self.ik.neck(R_torso, points[:, 0], points[:, 4:])
+        return _findings(self.ik, self.where, angles, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pelvis:
     """Flexion, bending and rotation of the hips under the torso."""
 
-    figure: Figure
+    ik: ClosedForm
     tolerance: float
     name: str = "joint_range"
     where: tuple[str, ...] = ("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
@@ -111,8 +122,8 @@ class Pelvis:
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
-        angles = self.figure.ik.pelvis(R_torso, R_hips)
-        return _findings(self.figure, self.where, angles, self.tolerance)
+        angles = self.ik.pelvis(R_torso, R_hips)
+        return _findings(self.ik, self.where, angles, self.tolerance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,4 +174,4 @@ class Limb:
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
             angles[tolerance[:, 2] > UNSEEN, 2] = np.nan
-        return _findings(self.figure, self.where, angles, tolerance)
+        return _findings(self.figure.ik, self.where, angles, tolerance)

@@ -150,9 +150,11 @@ def _completed(
 ) -> SegmentLengths:
     """Take what was seen, and the rest from proportions."""
     base = reference_lengths(reference)
-    prior = lengths_from_proportions(proportions, stature or USUAL_STATURE, reference=base)
+    prior = lengths_from_proportions(
+        proportions, USUAL_STATURE if stature is None else stature, reference=base
+    )
     dimensions = dimensions_of(prior.lengths)
-    relative = spread()
+    relative = spread(proportions)
     inside = [name for name in DIMENSIONS if name in seen]
     if stature is None and inside:
         size = float(np.median([found[seen[name]] / dimensions[name] for name in inside]))

@@ -49,6 +49,10 @@ widths over the bones and key points are at the joints: the heads of the femurs 
 against 0.19 for the hips' width.
 """
 
+CENTRES: Final = {SHOULDERS: 0.08, HIPS: 0.1}
+"""The same where the widths are those of joint centres: biacromial breadth's 4.6 %, the femoral heads' 6.6 %, and room
+for where a detector sees the joints."""
+
 DE_LEVA_STATURE: Final[dict[Sex, float]] = {"female": 1735.0, "male": 1741.0}
 DE_LEVA: Final[dict[Sex, dict[str, float]]] = {
     "female": {"upper_arm": 275.1, "forearm": 264.3, "thigh": 368.5, "shank": 438.6},
@@ -148,7 +152,7 @@ def lengths_from_proportions(
     base = reference_lengths(reference)
     dimensions = _dimensions(name, stature, sex, base)
     says = source.source + (f", {sex}" if sex is not None and source.sexes else "")
-    return completed(dimensions, np.diag(spread() ** 2), base, says, (), stature)
+    return completed(dimensions, np.diag(spread(name) ** 2), base, says, (), stature)
 
 
 def source_of(name: str) -> Proportions:
@@ -158,10 +162,11 @@ def source_of(name: str) -> Proportions:
     return SOURCES[name]
 
 
-def spread() -> Array:
-    """Return the relative standard deviation (11,) of each of `DIMENSIONS` among people."""
-    parts = {limb(side, part): SPREAD[part] for part in LIMBS for side in SIDES}
-    return np.array([parts.get(name, SPREAD.get(name, np.nan)) for name in DIMENSIONS])
+def spread(name: str) -> Array:
+    """Return the relative standard deviation (11,) of each of `DIMENSIONS` about a source's proportions."""
+    given = SPREAD | (CENTRES if name == "de-leva" else {})
+    parts = {limb(side, part): given[part] for part in LIMBS for side in SIDES}
+    return np.array([parts.get(one, given.get(one, np.nan)) for one in DIMENSIONS])
 
 
 def _dimensions(name: str, stature: float, sex: Sex | None, base: dict[str, float]) -> dict[str, float]:

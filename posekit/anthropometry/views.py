@@ -20,25 +20,20 @@ from posekit.anthropometry.body import (
     limb,
     reference_lengths,
 )
-from posekit.anthropometry.foreshortening import cosine_variance
-from posekit.anthropometry.independent import independent_frames
 from posekit.anthropometry.proportions import Sex, lengths_from_proportions, spread
+from posekit.anthropometry.view_fit import maximise
 from posekit.anthropometry.view_likelihood import ViewLikelihood
+from posekit.anthropometry.view_prior import conditioned, positive, prior_covariance, sides_averaged
 from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import nearest, refusal, shown
+from posekit.intake import refusal
 from posekit.skeleton import JOINT, JOINTS, SIDES
-from posekit.skeleton_map.skeleton_map import other_side
 
 MOST_FRAMES: Final = 400
 """Frames that are used, evenly chosen: more of one recording tell little more."""
 FEWEST_PIXELS: Final = 2.0
 """Median length seen, pixels, below which it is no person."""
 UNKNOWN_STATURE: Final = 1.70
-SIZE_SPREAD: Final = 0.08
-"""Relative deviation of the whole body where neither stature nor a length is given (adults of both sexes)."""
-KNOWN: Final = 0.002
-"""Relative deviation of a length that is given."""
 RELIEF: Final = {
     "upper_arm": 0.15,
     "forearm": 0.22,
@@ -50,8 +45,6 @@ RELIEF: Final = {
 }
 """Metres in depth by which the middle of each is off the body's, standard deviation: a little less than among random
 legal postures."""
-STACK: Final = 0.02
-"""Relative deviation of the way from ankles to shoulders at a known stature: head, neck and feet are the rest."""
 UPRIGHT: Final = {
     "upper_arm": 2.5,
     "forearm": 0.2,
@@ -63,18 +56,14 @@ UPRIGHT: Final = {
 }
 """Concentration of each about the picture's plane, where upright people are seen by level cameras from all around.
 
-From the mean squared cosines of 4060 frames of walking, running, jumping and signalling (CMU Graphics Lab Motion Capture
-Database): 0.17, 0.32, 0.06, 0.11, 0.50, 0.50, 0.02; somewhat less for thigh and trunk, as others bend more.
+From the mean squared cosines of 4060 frames of walking, running, jumping and signalling (CMU Graphics Lab Motion
+Capture Database): 0.17, 0.32, 0.06, 0.11, 0.50, 0.50, 0.02; somewhat less for thigh and trunk, as others bend more.
 """
 LOOSE: Final = {SHOULDERS: 0.03, HIPS: 0.02, TRUNK: 0.05}
 """How much widths and trunk change with posture, as a fraction: the girdle moves, the back bends."""
 LIMB_JOINTS: Final = tuple(name for name in JOINTS if name not in ("neck", "pelvis"))
 LEAST_NOISE: Final = 0.05
 """Pixels."""
-PASSES: Final = 2
-STEPS: Final = 15
-CONVERGED: Final = 0.01
-"""Squared length of a step, in standard deviations, at which it is no use to go on."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,10 +108,11 @@ def lengths_from_views(
     r"""Estimate a person's lengths from the key points of one camera over some frames.
 
     A segment of length l, seen in a frame of scale s (pixels a metre at the body, scaled orthographic), has the image
-    :math:`r = s\,l \sin\theta` with noise; its direction is isotropic. The frames' scales are unknown and
-    integrated out over a normal distribution of their logarithm, whose mean and width are found too. Pictures alone
-    tell ratios of lengths; the size of the whole comes from the stature or a known length. Proportions with their
-    spread among people are the prior: a segment that never turns across the view stays near them.
+    :math:`r = s\,l \sin\theta` with noise; its direction is isotropic, or where `upright` rather in the picture. The
+    frames' scales are unknown and integrated out over a normal distribution of their logarithm, whose mean and width
+    are found too. Pictures alone tell ratios of lengths; the size of the whole comes from the stature or a known length.
+    Proportions with their spread among people are the prior: a segment that never turns across the view stays near
+    them. Frames that show the same posture again count once (`posekit.anthropometry.independent`).
 
     The neck and the pelvis joint are not used: no detector sees them. The torso inside is the reference's, scaled to
     the widths and the trunk (`posekit.anthropometry.body.lengths_of`).
@@ -167,11 +157,13 @@ def lengths_from_views(
     """
     points = _points(image)
     base = reference_lengths(reference)
-    prior = lengths_from_proportions(proportions, stature or UNKNOWN_STATURE, sex=sex, reference=base)
+    prior = lengths_from_proportions(
+        proportions, UNKNOWN_STATURE if stature is None else stature, sex=sex, reference=base
+    )
     dimensions = dimensions_of(prior.lengths)
     middle = np.log([dimensions[name] for name in DIMENSIONS])
-    covariance = _covariance(both_sides)
-    middle, covariance = _with_known(middle, covariance, known or {}, stature, scale is not None)
+    covariance = prior_covariance(spread(proportions), both_sides)
+    middle, covariance = conditioned(middle, covariance, known or {}, stature, scale is not None)
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_FRAMES)).round().astype(int))
     seen = _seen(points)
     given = _given_scale(scale, len(points))
@@ -193,17 +185,19 @@ def lengths_from_views(
         scale_known=scale is not None,
         relief=np.array([relief.get(name, RELIEF.get(name, np.nan)) for name in DIMENSIONS]),
         loose=np.array([LOOSE.get(name, 0.0) for name in DIMENSIONS]),
-        focal=None if focal is None else _positive("focal", focal),
-        noise=None if noise is None else max(_not_negative("noise", noise), LEAST_NOISE),
+        focal=None if focal is None else positive("focal", focal),
+        noise=None
+        if noise is None
+        else max(positive("noise", noise + LEAST_NOISE) - LEAST_NOISE, LEAST_NOISE),
         concentration=_concentrations(upright),
     )
-    fit = _maximise(likelihood, middle, covariance)
+    fit = maximise(likelihood, middle, covariance)
     independent = float(np.median(fit.independent[fit.independent > 0]))
     scales = np.full(len(points), np.nan)
     scales[usable] = np.exp(likelihood.posterior_scales(fit.y))
     count = len(DIMENSIONS)
     if both_sides:
-        fit.y[:count] = _sides_averaged(fit.y[:count])
+        fit.y[:count] = sides_averaged(fit.y[:count])
     learned = 1 - np.diag(fit.covariance)[:count] / np.diag(covariance)
     source = f"key points of {len(usable)} frames ({independent:.0f} independent), prior: {prior.source}"
     return ViewLengths(
@@ -223,58 +217,6 @@ def lengths_from_views(
         frames=len(usable),
         independent=independent,
         learned=dict(zip(DIMENSIONS, np.maximum(learned, 0.0).tolist(), strict=True)),
-    )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Fit:
-    y: Array
-    covariance: Array
-    independent: Array
-
-
-def _maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> _Fit:
-    """Find where the slopes vanish, each dimension's weighted by how many independent frames it has shown.
-
-    Newton's method with the sum of the slopes' squares for the information (Berndt, Hall, Hall & Hausman 1974).
-    """
-    count = len(middle)
-    start = np.concatenate(
-        [
-            middle,
-            [float(np.median(likelihood.first)), np.log(0.1)],
-        ]
-    )
-    precision = np.zeros((count + 2, count + 2))
-    precision[:count, :count] = np.linalg.inv(covariance)
-    precision[-2, -2], precision[-1, -1] = 1e-6, 1.0
-    frames = len(likelihood.seen)
-    y = start
-    independent = np.ones(count)
-    information = precision
-    usual_variance = np.array([cosine_variance(float(one)) for one in likelihood.concentration])
-    for _ in range(PASSES):
-        # What the frames are worth depends on their scales, which are better known afterwards.
-        independent = independent_frames(*likelihood.squared_cosines(y), usual_variance)
-        usual = float(np.median(independent[independent > 0]))
-        weight = np.concatenate([independent, np.full(2, usual)]) / frames
-        share, before = 1.0, np.inf
-        for _ in range(STEPS):
-            slopes = likelihood.slopes(y)
-            slope = weight * slopes.sum(axis=0) - precision @ (y - start)
-            weighted = np.sqrt(weight) * slopes
-            information = weighted.T @ weighted + precision
-            step = np.linalg.solve(information, slope)
-            left = float(slope @ step)
-            if left < CONVERGED:
-                break
-            share = share / 2 if left > before else share
-            before = left
-            y = y + share * np.clip(step, -0.2, 0.2)
-    return _Fit(
-        y=y,
-        covariance=np.asarray(np.linalg.inv(information), dtype=np.float64),
-        independent=independent,
     )
 
 
@@ -322,80 +264,6 @@ def _given_scale(scale: Array | None, count: int) -> Array:
     if np.isinf(given).any() or (given <= 0).any():
         raise InputError("scale: expected positive numbers, pixels a metre, NaN where unknown")
     return given
-
-
-def _covariance(both_sides: bool) -> Array:
-    """Return the prior covariance (11, 11) of the dimensions' logarithms; sides that are equal move together."""
-    deviation = spread()
-    correlation = np.eye(len(DIMENSIONS))
-    alike = 1 - 1e-4 if both_sides else 1 - ASYMMETRY**2
-    for part in LIMBS:
-        right, left = (DIMENSIONS.index(limb(side, part)) for side in SIDES)
-        correlation[right, left] = correlation[left, right] = alike
-    return np.asarray(correlation * np.outer(deviation, deviation))
-
-
-ASYMMETRY: Final = 0.4
-"""How much left and right differ, as a share of the spread among people, where they are told apart: some 2 % of l."""
-
-
-def _sides_averaged(dimensions: Array) -> Array:
-    """Make left and right the same to the last bit."""
-    other = [DIMENSIONS.index(_other_side(name)) for name in DIMENSIONS]
-    return np.asarray((dimensions + dimensions[other]) / 2)
-
-
-def _other_side(name: str) -> str:
-    """Name the limb of the other side; widths and trunk are their own."""
-    if name in (SHOULDERS, HIPS, TRUNK):
-        return name
-    return "-".join(other_side(end) for end in name.split("-"))
-
-
-def _with_stack(middle: Array, covariance: Array) -> Array:
-    """Condition the prior on what adds up to the stature: shank, thigh and trunk, from ankles to shoulders."""
-    share = np.zeros(len(DIMENSIONS))
-    for part in ("thigh", "shank"):
-        for side in SIDES:
-            share[DIMENSIONS.index(limb(side, part))] = 0.5
-    share[DIMENSIONS.index(TRUNK)] = 1.0
-    share *= np.exp(middle)
-    share /= share.sum()
-    gain = covariance @ share / (share @ covariance @ share + STACK**2)
-    return np.asarray(covariance - np.outer(gain, covariance @ share))
-
-
-def _with_known(
-    middle: Array, covariance: Array, known: Mapping[str, float], stature: float | None, has_scale: bool
-) -> tuple[Array, Array]:
-    """Condition the prior on the stature and on lengths that are given; widen it where nothing says the size."""
-    covariance = _with_stack(middle, covariance)
-    if stature is None:
-        if not known and not has_scale:
-            raise InputError(
-                "nothing fixes the size: pictures tell ratios alone; give the stature, a known length, or scales"
-            )
-        covariance = covariance + SIZE_SPREAD**2
-    for name, length in known.items():
-        if name not in DIMENSIONS or name == TRUNK:
-            raise refusal("", "known", shown(name), "a limb or a width", nearest(name, DIMENSIONS[:-1]))
-        k = DIMENSIONS.index(name)
-        gain = covariance[:, k] / (covariance[k, k] + KNOWN**2)
-        middle = middle + gain * (np.log(_positive(f"known {name}", length)) - middle[k])
-        covariance = covariance - np.outer(gain, covariance[k])
-    return middle, covariance
-
-
-def _positive(name: str, value: float) -> float:
-    if not (np.isfinite(value) and value > 0):
-        raise InputError(f"{name} is {value:g}; expected a positive, finite number")
-    return float(value)
-
-
-def _not_negative(name: str, value: float) -> float:
-    if not (np.isfinite(value) and value >= 0):
-        raise InputError(f"{name} is {value:g}; expected a finite number, 0 or more")
-    return float(value)
 
 
 def _concentrations(upright: bool) -> Array:

@@ -73,7 +73,8 @@ Deviation = Annotated[
     typer.Option(
         "--deviation",
         metavar="PX",
-        help="Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 2.",
+        help="Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 5 "
+        "of a detector's and 2 of others.",
     ),
 ]
 Proportions = Annotated[

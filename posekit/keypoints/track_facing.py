@@ -23,8 +23,8 @@ SEEN: Final = 0.6
 """Confidence of a face against the body's from which it is seen."""
 HIDDEN: Final = 0.25
 """The same, below which it is not."""
-INFORMED: Final = 0.02
-"""Spread of the confidences from which they are a detector's own."""
+INFORMED: Final = 0.05
+"""Range of the confidences from which they are a detector's own."""
 FACE: Final = tuple(LANDMARK[name] for name in ("nose", "right_eye", "left_eye"))
 HEARD: Final = tuple(LANDMARK[name] for name in ("right_ear", "left_ear"))
 BODY: Final = tuple(
@@ -78,7 +78,7 @@ def _way(width: Array, least: float) -> NDArray[np.int8]:
 def informed(landmarks: Array, confidence: Array) -> bool:
     """Tell whether what is seen of the face says something: confidences (F, 21) differ, or face points are missing."""
     known = confidence[~np.isnan(confidence)]
-    if len(known) and float(known.std()) > INFORMED:
+    if len(known) and float(np.ptp(known)) > INFORMED:
         return True
     there = ~np.isnan(landmarks[:, FACE, 0])
     return bool(there.any() and not there.all())

@@ -14,17 +14,13 @@ from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.files import LeeChenModel, Root, View
 from posekit.pipeline.tolerance import Tolerance
-from posekit.placement import Method, Placement, place
-from posekit.skeleton import JOINT, POINTS
+from posekit.placement import DETECTED_DEVIATION, DETECTED_OFFSET, Method, Placement, place
 
 DEVIATION: Final = 2.0
-"""Standard deviation (px) of image points of which the view says none."""
+"""Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
 
 RELATIVE: Final = 1e-3
 """The same on the image plane of a `lee-chen` camera, as a fraction of f: some 2 pixels of most cameras."""
-
-OFFSETS: Final = {"neck": 0.02, "pelvis": 0.03}
-"""Standard deviation (m) of joints that were put between others from where the figure has them."""
 
 STEP: Final = 0.02
 """Metres to which tolerances are rounded up, so that frames of nearly the same are grown together."""
@@ -62,13 +58,14 @@ def place_roots(
     rooting: Rooting,
     tolerance: Tolerance | None,
 ) -> list[Placement]:
-    """Place the neck in some frames of a view (`posekit.placement.place`)."""
-    deviation = rooting.deviation or view.deviation or DEVIATION
+    """Place the neck in some frames of a view (`posekit.placement.place`).
+
+    A view with derived joints is a detector's, whose points are farther off, of a body that gives.
+    """
+    detected = bool(view.derived)
+    deviation = rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEVIATION)
     if isinstance(view.camera, LeeChenModel):
         deviation = RELATIVE * float(view.camera.f or 1.0)
-    offset = np.zeros(len(POINTS))
-    for name in view.derived:
-        offset[JOINT[name]] = OFFSETS.get(name, 0.0)
     K = camera.K if camera.K.ndim == 2 else camera.K[frames]
     return place(
         PinholeCamera(K=K, distortion=camera.distortion),
@@ -77,7 +74,7 @@ def place_roots(
         view.head_image[frames],
         method=rooting.method,
         deviation=deviation,
-        offset=offset,
+        offset=DETECTED_OFFSET if detected else 0.0,
         tolerance=None if tolerance is None else tolerance.rigid,
         tangent=None if tolerance is None else tolerance.tangent,
     )

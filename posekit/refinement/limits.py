@@ -28,85 +28,98 @@ LEAST = 0.05
 BRANCHES = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))
 """Euler branch, and side of the hinge."""
 
+Signs = NDArray[np.int8]
+
 
 class Limbs(NamedTuple):
-    """Directions of limbs and their tangents; the four angles of the first branch.
+    """Angles of limbs, the first Euler branch and the hinge's positive side, and what they come from.
 
     Attributes
     ----------
-    tangents : array (4, 2, 2, 3, N)
-        Of upper and lower segment, camera frame: a, b and f, e.
     angles : array (4, 4, N)
-        By limb: alpha, beta, gamma, epsilon, radians; cos beta >= 0, epsilon >= 0.
-    cos_beta, sin_bend, cos_bend : array (4, N)
+        By angle and limb: alpha, beta, gamma, epsilon, radians; cos beta >= 0, epsilon >= 0.
+    cosines, sines : array (4, 4, N)
+        Of the angles.
+    a, b : array (4, 3, N)
+        Tangents of the upper direction, camera frame.
     """
 
-    tangents: Array
     angles: Array
-    cos_beta: Array
-    sin_bend: Array
-    cos_bend: Array
+    cosines: Array
+    sines: Array
+    a: Array
+    b: Array
 
 
-class Active(NamedTuple):
-    """Residuals of M limbs that are outside their limits.
+class Outside(NamedTuple):
+    """M limbs that are outside their limits, or watched.
 
     Attributes
     ----------
     limb, row : int array (M,)
-    residual : array (4, M)
-    jacobian : array (4, 7, M)
-        Along a, b, f, e, and the parent's rotation vector (camera frame).
+    over : array (4, M)
+        Radians above the upper limit (positive) or below the lower; watched limits that are not reached count too.
+    weight : array (4, M)
+        What an angle counts for.
+    side, euler : array (M,)
+        Of the branch that is judged.
     crossed : int array (4, M)
         1 above the upper limit, -1 below the lower, 0 inside.
     """
 
     limb: NDArray[np.intp]
     row: NDArray[np.intp]
-    residual: Array
-    jacobian: Array
-    crossed: NDArray[np.int8]
+    over: Array
+    weight: Array
+    side: Array
+    euler: Array
+    crossed: Signs
+
+    def residual(self) -> Array:
+        """Return what is judged of each angle (4, M), radians."""
+        return _shortened(self.over) * self.weight
+
+    def cost(self) -> Array:
+        """Return the squares of what is outside (M,)."""
+        return np.asarray(np.where(self.crossed != 0, self.residual() ** 2, 0.0).sum(axis=0))
 
 
-def limbs(directions: Array, parent: Array) -> Limbs:
-    """Find tangents and angles of limbs (4, 2, 3, N) on their parents (4, 3, 3, N)."""
+def limb_angles(directions: Array, parent: Array) -> Limbs:
+    """Find the angles of limbs (4, 2, 3, N) on their parents (4, 3, 3, N)."""
     upper, lower = directions[:, 0], directions[:, 1]
-    x, y, z = (dot(parent[:, :, k], upper) for k in range(3))
-    h = np.hypot(x, z)
+    x, y, z = np.einsum("likn,lin->kln", parent, upper)
+    square = x * x + z * z
+    h = np.sqrt(square)
+    angles, cosines, sines = np.empty((3, 4, *h.shape))
     level = h > 0
-    safe = np.where(level, h, 1.0)
-    sin_a, cos_a = np.where(level, -x / safe, 0.0), np.where(level, -z / safe, 1.0)
-    tangents = np.empty((4, 2, 2, 3, upper.shape[2]))
-    a, b = tangents[:, 0, 0], tangents[:, 0, 1]
-    forward, left, up = parent[:, :, 0], parent[:, :, 1], parent[:, :, 2]
-    a[...] = sin_a[:, None] * up - cos_a[:, None] * forward
-    b[...] = (sin_a * y)[:, None] * forward + h[:, None] * left + (cos_a * y)[:, None] * up
-    across_a, across_b, cos_e = dot(a, lower), dot(b, lower), dot(upper, lower)
-    sin_e = np.hypot(across_a, across_b)
-    bent = sin_e > 0
-    safe = np.where(bent, sin_e, 1.0)
+    inverse = 1.0 / np.where(level, h, 1.0)
+    sines[0], cosines[0] = -x * inverse, np.where(level, -z * inverse, 1.0)
+    sines[1], cosines[1] = y, h
+    forward, left, up = (parent[:, :, k] for k in range(3))
+    a = sines[0][:, None] * up - cosines[0][:, None] * forward
+    b = (sines[0] * y)[:, None] * forward + h[:, None] * left + (cosines[0] * y)[:, None] * up
     # The lower direction after alpha and beta is (-a.d, b.d, .): gamma is the angle of (a.d, -b.d).
-    cos_g, sin_g = np.where(bent, across_a / safe, 1.0), np.where(bent, -across_b / safe, 0.0)
-    tangents[:, 1, 0] = -sin_g[:, None] * a - cos_g[:, None] * b
-    tangents[:, 1, 1] = (cos_e * cos_g)[:, None] * a - (cos_e * sin_g)[:, None] * b - sin_e[:, None] * upper
-    angles = np.stack(
-        [np.arctan2(sin_a, cos_a), np.arctan2(y, h), np.arctan2(sin_g, cos_g), np.arctan2(sin_e, cos_e)], axis=1
-    )
-    return Limbs(tangents, angles, h, sin_e, cos_e)
+    across_a, across_b = dot(a, lower), -dot(b, lower)
+    cosines[3] = dot(upper, lower)
+    sines[3] = np.sqrt(across_a * across_a + across_b * across_b)
+    bent = sines[3] > 0
+    inverse = 1.0 / np.where(bent, sines[3], 1.0)
+    cosines[2], sines[2] = np.where(bent, across_a * inverse, 1.0), across_b * inverse
+    np.arctan2(sines, cosines, out=angles)
+    return Limbs(angles, cosines, sines, a, b)
 
 
-def outside(angles: Array, bounds: Bounds) -> Array:
-    """Return by how much angles (B, K, N) are above (positive) or below their limits, to the nearer turn."""
-    lower, upper = bounds.lower[..., None], bounds.upper[..., None]
-    middle, half = (lower + upper) / 2, (upper - lower) / 2
-    away = angles - middle
-    away -= 2 * np.pi * np.round(away / (2 * np.pi))
-    return away - np.clip(away, -half, half)
+def tangents_of(found: Limbs, upper: Array) -> Array:
+    """Return the tangents a, b and f, e of limbs (4, 2, 2, 3, N), camera frame."""
+    cos_g, sin_g, cos_e, sin_e = found.cosines[2], found.sines[2], found.cosines[3], found.sines[3]
+    out = np.empty((4, 2, 2, 3, upper.shape[2]))
+    out[:, 0, 0], out[:, 0, 1] = found.a, found.b
+    out[:, 1, 0] = -sin_g[:, None] * found.a - cos_g[:, None] * found.b
+    out[:, 1, 1] = (cos_e * cos_g)[:, None] * found.a - (cos_e * sin_g)[:, None] * found.b - sin_e[:, None] * upper
+    return out
 
 
-def limb_residuals(
-    found: Limbs, bounds: Bounds, deviation: float, watch: NDArray[np.int8] | None = None
-) -> tuple[Array, Active | None]:
+def limb_limits(found: Limbs, bounds: Bounds, watch: Signs | None = None) -> Outside | None:
     """Judge limbs by their four angles; the branch that violates the limits least counts.
 
     Parameters
@@ -114,34 +127,27 @@ def limb_residuals(
     found : Limbs
     bounds : Bounds
         (4, 4).
-    deviation : float
-        Radians.
     watch : int array (4, 4, N), optional
-        By limb and angle, limits that a step would pass: 1 the upper, -1 the lower, 0 none. Their residuals are
-        negative inside, and do not count in the cost.
+        By angle and limb, limits that a step would pass: 1 the upper, -1 the lower, 0 none.
 
     Returns
     -------
-    cost : array (N,)
-        Sum of squared residuals.
-    active : Active or None
-        The limbs that are outside or watched; None where there are none.
+    Outside or None
+        None where all are inside and nothing is watched.
     """
-    cost: Array = np.zeros(found.angles.shape[2])
-    outer = outside(found.angles, bounds).any(axis=1)
-    limb, row = np.nonzero(outer if watch is None else outer | watch.any(axis=1))
-    if not limb.size:
-        return cost, None
-    lower, upper = bounds.lower[limb].T, bounds.upper[limb].T
+    lower, upper = bounds.lower.T[..., None], bounds.upper.T[..., None]
     middle, half = (lower + upper) / 2, (upper - lower) / 2
-    angles = found.angles[limb, :, row].T
+    outer = (np.abs(found.angles - middle) > half).any(axis=0)  # a full turn, or another branch, may bring them inside
+    limb, row = np.nonzero(outer if watch is None else outer | (watch != 0).any(axis=0))
+    if not limb.size:
+        return None
+    middle, half = (array[:, limb, 0] for array in (middle, half))
+    angles = found.angles[:, limb, row]
     weight = np.ones_like(angles)
-    weight[0], weight[2] = found.cos_beta[limb, row], found.sin_bend[limb, row]
+    weight[0], weight[2] = found.cosines[1, limb, row], found.sines[3, limb, row]
     best = np.full(len(limb), np.inf)
     away, side, euler = np.zeros_like(angles), np.ones(len(limb)), np.zeros(len(limb))
-    for branch, hinge in BRANCHES:
-        if not _possible(bounds, branch, hinge):
-            continue
+    for branch, hinge in _possible(bounds):
         other = angles.copy()
         if branch:
             other[0] += np.pi
@@ -150,117 +156,120 @@ def limb_residuals(
             other[2] += np.pi
         other[3] *= hinge
         other -= middle
-        other -= 2 * np.pi * np.round(other / (2 * np.pi))
-        beyond = other - np.clip(other, -half, half)
-        total = ((_shortened(beyond) * weight) ** 2).sum(axis=0)
+        other -= TURN * np.round(other / TURN)
+        total = ((_shortened(_beyond(other, half)) * weight) ** 2).sum(axis=0)
         better = total < best
         best = np.where(better, total, best)
         away = np.where(better, other, away)
         side, euler = np.where(better, hinge, side), np.where(better, branch, euler)
-    beyond = away - np.clip(away, -half, half)
+    beyond = _beyond(away, half)
     over, watched = beyond, np.zeros(len(limb), dtype=np.bool_)
     if watch is not None:
-        sign = watch[limb, :, row].T
+        sign = watch[:, limb, row]
         inside = (beyond == 0) & (sign != 0)
         over, watched = np.where(inside, away - sign * half, beyond), inside.any(axis=0)
-    keep = (best > 0) | watched
-    if not keep.any():
-        return cost, None
-    limb, row, over, beyond, weight = limb[keep], row[keep], over[:, keep], beyond[:, keep], weight[:, keep]
-    side, euler = side[keep], euler[keep]
-    residual = _shortened(over) * weight / deviation
-    np.add.at(cost, row, np.where(beyond != 0, residual * residual, 0.0).sum(axis=0))
-    crossed = np.sign(beyond).astype(np.int8)
-    return cost, Active(limb, row, residual, _rows(found, limb, row, over, side, euler) / deviation, crossed)
+    keep = np.flatnonzero((best > 0) | watched)
+    if not keep.size:
+        return None
+    crossed = np.sign(beyond[:, keep]).astype(np.int8)
+    return Outside(limb[keep], row[keep], over[:, keep], weight[:, keep], side[keep], euler[keep], crossed)
+
+
+def limb_rows(found: Limbs, out: Outside, f: Array, e: Array) -> Array:
+    """Differentiate what is judged (4, 7, M): along a, b, f, e, and the parent's rotation vector (camera frame).
+
+    `f` and `e` (M, 3) are the tangents of the lower directions.
+    """
+    limb, row, over = out.limb, out.row, out.over
+    a, b = found.a[limb, :, row].T, found.b[limb, :, row].T
+    cos_b, cos_g, cos_e = (found.cosines[k, limb, row] for k in (1, 2, 3))
+    sin_b, sin_g, sin_e = (found.sines[k, limb, row] for k in (1, 2, 3))
+    alpha, beta, rotation, bend = np.zeros((4, 7, len(limb)))
+    alpha[0], alpha[4:] = 1.0, -b
+    beta[1], beta[4:] = 1.0, a
+    per_alpha = alpha / np.maximum(cos_b, LEAST)
+    rotation[2], rotation[4:] = 1.0, -e.T
+    rotation += per_alpha * (cos_b * cos_e * sin_g + sin_b * sin_e) + beta * (cos_e * cos_g)
+    bend[3], bend[4:] = 1.0, f.T
+    bend += beta * sin_g - per_alpha * (cos_b * cos_g)
+    sine = np.sin(np.clip(over, -np.pi / 2, np.pi / 2))
+    cosine = np.where(np.abs(over) < np.pi / 2, np.cos(over), 0.0)
+    felt = over != 0
+    rows = np.empty((4, 7, len(limb)))
+    rows[0] = felt[0] * (cosine[0] * alpha - sine[0] * sin_b * beta)
+    rows[1] = felt[1] * np.where(out.euler > 0, -1.0, 1.0) * beta
+    rows[2] = felt[2] * (cosine[2] * rotation + sine[2] * cos_e * bend)
+    rows[3] = felt[3] * out.side * bend
+    return rows
+
+
+TURN = 2 * np.pi
+
+
+def _beyond(away: Array, half: Array) -> Array:
+    return away - np.minimum(np.maximum(away, -half), half)
 
 
 def _shortened(over: Array) -> Array:
     """Return angles outside the limits as they are judged: the sines of first angle and axial rotation."""
     out = over.copy()
-    out[[0, 2]] = np.sin(np.clip(over[[0, 2]], -np.pi / 2, np.pi / 2))
+    out[::2] = np.sin(np.minimum(np.maximum(over[::2], -np.pi / 2), np.pi / 2))
     return out
 
 
-def _rows(found: Limbs, limb: NDArray[np.intp], row: NDArray[np.intp], over: Array, side: Array, euler: Array) -> Array:
-    """Differentiate the residuals, in radians (4, 7, M)."""
-    tangents = found.tangents[limb, :, :, :, row]
-    (a, b), (f, e) = (tangents[:, k].transpose(1, 2, 0) for k in range(2))
-    cos_b, sin_b = found.cos_beta[limb, row], np.sin(found.angles[limb, 1, row])
-    gamma = found.angles[limb, 2, row]
-    cos_g, sin_g = np.cos(gamma), np.sin(gamma)
-    sin_e, cos_e = found.sin_bend[limb, row], found.cos_bend[limb, row]
-    m = len(limb)
-    alpha, beta, rotation, bend = np.zeros((4, 7, m))
-    alpha[0], alpha[4:] = 1.0, -b
-    beta[1], beta[4:] = 1.0, a
-    per_alpha = alpha / np.maximum(cos_b, LEAST)
-    rotation[2], rotation[4:] = 1.0, -e
-    rotation += per_alpha * (cos_b * cos_e * sin_g + sin_b * sin_e) + beta * (cos_e * cos_g)
-    bend[3], bend[4:] = 1.0, f
-    bend += beta * sin_g - per_alpha * (cos_b * cos_g)
-    out = np.zeros((4, 7, m))
-    near = np.abs(over) < np.pi / 2
-    sine, cosine = np.sin(np.clip(over, -np.pi / 2, np.pi / 2)), np.where(near, np.cos(over), 0.0)
-    outside_of = over != 0
-    out[0] = outside_of[0] * (cosine[0] * alpha - sine[0] * sin_b * beta)
-    out[1] = outside_of[1] * np.where(euler > 0, -1.0, 1.0) * beta
-    out[2] = outside_of[2] * (cosine[2] * rotation + sine[2] * cos_e * bend)
-    out[3] = outside_of[3] * side * bend
-    return out
-
-
-def _possible(bounds: Bounds, branch: int, hinge: float) -> bool:
-    """Return whether any limb's limits reach into a branch."""
-    if branch and not (np.abs(bounds.lower[:, 1]) > np.pi / 2).any() and not (bounds.upper[:, 1] > np.pi / 2).any():
-        return False
-    return bool((bounds.upper[:, 3] > 0).any() if hinge > 0 else (bounds.lower[:, 3] < 0).any())
+def _possible(bounds: Bounds) -> list[tuple[int, float]]:
+    """Return the branches into which any limb's limits reach."""
+    over_the_top = (np.abs(bounds.lower[:, 1]) > np.pi / 2).any() or (np.abs(bounds.upper[:, 1]) > np.pi / 2).any()
+    either = ((bounds.upper[:, 3] > 0).any(), (bounds.lower[:, 3] < 0).any())
+    return [
+        (branch, hinge) for branch, hinge in BRANCHES if (over_the_top or not branch) and either[int(hinge < 0)]
+    ]
 
 
 class Ball(NamedTuple):
-    """Residuals of a ball joint, and how they change with its parent's and its own rotation vector.
+    """What is judged of a ball joint, radians.
 
     Attributes
     ----------
     residual : array (3, N)
+        As `Outside.over`.
     jacobian : array (3, 3, N) or None
         Along the child's rotation vector, camera frame; the parent's has the opposite sign. None where all are zero.
     crossed : int array (3, N)
-        1 above the upper limit, -1 below the lower, 0 inside.
     """
 
     residual: Array
     jacobian: Array | None
-    crossed: NDArray[np.int8]
+    crossed: Signs
 
-    @property
     def cost(self) -> Array:
-        """Sum of squared residuals of what is outside (N,)."""
+        """Return the squares of what is outside (N,)."""
         return np.asarray(np.where(self.crossed != 0, self.residual**2, 0.0).sum(axis=0))
 
 
-def ball_residuals(
-    parent: Array, child: Array, bounds: Bounds, deviation: float, watch: NDArray[np.int8] | None = None
-) -> Ball:
+def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None = None) -> Ball:
     """Judge the three angles of a part (3, 3, N) on its parent (3, 3, N); `watch` (3, N) as for limbs."""
     up = child[:, 2]
-    x, y, z = (-dot(parent[:, k], up) for k in range(3))
-    h = np.hypot(x, z)
-    safe = np.where(h > 0, h, 1.0)
-    sin_a, cos_a = np.where(h > 0, -x / safe, 0.0), np.where(h > 0, -z / safe, 1.0)
+    x, y, z = -np.einsum("ikn,in->kn", parent, up)
+    h = np.sqrt(x * x + z * z)
+    inverse = 1.0 / np.where(h > 0, h, 1.0)
+    sin_a, cos_a = -x * inverse, np.where(h > 0, -z * inverse, 1.0)
     axis = cos_a * parent[:, 0] - sin_a * parent[:, 2]
-    side = cross(up, axis)
-    gamma = np.arctan2(dot(side, child[:, 0]), dot(axis, child[:, 0]))
-    angles = np.stack([np.arctan2(sin_a, cos_a), np.arctan2(y, h), gamma])
-    beyond = outside(angles[None], bounds)[0]
+    forward = child[:, 0]
+    sine, cosine = np.stack([sin_a, y, dot(cross(up, axis), forward)]), np.stack([cos_a, h, dot(axis, forward)])
+    lower, upper = bounds.lower[0, :, None], bounds.upper[0, :, None]
+    middle, half = (lower + upper) / 2, (upper - lower) / 2
+    away = np.arctan2(sine, cosine) - middle
+    away -= TURN * np.round(away / TURN)
+    beyond = _beyond(away, half)
     over = beyond
     if watch is not None:
-        lower, upper = bounds.lower[0, :, None], bounds.upper[0, :, None]
-        over = np.where((beyond == 0) & (watch != 0), angles - np.where(watch > 0, upper, lower), beyond)
-    active = over != 0
-    if not active.any():
-        return Ball(over, None, beyond.astype(np.int8))
+        over = np.where((beyond == 0) & (watch != 0), away - watch * half, beyond)
+    crossed = np.sign(beyond).astype(np.int8)
+    felt = over != 0
+    if not felt.any():
+        return Ball(over, None, crossed)
     cos_b = np.maximum(h, LEAST)
-    left = parent[:, 1]
-    square = cos_b * cos_b
+    left, square = parent[:, 1], cos_b * cos_b
     jacobian = np.stack([(left + y * up) / square, axis, (up + y * left) / square])
-    return Ball(over / deviation, jacobian * active[:, None] / deviation, np.sign(beyond).astype(np.int8))
+    return Ball(over, jacobian * felt[:, None], crossed)

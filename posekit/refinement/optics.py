@@ -87,6 +87,18 @@ class Optics:
         image = np.stack([fx * x + skew * y + self.centre[0], fy * y + self.centre[1]], axis=1)
         return image, jacobian
 
+    def image(self, points: Array) -> Array:
+        """Project points (J, 3, N) to pixels (J, 2, N): `project` without the derivative."""
+        fx, skew, fy = self.focal
+        if not self.perspective:
+            return np.asarray(points[:, :2] * self.focal[[0, 2]])
+        depth = points[:, 2]
+        inverse = 1.0 / np.where(depth > 0, depth, np.nan)
+        x, y = points[:, 0] * inverse, points[:, 1] * inverse
+        if self.distortion is not None:
+            (x, y), _ = _distorted(x, y, self.distortion)
+        return np.stack([fx * x + skew * y + self.centre[0], fy * y + self.centre[1]], axis=1)
+
     def rays(self, image: Array, start: Array) -> tuple[Array, Array]:
         """Return the rays (J, 3, N) of image points (J, 2, N), unit vectors, and their points nearest to `start`."""
         fx, skew, fy = self.focal

@@ -61,6 +61,29 @@ class Problem:
         """Return the same problem with the limbs left out."""
         return replace(self, trunk_only=True)
 
+    def see(self, points: Array, joints: slice) -> tuple[Array, Array]:
+        """Return residuals (J, 2, N) of some joints' image points, and their derivative (J, 2, 3, N) along the joints.
+
+        Residuals are huge, and derivatives zero, where a joint that was seen is behind the camera.
+        """
+        return _whitened(*self.optics.project(points), self.image[joints], self.weight[joints])
+
+    def miss(self, points: Array, joints: slice) -> Array:
+        """Return the residuals alone."""
+        return _residual(self.optics.image(points), self.image[joints], self.weight[joints])
+
+    def see_head(self, points: Array) -> tuple[Array, Array]:
+        """Do for the head's points (5, 3, N) what `see` does for joints."""
+        image, jacobian = self.optics.project(points)
+        if self.head_image is None or self.head_weight is None:
+            return np.zeros((0, 2, points.shape[2])), jacobian[:0]
+        return _whitened(image, jacobian, self.head_image, self.head_weight)
+
+    @property
+    def limited(self) -> bool:
+        """Whether there are limits."""
+        return bool(np.isfinite(self.limit_deviation))
+
     @property
     def trunk_width(self) -> int:
         """How many numbers of the trunk are varied."""
@@ -73,3 +96,24 @@ class Problem:
 
 
 PER_POSTURE = ("image", "weight", "head_image", "head_weight", "root", "root_weight")
+
+
+def _residual(image: Array, seen: Array, weight: Array) -> Array:
+    residual = (image - seen) * weight[:, None]
+    behind = np.isnan(residual)
+    if behind.any():
+        residual[behind] = np.broadcast_to(np.where(weight > 0, FAR, 0.0)[:, None], residual.shape)[behind]
+    return residual
+
+
+def _whitened(image: Array, jacobian: Array, seen: Array, weight: Array) -> tuple[Array, Array]:
+    residual = _residual(image, seen, weight)
+    jacobian *= weight[:, None, None]
+    wrong = np.isnan(jacobian)
+    if wrong.any():
+        jacobian[wrong] = 0.0
+    return residual, jacobian
+
+
+FAR = 1e100
+"""Standard deviations by which a joint behind the camera is off."""

@@ -1,4 +1,4 @@
-"""Linear algebra of small matrices for a batch, the batch as the last axis."""
+"""Linear algebra of small vectors and matrices for a batch, the batch as the last axis."""
 
 from __future__ import annotations
 
@@ -10,26 +10,73 @@ TINY = 1e-300
 """Least pivot: a matrix that is positive but for rounding must not give NaN."""
 
 
+def dot(a: Array, b: Array) -> Array:
+    """Multiply vectors (..., k, N): (..., N)."""
+    return np.asarray(np.einsum("...in,...in->...n", a, b))
+
+
+def turned(a: Array, vectors: Array) -> Array:
+    """Multiply matrices (..., i, j, N) and vectors (..., j, N)."""
+    return np.asarray(np.einsum("...ijn,...jn->...in", a, vectors))
+
+
+def product(a: Array, b: Array) -> Array:
+    """Multiply matrices (..., i, j, N) and (..., j, k, N)."""
+    return np.asarray(np.einsum("...ijn,...jkn->...ikn", a, b))
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross vectors (..., 3, N)."""
+    twice_a = np.concatenate([a, a[..., :2, :]], axis=-2)
+    twice_b = np.concatenate([b, b[..., :2, :]], axis=-2)
+    out = twice_a[..., 1:4, :] * twice_b[..., 2:5, :]
+    out -= twice_a[..., 2:5, :] * twice_b[..., 1:4, :]
+    return np.asarray(out)
+
+
+def unit(vectors: Array) -> Array:
+    """Scale vectors (..., 3, N) to length one."""
+    return np.asarray(vectors / np.sqrt(dot(vectors, vectors))[..., None, :])
+
+
+def rotation(turn: Array) -> Array:
+    r"""Return rotations (3, 3, N) about vectors (3, N), by their lengths to third order.
+
+    The rotation of the quaternion :math:`(1, \omega / 2)`, whose angle is :math:`2 \arctan(|\omega| / 2)`: a step of
+    the search need be no exact exponential.
+    """
+    half = 0.5 * turn
+    scale = 2.0 / (1.0 + dot(half, half))
+    x, y, z = half
+    out = scale * half[:, None] * half[None, :]
+    diagonal = 1.0 - scale * dot(half, half)
+    for i in range(3):
+        out[i, i] += diagonal
+    for i, j, w in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
+        sine = scale * w
+        out[i, j] += sine
+        out[j, i] -= sine
+    return np.asarray(out)
+
+
 def cholesky(matrix: Array) -> Array:
-    """Factor symmetric positive definite matrices (k, k, ...): L (k, k, ...), lower, L L' = A; A is overwritten."""
-    left = matrix
-    for j in range(len(left)):
-        pivot = np.sqrt(np.maximum(left[j, j], TINY))
-        left[j, j] = pivot
-        if j + 1 < len(left):
-            column = left[j + 1 :, j]
-            column /= pivot
-            for i in range(len(column)):
-                left[j + 1 + i, j + 1 : j + 2 + i] -= column[i] * column[: i + 1]
-    return left
+    """Factor symmetric positive definite matrices (k, k, ...), in place: L of L L' in the lower triangle."""
+    for j in range(len(matrix)):
+        pivot = np.sqrt(np.maximum(matrix[j, j], TINY))
+        matrix[j, j] = pivot
+        column = matrix[j + 1 :, j]
+        column /= pivot
+        for i in range(len(column)):
+            matrix[j + 1 + i, j + 1 : j + 2 + i] -= column[i] * column[: i + 1]
+    return matrix
 
 
 def forward(factor: Array, right: Array) -> Array:
     """Solve L y = b for right sides (k, m, ...), in place."""
     for j in range(len(factor)):
         right[j] /= factor[j, j]
-        for i in range(j + 1, len(factor)):
-            right[i] -= factor[i, j] * right[j]
+        if j + 1 < len(factor):
+            right[j + 1 :] -= _each(factor[j + 1 :, j], right) * right[j]
     return right
 
 
@@ -37,55 +84,11 @@ def backward(factor: Array, right: Array) -> Array:
     """Solve L' x = y for right sides (k, m, ...), in place."""
     for j in range(len(factor) - 1, -1, -1):
         right[j] /= factor[j, j]
-        for i in range(j):
-            right[i] -= factor[j, i] * right[j]
+        if j:
+            right[:j] -= _each(factor[j, :j], right) * right[j]
     return right
 
 
-def product(a: Array, b: Array) -> Array:
-    """Multiply matrices (..., i, j, N) and (..., j, k, N)."""
-    out: Array = a[..., :, 0, None, :] * b[..., None, 0, :, :]
-    for j in range(1, a.shape[-2]):
-        out += a[..., :, j, None, :] * b[..., None, j, :, :]
-    return out
-
-
-def turned(a: Array, vectors: Array) -> Array:
-    """Multiply matrices (..., i, j, N) and vectors (..., j, N)."""
-    out: Array = a[..., :, 0, :] * vectors[..., None, 0, :]
-    for j in range(1, a.shape[-2]):
-        out += a[..., :, j, :] * vectors[..., None, j, :]
-    return out
-
-
-def dot(a: Array, b: Array) -> Array:
-    """Multiply vectors (..., 3, N)."""
-    return np.asarray(a[..., 0, :] * b[..., 0, :] + a[..., 1, :] * b[..., 1, :] + a[..., 2, :] * b[..., 2, :])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross vectors (..., 3, N)."""
-    out = np.empty(np.broadcast_shapes(a.shape, b.shape))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        np.subtract(a[..., j, :] * b[..., k, :], a[..., k, :] * b[..., j, :], out=out[..., i, :])
-    return out
-
-
-def rotation(turn: Array) -> Array:
-    r"""Return the rotations (3, 3, N) of rotation vectors (3, N): Rodrigues' formula, exact for small angles too."""
-    square = dot(turn, turn)
-    angle = np.sqrt(square)
-    small = square < 1e-8
-    safe = np.where(small, 1.0, angle)
-    a = np.where(small, 1.0 - square / 6.0, np.sin(safe) / safe)
-    half = np.sin(0.5 * safe) / safe
-    b = np.where(small, 0.5 - square / 24.0, 2.0 * half * half)
-    x, y, z = turn
-    out = b * turn[:, None] * turn[None, :]
-    diagonal = 1.0 - b * square
-    for i in range(3):
-        out[i, i] += diagonal
-    for i, j, w in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
-        out[i, j] += a * w
-        out[j, i] -= a * w
-    return out
+def _each(column: Array, right: Array) -> Array:
+    """Let a column (k, ...) of a factor count for each of the right sides (k, m, ...), where there are several."""
+    return column[:, None] if right.ndim > column.ndim else column

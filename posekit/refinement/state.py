@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.refinement.anatomy import ARMS, END, LEGS, MIDDLE
-from posekit.refinement.small import cross, dot, product, rotation, turned
+from posekit.refinement.small import product, rotation, turned, unit
 
-Rows = NDArray[np.intp] | NDArray[np.bool_] | slice
+Rows = NDArray[np.intp]
 
 
 class State(NamedTuple):
@@ -54,6 +54,10 @@ class State(NamedTuple):
         for mine, theirs in zip(self, other, strict=True):
             mine[..., rows] = theirs
 
+    def copy(self) -> State:
+        """Return a copy."""
+        return State(*(array.copy() for array in self))
+
 
 class Step(NamedTuple):
     """A step away from N postures.
@@ -62,76 +66,74 @@ class Step(NamedTuple):
     ----------
     trunk : array (9, N) or (18, N)
         Shift of the root, rotation vectors of torso and hips (camera frame), then changes of the shape.
-    limbs : array (4, U, N)
+    limbs : array (U, 4, N) or None
         Along the tangents of upper and lower direction, two each, radians; then the logarithms of their lengths.
-    head : array (3, N)
+    head : array (3, N) or None
         Rotation vector.
     """
 
     trunk: Array
-    limbs: Array
-    head: Array
-
-
-class Joints(NamedTuple):
-    """Where the joints are.
-
-    Attributes
-    ----------
-    trunk : array (6, 3, N)
-        From the root, camera frame, metres.
-    joints : array (14, 3, N)
-        Camera frame, metres.
-    """
-
-    trunk: Array
-    joints: Array
+    limbs: Array | None = None
+    head: Array | None = None
 
 
 def trunk_offsets(state: State) -> Array:
-    """Place torso and hips relative to the root (6, 3, N)."""
-    b, a, right_y, right_z, left_y, left_z, h, hip_right, hip_left = state.shape
-    x, y, z = state.torso[:, 0], state.torso[:, 1], state.torso[:, 2]
+    """Place torso and hips relative to the root (6, 3, N), metres."""
     out = np.zeros((6, 3, state.root.shape[1]))
-    out[1] = a * x + right_y * y + right_z * z
-    out[2] = a * x + left_y * y + left_z * z
-    out[3] = -b * z
-    across, down = state.hips[:, 1], -h * state.hips[:, 2]
-    out[4] = out[3] + hip_right * across + down
-    out[5] = out[3] + hip_left * across + down
+    shape = state.shape
+    z = state.torso[:, 2]
+    forward = shape[1] * state.torso[:, 0]
+    out[3] = -shape[0] * z
+    across, down = state.hips[:, 1], out[3] - shape[6] * state.hips[:, 2]
+    for joint in (0, 1):
+        out[1 + joint] = forward + shape[2 + 2 * joint] * state.torso[:, 1] + shape[3 + 2 * joint] * z
+        out[4 + joint] = down + shape[7 + joint] * across
     return out
 
 
-def place(state: State) -> Joints:
-    """Place all joints."""
-    trunk = trunk_offsets(state)
+def place(state: State, offsets: Array | None = None) -> Array:
+    """Place all joints (14, 3, N), camera frame, metres."""
     out = np.empty((14, 3, state.root.shape[1]))
-    out[:6] = state.root + trunk
-    middle = out[[1, 2, 4, 5]] + state.limbs[:, 0, None] * state.directions[:, 0]
-    out[list(MIDDLE)] = middle
-    out[list(END)] = middle + state.limbs[:, 1, None] * state.directions[:, 1]
-    return Joints(trunk, out)
+    out[:6] = state.root + (trunk_offsets(state) if offsets is None else offsets)
+    place_limbs(out[[1, 2, 4, 5]], state.directions, state.limbs, out[6:])
+    return out
 
 
-def moved(state: State, step: Step, tangents: Array) -> State:
-    """Take a step; `tangents` (4, 2, 2, 3, N) are the unit vectors that it counts along."""
+def place_limbs(starts: Array, directions: Array, lengths: Array, out: Array) -> None:
+    """Place middles and ends of limbs from their starts (4, 3, N), into the last eight joints (8, 3, N)."""
+    middle = starts + lengths[:, 0, None] * directions[:, 0]
+    out[_MIDDLE] = middle
+    out[_END] = middle + lengths[:, 1, None] * directions[:, 1]
+
+
+_MIDDLE, _END = ([joint - 6 for joint in joints] for joints in (MIDDLE, END))
+
+
+def moved(state: State, step: Step, tangents: Array | None) -> State:
+    """Take a step; `tangents` (4, 2, 2, 3, N) are the unit vectors along which it turns the limbs."""
     trunk = step.trunk
-    turn = step.limbs[:, :4].reshape(4, 2, 2, -1)
-    along = turn[:, :, 0, None] * tangents[:, :, 0] + turn[:, :, 1, None] * tangents[:, :, 1]
-    angle = np.sqrt(dot(along, along))[:, :, None]
-    safe = np.where(angle > 0, angle, 1.0)
-    directions = np.cos(angle) * state.directions + np.sin(safe) / safe * along
-    directions /= np.sqrt(dot(directions, directions))[:, :, None]
-    lengthened = step.limbs.shape[1] > 4
+    directions, limbs = state.directions, state.limbs
+    if step.limbs is not None and tangents is not None:
+        directions, limbs = moved_limbs(directions, limbs, step.limbs, tangents)
     return State(
         root=state.root + trunk[:3],
         torso=product(rotation(trunk[3:6]), state.torso),
         hips=product(rotation(trunk[6:9]), state.hips),
-        head=product(rotation(step.head), state.head) if step.head.size else state.head,
+        head=state.head if step.head is None else product(rotation(step.head), state.head),
         directions=directions,
         shape=state.shape + trunk[9:] if len(trunk) > 9 else state.shape,
-        limbs=state.limbs * np.exp(step.limbs[:, 4:]) if lengthened else state.limbs,
+        limbs=limbs,
     )
+
+
+def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array) -> tuple[Array, Array]:
+    """Turn and lengthen limbs by a step (U, 4, N)."""
+    turn = step[:4].reshape(2, 2, *step.shape[1:])
+    along = np.einsum("stln,lstin->lsin", turn, tangents)
+    along += directions
+    if len(step) > 4:
+        lengths = lengths * np.exp(step[4:]).transpose(1, 0, 2)
+    return unit(along), lengths
 
 
 def parents(state: State) -> Array:
@@ -144,6 +146,3 @@ def parents(state: State) -> Array:
 def head_points(state: State, offsets: Array) -> Array:
     """Place the head's points relative to the root (5, 3, N)."""
     return np.stack([turned(state.head, np.broadcast_to(o[:, None], state.root.shape)) for o in offsets])
-
-
-__all__ = ["Joints", "State", "Step", "cross", "head_points", "moved", "parents", "place", "trunk_offsets"]
