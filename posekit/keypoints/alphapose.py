@@ -21,8 +21,8 @@ from posekit.intake import cut, refusal, shown, write_text
 from posekit.keypoints.format import Format
 from posekit.keypoints.given import Given
 from posekit.keypoints.keypoints import KeyPoints
-from posekit.keypoints.track_layouts import by_count
-from posekit.keypoints.track_rows import Rows, number, numbers, whole
+from posekit.keypoints.named_layout import by_count
+from posekit.keypoints.rows import Rows, number, numbers, whole
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
 
 BODIES = {"bodies": "joints", "people": "pose_keypoints_2d"}

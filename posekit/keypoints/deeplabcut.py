@@ -21,8 +21,8 @@ from posekit.intake import cut, refusal, shown, write_text
 from posekit.keypoints.format import Format
 from posekit.keypoints.given import Given
 from posekit.keypoints.keypoints import KeyPoints
-from posekit.keypoints.track_layouts import by_names
-from posekit.keypoints.track_rows import LARGEST, Rows
+from posekit.keypoints.named_layout import by_names
+from posekit.keypoints.rows import LARGEST, Rows
 from posekit.skeleton_map import SkeletonMap
 
 HDF5 = (".h5", ".hdf5", ".hdf")

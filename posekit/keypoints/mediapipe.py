@@ -22,7 +22,7 @@ from posekit.keypoints.keypoints import KeyPoints
 from posekit.keypoints.mediapipe_json import add_document, looks_like_landmarks
 from posekit.keypoints.mediapipe_table import add_table, looks_like_table
 from posekit.keypoints.mediapipe_write import write_json_of, write_table_of
-from posekit.keypoints.track_rows import Rows
+from posekit.keypoints.rows import Rows
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
 
 PIXELS = 3.0

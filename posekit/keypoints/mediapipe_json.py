@@ -21,7 +21,7 @@ from posekit.keypoints.mediapipe_names import (
     landmark,
     one_of,
 )
-from posekit.keypoints.track_rows import LARGEST, NUMBERS, Rows, number, whole
+from posekit.keypoints.rows import LARGEST, NUMBERS, Rows, number, whole
 from posekit.skeleton_map.skeleton_map import plain
 
 FRAMES = ("frames", "posedata", "framesdata", "framedata", "poses", "results", "data")

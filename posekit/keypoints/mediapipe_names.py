@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from posekit.cameras import Array
-from posekit.keypoints.track_rows import whole
+from posekit.keypoints.rows import whole
 from posekit.skeleton_map.skeleton_map import plain
 
 NAMES: Final = tuple(

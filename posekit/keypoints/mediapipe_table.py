@@ -23,7 +23,7 @@ from posekit.keypoints.mediapipe_names import (
     landmark,
     one_of,
 )
-from posekit.keypoints.track_rows import LARGEST, Rows, whole
+from posekit.keypoints.rows import LARGEST, Rows, whole
 from posekit.skeleton_map.skeleton_map import plain
 
 TIMES = (*MILLISECONDS, *MICROSECONDS, *SECONDS, *EITHER)

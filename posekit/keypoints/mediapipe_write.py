@@ -14,7 +14,7 @@ from posekit.intake import write_text
 from posekit.intake.writing import json_pieces
 from posekit.keypoints.keypoints import KeyPoints
 from posekit.keypoints.mediapipe_names import NAMES
-from posekit.keypoints.track_rows import whole
+from posekit.keypoints.rows import whole
 
 
 def write_json_of(path: Path, keypoints: KeyPoints) -> None:

@@ -16,8 +16,8 @@ from posekit.keypoints.format import Format
 from posekit.keypoints.given import Given
 from posekit.keypoints.keypoints import KeyPoints
 from posekit.keypoints.mmpose_instances import add_frames, add_instances, is_frame, written_frames
-from posekit.keypoints.track_layouts import by_names
-from posekit.keypoints.track_rows import Rows, whole
+from posekit.keypoints.named_layout import by_names
+from posekit.keypoints.rows import Rows, whole
 from posekit.skeleton_map import SkeletonMap
 
 MAX_POINTS = 1000

@@ -16,7 +16,7 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.intake import refusal, shown
 from posekit.keypoints.keypoints import KeyPoints
-from posekit.keypoints.track_rows import Rows, number, numbers, pairs, whole
+from posekit.keypoints.rows import Rows, number, numbers, pairs, whole
 
 CERTAIN = 1.0
 """What is written for a point whose confidence is not known."""

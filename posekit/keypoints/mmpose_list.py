@@ -26,8 +26,8 @@ from posekit.keypoints.mmpose_instances import (
     is_instance,
     written_frames,
 )
-from posekit.keypoints.track_layouts import by_count
-from posekit.keypoints.track_rows import Rows
+from posekit.keypoints.named_layout import by_count
+from posekit.keypoints.rows import Rows
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
 
 BY_COUNT = {17: "coco_17", 26: "halpe_26", 133: "coco_wholebody_133", 136: "halpe_136"}

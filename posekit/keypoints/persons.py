@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Array
 from posekit.intake import refusal, shown
 from posekit.keypoints.keypoints import KeyPoints
-from posekit.keypoints.track_rows import whole
+from posekit.keypoints.rows import whole
 from posekit.keypoints.track_similarity import area
 from posekit.keypoints.tracking import track
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.intake import cut
 from posekit.keypoints.keypoints import KeyPoints
-from posekit.keypoints.track_body import AROUND
-from posekit.keypoints.track_facing import facing, informed, order
-from posekit.keypoints.track_flips import GROUPS, flips
-from posekit.keypoints.track_gait import gait_evidence
+from posekit.keypoints.side_body import AROUND
+from posekit.keypoints.side_facing import facing, informed, order
+from posekit.keypoints.side_flips import GROUPS, flips
+from posekit.keypoints.side_gait import gait_evidence
 from posekit.keypoints.tracking import track
 from posekit.skeleton_map import LANDMARK, SkeletonMap
 from posekit.skeleton_map.skeleton_map import other_side
@@ -93,9 +93,9 @@ class SideCheck:
 def check_sides(keypoints: KeyPoints) -> SideCheck:
     """Look for left and right the wrong way round.
 
-    Pictures whose arms or legs jump are found by `posekit.keypoints.track_flips`, and put right before the rest is
+    Pictures whose arms or legs jump are found by `posekit.keypoints.side_flips`, and put right before the rest is
     looked at. What says whether they are swapped in all pictures: parts that are against each other and faces that are
-    seen (`posekit.keypoints.track_facing`), and the way somebody walks (`posekit.keypoints.track_gait`). Evidence is
+    seen (`posekit.keypoints.side_facing`), and the way somebody walks (`posekit.keypoints.side_gait`). Evidence is
     summed over the people. In a collection of photographs only single pictures are looked at, all together.
 
     Parameters

@@ -87,7 +87,7 @@ def test_missing_points_stay_missing(rng: np.random.Generator) -> None:
     ("distortion", "fisheye", "outside"),
     [
         ([-0.4, 0.0, 0.0, 0.0, 0.0, 0.001, 0.0, 0.0], False, 1.3),
-        ([-0.15, 0.0, 0.0, 0.0], True, 1.45),
+        ([-0.25, 0.0, 0.0, 0.0], True, 1.45),
     ],
 )
 def test_pixels_beyond_the_lens_are_nan(distortion: list[float], fisheye: bool, outside: float) -> None:

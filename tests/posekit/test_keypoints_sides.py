@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from posekit.figure import load_figure
 from posekit.keypoints import KeyPoints, check_sides, swap
 from posekit.keypoints.persons import select
+from posekit.keypoints.side_flips import GROUPS, flips
+from posekit.keypoints.side_gait import gait_evidence
 from posekit.keypoints.sides import SURE
-from posekit.keypoints.track_flips import GROUPS, flips
-from posekit.keypoints.track_gait import gait_evidence
 from posekit.skeleton_map import LANDMARK, load_skeleton_map, parse_skeleton_map
 from posekit.synthesis import Scene, Walker, random_views, walker_scene
 
@@ -301,7 +301,7 @@ def test_a_jump_is_found_where_it_is(group: str, part: slice, long: int) -> None
 def test_the_signs_are_the_best_there_are(seed: int) -> None:
     from itertools import product
 
-    from posekit.keypoints.track_flips import _bends, _signs
+    from posekit.keypoints.side_flips import _bends, _signs
 
     d = np.random.default_rng(seed).normal(size=(7, 2))
     best = min(_bends(d * np.array(signs)[:, None]).sum() for signs in product((1, -1), repeat=7))

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.keypoints.track_body import ARM, LEG, pair, runs, size
+from posekit.keypoints.side_body import ARM, LEG, pair, runs, size
 
 FEWEST: Final = 5
 """Pictures of a sequence: with fewer, a jump is no jump."""

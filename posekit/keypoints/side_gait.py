@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.keypoints.track_body import ARM, LEG, length, limb, mean, of, pair, size, trunk, upright
+from posekit.keypoints.side_body import ARM, LEG, length, limb, mean, of, pair, size, trunk, upright
 from posekit.skeleton import SIDES
 
 FEWEST: Final = 4

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.keypoints.track_body import AROUND, of, pair, size, upright
+from posekit.keypoints.side_body import AROUND, of, pair, size, upright
 from posekit.skeleton_map import LANDMARK, LANDMARKS
 
 SHOULDERS, HIPS, EARS, EYES = 0.2, 0.125, 0.12, 0.05
