@@ -52,9 +52,8 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
         return projected_angles(figure, ranges, tolerance=tolerance)
     ik = figure.ik
     if ranges.anatomy is not None:
-        ik = _limited(
-            ik, ranges.limits
-        )  # the figure itself is left alone: rewriting a URDF takes milliseconds
+        # The figure itself is left alone: to write a URDF and read it again takes as long as many frames.
+        ik = _limited(ik, ranges.limits)
     elif ranges.limits:
         figure = figure.with_limits(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}

@@ -97,7 +97,11 @@ def write_lengths(path: str | Path, lengths: SegmentLengths, *, unit: str = "m")
     if path.suffix.lower() != ".toml":
         raise refusal(path, "", f"the ending {shown(path.suffix)}", ".toml", "name it so")
     scale = PER_METRE[unit]
-    lines = [f'schema = "{SCHEMA}"', f'unit = "{unit}"', f"source = {json.dumps(one_line(lengths.source))}"]
+    lines = [
+        f'schema = "{SCHEMA}"',
+        f'unit = "{unit}"',
+        f"source = {json.dumps(one_line(lengths.source), ensure_ascii=False)}",
+    ]
     if lengths.stature is not None:
         lines.append(f"stature = {lengths.stature * scale!r}")
     lines += ["", "[lengths]", *(f'"{name}" = {value * scale!r}' for name, value in lengths.lengths.items())]

@@ -110,7 +110,7 @@ def lengths_from_views(
     A segment of length l, seen in a frame of scale s (pixels a metre at the body, scaled orthographic), has the image
     :math:`r = s\,l \sin\theta` with noise; its direction is isotropic, or where `upright` rather in the picture. The
     frames' scales are unknown and integrated out over a normal distribution of their logarithm, whose mean and width
-    are found too. Pictures alone tell ratios of lengths; the size of the whole comes from the stature or a known length.
+    are found too. Pictures alone tell ratios of lengths; the size of the whole comes from the stature or a given one.
     Proportions with their spread among people are the prior: a segment that never turns across the view stays near
     them. Frames that show the same posture again count once (`posekit.anthropometry.independent`).
 

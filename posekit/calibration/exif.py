@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import Any, Final
 
@@ -53,7 +54,10 @@ def read_exif(path: str | Path) -> CalibratedCamera:
     """
     path = Path(path)
     image = extra("PIL.Image", "pictures", "reading EXIF")
-    with open_file(path, limit=MAX_BYTES, too_large="name a photograph") as file:
+    with open_file(path, limit=MAX_BYTES, too_large="name a photograph") as file, warnings.catch_warnings():
+        warnings.simplefilter(
+            "ignore"
+        )  # of Pillow's, about tags that are damaged: what is needed is checked here
         try:
             with image.open(file, formats=FORMATS) as picture:
                 width, height = picture.size

@@ -134,7 +134,7 @@ def write_pose2sim(path: Path, cameras: dict[str, CalibratedCamera]) -> None:
         )
     lines: list[str] = []
     for number, camera in enumerate(cameras.values(), start=1):
-        lines += [f"[cam_{number:02d}]", f"name = {json.dumps(camera.name, ensure_ascii=True)}"]
+        lines += [f"[cam_{number:02d}]", f"name = {_text(camera.name)}"]
         if camera.size is not None:
             lines.append(f"size = {_listed(camera.size)}")
         rows = ", ".join(_listed(row) for row in camera.K)
@@ -145,7 +145,7 @@ def write_pose2sim(path: Path, cameras: dict[str, CalibratedCamera]) -> None:
         lines.append(f"fisheye = {'true' if camera.fisheye else 'false'}")
         if camera.guessed:
             lines += [
-                f"how = {json.dumps(camera.how, ensure_ascii=True)}",
+                f"how = {_text(camera.how)}",
                 f"deviation = {camera.deviation!r}",
             ]
         lines.append("")
@@ -153,6 +153,13 @@ def write_pose2sim(path: Path, cameras: dict[str, CalibratedCamera]) -> None:
     if (up := next(iter(ups), "")) != "+z":
         lines.append(f'up = "{up}"')
     write_text(path, (f"{line}\n" for line in lines))
+
+
+def _text(text: str) -> str:
+    """Spell a text as TOML, which has JSON's escapes but not its pairs of surrogates."""
+    if one_line(text) != text:
+        raise InputError(f"camera {shown(text)}: characters that do not print; rename it to write it")
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _listed(values: Any) -> str:

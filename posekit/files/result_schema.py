@@ -154,6 +154,7 @@ class ResultRoot(FileModel):
         description="Reprojection error in pixels, or for a search the least misfit in `unit`."
     )
     residual_unit: str = Field(description="px, or a unit of length.")
+    estimate: Maybe = Field(default=None, description="The single most likely depth.")
     deviation: Maybe = Field(description="Standard deviation of the depth, to first order.")
     lower: Maybe = Field(description="Least feasible depth.")
     upper: Maybe = Field(description="Greatest feasible depth.")

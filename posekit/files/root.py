@@ -36,6 +36,8 @@ class Root:
         Of the method: root mean square reprojection error in pixels, or for a search the least misfit of the rigid
         parts in metres; NaN where there is none.
     residual_unit : {"px", "m"}
+    estimate : float
+        The single most likely depth, metres; NaN where there is none.
     deviation : float
         Standard deviation of the depth, metres, to first order; NaN where the method gives none.
     lower, upper : float
@@ -56,6 +58,7 @@ class Root:
     chosen: Array
     residual: float = np.nan
     residual_unit: str = "m"
+    estimate: float = np.nan
     deviation: float = np.nan
     lower: float = np.nan
     upper: float = np.nan
@@ -90,6 +93,7 @@ class Root:
             "chosen": from_metres(self.chosen, unit).tolist(),
             "residual": _known(from_metres(self.residual, unit) if in_metres else self.residual),
             "residual_unit": unit if in_metres else "px",
+            "estimate": _known(from_metres(self.estimate, unit)),
             "deviation": _known(from_metres(self.deviation, unit)),
             "lower": _known(from_metres(self.lower, unit)),
             "upper": _known(from_metres(self.upper, unit)),
@@ -117,7 +121,7 @@ class Root:
         residual = np.nan if fields["residual"] is None else float(fields["residual"])
         lengths = {
             name: np.nan if fields[name] is None else float(to_metres(fields[name], unit))
-            for name in ("deviation", "lower", "upper")
+            for name in ("estimate", "deviation", "lower", "upper")
         }
         return Root(
             method=fields["method"],

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,6 +156,7 @@ def recover(
         "figure": body.figure.hash,
         "lengths": dict(body.figure.lengths),
         "judged": [frame.judged for frame in frames],
+        "noisy": _widest([frame.tolerance for frame in frames if frame.judged == "noisy"]),
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings)
@@ -226,6 +227,12 @@ def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
         if k == len(first) or following - start > FRAMES_AT_ONCE:
             yield usable[start:end]
             start = end
+
+
+def _widest(tolerances: Sequence[Tolerance | None]) -> dict[str, Any] | None:
+    """Return the widest of some tolerances; None where there is none."""
+    known = [asdict(one) for one in tolerances if one is not None]
+    return {name: max(one[name] for one in known) for name in known[0]} if known else None
 
 
 def _place(placed: dict[int, tuple[Batch, int]], batch: Batch, frames: NDArray[np.intp]) -> None:

@@ -310,7 +310,8 @@ class FrameRecovery:
         with tolerances that were ``given``.
         """
         names = {None: None, EXACT: "exact", MEASURED: "measured", PHOTOGRAPH: "photograph"}
-        if self.placement is not None and self.tolerance == tolerance_of(self.placement):
+        placement = self.placement
+        if placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement):
             return "noisy"
         return names.get(self.tolerance, "given")
 

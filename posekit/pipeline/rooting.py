@@ -95,6 +95,7 @@ def root_of(placement: Placement) -> Root:
         chosen=placement.depths,
         residual=placement.residual if math.isfinite(placement.residual) else math.nan,
         residual_unit=placement.unit,
+        estimate=placement.estimate,
         deviation=placement.deviation,
         lower=placement.lower,
         upper=placement.upper,

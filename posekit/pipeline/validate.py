@@ -14,7 +14,7 @@ from posekit.files import Postures, Report, Result
 from posekit.files.postures_q import Configurations
 from posekit.files.report import PostureReport
 from posekit.files.report_columns import Columns, Place, joined
-from posekit.pipeline.tolerance import EXACT, MEASURED
+from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH
 from posekit.pipeline.validate_columns import columns_of
 from posekit.pipeline.validate_listing import list_postures
 from posekit.robot.scaling import segment_lengths, shoulders_are_behind
@@ -124,9 +124,12 @@ def recovered_with(result: Result) -> tuple[Figure, float]:
     tolerances = [EXACT.angle]
     if "measured" in kinds:
         tolerances.append(MEASURED.angle)
-    given = settings.get("tolerance")
-    if "given" in kinds and isinstance(given, dict):
-        tolerances.append(float(given.get("angle", EXACT.angle)))
+    if "photograph" in kinds:
+        tolerances.append(PHOTOGRAPH.angle)
+    for kind, field in (("given", "tolerance"), ("noisy", "noisy")):
+        said = settings.get(field)
+        if kind in kinds and isinstance(said, dict):
+            tolerances.append(float(said.get("angle", EXACT.angle)))
     return figure, max(tolerances)
 
 

@@ -48,7 +48,7 @@ def test_rotation_vectors_round_trip(vector: list[float], size: float) -> None:
     assert np.linalg.norm(back) <= math.pi + 1e-12
 
 
-@pytest.mark.parametrize("axis", np.eye(3).tolist() + [[1.0, 1.0, 0.0], [-1.0, 2.0, 3.0]])
+@pytest.mark.parametrize("axis", [*np.eye(3).tolist(), [1.0, 1.0, 0.0], [-1.0, 2.0, 3.0]])
 def test_half_a_turn_round_trips(axis: list[float]) -> None:
     R = rotation_from_vector(math.pi * np.array(axis) / np.linalg.norm(axis))
     np.testing.assert_allclose(rotation_from_vector(vector_from_rotation(R)), R, atol=1e-12)
@@ -60,7 +60,9 @@ def test_quaternions_are_hamiltons(vector: list[float]) -> None:
     angle = float(np.linalg.norm(vector))
     axis = np.array(vector) / angle if angle else np.array([1.0, 0.0, 0.0])
     q = np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
-    np.testing.assert_allclose(rotation_from_quaternion(q), rotation_from_vector(np.array(vector)), atol=1e-12)
+    np.testing.assert_allclose(
+        rotation_from_quaternion(q), rotation_from_vector(np.array(vector)), atol=1e-12
+    )
 
 
 def test_a_rounded_rotation_becomes_exact() -> None:
@@ -150,7 +152,9 @@ def test_the_position_is_where_the_camera_frame_begins() -> None:
         ([0.0] * 4, True, True),
     ],
 )
-def test_undistortion_is_needed_beyond_browns_five(distortion: list[float], fisheye: bool, needs: bool) -> None:
+def test_undistortion_is_needed_beyond_browns_five(
+    distortion: list[float], fisheye: bool, needs: bool
+) -> None:
     assert needs_undistortion(camera(distortion=distortion, fisheye=fisheye)) is needs
 
 
@@ -163,7 +167,9 @@ def test_the_pinhole_projects_as_opencv_does(rng: np.random.Generator) -> None:
     assert pinhole_of(camera(distortion=[0.0] * 5)).distortion is None
 
 
-@pytest.mark.parametrize(("axis", "extent"), [("diagonal", 800.0), ("horizontal", 640.0), ("vertical", 480.0)])
+@pytest.mark.parametrize(
+    ("axis", "extent"), [("diagonal", 800.0), ("horizontal", 640.0), ("vertical", 480.0)]
+)
 def test_an_angle_of_view_spans_its_extent(axis: str, extent: float) -> None:
     one = camera_from_fov((640, 480), 70.0, axis)  # type: ignore[arg-type]
     assert 2 * math.degrees(math.atan(extent / 2 / one.K[0, 0])) == pytest.approx(70.0)

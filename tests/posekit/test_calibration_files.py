@@ -68,6 +68,8 @@ projection_matrix:
   data: [538.63, 0, 457.698, 0, 0, 539.723, 297.003, 0, 0, 0, 1, 0]
 """
 
+ONE = '{"name": "a", "K": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}'
+
 CAMERAS_TXT = """# Camera list with one line of data per camera:
 #   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]
 # Number of cameras: 3
@@ -84,12 +86,25 @@ def save(folder: Path, name: str, text: str) -> Path:
 
 
 def a_camera(name: str = "left", **more: object) -> CalibratedCamera:
-    parameters = {"K": K, "distortion": DIST, "size": (1280, 720), "R": rotation_from_vector(VECTOR), "t": T} | more
+    parameters = {
+        "K": K,
+        "distortion": DIST,
+        "size": (1280, 720),
+        "R": rotation_from_vector(VECTOR),
+        "t": T,
+    } | more
     return CalibratedCamera(name=name, **parameters)  # type: ignore[arg-type]
 
 
 def same(a: CalibratedCamera, b: CalibratedCamera) -> None:
-    assert (a.name, a.fisheye, a.size, a.up, a.how, a.deviation) == (b.name, b.fisheye, b.size, b.up, b.how, b.deviation)
+    assert (a.name, a.fisheye, a.size, a.up, a.how, a.deviation) == (
+        b.name,
+        b.fisheye,
+        b.size,
+        b.up,
+        b.how,
+        b.deviation,
+    )
     np.testing.assert_array_equal(a.K, b.K)
     np.testing.assert_array_equal(a.distortion, b.distortion)
     assert (a.R is None, a.t is None) == (b.R is None, b.t is None)
@@ -137,7 +152,9 @@ def test_ros_has_a_name_and_no_pose(tmp_path: Path) -> None:
 
 
 def test_a_rectification_is_no_pose(tmp_path: Path) -> None:
-    text = json.dumps({"K": K.tolist(), "D": DIST.tolist(), "R": np.eye(3).tolist(), "P": np.eye(4)[:3].tolist()})
+    text = json.dumps(
+        {"K": K.tolist(), "D": DIST.tolist(), "R": np.eye(3).tolist(), "P": np.eye(4)[:3].tolist()}
+    )
     (camera,) = read_cameras(save(tmp_path, "x.json", text)).values()
     assert camera.R is None and camera.t is None
 
@@ -158,8 +175,16 @@ def test_fisheye_is_told_apart(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "fields",
     [
-        {"K_left": K.tolist(), "dist_left": DIST.tolist(), "K_right": K.tolist(), "dist_right": DIST.tolist()},
-        {"left": {"K": K.tolist(), "dist": DIST.tolist()}, "right": {"mtx": K.tolist(), "dist": DIST.tolist()}},
+        {
+            "K_left": K.tolist(),
+            "dist_left": DIST.tolist(),
+            "K_right": K.tolist(),
+            "dist_right": DIST.tolist(),
+        },
+        {
+            "left": {"K": K.tolist(), "dist": DIST.tolist()},
+            "right": {"mtx": K.tolist(), "dist": DIST.tolist()},
+        },
         {"cameras": [{"name": n, "K": K.tolist(), "distCoef": DIST.tolist()} for n in ("left", "right")]},
     ],
 )
@@ -171,7 +196,12 @@ def test_files_of_several_cameras(fields: dict[str, object], tmp_path: Path) -> 
 
 
 def test_stereo_matrices_have_numbers(tmp_path: Path) -> None:
-    fields = {"M1": K.tolist(), "D1": DIST.tolist(), "M2": (K * [[2], [2], [1]]).tolist(), "D2": DIST.tolist()}
+    fields = {
+        "M1": K.tolist(),
+        "D1": DIST.tolist(),
+        "M2": (K * [[2], [2], [1]]).tolist(),
+        "D2": DIST.tolist(),
+    }
     cameras = read_cameras(save(tmp_path, "x.json", json.dumps(fields)))
     assert list(cameras) == ["1", "2"] and cameras["2"].K[0, 0] == 2 * K[0, 0]
 
@@ -180,6 +210,7 @@ def test_npz(tmp_path: Path) -> None:
     path = tmp_path / "calib.npz"
     np.savez(path, mtx=K, dist=DIST[None], rvec=VECTOR[:, None], tvec=1000 * T, size=[1280, 720])
     camera = read_cameras(path, unit="mm")["calib"]
+    assert camera.t is not None
     np.testing.assert_allclose(camera.t, T)
     same(camera, a_camera("calib", t=camera.t))
 
@@ -188,13 +219,19 @@ def test_a_view_of_our_own(tmp_path: Path) -> None:
     view = {
         "schema": "posekit.view/1",
         "unit": "cm",
-        "camera": {"model": "opencv", "K": K.tolist(), "R": np.eye(3).tolist(), "t": [1, 2, 300], "size": [1280, 720]},
+        "camera": {
+            "model": "opencv",
+            "K": K.tolist(),
+            "R": np.eye(3).tolist(),
+            "t": [1, 2, 300],
+            "size": [1280, 720],
+        },
         "frames": [],
     }
     camera = read_cameras(save(tmp_path, "walk.json", json.dumps(view)))["walk"]
     assert camera.t is not None and camera.t.tolist() == [0.01, 0.02, 3.0]
     view["camera"] = {"model": "scaled-orthographic", "scale": None}
-    with pytest.raises(InputError, match="camera.model"):
+    with pytest.raises(InputError, match=r"camera\.model"):
         read_cameras(save(tmp_path, "walk.json", json.dumps(view)))
 
 
@@ -206,6 +243,7 @@ def test_pose2sim(tmp_path: Path) -> None:
     assert list(cameras) == ["left", "right"]
     left = cameras["left"]
     assert left.size == (1088, 1920) and left.up == "+z" and left.how == "calibrated"
+    assert left.R is not None
     np.testing.assert_allclose(left.R, cv2.Rodrigues(np.array([1.688, 1.048, -0.419]))[0], atol=1e-12)
 
 
@@ -243,25 +281,40 @@ def test_pose2sim_round_trips(
     guess = {"how": f"a guess: {name}", "deviation": 0.05} if guessed else {}
     cameras = {
         name: a_camera(
-            name, R=rotation_from_vector(np.array(vector)), t=t, distortion=np.full(count, 0.01), up=up, **guess
+            name,
+            R=rotation_from_vector(np.array(vector)),
+            t=t,
+            distortion=np.full(count, 0.01),
+            up=up,
+            **guess,
         ),
         f"{name}2": a_camera(f"{name}2", up=up, R=None, t=None, size=None, fisheye=True, distortion=[]),
     }
-    if any(0xD800 <= ord(letter) < 0xE000 for letter in name):
+    if not name.isprintable():
+        with pytest.raises(InputError, match="do not print"):
+            write_cameras(path, cameras)
         return
     write_cameras(path, cameras)
     assert "[metadata]" in path.read_text()
     back = read_cameras(path)
     assert list(back) == list(cameras)
-    for one in cameras:
-        same(back[one], cameras[one])
+    for one, camera in cameras.items():
+        same(back[one], camera)
 
 
 def test_what_is_written_has_pose2sims_keys(tmp_path: Path) -> None:
     path = tmp_path / "Calib.toml"
     write_cameras(path, {"left": a_camera(up="+z")})
     table = tomllib.loads(path.read_text())
-    assert set(table["cam_01"]) == {"name", "size", "matrix", "distortions", "rotation", "translation", "fisheye"}
+    assert set(table["cam_01"]) == {
+        "name",
+        "size",
+        "matrix",
+        "distortions",
+        "rotation",
+        "translation",
+        "fisheye",
+    }
     assert table["metadata"] == {"adjusted": False, "error": 0.0}
     np.testing.assert_allclose(table["cam_01"]["rotation"], VECTOR, atol=1e-12)
 
@@ -298,7 +351,9 @@ def test_colmap_cameras(tmp_path: Path) -> None:
         ("OPENCV_FISHEYE", "900 901 640 360 0.1 -0.02 0.003 0.004", [0.1, -0.02, 0.003, 0.004], True),
     ],
 )
-def test_colmap_models(model: str, parameters: str, order: list[float], fisheye: bool, tmp_path: Path) -> None:
+def test_colmap_models(
+    model: str, parameters: str, order: list[float], fisheye: bool, tmp_path: Path
+) -> None:
     camera = read_cameras(save(tmp_path, "cameras.txt", f"7 {model} 1280 720 {parameters}\n"))["7"]
     assert camera.distortion.tolist() == order and camera.fisheye is fisheye
 
@@ -391,7 +446,7 @@ def test_damaged_colmap_pictures(text: str, says: str, tmp_path: Path) -> None:
         ("a.xml", "<opencv_storage><camera_matrix>", "XML"),
         ("a.json", "[1, 2]", "no 3x3 matrix"),
         ("a.json", "{", "JSON"),
-        ("a.json", '{"cameras": [{"name": "a", "K": [[1,0,0],[0,1,0],[0,0,1]]}, {"name": "a", "K": [[1,0,0],[0,1,0],[0,0,1]]}]}', "twice"),
+        ("a.json", f'{{"cameras": [{ONE}, {ONE}]}}', "twice"),
         ("a.toml", "x = 1", "no camera"),
         ("a.toml", POSE2SIM.replace('"right"', '"left"'), "twice"),
         ("a.toml", POSE2SIM.replace("fisheye = false", "fisheye = 0"), "true or false"),
@@ -456,7 +511,10 @@ def test_long_lines_take_no_time() -> None:
 
 
 def test_yaml_of_the_usual_kind() -> None:
-    text = "%YAML:1.0\n---\nname: \"a # b\"\nlist:\n   - 1\n   - { x: 2., y: [ 3, -.5e+1 ] }\n   -\n     z: ~\nempty:\nlast: .Inf # c\n"
+    text = (
+        '%YAML:1.0\n---\nname: "a # b"\nlist:\n   - 1\n   - { x: 2., y: [ 3, -.5e+1 ] }\n'
+        "   -\n     z: ~\nempty:\nlast: .Inf # c\n"
+    )
     assert parse_yaml(text, "x") == {
         "name": "a # b",
         "list": [1, {"x": 2.0, "y": [3, -5.0]}, {"z": None}],

@@ -612,7 +612,7 @@ BAD_VIEWS: dict[str, tuple[Callable[[dict[str, Any]], Any], tuple[str, ...]]] = 
                 {"time": frame["time"], "image": {"neck": frame["image"]["neck"]}} for frame in d["frames"]
             ],
         },
-        ("view.json: frames[0]: no joint beside the neck is seen", "or give root"),
+        ("view.json: frames[0]: nothing bounds how far away the neck is", "or give root"),
     ),
 }
 

@@ -260,7 +260,7 @@ def test_a_view_of_which_only_the_neck_is_seen_is_refused() -> None:
     image = np.full_like(SEQ1.image, np.nan)
     image[:, 0] = SEQ1.image[:, 0]
     blind = change(SEQ1, camera=LeeChenModel(f=0.05), image=image, head_image=np.full((5, 5, 2), np.nan))
-    with pytest.raises(InputError, match=r"frames.0.: no joint beside the neck is seen.*give root"):
+    with pytest.raises(InputError, match=r"frames.0.: nothing bounds how far away the neck is.*give root"):
         recover(blind)
 
 

@@ -1,0 +1,153 @@
+"""Levenberg-Marquardt over a batch of postures, until each is settled."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.equations import Watch, evaluate, factor, linearise, solve
+from posekit.refinement.problem import Problem
+from posekit.refinement.state import State, Step, moved
+
+STEPS = 20
+"""Steps after which a posture is left where it is."""
+
+DAMPING = 1e-4
+"""Fraction of the diagonal that is added to it, at first."""
+
+LEAST, MOST = 1e-12, 1e6
+
+LIGHT = 0.1
+"""Damping up to which a small promise means that there is nothing left to gain."""
+
+SLOWER, FASTER = 8.0, 0.1
+
+TINY = 1e-300
+
+BLOCK = 512
+"""Postures worked on at once: their matrices stay in the processor's cache."""
+
+PRECISION = 1e-3
+"""Promised decrease of chi2 that ends the search."""
+
+
+class Descent(NamedTuple):
+    """Where the search ended.
+
+    Attributes
+    ----------
+    state : State
+    chi2 : array (N,)
+    steps : int array (N,)
+    settled : bool array (N,)
+    folds, active : int array (N,)
+        How many segments are held at right angles to their rays, and how many limits are felt.
+    """
+
+    state: State
+    chi2: Array
+    steps: NDArray[np.intp]
+    settled: NDArray[np.bool_]
+    folds: NDArray[np.intp]
+    active: NDArray[np.intp]
+
+
+def descend(
+    problem: Problem, start: State, *, steps: int = STEPS, precision: float = PRECISION, hopeless: float = np.inf
+) -> Descent:
+    """Minimise chi2 from postures; it never increases.
+
+    Levenberg 1944, Marquardt 1963, damping after Nielsen 1999. A posture is settled where a step promises less
+    than `precision` of chi2, or no step decreases it. It is given up where chi2 is beyond `hopeless` and the next
+    step does not promise to halve it.
+    """
+    search = _Search(problem, start)
+    rows = np.arange(start.root.shape[1])
+    for taken in range(steps + 1):
+        rows = np.concatenate(
+            [
+                search.advance(rows[at : at + BLOCK], precision, hopeless, last=taken == steps)
+                for at in range(0, max(len(rows), 1), BLOCK)
+            ]
+        )
+        if not rows.size:
+            break
+    return search.found
+
+
+class _Search:
+    """All postures, and how far each search has come."""
+
+    def __init__(self, problem: Problem, start: State) -> None:
+        n = start.root.shape[1]
+        self.problem, self.state = problem, start.copy()
+        self.damping, self.watch = np.full(n, DAMPING), Watch.none(n)
+        self.watching = np.zeros(n, dtype=np.bool_)
+        self.passed = np.zeros(n, dtype=np.intp)
+        chi2, active = np.empty(n), np.empty(n, dtype=np.intp)
+        for at in range(0, n, BLOCK):
+            rows = np.arange(at, min(at + BLOCK, n))
+            chi2[rows], passed = evaluate(problem.take(rows), self.state.take(rows))
+            active[rows] = passed.count()
+        none = np.zeros(n, dtype=np.intp)
+        self.found = Descent(self.state, chi2, none.copy(), np.zeros(n, dtype=np.bool_), none.copy(), active)
+
+    def advance(self, rows: NDArray[np.intp], precision: float, hopeless: float, *, last: bool) -> NDArray[np.intp]:
+        """Take a step with some postures, unless it is the last time; return which are not done."""
+        if not rows.size:
+            return rows
+        part, now, found = self.problem.take(rows), self.state.take(rows), self.found
+        watched = self.watching[rows].any()
+        here = linearise(part, now, self.watch.take(rows) if watched else None)
+        change, gain = solve(here, factor(here, self.damping[rows]))
+        chi2, damping, watching = found.chi2[rows], self.damping[rows], self.watching[rows]
+        found.folds[rows] = here.folds()
+        done = (damping > MOST) | ((gain <= precision) & (damping <= LIGHT) & ~watching)
+        found.settled[rows] = done
+        done |= ~np.isfinite(chi2) | ((chi2 > hopeless) & (gain < 0.5 * chi2) & ~watching)
+        if last:
+            return rows[:0]
+        if done.any():
+            left = np.flatnonzero(~done)
+            rows = rows[left]
+            if not rows.size:
+                return rows
+            part, now = part.take(left), now.take(left)
+            change = Step(*(None if array is None else array[..., left] for array in change))
+            tangents = None if here.limbs is None else here.limbs.tangents[..., left]
+            gain, chi2, damping = gain[left], chi2[left], damping[left]
+        else:
+            tangents = None if here.limbs is None else here.limbs.tangents
+        trial = moved(now, change, tangents)
+        value, passed = evaluate(part, trial)
+        found.steps[rows] += 1
+        better = value <= chi2
+        # A step that ran into a limit is taken anew, with that limit in its equations.
+        ran = self._run_into(rows, passed, better)
+        # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
+        with np.errstate(invalid="ignore"):
+            ratio = np.clip((chi2 - value) / np.maximum(gain, TINY), 0.0, 1.0)
+        slower = np.where(ran, 1.0, SLOWER)
+        change_by = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), slower)
+        self.damping[rows] = np.maximum(damping * change_by, LEAST)
+        good = np.flatnonzero(better)
+        self.state.put(rows[good], trial.take(good))
+        found.chi2[rows[good]] = value[good]
+        found.active[rows[good]] = passed.take(good).count()
+        return rows
+
+    def _run_into(self, rows: NDArray[np.intp], passed: Watch, better: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Watch the limits that a step which was no better ran into (N,); forget them after one that was."""
+        ran = np.zeros(len(rows), dtype=np.bool_)
+        if better.all() and not self.watching[rows].any():
+            return ran
+        for mine, theirs in zip(self.watch, passed, strict=True):
+            old = mine[..., rows]
+            new = np.where((old == 0) & ~better, theirs, 0)
+            ran |= new.reshape(-1, len(rows)).any(axis=0)
+            mine[..., rows] = np.where(better, 0, old + new)
+        self.watching[rows] = (self.watching[rows] | ran) & ~better
+        return ran

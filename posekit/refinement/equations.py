@@ -1,0 +1,237 @@
+"""The normal equations of whole postures, an arrow of small blocks, and their solution.
+
+Limbs are coupled with the trunk through their starts alone, the head through the root: each is eliminated by itself,
+a matrix of four (or six) unknowns, and what remains is a quadratic function of the trunk, whose nine (or eighteen)
+unknowns are solved last.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.anatomy import START
+from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
+from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
+from posekit.refinement.limits import Signs
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import backward, cholesky, forward
+from posekit.refinement.state import State, Step, parents, trunk_offsets
+from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
+
+FLOOR = 1e-6
+"""Added to diagonals, one over rad^2 or m^2: what nothing determines does not move."""
+
+
+class Watch(NamedTuple):
+    """Limits that are passed, or would be: 1 the upper, -1 the lower, 0 neither.
+
+    Attributes
+    ----------
+    limbs : int array (4, 4, N)
+        By angle and limb.
+    hips, head : int array (3, N)
+    """
+
+    limbs: Signs
+    hips: Signs
+    head: Signs
+
+    @staticmethod
+    def none(n: int) -> Watch:
+        """Watch nothing."""
+        return Watch(*(np.zeros((*shape, n), dtype=np.int8) for shape in ((4, 4), (3,), (3,))))
+
+    def take(self, rows: NDArray[np.intp]) -> Watch:
+        """Return some postures."""
+        return Watch(*(array[..., rows] for array in self))
+
+    def any(self) -> NDArray[np.bool_]:
+        """Return which postures have any (N,)."""
+        return (self.limbs != 0).any(axis=(0, 1)) | (self.hips != 0).any(axis=0) | (self.head != 0).any(axis=0)
+
+    def count(self) -> NDArray[np.intp]:
+        """Count the limits of each posture (N,)."""
+        return (self.limbs != 0).sum(axis=(0, 1)) + (self.hips != 0).sum(axis=0) + (self.head != 0).sum(axis=0)
+
+
+class Equations(NamedTuple):
+    """A problem linearised at some postures; limbs or head are None where they are left out."""
+
+    trunk: TrunkTerms
+    limbs: LimbTerms | None
+    head: HeadTerms | None
+
+    @property
+    def slack(self) -> Array:
+        """Squares of limits that are watched, not passed (N,): in the matrices, not in chi2."""
+        slack = self.trunk.slack
+        if self.limbs is not None:
+            slack = slack + self.limbs.slack.sum(axis=0)
+        return slack if self.head is None else slack + self.head.slack
+
+    def folds(self) -> NDArray[np.intp]:
+        """Count the segments that are held at right angles to their rays (N,)."""
+        n = len(self.trunk.chi2)
+        return np.zeros(n, dtype=np.intp) if self.limbs is None else self.limbs.folds.sum(axis=(0, 1))
+
+
+def chains_of(state: State, offsets: Array) -> Chains:
+    """Return the limbs of postures."""
+    return Chains(state.root + offsets[list(START)], parents(state), state.directions, state.limbs)
+
+
+def linearise(problem: Problem, state: State, watch: Watch | None = None) -> Equations:
+    """Linearise the problem at postures; limits that are watched are in the matrices though they are not passed."""
+    trunk = trunk_terms(problem, state, watch and watch.hips)
+    limbs = None
+    if not problem.trunk_only:
+        limbs = limb_terms(problem, chains_of(state, trunk.offsets), watch and watch.limbs)
+    head = None if problem.head_image is None else head_terms(problem, state, watch and watch.head)
+    return Equations(trunk, limbs, head)
+
+
+def evaluate(problem: Problem, state: State) -> tuple[Array, Watch]:
+    """Return chi2 of postures (N,), infinite where a joint that was seen is behind the camera, and limits passed."""
+    offsets = trunk_offsets(state)
+    passed = Watch.none(state.root.shape[1])
+    chi2, hips = trunk_chi2(problem, state, offsets)
+    passed.hips[...] = hips
+    if not problem.trunk_only:
+        by_limb, limbs = limb_chi2(problem, chains_of(state, offsets))
+        chi2 += by_limb.sum(axis=0)
+        passed.limbs[...] = limbs
+    if problem.head_image is not None:
+        of_head, head = head_chi2(problem, state)
+        chi2 += of_head
+        passed.head[...] = head
+    return np.where(chi2 < HUGE, chi2, np.inf), passed
+
+
+HUGE = 1e150
+
+
+class Reduced(NamedTuple):
+    """One block after elimination.
+
+    Attributes
+    ----------
+    factor : array (k, k, ...)
+        Cholesky factor.
+    right : array (k, 7, ...)
+        Its inverse times coupling and gradient.
+    damped : array (k, ...)
+        What was added to the diagonal.
+    """
+
+    factor: Array
+    right: Array
+    damped: Array
+
+
+def eliminate(matrix: Array, coupling: Array, gradient: Array, damping: Array | float, floor: float) -> Reduced:
+    """Factor a block (k, k, ...), damped by a fraction of its diagonal."""
+    factor = matrix.copy()
+    damped = _damp(factor, damping, floor)
+    right = np.concatenate([coupling, gradient[:, None]], axis=1)
+    return Reduced(cholesky(factor), forward(factor, right), damped) if len(factor) else Reduced(factor, right, damped)
+
+
+def left_over(reduced: Reduced, matrix: Array, gradient: Array) -> tuple[Array, Array]:
+    """Return what an eliminated block leaves of the matrix (6, 6, ...) and gradient (6, ...) that it is coupled with."""
+    coupling, own = reduced.right[:, :-1], reduced.right[:, -1]
+    return matrix - np.einsum("ki...,kj...->ij...", coupling, coupling), gradient - np.einsum(
+        "ki...,k...->i...", coupling, own
+    )
+
+
+def _damp(matrix: Array, damping: Array | float, floor: float) -> Array:
+    """Add damping and floor to the diagonal, in place; return what was added."""
+    index = np.arange(len(matrix))
+    added = matrix[index, index] * damping + floor
+    matrix[index, index] += added
+    return np.asarray(added)
+
+
+class Arrow(NamedTuple):
+    """Factored equations.
+
+    Attributes
+    ----------
+    trunk : Reduced
+        `right` is the gradient alone.
+    limbs, head : Reduced or None
+    starts : array (4, 6, C, N)
+        How the trunk's unknowns move limbs' starts and turn their parts.
+    """
+
+    trunk: Reduced
+    limbs: Reduced | None
+    head: Reduced | None
+    starts: Array | None
+
+
+def factor(here: Equations, damping: Array | float, floor: float = FLOOR) -> Arrow:
+    """Eliminate limbs and head, and factor what is left."""
+    P, g = here.trunk.points, here.trunk.pull
+    limbs = head = starts = None
+    turns = None
+    if here.limbs is not None:
+        terms = here.limbs
+        limbs = eliminate(terms.matrix, terms.coupling, terms.gradient, damping, floor)
+        start, push = left_over(limbs, terms.start, terms.start_gradient)
+        P, g = P.copy(), g.copy()
+        P[list(START)] += start[:3, :3].transpose(2, 0, 1, 3)
+        g[list(START)] += push[:3].transpose(1, 0, 2)
+        starts = start_ways(here.trunk)
+        if (terms.crossed != 0).any() or terms.slack.any():
+            turns = start, push
+    matrix, gradient = spread(here.trunk, P, g)
+    if turns is not None and starts is not None:
+        _add_turns(*turns, starts, matrix, gradient)
+    if here.head is not None:
+        head = eliminate(here.head.matrix, here.head.coupling, here.head.gradient, damping, floor)
+        more, push = left_over(head, here.head.trunk, here.head.trunk_gradient)
+        matrix[:6, :6] += more
+        gradient[:6] += push
+    none = np.zeros((len(gradient), 0, gradient.shape[1]))
+    return Arrow(eliminate(matrix, none, gradient, damping, floor), limbs, head, starts)
+
+
+def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient: Array) -> None:
+    """Add how the limits of limbs depend on the rotation of the part on which they hang."""
+    place, turn = starts[:, :3], starts[:, 3:]
+    gradient += np.einsum("licn,iln->cn", turn, push[3:])
+    both = np.einsum("licn,ijln->ljcn", place, start[:3, 3:])
+    cross = np.einsum("ljcn,ljdn->cdn", both, turn)
+    matrix += cross + cross.transpose(1, 0, 2)
+    matrix += np.einsum("licn,ijln,ljdn->cdn", turn, start[3:, 3:], turn, optimize=True)
+
+
+def solve(here: Equations, arrow: Arrow) -> tuple[Step, Array]:
+    """Solve for the step, and the decrease of chi2 that it promises (N,), watched limits left out."""
+    own = arrow.trunk.right[:, 0]
+    trunk = -backward(arrow.trunk.factor, own.copy())
+    gain = np.einsum("cn,cn->n", own, own) + np.einsum("cn,cn->n", arrow.trunk.damped, trunk * trunk)
+    limbs = head = None
+    if arrow.limbs is not None and arrow.starts is not None:
+        shift = np.einsum("licn,cn->iln", arrow.starts, trunk)
+        limbs = _follow(arrow.limbs, shift)
+        gain += _gain(arrow.limbs, limbs).sum(axis=0)
+    if arrow.head is not None:
+        head = _follow(arrow.head, trunk[:6])
+        gain += _gain(arrow.head, head)
+    return Step(trunk, limbs, head), gain - here.slack
+
+
+def _follow(block: Reduced, shift: Array) -> Array:
+    """Return the step of an eliminated block when what it is coupled with moves by `shift` (6, ...)."""
+    right = block.right[:, -1] + np.einsum("ki...,i...->k...", block.right[:, :-1], shift)
+    return -backward(block.factor, right)
+
+
+def _gain(block: Reduced, step: Array) -> Array:
+    return np.asarray((block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0))

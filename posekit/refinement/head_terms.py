@@ -1,0 +1,72 @@
+"""What the head's image points and the neck's limits say of the head, the root and the torso."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.refinement.limits import Signs, ball_limits
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import cross, dot
+from posekit.refinement.state import State, head_points
+
+
+class HeadTerms(NamedTuple):
+    """The head's part of the normal equations: its rotation (3), and root and torso's rotation (6).
+
+    Attributes
+    ----------
+    chi2 : array (N,)
+    matrix, coupling, trunk : array (3, 3, N), (3, 6, N), (6, 6, N)
+    gradient, trunk_gradient : array (3, N), (6, N)
+    crossed : int array (3, N)
+    slack : array (N,)
+    """
+
+    chi2: Array
+    matrix: Array
+    coupling: Array
+    trunk: Array
+    gradient: Array
+    trunk_gradient: Array
+    crossed: Signs
+    slack: Array
+
+
+def head_terms(problem: Problem, state: State, watch: Signs | None = None) -> HeadTerms:
+    """Linearise the head."""
+    n = state.root.shape[1]
+    offsets = head_points(state, problem.anatomy.head)
+    residual, A = problem.see_head(state.root + offsets)
+    chi2 = np.einsum("jcn,jcn->n", residual, residual)
+    turn = cross(np.broadcast_to(offsets[:, None], A.shape), A)
+    J = np.concatenate([turn, A], axis=2)  # along its rotation, then the root
+    normal, push = np.einsum("jcin,jckn->ikn", J, J), np.einsum("jcin,jcn->in", J, residual)
+    matrix, gradient = normal[:3, :3].copy(), push[:3].copy()
+    coupling, trunk, trunk_gradient = np.zeros((3, 6, n)), np.zeros((6, 6, n)), np.zeros((6, n))
+    coupling[:, :3], trunk[:3, :3], trunk_gradient[:3] = normal[:3, 3:], normal[3:, 3:], push[3:]
+    crossed, slack = np.zeros((3, n), dtype=np.int8), np.zeros(n)
+    if problem.limited:
+        ball = ball_limits(state.torso, state.head, problem.anatomy.neck_bounds, watch)
+        squared = problem.limit_deviation**-2
+        cost = ball.cost()
+        chi2 += cost * squared
+        slack = (dot(ball.residual, ball.residual) - cost) * squared
+        crossed = ball.crossed
+        if ball.jacobian is not None:
+            limit = np.einsum("ain,ajn->ijn", ball.jacobian, ball.jacobian) * squared
+            pushed = np.einsum("ain,an->in", ball.jacobian, ball.residual) * squared
+            matrix += limit
+            coupling[:, 3:] -= limit
+            trunk[3:, 3:] += limit
+            gradient += pushed
+            trunk_gradient[3:] -= pushed
+    return HeadTerms(chi2, matrix, coupling, trunk, gradient, trunk_gradient, crossed, slack)
+
+
+def head_chi2(problem: Problem, state: State) -> tuple[Array, Signs]:
+    """Return the head's chi2 (N,) and the limits of the neck that are passed (3, N)."""
+    terms = head_terms(problem, state)
+    return terms.chi2, terms.crossed

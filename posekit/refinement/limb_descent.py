@@ -1,0 +1,94 @@
+"""Limbs refined by themselves, with the trunk held: four independent searches in each row."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.descent import BLOCK, DAMPING, FASTER, LEAST, LIGHT, MOST, SLOWER, TINY
+from posekit.refinement.equations import FLOOR, eliminate
+from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import backward
+from posekit.refinement.state import moved_limbs
+
+
+class LimbFit(NamedTuple):
+    """Limbs where their searches ended.
+
+    Attributes
+    ----------
+    chains : Chains
+    chi2 : array (4, M)
+    """
+
+    chains: Chains
+    chi2: Array
+
+
+def fit_limbs(problem: Problem, start: Chains, steps: int, precision: float, hopeless: float) -> LimbFit:
+    """Minimise each limb's chi2 over its own directions and lengths; it never increases.
+
+    A limb is left where it is when its next step promises less than `precision`, or when its chi2 is beyond `hopeless`
+    and the next step does not promise to halve it.
+    """
+    n = start.start.shape[2]
+    chains = Chains(start.start, start.parent, start.directions.copy(), start.lengths.copy())
+    chi2 = np.empty((4, n))
+    for at in range(0, n, BLOCK):
+        rows = np.arange(at, min(at + BLOCK, n))
+        chi2[:, rows] = limb_chi2(problem.take(rows), chains.take(rows))[0]
+    damping = np.full((4, n), DAMPING)
+    watch = np.zeros((4, 4, n), dtype=np.int8)
+    rows = np.flatnonzero((chi2 > precision).any(axis=0))
+    for _ in range(steps):
+        left: list[NDArray[np.intp]] = []
+        for at in range(0, len(rows), BLOCK):
+            part = rows[at : at + BLOCK]
+            going = _advance(problem.take(part), chains, chi2, damping, watch, part, precision, hopeless)
+            left.append(part[going])
+        rows = np.concatenate(left) if left else rows[:0]
+        if not rows.size:
+            break
+    return LimbFit(chains, chi2)
+
+
+def _advance(
+    problem: Problem,
+    chains: Chains,
+    chi2: Array,
+    damping: Array,
+    watch: NDArray[np.int8],
+    rows: NDArray[np.intp],
+    precision: float,
+    hopeless: float,
+) -> NDArray[np.bool_]:
+    """Take a step with the limbs of some rows, in place; return which rows have limbs that are not done."""
+    now, watched, value, damped = chains.take(rows), watch[..., rows], chi2[:, rows], damping[:, rows]
+    terms = limb_terms(problem, now, watched if watched.any() else None)
+    block = eliminate(terms.matrix, terms.coupling[:, :0], terms.gradient, damped, FLOOR)
+    step = -backward(block.factor, block.right[:, -1].copy())
+    gain = (block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0) - terms.slack
+    watching = (watched != 0).any(axis=0)
+    done = (damped > MOST) | ((gain <= precision) & (damped <= LIGHT) & ~watching)
+    done |= (value > hopeless) & (gain < 0.5 * value) & ~watching
+    if done.all():
+        return np.zeros(len(rows), dtype=np.bool_)
+    step *= ~done
+    directions, lengths = moved_limbs(now.directions, now.lengths, step, terms.tangents)
+    trial, passed = limb_chi2(problem, now._replace(directions=directions, lengths=lengths))
+    better = (trial <= value) & ~done
+    new = np.where((watched == 0) & ~better & ~done, passed, 0)
+    ran = new.any(axis=0)
+    with np.errstate(invalid="ignore"):
+        ratio = np.clip((value - trial) / np.maximum(gain, TINY), 0.0, 1.0)
+    change = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), np.where(ran | done, 1.0, SLOWER))
+    damping[:, rows] = np.maximum(damped * change, LEAST)
+    watch[..., rows] = np.where(better | done, 0, watched + new)
+    chi2[:, rows] = np.where(better, trial, value)
+    chains.directions[..., rows] = np.where(better[:, None, None], directions, now.directions)
+    chains.lengths[..., rows] = np.where(better[:, None], lengths, now.lengths)
+    return np.asarray(~done.all(axis=0))

@@ -1,0 +1,207 @@
+"""What the image, the root's prior, the limits of the hips and the trunk's lengths say of root, torso and hips."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.anatomy import LEGS, START, TRUNK_SEGMENTS
+from posekit.refinement.limits import Ball, Signs, ball_limits
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import cross, dot, turned
+from posekit.refinement.state import State, trunk_offsets
+
+
+class TrunkTerms(NamedTuple):
+    """The trunk's part of the normal equations: root, torso, hips (9 unknowns), and the shape (9 more) where varied.
+
+    Attributes
+    ----------
+    chi2 : array (N,)
+    matrix, gradient : array (C, C, N), (C, N)
+        Of prior, limits and distances.
+    points, pull : array (6, 3, 3, N), (6, 3, N)
+        J'J and J'r of the trunk's image points, along their joints.
+    ways : array (6, 3, C, N)
+        How the unknowns move the joints.
+    offsets : array (6, 3, N)
+        The joints from the root.
+    crossed : int array (3, N)
+        Limits of the hips that are passed.
+    slack : array (N,)
+    """
+
+    chi2: Array
+    matrix: Array
+    gradient: Array
+    points: Array
+    pull: Array
+    ways: Array
+    offsets: Array
+    crossed: Signs
+    slack: Array
+
+
+def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> TrunkTerms:
+    """Linearise the trunk."""
+    offsets = trunk_offsets(state)
+    residual, A = problem.see(state.root + offsets, slice(0, 6))
+    n, width = state.root.shape[1], problem.trunk_width
+    matrix, gradient = np.zeros((width, width, n)), np.zeros((width, n))
+    W, away = problem.root_weight, _root(problem, state)
+    matrix[:3, :3] = np.einsum("kin,kjn->ijn", W, W)
+    gradient[:3] = np.einsum("kin,kn->in", W, away)
+    chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
+    crossed, slack = np.zeros((3, n), dtype=np.int8), np.zeros(n)
+    if problem.limited:
+        ball = ball_limits(state.torso, state.hips, problem.anatomy.pelvis_bounds, watch)
+        squared = problem.limit_deviation**-2
+        _add_ball(ball, squared, matrix, gradient)
+        cost = ball.cost()
+        chi2 += cost * squared
+        slack = (dot(ball.residual, ball.residual) - cost) * squared
+        crossed = ball.crossed
+    if problem.shape_weight is not None:
+        stretch, J = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
+        matrix[9:, 9:] += np.einsum("kin,kjn->ijn", J, J)
+        gradient[9:] += np.einsum("kin,kn->in", J, stretch)
+        chi2 += np.einsum("kn,kn->n", stretch, stretch)
+    return TrunkTerms(
+        chi2=chi2,
+        matrix=matrix,
+        gradient=gradient,
+        points=np.einsum("jcin,jckn->jikn", A, A),
+        pull=np.einsum("jcin,jcn->jin", A, residual),
+        ways=_ways(problem, state, offsets),
+        offsets=offsets,
+        crossed=crossed,
+        slack=slack,
+    )
+
+
+def trunk_chi2(problem: Problem, state: State, offsets: Array) -> tuple[Array, Signs]:
+    """Return the trunk's chi2 (N,) and the limits of the hips that are passed (3, N)."""
+    residual, away = problem.miss(state.root + offsets, slice(0, 6)), _root(problem, state)
+    chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
+    crossed = np.zeros((3, len(chi2)), dtype=np.int8)
+    if problem.limited:
+        ball = ball_limits(state.torso, state.hips, problem.anatomy.pelvis_bounds)
+        chi2 += ball.cost() / problem.limit_deviation**2
+        crossed = ball.crossed
+    if problem.shape_weight is not None:
+        stretch, _ = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
+        chi2 += np.einsum("kn,kn->n", stretch, stretch)
+    return chi2, crossed
+
+
+def spread(terms: TrunkTerms, P: Array, g: Array) -> tuple[Array, Array]:
+    """Carry matrices (6, 3, 3, N) and gradients (6, 3, N) at the trunk's joints to its unknowns, with its own terms.
+
+    With the curvature of turning: a joint at x from the axis, pushed outward, resists as `limb_terms` says.
+    """
+    moving = np.einsum("jikn,jkcn->jicn", P, terms.ways)
+    matrix = np.einsum("jicn,jidn->cdn", terms.ways, moving)
+    matrix += terms.matrix
+    gradient = np.einsum("jicn,jin->cn", terms.ways, g)
+    gradient += terms.gradient
+    x, y = terms.offsets[1:4], terms.offsets[4:] - terms.offsets[3]
+    torso = g[1:4].copy()
+    torso[2] += g[4] + g[5]
+    for first, arm, push in ((3, x, torso), (6, y, g[4:])):
+        outward = np.maximum(-dot(arm, push), 0.0)
+        square = dot(arm, arm)
+        share = outward / np.where(square > 0, square, 1.0)
+        matrix[first : first + 3, first : first + 3] -= np.einsum("jn,jin,jkn->ikn", share, arm, arm)
+        total = outward.sum(axis=0)
+        for i in range(first, first + 3):
+            matrix[i, i] += total
+    return matrix, gradient
+
+
+def start_ways(terms: TrunkTerms) -> Array:
+    """Return how the trunk's unknowns move limbs' starts and turn their parts (4, 6, C, N)."""
+    width, n = terms.ways.shape[2:]
+    out = np.zeros((4, 6, width, n))
+    out[:, :3] = terms.ways[list(START)]
+    for limb in range(4):
+        first = 6 if limb >= LEGS.start else 3
+        for i in range(3):
+            out[limb, 3 + i, first + i] = 1.0
+    return out
+
+
+def _root(problem: Problem, state: State) -> Array:
+    return turned(problem.root_weight, state.root - problem.root)
+
+
+def _ways(problem: Problem, state: State, offsets: Array) -> Array:
+    ways = np.zeros((6, 3, problem.trunk_width, state.root.shape[1]))
+    for i in range(3):
+        ways[:, i, i] = 1.0
+    _turning(offsets[1:4], ways[1:4, :, 3:6])
+    _turning(offsets[[3, 3]], ways[4:, :, 3:6])
+    _turning(offsets[4:] - offsets[3], ways[4:, :, 6:9])
+    if problem.shape_weight is not None:
+        ways[..., 9:, :] = shape_ways(state)
+    return ways
+
+
+def _turning(x: Array, out: Array) -> None:
+    """Write the derivative of w x x (J, 3, N) along w."""
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, i, j], out[:, j, i] = x[:, k], -x[:, k]
+
+
+def _add_ball(ball: Ball, squared: float, matrix: Array, gradient: Array) -> None:
+    if ball.jacobian is None:
+        return
+    normal = np.einsum("ain,ajn->ijn", ball.jacobian, ball.jacobian) * squared
+    push = np.einsum("ain,an->in", ball.jacobian, ball.residual) * squared
+    torso, hips = slice(3, 6), slice(6, 9)
+    matrix[torso, torso] += normal
+    matrix[hips, hips] += normal
+    matrix[torso, hips] -= normal
+    matrix[hips, torso] -= normal
+    gradient[torso] -= push
+    gradient[hips] += push
+
+
+def shape_ways(state: State) -> Array:
+    """Return how the nine numbers of the shape move the trunk's joints (6, 3, 9, N)."""
+    ways = np.zeros((6, 3, 9, state.root.shape[1]))
+    forward, left, up = state.torso[:, 0], state.torso[:, 1], state.torso[:, 2]
+    ways[3:, :, 0] = -up
+    for shoulder, first in ((1, 2), (2, 4)):
+        ways[shoulder, :, 1], ways[shoulder, :, first], ways[shoulder, :, first + 1] = forward, left, up
+    ways[4:, :, 6] = -state.hips[:, 2]
+    ways[4, :, 7] = ways[5, :, 8] = state.hips[:, 1]
+    return ways
+
+
+def _distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
+    """Return the residuals (9, N) of the trunk's distances and their derivative (9, 9, N) along the shape."""
+    points, mine = np.einsum("jis,sn->jin", _PLACES, shape), _PLACES @ own
+    residual, J = np.empty_like(shape), np.empty((9, *shape.shape))
+    for row, (i, j) in enumerate(TRUNK_SEGMENTS):
+        apart = points[j] - points[i]
+        square = dot(apart, apart)
+        residual[row] = weight[row] * 0.5 * np.log(square / ((mine[j] - mine[i]) ** 2).sum())
+        J[row] = weight[row] * np.einsum("in,is->sn", apart, _PLACES[j] - _PLACES[i]) / square
+    return residual, J
+
+
+def _places() -> NDArray[np.float64]:
+    """Return how the shape places torso and hips (6, 3, 9) with both parts' axes alike: for distances in one part."""
+    places = np.zeros((6, 3, 9))
+    places[3:, 2, 0] = -1.0
+    for shoulder, first in ((1, 2), (2, 4)):
+        places[shoulder, 0, 1] = places[shoulder, 1, first] = places[shoulder, 2, first + 1] = 1.0
+    places[4:, 2, 6] = -1.0
+    places[4, 1, 7] = places[5, 1, 8] = 1.0
+    return places
+
+
+_PLACES = _places()
