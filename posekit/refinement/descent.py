@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.refinement.equations import Watch, evaluate, factor, linearise, solve
+from posekit.refinement.equations import Watch, evaluate, linearise, solve
 from posekit.refinement.problem import Problem
 from posekit.refinement.state import State, Step, moved
 
@@ -102,7 +102,7 @@ class _Search:
         part, now, found = self.problem.take(rows), self.state.take(rows), self.found
         watched = self.watching[rows].any()
         here = linearise(part, now, self.watch.take(rows) if watched else None)
-        change, gain = solve(here, factor(here, self.damping[rows]))
+        change, gain = solve(here, self.damping[rows])
         chi2, damping, watching = found.chi2[rows], self.damping[rows], self.watching[rows]
         found.folds[rows] = here.folds()
         done = (damping > MOST) | ((gain <= precision) & (damping <= LIGHT) & ~watching)

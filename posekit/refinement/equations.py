@@ -157,28 +157,27 @@ def _damp(matrix: Array, damping: Array | float, floor: float) -> Array:
 
 
 class Arrow(NamedTuple):
-    """Factored equations.
+    """The equations of the trunk when limbs and head are eliminated.
 
     Attributes
     ----------
-    trunk : Reduced
-        `right` is the gradient alone.
+    matrix, gradient : array (C, C, N), (C, N)
     limbs, head : Reduced or None
-    starts : array (4, 6, C, N)
+    starts : array (4, 6, C, N) or None
         How the trunk's unknowns move limbs' starts and turn their parts.
     """
 
-    trunk: Reduced
+    matrix: Array
+    gradient: Array
     limbs: Reduced | None
     head: Reduced | None
     starts: Array | None
 
 
-def factor(here: Equations, damping: Array | float, floor: float = FLOOR) -> Arrow:
-    """Eliminate limbs and head, and factor what is left."""
+def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> Arrow:
+    """Eliminate limbs and head."""
     P, g = here.trunk.points, here.trunk.pull
-    limbs = head = starts = None
-    turns = None
+    limbs = head = starts = turns = None
     if here.limbs is not None:
         terms = here.limbs
         limbs = eliminate(terms.matrix, terms.coupling, terms.gradient, damping, floor)
@@ -197,8 +196,7 @@ def factor(here: Equations, damping: Array | float, floor: float = FLOOR) -> Arr
         more, push = left_over(head, here.head.trunk, here.head.trunk_gradient)
         matrix[:6, :6] += more
         gradient[:6] += push
-    none = np.zeros((len(gradient), 0, gradient.shape[1]))
-    return Arrow(eliminate(matrix, none, gradient, damping, floor), limbs, head, starts)
+    return Arrow(matrix, gradient, limbs, head, starts)
 
 
 def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient: Array) -> None:
@@ -211,23 +209,24 @@ def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient
     matrix += np.einsum("licn,ijln,ljdn->cdn", turn, start[3:, 3:], turn, optimize=True)
 
 
-def solve(here: Equations, arrow: Arrow) -> tuple[Step, Array]:
+def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
     """Solve for the step, and the decrease of chi2 that it promises (N,), watched limits left out."""
-    own = arrow.trunk.right[:, 0]
-    trunk = -backward(arrow.trunk.factor, own.copy())
-    gain = np.einsum("cn,cn->n", own, own) + np.einsum("cn,cn->n", arrow.trunk.damped, trunk * trunk)
+    arrow = assemble(here, damping)
+    last = eliminate(arrow.matrix, arrow.matrix[:, :0], arrow.gradient, damping, FLOOR)
+    own = last.right[:, 0]
+    trunk = -backward(last.factor, own.copy())
+    gain = np.einsum("cn,cn->n", own, own) + np.einsum("cn,cn->n", last.damped, trunk * trunk)
     limbs = head = None
     if arrow.limbs is not None and arrow.starts is not None:
-        shift = np.einsum("licn,cn->iln", arrow.starts, trunk)
-        limbs = _follow(arrow.limbs, shift)
+        limbs = follow(arrow.limbs, np.einsum("licn,cn->iln", arrow.starts, trunk))
         gain += _gain(arrow.limbs, limbs).sum(axis=0)
     if arrow.head is not None:
-        head = _follow(arrow.head, trunk[:6])
+        head = follow(arrow.head, trunk[:6])
         gain += _gain(arrow.head, head)
     return Step(trunk, limbs, head), gain - here.slack
 
 
-def _follow(block: Reduced, shift: Array) -> Array:
+def follow(block: Reduced, shift: Array) -> Array:
     """Return the step of an eliminated block when what it is coupled with moves by `shift` (6, ...)."""
     right = block.right[:, -1] + np.einsum("ki...,i...->k...", block.right[:, :-1], shift)
     return -backward(block.factor, right)

@@ -139,13 +139,9 @@ def refine(
         limb_weight=limb_weight,
     )
     skull = None if head is None else _heads(head, len(points), frames)
-    start = state_of(anatomy, positions, skull)
-    del spread
-    first, second = chi2_of(problem, start), _again(problem, start, positions[:, :6], frames, steps, precision)
-    laid = chi2_of(problem, second)
-    second.put(np.flatnonzero(laid > first), start.take(np.flatnonzero(laid > first)))
-    found = descend(problem, second, steps=steps, precision=precision, hopeless=hopeless)
-    return _refined(figure, problem, frames, found, first, placeable)
+    factors = factor_postures(frames, positions)
+    found = _search(problem, anatomy, positions, skull, factors, steps, precision, hopeless)
+    return _refined(figure, problem, frames, found, placeable)
 
 
 HELD = 1e6
@@ -155,15 +151,57 @@ FAR = 1e3
 """Metres: stands for the joints of survivors that cannot be placed."""
 
 
-def _again(
-    problem: Problem, start: State, trunk: Array, frames: NDArray[np.intp], steps: int, precision: float
-) -> State:
-    """Refine torso and hips alone, each different trunk once, and lay the limbs on their rays again."""
-    far = sides(problem.optics, start)
-    one, which = distinct(np.concatenate([frames[:, None], trunk.reshape(len(trunk), -1)], axis=1))
-    found = descend(problem.take(one).trunk_alone(), start.take(one), steps=steps, precision=precision)
-    trunks = found.state.take(which)
-    return relift(problem, trunks._replace(directions=start.directions, limbs=start.limbs), far)
+class _Found(NamedTuple):
+    """Where the search began and ended."""
+
+    descent: Descent
+    first: Array
+
+
+def _search(
+    problem: Problem,
+    anatomy: Anatomy,
+    postures: Array,
+    skull: Array | None,
+    factors: Factors,
+    steps: int,
+    precision: float,
+    hopeless: float,
+) -> _Found:
+    """Refine trunks, then limbs on them, then survivors."""
+    one = factors.trunk
+    start = state_of(anatomy, postures[one], None if skull is None else skull[one])
+    trunk_problem = problem.take(one).trunk_alone()
+    rows = problem.take(one[factors.row_trunk])
+    limbs = _limbs_of(anatomy, postures, factors, start)
+    first = _first_chi2(trunk_problem, rows, start, limbs, factors)
+    trunks = descend(trunk_problem, start, steps=steps, precision=precision)
+    far = sides(problem.optics.take(one[factors.row_trunk]), limbs.start, limbs.directions, limbs.lengths)
+    held = chains_of(trunks.state.take(factors.row_trunk)._replace(directions=limbs.directions, limbs=limbs.lengths))
+    fit = fit_limbs(rows, relift(rows, held, far), steps, precision, hopeless)
+    joined = join(problem, rows, trunks, fit, factors, precision=precision, hopeless=hopeless)
+    found = Descent(
+        joined.state,
+        joined.chi2,
+        trunks.steps[factors.trunk_of] + 1,
+        joined.settled,
+        joined.folds,
+        joined.active,
+    )
+    worse = np.flatnonzero(~(joined.chi2 <= first))
+    if worse.size:
+        again = _assembled_start(start, limbs, factors, worse)
+        joined.state.put(worse, again)
+        found.chi2[worse] = first[worse]
+    open_ = ~joined.settled & (joined.chi2 <= hopeless)
+    open_[worse] = True
+    rest = np.flatnonzero(open_)
+    if rest.size:
+        more = descend(problem.take(rest), joined.state.take(rest), steps=steps, precision=precision, hopeless=hopeless)
+        joined.state.put(rest, more.state)
+        for mine, theirs in zip(found[1:], more[1:], strict=True):
+            mine[rest] = theirs
+    return _Found(found, first)
 
 
 def _refined(

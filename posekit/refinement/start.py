@@ -7,11 +7,12 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure.frames import fit_rotation
-from posekit.refinement.anatomy import END, LIMBS, MIDDLE, START, Anatomy
+from posekit.refinement.anatomy import END, LIMBS, MIDDLE, Anatomy
+from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import dot
-from posekit.refinement.state import State, place
+from posekit.refinement.state import State
 
 HANGING = 2
 """The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
@@ -65,39 +66,37 @@ def _batch_last(array: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(array, 0, -1))
 
 
-def sides(optics: Optics, state: State) -> NDArray[np.bool_]:
-    """Return whether limbs' segments point away from the camera (4, 2, N): their ends lie behind the ray's middle."""
+def sides(optics: Optics, starts: Array, directions: Array, lengths: Array) -> NDArray[np.bool_]:
+    """Return whether limbs' segments (4, 2, N) point away from the camera: their ends lie behind the ray's middle."""
     if not optics.perspective:
-        return np.asarray(state.directions[:, :, 2] > 0)
-    joints = place(state).joints
-    ends = np.stack([joints[list(MIDDLE)], joints[list(END)]], axis=1)
-    return dot(state.directions, ends) > 0
+        return np.asarray(directions[:, :, 2] > 0)
+    middle = starts + lengths[:, 0, None] * directions[:, 0]
+    end = middle + lengths[:, 1, None] * directions[:, 1]
+    return np.asarray(dot(directions, np.stack([middle, end], axis=1)) > 0)
 
 
-def relift(problem: Problem, state: State, far: NDArray[np.bool_]) -> State:
-    """Lay the limbs of postures on their rays again, each segment to the side `far` (4, 2, N) that it had.
+def relift(problem: Problem, chains: Chains, far: NDArray[np.bool_]) -> Chains:
+    """Lay limbs on their rays, each segment to its side `far` (4, 2, N).
 
     Where the ray is out of reach, the segment points to the nearest place on it. Where a joint was not seen, or its
     ray is behind, the segment keeps its direction.
     """
-    joints = place(state).joints
-    directions = state.directions.copy()
-    start = joints[list(START)]
+    directions = chains.directions.copy()
+    start = chains.start
     for segment, ends in enumerate((MIDDLE, END)):
         seen = problem.weight[list(ends)] > 0
-        length = state.limbs[:, segment]
+        length = chains.lengths[:, segment]
         along = _lifted(problem.optics, problem.image[list(ends)], start, length, far[:, segment])
         good = seen & np.isfinite(along).all(axis=1)
         directions[:, segment] = np.where(good[:, None], along, directions[:, segment])
         start = start + length[:, None] * directions[:, segment]
-    return state._replace(directions=directions)
+    return chains._replace(directions=directions)
 
 
 def _lifted(optics: Optics, image: Array, start: Array, length: Array, far: NDArray[np.bool_]) -> Array:
     """Return the directions (4, 3, N) from starts (4, 3, N) to where rays meet the segments' spheres."""
     ray, foot = optics.rays(image, start)
     apart = foot - start
-    height = np.sqrt(dot(apart, apart))
-    half = np.sqrt(np.maximum(length * length - height * height, 0.0))
+    half = np.sqrt(np.maximum(length * length - dot(apart, apart), 0.0))
     along = apart + np.where(far, half, -half)[:, None] * ray
     return np.asarray(along / np.sqrt(dot(along, along))[:, None])

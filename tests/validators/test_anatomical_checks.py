@@ -10,11 +10,12 @@ import pytest
 from posekit.figure import load_figure
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS, SIDES
 from posekit.tree import Check
-from posekit.validators import Ranges, joint_range, load_ranges
+from posekit.validators import Ranges, Validator, joint_range, load_ranges
 from posekit.validators.anatomical import Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
 
 FIGURE = load_figure()
+MODEL = FIGURE.model
 TABLE = load_ranges("anatomical")
 assert TABLE.anatomy is not None
 ANATOMY: Anatomy = TABLE.anatomy
@@ -358,3 +359,16 @@ def test_an_empty_batch_is_judged() -> None:
     for check in CHECKS:
         findings = check.judge(np.empty((0, len(check.points), 3)))
         assert findings.violated.shape == (0, len(check.where))
+
+
+def test_configurations_are_judged_as_the_postures_they_give() -> None:
+    """Couplings are no limits of single angles: q alone must not slip past them."""
+    rng = np.random.default_rng(8)
+    lower, upper = (np.degrees(limit[7:]) for limit in (MODEL.lowerPositionLimit, MODEL.upperPositionLimit))
+    q = np.tile(pin.neutral(MODEL), (200, 1))
+    q[:, 7:] = np.radians(rng.uniform(0.7 * lower, 0.7 * upper, size=(200, len(lower))))
+    validator = Validator(ranges="anatomical", checks=("joint-range",))
+    of_q = validator.check(q=q).verdicts
+    points = FIGURE.forward_kinematics(q)
+    assert of_q == validator.check(points[:, :14], points[:, 14:]).verdicts
+    assert {"valid", "invalid"} <= set(of_q)

@@ -69,7 +69,7 @@ class FigureConfigurations:
         for name in self.checks:
             if name == "collision":
                 judgements.append(self.collision.judge(checked))
-            elif name == "joint-range" and self.ranges.kind == "configuration":
+            elif name == "joint-range" and not self._of_postures:
                 judgements.append(self._joint_range(checked))
             elif name.replace("-", "_") in by_name:
                 judgements.append(by_name[name.replace("-", "_")])
@@ -96,7 +96,12 @@ class FigureConfigurations:
         return SelfCollision(subject=self.subject, contact_margin=self.contact_margin)
 
     def _projects(self, check: Check) -> bool:
-        return check.name == "joint_range" and self.ranges.kind == "projected"
+        return check.name == "joint_range" and self._of_postures
+
+    @property
+    def _of_postures(self) -> bool:
+        """Whether ranges are of postures, and not only limits of single angles."""
+        return self.ranges.kind == "projected" or self.ranges.anatomy is not None
 
     def _joint_range(self, q: Array) -> Judgement:
         judgement = judge_joint_range(self.subject, q, tolerance=self.angle_tolerance)
