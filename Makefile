@@ -50,7 +50,7 @@ $(VENV)/runtime.stamp: pyproject.toml constraints.txt | $(BIN)/python
 
 $(VENV)/dev.stamp: $(VENV)/runtime.stamp
 	@echo "Installing the tools for tests and docs into $(VENV)"
-	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[dev,docs]'
+	@$(PIP_INSTALL) -c constraints.txt --no-build-isolation -e '.[dev,docs,witnesses]'
 	@touch $@
 
 .PHONY: venv

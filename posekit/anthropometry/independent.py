@@ -10,8 +10,8 @@ from posekit.cameras import Array
 
 FADED: Final = 0.05
 """Correlation at which neighbours count as strangers."""
-SCATTER: Final = 1.07
-"""Standard deviation of that variance in a sample of one, relative: what it scatters by in T frames is over sqrt(T)."""
+ENOUGH: Final = 0.5
+"""Share of the usual variance at which a segment has turned enough: samples scatter, and so does the noise."""
 
 
 def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Array:
@@ -19,8 +19,8 @@ def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Arr
 
     Two things make them fewer than frames. Neighbours in a film are alike (`unlike_neighbours`). And a segment that
     keeps to one direction, as the shoulders of somebody who walks by, shows one however long it is filmed: where the
-    squared cosine varies less than is usual, any two frames are correlated by what is missing, and n
-    frames so correlated by r count as :math:`n / (1 + (n - 1) r)`.
+    squared cosine varies less than half of what is usual, any two frames are taken to be correlated by what is
+    missing, and n frames so correlated by r count as :math:`n / (1 + (n - 1) r)`.
 
     Parameters
     ----------
@@ -40,8 +40,7 @@ def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Arr
     count = known.sum(axis=0)
     blur = np.where(known, noise, 0.0).sum(axis=0) / np.maximum(count, 1)
     neighbours, variance = unlike_neighbours(squared_cosine, blur)
-    missing = 1 - variance / usual - 2 * SCATTER / np.sqrt(np.maximum(neighbours, 1))
-    shared = np.clip(missing, 0.0, 1.0)
+    shared = np.clip(1 - variance / (ENOUGH * usual), 0.0, 1.0)
     return np.where(count > 0, np.maximum(neighbours / (1 + (neighbours - 1) * shared), 1.0), 0.0)
 
 

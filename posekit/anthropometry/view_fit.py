@@ -13,7 +13,9 @@ from posekit.anthropometry.view_likelihood import ViewLikelihood
 from posekit.cameras import Array
 
 PASSES: Final = 2
-STEPS: Final = 15
+STEPS: Final = 40
+SHARE: Final = 0.5
+"""Of a step that is taken: the information is that of a sample, and whole steps overshoot."""
 CONVERGED: Final = 0.01
 """Squared length of a step, in standard deviations, at which it is no use to go on."""
 
@@ -52,7 +54,6 @@ def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> Fi
         independent = independent_frames(*likelihood.squared_cosines(y), usual_variance)
         usual = float(np.median(independent[independent > 0]))
         weight = np.concatenate([independent, np.full(2, usual)]) / frames
-        share, before = 1.0, np.inf
         for _ in range(STEPS):
             slopes = likelihood.slopes(y)
             slope = weight * slopes.sum(axis=0) - precision @ (y - start)
@@ -62,9 +63,7 @@ def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> Fi
             left = float(slope @ step)
             if left < CONVERGED:
                 break
-            share = share / 2 if left > before else share
-            before = left
-            y = y + share * np.clip(step, -0.2, 0.2)
+            y = y + SHARE * np.clip(step, -0.2, 0.2)
     return Fit(
         y=y,
         covariance=np.asarray(np.linalg.inv(information), dtype=np.float64),

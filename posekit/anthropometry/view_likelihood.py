@@ -21,6 +21,7 @@ DISTANCE: Final = 4.5
 """Metres to the camera, where the focal length does not say."""
 JOINT_NOISE: Final = 0.015
 """Metres by which detectors are off a joint, a coordinate: their errors grow with a person's size in the picture."""
+LONGEST: Final = 0.95
 SHIFT: Final = 0.01
 """Step of the differences that give slopes: the tables are exact to less, and the likelihood is wider."""
 
@@ -158,12 +159,23 @@ class ViewLikelihood:
         return slopes
 
     def squared_cosines(self, y: Array) -> tuple[Array, Array]:
-        """Return the squared cosine of each segment to the line of sight (T, M), and its variance by noise (T, M)."""
-        p = Parameters.from_vector(y)
+        """Return the squared cosine of each segment to the line of sight (T, M), and its variance by noise (T, M).
+
+        As if each had its full length in the frame that shows it longest but for a twentieth of the frames: a length
+        that is not known yet cannot say how much a segment turned.
+        """
         scale = self.posterior_scales(y)
-        full = np.exp(scale[:, None] + p.dimensions)
-        x = np.minimum(self.seen / full, 1.0)
-        return 1 - x * x, (2 * x) ** 2 * 2 * self.blur(scale)[:, None] ** 2 / full**2
+        metres = self.seen / np.exp(scale)[:, None]
+        known = np.isfinite(metres)
+        full = np.array(
+            [
+                np.quantile(one[k], LONGEST) if k.any() else 1.0
+                for one, k in zip(metres.T, known.T, strict=True)
+            ]
+        )
+        full = np.maximum(full, 1e-6)
+        x = np.minimum(metres / full, 1.0)
+        return 1 - x * x, (2 * x) ** 2 * 2 * (self.blur(scale) / np.exp(scale))[:, None] ** 2 / full**2
 
     def posterior_scales(self, y: Array) -> Array:
         """Return the mean of the logarithm of each picture's scale (T,)."""

@@ -79,8 +79,9 @@ class Equations(NamedTuple):
         return np.zeros(n, dtype=np.intp) if self.limbs is None else self.limbs.folds.sum(axis=(0, 1))
 
 
-def chains_of(state: State, offsets: Array) -> Chains:
-    """Return the limbs of postures."""
+def chains_of(state: State, offsets: Array | None = None) -> Chains:
+    """Return the limbs of postures, whose trunks' offsets may be known already."""
+    offsets = trunk_offsets(state) if offsets is None else offsets
     return Chains(state.root + offsets[list(START)], parents(state), state.directions, state.limbs)
 
 

@@ -13,7 +13,7 @@ from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.refinement.covariance import covariances
 from posekit.refinement.problem import Problem
-from posekit.refinement.start import state_of
+from posekit.refinement.start import limb_directions, state_of
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import SEGMENTS
 
@@ -104,7 +104,9 @@ class Refined:
     @cached_property
     def covariance(self) -> Array:
         """The covariance of every joint (N, 14, 3, 3), square metres, to first order: see `covariances`."""
-        return covariances(self.problem, state_of(self.problem.anatomy, self.joints, self.head))
+        state = state_of(self.problem.anatomy, self.joints, self.head)
+        rows = np.tile(np.arange(len(self)), (4, 1))
+        return covariances(self.problem, state._replace(directions=limb_directions(self.joints, rows, state)))
 
     @property
     def deviation(self) -> Array:

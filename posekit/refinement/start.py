@@ -12,14 +12,14 @@ from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import dot
-from posekit.refinement.state import State
+from posekit.refinement.state import State, parents
 
 HANGING = 2
 """The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
 
 
 def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> State:
-    """Turn postures (N, 14, 3) and heads (N, 5, 3) into states: the figure's trunk laid onto theirs, their directions.
+    """Lay the figure's torso, hips and head onto those of postures (N, 14, 3) and heads (N, 5, 3); limbs are left open.
 
     What is NaN is put in its neutral place; the neck must be known.
     """
@@ -35,23 +35,32 @@ def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> St
     if head is not None:
         skull = _laid(anatomy.head, head - postures[:, :1])
         skull = np.where(np.isnan(skull), torso, skull)
-    directions = np.empty((4, 2, 3, n))
-    for limb, joints in enumerate(LIMBS):
-        hanging = -(torso if limb < 2 else hips)[:, :, HANGING].T
-        for segment in range(2):
-            along = (postures[:, joints[segment + 1]] - postures[:, joints[segment]]).T
-            far = np.sqrt(dot(along, along))
-            known = far > 0
-            directions[limb, segment] = np.where(known, along / np.where(known, far, 1.0), hanging)
+    rotations = [_batch_last(rotation) for rotation in (torso, hips, skull)]
     return State(
         root=postures[:, 0].T.copy(),
-        torso=_batch_last(torso),
-        hips=_batch_last(hips),
-        head=_batch_last(skull),
-        directions=directions,
+        torso=rotations[0],
+        hips=rotations[1],
+        head=rotations[2],
+        directions=np.zeros((4, 2, 3, n)),
         shape=shape,
         limbs=np.repeat(anatomy.limbs[:, :, None], n, axis=2),
     )
+
+
+def limb_directions(postures: Array, rows: NDArray[np.intp], state: State) -> Array:
+    """Return the directions of limbs (4, 2, 3, M): of each kind those of some postures (4, M), on trunks (M).
+
+    A segment whose ends are not known hangs along its part.
+    """
+    out = np.empty((4, 2, 3, rows.shape[1]))
+    hanging = -parents(state)[:, :, HANGING]
+    for limb, joints in enumerate(LIMBS):
+        for segment in range(2):
+            along = (postures[rows[limb], joints[segment + 1]] - postures[rows[limb], joints[segment]]).T
+            far = np.sqrt(dot(along, along))
+            known = far > 0
+            out[limb, segment] = np.where(known, along / np.where(known, far, 1.0), hanging[limb])
+    return out
 
 
 def _laid(own: Array, seen: Array) -> Array:
@@ -66,13 +75,13 @@ def _batch_last(array: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(array, 0, -1))
 
 
-def sides(optics: Optics, starts: Array, directions: Array, lengths: Array) -> NDArray[np.bool_]:
+def sides(optics: Optics, chains: Chains) -> NDArray[np.bool_]:
     """Return whether limbs' segments (4, 2, N) point away from the camera: their ends lie behind the ray's middle."""
     if not optics.perspective:
-        return np.asarray(directions[:, :, 2] > 0)
-    middle = starts + lengths[:, 0, None] * directions[:, 0]
-    end = middle + lengths[:, 1, None] * directions[:, 1]
-    return np.asarray(dot(directions, np.stack([middle, end], axis=1)) > 0)
+        return np.asarray(chains.directions[:, :, 2] > 0)
+    middle = chains.start + chains.lengths[:, 0, None] * chains.directions[:, 0]
+    end = middle + chains.lengths[:, 1, None] * chains.directions[:, 1]
+    return np.asarray(dot(chains.directions, np.stack([middle, end], axis=1)) > 0)
 
 
 def relift(problem: Problem, chains: Chains, far: NDArray[np.bool_]) -> Chains:

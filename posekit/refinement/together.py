@@ -95,7 +95,7 @@ def join(
     precision, hopeless : float
         See `posekit.refinement.descent.descend`.
     """
-    state = _assembled(trunks.state, fit.chains, factors)
+    state = put_together(trunks.state, fit.chains, factors)
     by_limb = np.stack([fit.chi2[k, factors.row_of[k]] for k in range(4)])
     chi2 = trunks.chi2[factors.trunk_of] + by_limb.sum(axis=0)
     limbs = _limb_tables(rows, trunks.state.take(factors.row_trunk), fit.chains)
@@ -119,7 +119,8 @@ def join(
     return Together(state, chi2, settled, folds, active)
 
 
-def _assembled(trunks: State, chains: Chains, factors: Factors) -> State:
+def put_together(trunks: State, chains: Chains, factors: Factors) -> State:
+    """Return survivors (N) from trunks (T) and rows of limbs (M)."""
     directions = np.stack([chains.directions[k][..., factors.row_of[k]] for k in range(4)])
     lengths = np.stack([chains.lengths[k][..., factors.row_of[k]] for k in range(4)])
     return trunks.take(factors.trunk_of)._replace(directions=directions, limbs=lengths)

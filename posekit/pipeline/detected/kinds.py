@@ -8,15 +8,20 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from posekit.errors import InputError
-from posekit.files.npz import open_npz
-from posekit.files.result_npz import MAX_PADDED
-from posekit.intake import read_toml, refusal
+from posekit.calibration.reading import SUFFIXES
+from posekit.intake import cut, nearest, refusal, shown
+from posekit.intake.regular_file import check_file, unreadable
 from posekit.keypoints import Given, formats, is_format
 from posekit.motion import motion_formats
-
-CAMERA_ENDS: Final = (".yml", ".yaml", ".xml", ".txt", ".jpg", ".jpeg")
-"""Ends of files that can only be cameras'."""
+from posekit.pipeline.detected.structure import (
+    LARGEST,
+    first_line,
+    has_matrix,
+    is_camera_npz,
+    is_in_space,
+    is_survivors,
+    schema,
+)
 
 
 class Kind(StrEnum):
@@ -29,7 +34,7 @@ class Kind(StrEnum):
     SURVIVORS = "a table of survivors"
     KEY_POINTS = "key points"
     MOTION = "motion"
-    CAMERA = "a camera"
+    CAMERA = "cameras"
     OTHER = "another file of posekit"
 
 
@@ -69,20 +74,25 @@ def kind_of(path: str | Path, format: str = "") -> What:
         Where it cannot be read, or is nothing that is known.
     """
     path = Path(path)
+    folder = _is_folder(path)
     if format:
         return _said(path, format)
-    schema = _schema(path)
-    if schema.startswith("posekit."):
-        return What(kind=SCHEMAS.get(schema.partition("/")[0], Kind.OTHER), schema=schema)
+    if folder:
+        return _of_folder(path)
+    named = schema(path)
+    if named.startswith("posekit."):
+        return What(kind=SCHEMAS.get(named.partition("/")[0], Kind.OTHER), schema=named)
+    if is_survivors(path):
+        return What(kind=Kind.SURVIVORS, formats=(path.suffix.lower().removeprefix("."),))
+    if is_camera_npz(path):
+        return What(kind=Kind.CAMERA)
     found = [
         *((Kind.KEY_POINTS, name) for name in _suiting(path)),
         *((Kind.MOTION, name) for name in _motions(path)),
     ]
-    if not found and path.suffix.lower() in (*CAMERA_ENDS, ".toml", ".json", ".npz"):
-        return What(kind=Kind.CAMERA)
+    found = found or _by_name(path)
     if not found:
-        known = ", ".join([*formats(), *motion_formats()])
-        raise refusal(path, "", "a file of no known format", known, "say which with --format")
+        return _nothing_known(path)
     kinds = {kind for kind, _ in found}
     names = tuple(dict.fromkeys(name for _, name in found))
     if len(kinds) > 1:
@@ -92,49 +102,82 @@ def kind_of(path: str | Path, format: str = "") -> What:
     return What(kind=kinds.pop(), formats=names)
 
 
+def _is_folder(path: Path) -> bool:
+    """Tell whether it is a folder; refuse what is not there, a pipe or a device."""
+    try:
+        if path.is_dir():
+            return True
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+    check_file(path, limit=LARGEST)
+    return False
+
+
 def _said(path: Path, format: str) -> What:
     if is_format(format):
         return What(kind=Kind.KEY_POINTS, formats=(format,))
     if format in motion_formats():
         return What(kind=Kind.MOTION, formats=(format,))
-    known = ", ".join([*formats(), *motion_formats()])
-    raise refusal(path, "--format", format, known, "choose one of them")
+    near = nearest(format, [*formats(), *motion_formats()])
+    raise refusal(path, "--format", shown(format), "a known format", near)
 
 
-def _schema(path: Path) -> str:
-    """Return the schema that a file names; empty where it names none."""
-    suffix = path.suffix.lower()
-    if suffix == ".npz" and path.is_file() and zipfile.is_zipfile(path):
-        with open_npz(path, limit=MAX_PADDED) as archive:
-            return str(archive.array("schema", "U", ())) if "schema" in archive.names else ""
-    if suffix == ".toml" and path.is_file():
-        return str(read_toml(path, limit=10_000_000).get("schema", ""))
+def _of_folder(path: Path) -> What:
+    """Tell what a folder is: a person as a robot, COLMAP's cameras, or pictures of key points."""
+    if (path / "cameras.txt").is_file():
+        return What(kind=Kind.CAMERA)
+    motions = [
+        one.name for one in motion_formats().values() if not one.suffixes and one.suits and one.suits(path)
+    ]
+    if motions:
+        return What(kind=Kind.MOTION, formats=tuple(motions))
     given = Given(path)
-    if suffix == ".json" and not given.is_folder:
-        document = given.document
-        return str(document.get("schema", "")) if isinstance(document, dict) else ""
-    return ""
+    names = tuple(one.name for one in formats().values() if one.suits(given))
+    if not names:
+        first = given.document
+        got = f"a folder whose first file, {cut(given.files[0].name)}, is {shown(first)}"
+        raise refusal(path, "", got, f"key points: {', '.join(formats())}", "say which with --format")
+    return What(kind=Kind.KEY_POINTS, formats=names)
 
 
 def _suiting(path: Path) -> list[str]:
+    """List the formats of key points that a file looks like."""
     given = Given(path)
-    if not given.is_folder and given.suffix not in (".json", ".csv", ".h5"):
+    if given.suffix not in (".json", ".csv", ".h5"):
         return []
-    try:
-        return [one.name for one in formats().values() if one.suits(given)]
-    except InputError:
-        if given.is_folder:  # a folder without key points may be another's
-            return []
-        raise
+    names = [one.name for one in formats().values() if one.suits(given)]
+    if given.suffix == ".csv" and "mediapipe" in names and is_in_space(first_line(path)):
+        names.remove("mediapipe")
+    return names
 
 
 def _motions(path: Path) -> list[str]:
-    """List the formats of motion by the end of the name, and by the content where several share it."""
+    """List the formats of motion by the end of the name, and by the content where the format can be told by it."""
     named = [one for one in motion_formats().values() if path.suffix.lower() in one.suffixes]
-    if path.is_dir():
-        return [
-            one.name
-            for one in motion_formats().values()
-            if not one.suffixes and one.suits and one.suits(path)
-        ]
     return [one.name for one in named if one.suits is None or one.suits(path)]
+
+
+def _by_name(path: Path) -> list[tuple[Kind, str]]:
+    """List the format of motion that alone has such names: of a damaged file its reader says what is wrong."""
+    named = [one for one in motion_formats().values() if path.suffix.lower() in one.suffixes]
+    alone = len(named) == 1 and path.suffix.lower() not in (*SUFFIXES, ".csv")
+    return [(Kind.MOTION, named[0].name)] if alone else []
+
+
+def _nothing_known(path: Path) -> What:
+    """Take a file for a camera's, where it can be one; else refuse it."""
+    suffix = path.suffix.lower()
+    known = ", ".join([*formats(), *motion_formats()])
+    if suffix == ".json":
+        document = Given(path).document
+        if not has_matrix(document):
+            raise refusal(
+                path, "", f"JSON of no known format, {shown(document)}", known, "say which with --format"
+            )
+    elif suffix == ".npz" and not zipfile.is_zipfile(path):
+        raise refusal(
+            path, "", "a damaged file: no NPZ", "arrays that NumPy saved", "check how it was written"
+        )
+    elif suffix not in SUFFIXES:
+        raise refusal(path, "", "a file of no known format", known, "say which with --format")
+    return What(kind=Kind.CAMERA)

@@ -1,0 +1,110 @@
+"""What orders survivors, and what picks one a frame: functions that are given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.pipeline.detected.ranking import rank_by_fit
+from posekit.pipeline.recovery import FrameRecovery
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ranking:
+    """The order of one frame's N survivors.
+
+    Parameters
+    ----------
+    order : int array (N,)
+        Indices of survivors, the best first.
+    probability : array (N,), optional
+        That each survivor is the true one, in the survivors' own order; their sum is at most one (what is left is that
+        none is). None where the ranking gives none.
+    """
+
+    order: NDArray[np.intp]
+    probability: Array | None = None
+
+
+class Ranker(Protocol):
+    """Orders the survivors of frames of one person."""
+
+    def __call__(self, frames: Sequence[FrameRecovery], figure: Figure) -> Sequence[Ranking]:
+        """Return one ranking a frame; of a frame without survivors an empty one."""
+        ...
+
+
+class Chooser(Protocol):
+    """Follows one person through the frames of one camera that stands still."""
+
+    def __call__(self, frames: Sequence[FrameRecovery]) -> ArrayLike:
+        """Return the index of one survivor a frame (F,), -1 where none is chosen."""
+        ...
+
+
+def by_fit(frames: Sequence[FrameRecovery], figure: Figure) -> list[Ranking]:
+    """Rank by the agreement with the person's lengths, without probabilities (`rank_by_fit`)."""
+    return [
+        Ranking(order=rank_by_fit(frame.joints, frame.length_residual, figure.lengths)) for frame in frames
+    ]
+
+
+def first_ranked(rankings: Sequence[Ranking], counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+    """Return the first survivor of each frame (-1 where there is none), and its probability (NaN where none is given).
+
+    Raises
+    ------
+    InputError
+        Where a ranking is not of the frame's survivors.
+    """
+    if len(rankings) != len(counts):
+        raise InputError(f"the ranking has {len(rankings)} frames; expected {len(counts)}")
+    first = np.full(len(counts), -1, dtype=np.intp)
+    probability = np.full(len(counts), np.nan)
+    for k, (ranking, count) in enumerate(zip(rankings, counts.tolist(), strict=True)):
+        order = np.asarray(ranking.order)
+        if order.shape != (count,) or not np.array_equal(np.sort(order), np.arange(count)):
+            raise InputError(
+                f"the ranking of frame {k} is no order of its {count} survivors; expected each index once"
+            )
+        given = ranking.probability
+        if given is not None and (
+            np.shape(given) != (count,) or not ((np.asarray(given) >= 0) & (np.asarray(given) <= 1)).all()
+        ):
+            raise InputError(
+                f"the probabilities of frame {k} are not {count} numbers from 0 to 1; expected one a survivor"
+            )
+        if count:
+            first[k] = order[0]
+            probability[k] = np.nan if given is None else given[order[0]]
+    return first, probability
+
+
+def chosen_by(chooser: Chooser, frames: Sequence[FrameRecovery]) -> NDArray[np.intp]:
+    """Return what a chooser chooses, checked.
+
+    Raises
+    ------
+    InputError
+        Where it is not one of each frame's survivors, or -1.
+    """
+    chosen = np.asarray(chooser(frames))
+    counts = np.array([len(frame) for frame in frames])
+    if chosen.shape != counts.shape or chosen.dtype.kind not in "iu":
+        raise InputError(
+            f"the choice through the sequence is {chosen.dtype} of shape {chosen.shape}; expected one whole number a "
+            f"frame, ({len(counts)},)"
+        )
+    if ((chosen < -1) | (chosen >= counts)).any():
+        k = int(np.argmax((chosen < -1) | (chosen >= counts)))
+        raise InputError(
+            f"frame {k} of the sequence: survivor {chosen[k]} was chosen; expected -1 to {counts[k] - 1}"
+        )
+    return chosen.astype(np.intp)

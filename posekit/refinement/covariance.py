@@ -1,0 +1,115 @@
+r"""The uncertainty of refined joints, to first order.
+
+With the trunk's covariance C (the inverse of its matrix when limbs and head are eliminated), a limb whose own matrix
+is H and whose coupling with its start is K moves by :math:`-H^{-1} K` per change of the start, and by
+:math:`H^{-1}` besides. So a joint with ways T of the trunk and U of the limb has
+
+.. math:: (T - U H^{-1} K)\, C\, (T - U H^{-1} K)^T + U H^{-1} U^T .
+
+What nothing determines keeps the deviation of an angle that may be anything, :math:`\pi / \sqrt 3`, and of a place
+in the room. Near a right angle to the ray, where a segment's depth does not show in the image to first order, the
+image still shows it to second order: a length l seen too short by the noise :math:`\sigma` (metres) turns by
+:math:`t = \sqrt{2 \sigma / l}`, and the estimate :math:`\sqrt{\max(y, 0)}` from :math:`y = t^2 + e` is off by
+:math:`E[(\hat t - t)^2] = E[\max(e, 0)] = 0.4\,\sigma` at t = 0. Its inverse, :math:`1.25\, l / \sigma`, is added as
+information on the turn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.refinement.anatomy import END, MIDDLE
+from posekit.refinement.descent import BLOCK
+from posekit.refinement.equations import Equations, assemble, linearise
+from posekit.refinement.limb_terms import LimbTerms
+from posekit.refinement.problem import Problem
+from posekit.refinement.small import backward, cholesky, dot, forward, turned
+from posekit.refinement.state import State, place
+
+ROOM = 10.0
+"""Metres: standard deviation of a place of which nothing is known."""
+
+ANY = np.pi / np.sqrt(3.0)
+"""Radians: standard deviation of an angle of which nothing is known."""
+
+CAP = 1.25
+"""See the module: information on a turn, times the noise over the length."""
+
+
+def covariances(problem: Problem, state: State) -> Array:
+    """Return the covariance of every joint (N, 14, 3, 3), square metres."""
+    n = state.root.shape[1]
+    out = np.empty((n, 14, 3, 3))
+    for at in range(0, n, BLOCK):
+        rows = np.arange(at, min(at + BLOCK, n))
+        part, here = problem.take(rows), state.take(rows)
+        out[rows] = _covariances(part, here, linearise(part, here))
+    return out
+
+
+def _covariances(problem: Problem, state: State, here: Equations) -> Array:
+    if here.limbs is None:
+        return np.full((state.root.shape[1], 14, 3, 3), np.nan)
+    n, width = state.root.shape[1], problem.trunk_width
+    limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
+    arrow = assemble(here._replace(limbs=limbs), 0.0, ANY**-2 * 1e-6)
+    index = np.arange(width)
+    arrow.matrix[index, index] += np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))[:, None]
+    trunk = cholesky(arrow.matrix)
+    out = np.empty((14, 3, 3, n))
+    # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
+    right = np.ascontiguousarray(here.trunk.ways.transpose(2, 0, 1, 3)).reshape(width, 18, n)
+    root = forward(trunk, right).reshape(width, 6, 3, n)
+    np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
+    if arrow.limbs is None or arrow.starts is None:
+        return out.transpose(3, 0, 1, 2)
+    whitened = backward(trunk, np.repeat(np.eye(width)[:, :, None], n, axis=2))
+    shift = np.einsum("licn,cwn->iwln", arrow.starts, whitened)
+    coupling = arrow.limbs.right[:, :6]
+    reach = len(coupling)
+    followed = -backward(arrow.limbs.factor, np.einsum("uiln,iwln->uwln", coupling, shift))
+    own = np.empty((reach, reach, 4, n))
+    own[:] = np.eye(reach)[:, :, None, None]
+    own = backward(arrow.limbs.factor, own)
+    for segment, joints in ((0, MIDDLE), (1, END)):
+        U = _limb_ways(state, limbs, segment, reach)
+        moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
+        alone = np.einsum("liun,uwln->liwn", U, own)
+        both = np.concatenate([moving, alone], axis=2)
+        out[list(joints)] = np.einsum("liwn,ljwn->lijn", both, both)
+    return out.transpose(3, 0, 1, 2)
+
+
+def _with_priors(problem: Problem, state: State, terms: LimbTerms) -> Array:
+    """Add to the limbs' matrices what is known of turns that the image does not show to first order."""
+    limb = terms.matrix.copy()
+    joints = place(state)
+    _, A = problem.see(joints, slice(0, 14))
+    for segment, ends in enumerate((MIDDLE, END)):
+        first = 2 * segment
+        for i in (first, first + 1):
+            limb[i, i] += ANY**-2
+        seen = turned(A[list(ends)], state.directions[:, segment])
+        ray = joints[list(ends)] if problem.optics.perspective else np.array([0.0, 0.0, 1.0])[:, None]
+        c, s = (dot(terms.tangents[:, segment, k], np.broadcast_to(ray, seen.shape[:1] + (3,) + seen.shape[2:])) for k in range(2))
+        size = np.maximum(np.sqrt(c * c + s * s), TINY)
+        known = CAP * state.limbs[:, segment] * np.sqrt(dot(seen, seen)) / (size * size)
+        for (i, x), (j, y) in (((a, p), (b, q)) for a, p in ((0, c), (1, s)) for b, q in ((0, c), (1, s))):
+            limb[first + i, first + j] += known * x * y
+    return limb
+
+
+TINY = 1e-12
+
+
+def _limb_ways(state: State, terms: LimbTerms, segment: int, reach: int) -> Array:
+    """Return how limbs' unknowns move their middles (segment 0) or ends (1), from their starts: (4, 3, U, N)."""
+    out = np.zeros((4, 3, reach, state.root.shape[1]))
+    for part in range(segment + 1):
+        length = state.limbs[:, part, None]
+        for tangent in range(2):
+            out[:, :, 2 * part + tangent] = length * terms.tangents[:, part, tangent]
+        if reach > 4:
+            out[:, :, 4 + part] = length * state.directions[:, part]
+    return out

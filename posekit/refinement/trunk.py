@@ -1,0 +1,186 @@
+r"""Torsos and hips that the noise allows, before any limb is lifted: where the tree is grown from under noise.
+
+Lifting a trunk joint by joint, each from the last, throws the noise of every point onto the depth of the next: a
+shoulder beside the neck, at right angles to its ray, is off by :math:`\sqrt{2 l \delta}`, 6 cm for 2 px at 4 m. The
+trunk as a whole has six points for nine unknowns, and one or two places only where it fits them. These are found
+first, by least squares, and their own image points put in place of the noisy ones: then the tree's rigid parts come
+out right to rounding, and limbs start from where they are most likely to start.
+
+Far away, a flat body and its image in a mirror at right angles to the ray look alike: with the mirror S of the ray
+and M of the body's own plane, S R M is the rotation of the second minimum if R is that of the first. Torso and hips
+are flat, or nearly, so from one minimum there are three more starts; what the near and far choices give themselves is
+only needed to find the first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.refinement.descent import BLOCK, descend
+from posekit.refinement.equations import evaluate
+from posekit.refinement.freedom import degrees_of_freedom
+from posekit.refinement.merging import groups_of
+from posekit.refinement.problem import Problem
+from posekit.refinement.refined import LEVEL
+from posekit.refinement.sight import Sight
+from posekit.refinement.small import product, unit
+from posekit.refinement.start import state_of
+from posekit.refinement.state import State, trunk_offsets
+from posekit.refinement.survival import chi2_survival
+from posekit.skeleton import PARENTS, TREE_SEGMENTS, segment_name
+
+TRIED = 2
+"""Near and far choices that are followed to their minima, the likeliest first."""
+
+STEPS = 15
+
+WITHIN = 0.01
+"""Metres: trunks none of whose joints are farther apart are one."""
+
+PROMISING = 100.0
+"""A chi2 beyond which a start is followed only while its steps promise to halve it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trunks:
+    """H trunks of F frames, by frame, the likeliest first.
+
+    Parameters
+    ----------
+    frame : int array (H,)
+    joints : array (H, 6, 3)
+        Neck, shoulders, pelvis and hips, camera frame, metres.
+    image : array (H, 14, 2)
+        The frame's key points, those of the trunk that were seen replaced by the projections of `joints`.
+    chi2, dof, p : array (H,)
+        See `posekit.refinement.refined.Refined`.
+    """
+
+    frame: NDArray[np.intp]
+    joints: Array
+    image: Array
+    chi2: Array
+    dof: NDArray[np.intp]
+    p: Array
+
+    def __len__(self) -> int:
+        """Count the trunks."""
+        return len(self.frame)
+
+    @property
+    def root(self) -> Array:
+        """The necks (H, 3)."""
+        return self.joints[:, 0]
+
+
+def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -> Trunks:
+    """Find the trunks that the noise can explain.
+
+    Parameters
+    ----------
+    sight : Sight
+        Its root must say where the neck is, however roughly.
+    level : float
+        Probability with which noise alone gives a trunk that is left out.
+    within : float
+        Metres; see `WITHIN`.
+
+    Returns
+    -------
+    Trunks
+        None in frames whose root is not known.
+
+    Raises
+    ------
+    InputError
+        Where there is no root.
+    """
+    if sight.root is None:
+        raise InputError("find_trunks: no root was given; expected a RootPrior that says where necks are")
+    known = np.flatnonzero(np.isfinite(sight.root.mean).all(axis=1))
+    starts = _lifts(sight, known)
+    frames = np.repeat(known, starts.shape[1])
+    flat = starts.reshape(-1, 14, 3)
+    one = sight.problem(known, sight.root.mean[known]).trunk_alone()
+    begin = state_of(one.anatomy, flat)
+    chi2 = np.empty(len(frames))
+    every = np.repeat(np.arange(len(known)), starts.shape[1])
+    for at in range(0, len(frames), BLOCK):
+        rows = np.arange(at, min(at + BLOCK, len(frames)))
+        chi2[rows] = evaluate(one.take(every[rows]), begin.take(rows))[0]
+    order = np.argsort(chi2.reshape(len(known), -1), axis=1, kind="stable")[:, :TRIED]
+    chosen = (np.arange(len(known))[:, None] * starts.shape[1] + order).reshape(-1)
+    which = np.repeat(np.arange(len(known)), order.shape[1])
+    first = descend(one.take(which), begin.take(chosen), steps=STEPS, hopeless=PROMISING)
+    best = np.argmin(first.chi2.reshape(len(known), -1), axis=1) + np.arange(len(known)) * order.shape[1]
+    turned = _reflections(first.state.take(best))
+    again = np.tile(np.arange(len(known)), 3)
+    second = descend(one.take(again), turned, steps=STEPS, hopeless=PROMISING)
+    state = State(*(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True)))
+    row = np.concatenate([which, again])
+    value, active = (np.concatenate([a, b]) for a, b in ((first.chi2, second.chi2), (first.active, second.active)))
+    dof = degrees_of_freedom(one)[row] + active
+    finite = np.isfinite(value)
+    p = np.where(finite, chi2_survival(np.where(finite, value, 0.0), dof), 0.0)
+    joints = (state.root + trunk_offsets(state)).transpose(2, 0, 1)
+    keep = np.flatnonzero(p >= level)
+    keep = keep[np.lexsort((value[keep], known[row[keep]]))]
+    leader = groups_of(known[row[keep]], joints[keep], within)
+    keep = keep[leader == np.arange(len(keep))]
+    return _trunks(sight, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
+
+
+def _trunks(
+    sight: Sight,
+    one: Problem,
+    frame: NDArray[np.intp],
+    joints: Array,
+    chi2: Array,
+    dof: NDArray[np.intp],
+    p: Array,
+    row: NDArray[np.intp],
+) -> Trunks:
+    image = sight.points()[frame].copy()
+    projected = one.optics.take(row).image(joints.transpose(1, 2, 0)).transpose(2, 0, 1)
+    image[:, :6] = np.where(np.isnan(image[:, :6]), np.nan, projected)
+    return Trunks(frame=frame, joints=joints, image=image, chi2=chi2, dof=dof, p=p)
+
+
+def _lifts(sight: Sight, frames: NDArray[np.intp]) -> Array:
+    """Lift trunks by every near and far choice, (len(frames), 32, 14, 3): out of reach means nearest to the ray."""
+    problem = sight.problem(frames, np.zeros((len(frames), 3)))
+    image, optics = problem.image[:6], problem.optics
+    seen = problem.weight[:6] > 0
+    placed: list[Array] = [problem.root[None]]  # by joint (choices, 3, N), as the bits of its path
+    for joint, (parent, _) in enumerate(TREE_SEGMENTS[:5], start=1):
+        length = sight.figure.lengths[segment_name((parent, joint))]
+        start = placed[parent]
+        pixels = np.broadcast_to(image[joint], (len(start), *image.shape[1:]))
+        ray, foot = optics.rays(pixels, start)
+        apart = foot - start
+        half = np.sqrt(np.maximum(length * length - np.einsum("cin,cin->cn", apart, apart), 0.0))[:, None] * ray
+        ends = np.stack([foot - half, foot + half], axis=1).reshape(2 * len(start), 3, -1)
+        placed.append(np.where(seen[joint], ends, np.nan))
+    out = np.full((len(frames), 32, 14, 3), np.nan)
+    code = np.arange(32)
+    out[:, :, 0] = problem.root.T[:, None]
+    for joint in range(1, 6):
+        bit = code >> (5 - joint) & 1
+        choice = bit if PARENTS[joint] == 0 else 2 * (code >> (5 - PARENTS[joint]) & 1) + bit
+        out[:, :, joint] = placed[joint][choice].transpose(2, 0, 1)
+    return out
+
+
+def _reflections(state: State) -> State:
+    """Return torsos, hips, and both, as a mirror at right angles to the ray shows them: (3 N)."""
+    ray = unit(state.root)
+    mirror = np.eye(3)[:, :, None] - 2 * ray[:, None] * ray[None]
+    flipped = np.array([-1.0, 1.0, 1.0])[None, :, None]
+    torso, hips = (product(mirror, rotation) * flipped for rotation in (state.torso, state.hips))
+    parts = (state._replace(torso=torso), state._replace(hips=hips), state._replace(torso=torso, hips=hips))
+    return State(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
