@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,9 @@ from posekit.pipeline.recovery import Batch
 from posekit.pipeline.tolerance import EXACT, Tolerance
 from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, Leaves
+
+MOST_HIDDEN = 1000
+"""Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
 
 TRUNK = tuple(JOINT[name] for name in TORSO[1:])
 
@@ -67,7 +71,7 @@ class Grower:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts()
         leaves = tree.prune(leaves, motion)
-        leaves, completion = self._complete(leaves, camera, image, suite, tolerance)
+        leaves, completion = self._complete(leaves, camera, image, suite, tolerance, chosen)
         if not motion:  # a joint without a position is no matter of motion
             physical = leaves.counts()
         return Batch(
@@ -81,20 +85,42 @@ class Grower:
         )
 
     def _complete(
-        self, leaves: Leaves, camera: Camera, image: Array, suite: Sequence[Check], tolerance: Tolerance
+        self,
+        leaves: Leaves,
+        camera: Camera,
+        image: Array,
+        suite: Sequence[Check],
+        tolerance: Tolerance,
+        chosen: NDArray[np.intp],
     ) -> tuple[Leaves, Completion | None]:
         """Complete survivors by the joints that were not seen, and drop those that cannot be.
 
-        Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said.
+        Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
+        where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
         """
         unseen = np.asarray(np.isnan(image).any(axis=2))
         placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
-        worth = np.asarray((unseen.any(axis=1) & placed)[leaves.frame])
+        hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
+        frame = self.fit.frame[chosen]
+        too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
+        self._warn_of(frame[too_many & placed])
+        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
         if not (self.infer and isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
         part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
         done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
         return reject(leaves, done.among(leaves.postures(), worth))
+
+    def _warn_of(self, frames: NDArray[np.intp]) -> None:
+        """Say of which frames nothing is inferred."""
+        if self.infer and isinstance(self.body, FigureBody) and len(frames):
+            named = ", ".join(f"frames[{k}]" for k in np.unique(frames)[:3].tolist())
+            warnings.warn(
+                f"{named}: too many survivors and hidden joints to infer ({MOST_HIDDEN} in a frame at most): "
+                "those joints stay unknown",
+                UserWarning,
+                stacklevel=4,
+            )
 
     def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
         """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
