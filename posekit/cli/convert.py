@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -26,7 +28,8 @@ from posekit.cli.detector_options import (
     Unit,
 )
 from posekit.cli.detector_source import source_of
-from posekit.cli.options import about, distinct, examples
+from posekit.cli.options import distinct, examples
+from posekit.errors import PosekitError
 
 EXAMPLES = examples(
     "posekit convert keypoints/ view.json --camera calibration.toml:cam_01 --stature 175cm",
@@ -71,6 +74,14 @@ def convert(
         str,
         typer.Option("--up", metavar="AXIS", help="The axis that shall point up, as +z. Default: by custom."),
     ] = "",
+    input_up: Annotated[
+        str,
+        typer.Option(
+            "--input-up",
+            metavar="AXIS",
+            help="The axis that points up in IN, where a file of motion does not say it or is wrong.",
+        ),
+    ] = "",
     clip: Annotated[
         str, typer.Option("--clip", metavar="NAME", help="Of motion capture with several clips: which.")
     ] = "",
@@ -93,10 +104,13 @@ def convert(
 ) -> None:
     """Convert a file: key points to views, results and motion capture to what other programs open."""
     from posekit import files
+    from posekit.pipeline.detected.camera import split_camera
     from posekit.pipeline.detected.conversion import Conversion
     from posekit.pipeline.detected.conversion import convert as run
 
-    distinct(given, output, view)
+    calibration = split_camera(camera)[0] if camera else None
+    for read in (given, view, lengths, calibrate, calibration):
+        distinct(read, output)
     job = Conversion(
         given=given,
         output=output,
@@ -104,6 +118,7 @@ def convert(
         posture=posture,
         view=None if view is None else files.read_view(view),
         up=up,
+        input_up=input_up,
         clip=clip,
         unit=unit,
         source=source_of(
@@ -124,8 +139,19 @@ def convert(
             proportions=proportions,
         ),
     )
-    with about(given):
+    with _naming(given, output):
         lines = run(job)
     for line in lines:
         typer.echo(line)
     typer.echo(f"written: {output}")
+
+
+@contextmanager
+def _naming(given: Path, output: Path) -> Iterator[None]:
+    """Name the file in errors that name neither a file nor an option."""
+    try:
+        yield
+    except PosekitError as error:
+        if str(error).startswith(("--", str(given), str(output))):
+            raise
+        raise type(error)(f"{given}: {error}") from error

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TextIO
 
 import typer
 
-from posekit.cli import convert, demo, inspect, recover, render, reproduce, synth, validate, view
+from posekit.cli import convert, demo, evaluate, inspect, recover, render, reproduce, synth, validate, view
 from posekit.cli.options import examples
 from posekit.errors import PosekitError
 
@@ -33,6 +33,7 @@ app.command("recover", epilog=recover.EXAMPLES)(recover.recover)
 app.command("validate", epilog=validate.EXAMPLES)(validate.validate)
 app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.command("inspect", epilog=inspect.EXAMPLES)(inspect.inspect)
+app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.add_typer(synth.app, name="synth")
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
 app.command("render", epilog=render.EXAMPLES)(render.render)

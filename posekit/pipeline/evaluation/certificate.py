@@ -25,6 +25,9 @@ from posekit.validators import Ranges, judge, make_checks
 ROUNDING: Final = 1e-6
 """Metres, and degrees, that rounding may add to what is allowed."""
 
+TURNED: Final = 1e-3
+"""Degrees by which a witness's limb may differ: 5 um at a wrist. Limbs that are nearly straight are made straight."""
+
 UNSEEN: Final = 45.0
 """Degrees that an axial rotation may be off before it is not seen: as the ranges are defined (docs, "Real motion")."""
 
@@ -57,7 +60,7 @@ class Certificate(NamedTuple):
     @property
     def violations(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Survivors that break lengths, and ranges (N,) each."""
-        ranges = (self.angle > ROUNDING) | (self.turned > ROUNDING)
+        ranges = (self.angle > ROUNDING) | (self.turned > TURNED)
         return self.length > ROUNDING, np.asarray(ranges)
 
 
@@ -108,7 +111,8 @@ def _witnessed(joints: Array, figure: Figure, tolerance: float) -> tuple[Array, 
     angles = np.degrees(q[:, figure.angle_index])
     model = figure.model
     lower, upper = (
-        np.degrees(bound[figure.angle_index]) for bound in (model.lowerPositionLimit, model.upperPositionLimit)
+        np.degrees(bound[figure.angle_index])
+        for bound in (model.lowerPositionLimit, model.upperPositionLimit)
     )
     allowed = np.full(angles.shape, tolerance)
     for side in SIDES:
@@ -122,7 +126,10 @@ def _witnessed(joints: Array, figure: Figure, tolerance: float) -> tuple[Array, 
     placed = np.isfinite(q).all(axis=1)
     if placed.any():
         shown = figure.forward_kinematics(q[placed])
-        a, b = (unit(each[:, LIMB_SEGMENTS[:, 1]] - each[:, LIMB_SEGMENTS[:, 0]]) for each in (shown, joints[placed]))
+        a, b = (
+            unit(each[:, LIMB_SEGMENTS[:, 1]] - each[:, LIMB_SEGMENTS[:, 0]])
+            for each in (shown, joints[placed])
+        )
         chord = np.linalg.norm(a - b, axis=-1) / 2
         turned[placed] = np.degrees(2 * np.arcsin(np.minimum(chord, 1.0))).max(axis=1)
     return np.asarray(np.fmax.reduce(beyond, axis=1)), turned

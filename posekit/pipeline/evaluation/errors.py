@@ -32,7 +32,7 @@ def survivor_errors(joints: Array, truth: Array) -> Array:
 
 
 def _errors(joints: Array, truth: Array) -> Array:
-    known = np.isfinite(joints).all(axis=-1) & np.isfinite(truth).all(axis=-1)
+    known = np.asarray(np.isfinite(joints + truth).all(axis=-1))
     target = np.where(known[..., None], truth, np.nan)
     count = np.maximum(known.sum(axis=1), 1)[:, None, None]
     shift = np.where(known[..., None], target - joints, 0.0).sum(axis=1, keepdims=True) / count

@@ -20,7 +20,7 @@ from posekit.pipeline.recover import person_of, recover
 from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.rooting import Rooting
 from posekit.pipeline.tolerance import Tolerance
-from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
+from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, walking
 from posekit.validators.walking import DEFAULT_RULES
 
 RootFrom = Literal["given", "auto"]
@@ -72,14 +72,19 @@ class Method:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "checks", check_names(self.checks))
+        walking(load_figure(), self.rules)  # refuses rules that there are not
         if isinstance(self.ranges, str):
             object.__setattr__(self, "ranges", load_ranges(self.ranges))
         if self.root is not None and self.root not in get_args(RootFrom):
             raise InputError(f"--root: {self.root!r}; expected {' or '.join(get_args(RootFrom))}")
         if not self.noise or not all(0 <= level < math.inf for level in self.noise):
-            raise InputError(f"--noise: {list(self.noise)}; expected one or more finite numbers of pixels >= 0")
+            raise InputError(
+                f"--noise: {list(self.noise)}; expected one or more finite numbers of pixels >= 0"
+            )
         if len(set(self.noise)) != len(self.noise):
-            raise InputError(f"--noise: {list(self.noise)}; expected each level once; leave out what is repeated")
+            raise InputError(
+                f"--noise: {list(self.noise)}; expected each level once; leave out what is repeated"
+            )
         if self.seed < 0:
             raise InputError(f"--seed: {self.seed}; expected zero or more")
 
@@ -116,9 +121,7 @@ class Method:
             "sequences": None if self.choose is None else _name(self.choose),
         }
 
-    def _parts(
-        self, view: View, figure: Figure, rows: NDArray[np.intp]
-    ) -> Iterator[list[FrameRecovery]]:
+    def _parts(self, view: View, figure: Figure, rows: NDArray[np.intp]) -> Iterator[list[FrameRecovery]]:
         some = view if len(rows) == len(view) else of_frames(view, rows)
         try:
             yield recover(
@@ -144,15 +147,16 @@ def of_frames(view: View, rows: NDArray[np.intp]) -> View:
     return replace(view, **{name: getattr(view, name)[rows] for name in names})
 
 
-@lru_cache(maxsize=4)
-def _scaled(lengths: tuple[tuple[str, float], ...]) -> Figure:
+@lru_cache(maxsize=32)
+def scaled(lengths: tuple[tuple[str, float], ...]) -> Figure:
+    """Return the figure with some lengths (m, by segment), made once."""
     return load_figure().scaled(dict(lengths))
 
 
 def figure_of(view: View) -> Figure:
     """Return a view's person: made once for all parts of a clip."""
     if view.stature is None and not view.head_points:
-        return _scaled(tuple(view.lengths.items()))
+        return scaled(tuple(view.lengths.items()))
     return person_of(view, load_figure())
 
 

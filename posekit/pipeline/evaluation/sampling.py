@@ -57,7 +57,7 @@ class Sampling:
                 if name not in known:
                     raise InputError(
                         f"{option}: {shown(name)} is not in {capture.source}; expected one of its "
-                        f"{len(set(known))}; {nearest(name, known)}"
+                        f"{len(set(known))}; {nearest(name, tuple(dict.fromkeys(known)))}"
                     )
         found = [
             k
@@ -83,6 +83,4 @@ class Sampling:
 
 def action_names(capture: Capture) -> tuple[str, ...]:
     """Return each clip's action, or its own name where the file has none."""
-    return tuple(
-        action or name for name, action in zip(capture.names, capture.actions, strict=True)
-    )
+    return tuple(action or name for name, action in zip(capture.names, capture.actions, strict=True))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 
@@ -56,7 +57,8 @@ class Reliability(NamedTuple):
         The mean squared difference of probability and event (Brier 1950).
     lower : array (B,)
         Where each bin begins; it ends where the next begins, the last at 1.
-    count : int array (B,)
+    frames : int array (B,)
+        How many it has.
     probability, share : array (B,)
         Mean probability, and share of events, of each bin; NaN where it is empty.
     """
@@ -64,7 +66,7 @@ class Reliability(NamedTuple):
     error: float
     brier: float
     lower: Array
-    count: Array
+    frames: NDArray[np.intp]
     probability: Array
     share: Array
 
@@ -84,7 +86,7 @@ def reliability(probability: Array, event: Array) -> Reliability | None:
     if not len(p):
         return None
     which = np.minimum((p * BINS).astype(np.intp), BINS - 1)
-    count = np.bincount(which, minlength=BINS)
+    count = np.asarray(np.bincount(which, minlength=BINS), dtype=np.intp)
     sums = [np.bincount(which, weights=values, minlength=BINS) for values in (p, y)]
     mean, share = (np.where(count > 0, each / np.maximum(count, 1), np.nan) for each in sums)
     error = float(np.nansum(count * np.abs(mean - share)) / len(p))

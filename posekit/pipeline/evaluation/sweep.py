@@ -80,7 +80,9 @@ class Sweep:
         _ = self.sphere
         for name, values, unit_name in (("yaws", self.yaws, "degrees"), ("heights", self.heights, "metres")):
             if not values or not all(math.isfinite(value) for value in values):
-                raise InputError(f"--{name}: {list(values)}; expected one or more finite numbers, {unit_name}")
+                raise InputError(
+                    f"--{name}: {list(values)}; expected one or more finite numbers, {unit_name}"
+                )
             if len(set(values)) != len(values):
                 raise InputError(f"--{name}: {list(values)}; expected each once; leave out what is repeated")
         if len(self) > MOST_CAMERAS:
@@ -129,8 +131,8 @@ class Sweep:
         if not (np.abs(above) < 0.99 * self.distance).all():
             worst = float(height[np.abs(above).max(axis=1).argmax()])
             raise InputError(
-                f"--heights: {worst:g} m is as far above or below the body as the camera is away ({self.distance:g} m); "
-                "expected less; give a larger --distance"
+                f"--heights: {worst:g} m is as far above or below the body as the camera is away "
+                f"({self.distance:g} m); expected less; give a larger --distance"
             )
         left = cross(np.broadcast_to(up, forward.shape), forward)
         beside = np.cos(yaw)[:, None, None] * forward + np.sin(yaw)[:, None, None] * left

@@ -52,7 +52,7 @@ def true_branch(leaves: Leaves, truth: Array) -> TrueBranch:
     hypotheses = np.arange(len(truth))
     bits = np.zeros((len(truth), len(JOINTS)), dtype=np.int32)
     path = np.zeros((len(truth), len(JOINTS)), dtype=np.intp)
-    known = np.isfinite(truth).all(axis=(1, 2))
+    known = np.asarray(np.isfinite(truth).all(axis=(1, 2)))
     lost_at = np.zeros(len(truth), dtype=np.intp)
     for joint in range(1, len(JOINTS)):
         both = 2 * path[:, PARENTS[joint], None] + np.array([0, 1])

@@ -1,0 +1,266 @@
+"""`posekit evaluate`: how good recovery is where the truth is known."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from posekit.cli.detector_options import Format, Skeleton, Unit
+from posekit.cli.options import (
+    PHYSICAL,
+    AngleTolerance,
+    Checks,
+    RangesOption,
+    Rules,
+    Seed,
+    distinct,
+    examples,
+    progress,
+    rule_numbers,
+    split,
+)
+from posekit.errors import InputError
+
+if TYPE_CHECKING:
+    from posekit.files import View
+    from posekit.pipeline import Tolerance
+    from posekit.synthesis import Capture
+
+EXAMPLES = examples(
+    "posekit evaluate motion.npz -o report.json -o report.csv --plots",
+    "posekit evaluate walk.trc -o report.json --noise 0,2 --heights 1.5m --yaw-step 45",
+    "posekit evaluate motion.npz -o report.json --actions walking,running --ranges table1 --jobs 2",
+    "posekit evaluate view.json -o report.json",
+)
+
+SWEPT = ("--yaw-step", "--heights", "--distance", "--f", "--size")
+SAMPLED = ("--frames-per-clip", "--clips", "--actions", "--consecutive", "--skeleton", "--unit", "--up")
+
+
+def evaluate(
+    ctx: typer.Context,
+    file: Annotated[
+        Path,
+        typer.Argument(
+            metavar="FILE",
+            help="Motion (NPZ, TRC, C3D, BVH, CSV, Parquet), seen through virtual cameras; or a view with truth.",
+        ),
+    ],
+    output: Annotated[
+        list[Path],
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="REPORT",
+            help="The report: .json (everything), .csv (a row a condition) or .md (tables). May be repeated.",
+        ),
+    ],
+    noise: Annotated[
+        str,
+        typer.Option(
+            "--noise",
+            metavar="LIST",
+            help="Standard deviations of the image points, pixels, by commas. Default: 0,1,2,5,10; of a view 0.",
+        ),
+    ] = "",
+    yaw_step: Annotated[
+        float, typer.Option("--yaw-step", metavar="DEGREES", help="Between cameras, from 0 to 180 degrees.")
+    ] = 15.0,
+    heights: Annotated[
+        str, typer.Option("--heights", metavar="LIST", help="Of the cameras over the ground, as 0.5m,1.5m.")
+    ] = "0.5m,1.5m,2.5m",
+    distance: Annotated[
+        str, typer.Option("--distance", metavar="LENGTH", help="Of the cameras from the body's middle.")
+    ] = "4m",
+    f: Annotated[
+        float, typer.Option("--f", metavar="PX", help="Focal length of the cameras, pixels.")
+    ] = 1500.0,
+    size: Annotated[
+        str, typer.Option("--size", metavar="WxH", help="Size of their pictures, pixels.")
+    ] = "1920x1080",
+    frames_per_clip: Annotated[
+        int, typer.Option("--frames-per-clip", metavar="N", help="Evenly over each clip.")
+    ] = 10,
+    clips: Annotated[
+        str, typer.Option("--clips", metavar="LIST", help="Only these, by commas. Default: all.")
+    ] = "",
+    actions: Annotated[
+        str, typer.Option("--actions", metavar="LIST", help="Only clips of these, by commas. Default: all.")
+    ] = "",
+    consecutive: Annotated[
+        bool,
+        typer.Option(
+            "--consecutive",
+            help="Frames in a row from the middle of each clip, seen by cameras that stand still.",
+        ),
+    ] = False,
+    root: Annotated[
+        str,
+        typer.Option(
+            "--root",
+            metavar="HOW",
+            help="given: the neck is the true one; auto: it is placed from the image. Default: given; views stay as "
+            "they are.",
+        ),
+    ] = "",
+    checks: Checks = PHYSICAL,
+    ranges: RangesOption = "urdf",
+    rules: Rules = "1,2",
+    rigid_tolerance: Annotated[
+        str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
+    ] = "",
+    tangent_tolerance: Annotated[
+        str, typer.Option("--tangent-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
+    ] = "",
+    angle_tolerance: AngleTolerance = None,
+    format: Format = "",
+    skeleton: Skeleton = "",
+    unit: Unit = "",
+    up: Annotated[
+        str,
+        typer.Option(
+            "--up", metavar="AXIS", help="The axis of the motion that points up, as +z. Default: the file's."
+        ),
+    ] = "",
+    seed: Seed = 0,
+    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes, at most one a core.")] = 1,
+    plots: Annotated[
+        bool, typer.Option("--plots", help="Draw charts beside the first report: PNG, needs matplotlib.")
+    ] = False,
+) -> None:
+    """Recover views whose truth is known, and say how good the survivors are: retained, how many, how far off."""
+    from posekit.files import View
+    from posekit.pipeline import evaluation
+    from posekit.pipeline.evaluation.draw import plot_paths, write_plots
+    from posekit.pipeline.evaluation.report import check_evaluation_path, summary
+    from posekit.viewer.plots.figure import drawing
+
+    charts = plot_paths(output[0]) if plots else {}
+    distinct(file, *output, *charts.values())
+    for path in output:
+        check_evaluation_path(path)
+    if plots:
+        with drawing():  # refuses before the work, not after
+            pass
+    sweep = evaluation.Sweep(
+        yaws=_yaws(yaw_step),
+        heights=_heights(heights),
+        distance=_length(distance, "--distance"),
+        f=f,
+        size=_size(size),
+    )
+    sampling = evaluation.Sampling(
+        frames_per_clip=frames_per_clip, clips=split(clips), actions=split(actions), consecutive=consecutive
+    )
+    options: dict[str, Any] = {
+        "root": root or None,
+        "checks": split(checks),
+        "ranges": ranges,
+        "rules": rule_numbers(rules),
+        "tolerance": _tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
+        "seed": seed,
+    }
+    if noise:
+        options["noise"] = _noise(noise)
+    method = evaluation.Method(**options)
+    given = _read(file, format=format, skeleton=skeleton, unit=unit, up=up)
+    if isinstance(given, View):
+        _refuse_given(ctx, (*SWEPT, *SAMPLED))
+        if not noise:
+            method = evaluation.Method(**{**options, "noise": (0.0,)})
+    found = evaluation.evaluate(
+        given,
+        sampling=sampling,
+        sweep=sweep,
+        method=method,
+        jobs=jobs,
+        source=str(file),
+        progress=partial(progress, "evaluating"),
+    )
+    for path in output:
+        evaluation.write_evaluation(path, found)
+    written = [*output, *(write_plots(output[0], found) if plots else ())]
+    for line in summary(found):
+        typer.echo(line)
+    typer.echo(f"written: {', '.join(map(str, written))}")
+
+
+def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capture | View:
+    """Read motion, or a view."""
+    from posekit.files import read_view
+    from posekit.pipeline.detected.kinds import Kind, kind_of
+    from posekit.skeleton_map import load_skeleton_map
+    from posekit.synthesis import read_capture
+
+    what = kind_of(path, format)
+    if what.kind is Kind.VIEW:
+        return read_view(path)
+    if what.kind is not Kind.MOTION:
+        raise InputError(
+            f"{path}: {what.kind.value}, of which no truth is known; expected motion, or a view with truth"
+        )
+    return read_capture(
+        path,
+        format=what.formats[0] if what.formats else None,
+        unit=unit or None,
+        up=up or None,
+        layout=load_skeleton_map(skeleton) if skeleton else None,
+    )
+
+
+def _refuse_given(ctx: typer.Context, names: tuple[str, ...]) -> None:
+    """Refuse options of virtual cameras where a view is evaluated as it is."""
+    for name in names:
+        key = name.removeprefix("--").replace("-", "_")
+        source = ctx.get_parameter_source(key)
+        if source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"{name}: a view is evaluated as it is; expected motion; leave the option out")
+
+
+def _yaws(step: float) -> tuple[float, ...]:
+    if not 1 <= step <= 180:
+        raise InputError(f"--yaw-step: {step:g} degrees; expected 1 to 180")
+    return tuple(min(k * step, 180.0) for k in range(int(180 / step + 1e-9) + 1))
+
+
+def _heights(text: str) -> tuple[float, ...]:
+    return tuple(_length(one, "--heights") for one in split(text))
+
+
+def _length(text: str, option: str) -> float:
+    from posekit.files import parse_length
+
+    return parse_length(text, name=option)
+
+
+def _noise(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(word) for word in split(text))
+    except ValueError as error:
+        raise InputError(f"--noise: {text!r}; expected pixels by commas, as 0,1,2") from error
+
+
+def _size(text: str) -> tuple[int, int]:
+    parts = text.lower().split("x")
+    if len(parts) != 2 or not all(part.isascii() and part.isdigit() and len(part) <= 6 for part in parts):
+        raise InputError(f"--size: {text!r}; expected width and height in pixels, as 1920x1080")
+    return int(parts[0]), int(parts[1])
+
+
+def _tolerance(rigid: str, tangent: str, angle: float | None) -> Tolerance | None:
+    """Make the tolerance of what was given, the rest as measured points have it."""
+    from posekit.pipeline import EXACT, MEASURED
+    from posekit.pipeline import Tolerance as Made
+
+    if not rigid and not tangent and angle is None:
+        return None
+    metres = _length(rigid, "--rigid-tolerance") if rigid else MEASURED.rigid
+    return Made(
+        rigid=metres,
+        tangent=_length(tangent, "--tangent-tolerance") if tangent else MEASURED.tangent,
+        placement=metres <= EXACT.rigid,
+        angle=MEASURED.angle if angle is None else angle,
+    )

@@ -1,0 +1,243 @@
+"""`posekit evaluate`: motion of several formats, views, reports, charts, bad input."""
+
+import builtins
+import csv
+import importlib
+import json
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from posekit.figure import load_figure
+from posekit.files import write_view
+from posekit.motion import Motion, write_motion
+from posekit.pipeline import view_of
+from posekit.skeleton import JOINTS
+from posekit.synthesis import Walker, random_views, seq1
+
+FIGURE = load_figure()
+FRAMES = 12
+QUICK = ("--noise", "0,2", "--yaw-step", "90", "--heights", "1.5m", "--frames-per-clip", "3")
+
+
+class Outcome(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+Run = Callable[..., Outcome]
+
+
+@pytest.fixture
+def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+    """Return a way to run the command in this process, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    main = importlib.import_module("posekit.cli").main
+
+    def run(*arguments: str) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["posekit", "evaluate", *arguments])
+        with warnings.catch_warnings():
+            warnings.simplefilter("default")
+            capsys.readouterr()
+            with pytest.raises(SystemExit) as caught:
+                main()
+        text = capsys.readouterr()
+        return Outcome(caught.value.code if isinstance(caught.value.code, int) else 0, text.out, text.err)
+
+    return run
+
+
+def joints() -> np.ndarray:
+    """Return the walker's joints (F, 14, 3), y up, metres."""
+    walker, time = Walker(), np.arange(FRAMES) / 30
+    points = FIGURE.forward_kinematics(walker.configurations(walker.phase(time)))
+    return np.asarray(points[:, :14] + walker.travel(time)[:, None])
+
+
+def save(path: str, **changed: Any) -> None:
+    content = {
+        "joints": joints(),
+        "joint_names": np.array(JOINTS),
+        "clip": np.zeros(FRAMES, dtype=int),
+        "clip_names": np.array(["walk"]),
+        "clip_action": np.array(["walking"]),
+        "clip_fps": np.array([30.0]),
+        "up": np.array("+y"),
+    }
+    np.savez(path, **{**content, **changed})
+
+
+def assert_refused(outcome: Outcome, *parts: str) -> None:
+    assert outcome.code == 2, outcome
+    assert outcome.out == ""
+    assert outcome.err.startswith("posekit: error: ")
+    assert len(outcome.err.splitlines()) == 1
+    for part in parts:
+        assert part in outcome.err
+
+
+def test_reports_and_charts_are_written(run: Run) -> None:
+    pytest.importorskip("matplotlib")
+    save("walk.npz")
+    outcome = run("walk.npz", "-o", "report.json", "-o", "report.csv", *QUICK, "--plots")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "18 views of walk.npz, 3 yaws x 1 heights, ranges urdf" in outcome.out
+    assert "| walking | 9 " in outcome.out
+    report = json.loads(Path("report.json").read_text())
+    assert report["schema"] == "posekit.evaluation/1"
+    assert report["settings"]["noise_px"] == [0.0, 2.0]
+    assert report["by_noise"][0]["retained_branch"] == 1.0
+    assert report["all"]["violations"]["lengths"] == report["all"]["violations"]["ranges"] == 0
+    with Path("report.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(report["conditions"]) == 6
+    assert {row["yaw"] for row in rows} == {"0.0", "90.0", "180.0"}
+    for name in ("yaw", "survivors", "correct-poses"):
+        assert Path(f"report-{name}.png").read_bytes().startswith(b"\x89PNG")
+        assert f"report-{name}.png" in outcome.out
+    assert not Path("report-reliability.png").exists()  # the ranking states no probability
+
+
+def test_motion_of_other_formats_is_the_same(run: Run) -> None:
+    save("walk.npz")
+    motion = Motion(names=JOINTS, points=joints(), time=np.arange(FRAMES) / 30, rate=30.0, up="+y")
+    write_motion("walk.trc", motion)
+    write_motion("walk.csv", motion)
+    told = {}
+    for name in ("walk.npz", "walk.trc", "walk.csv"):
+        # The text files round: so all are judged with the tolerance of what was measured.
+        assert run(name, "-o", "r.json", *QUICK, "--noise", "0", "--rigid-tolerance", "3cm").code == 0
+        told[name] = json.loads(Path("r.json").read_text())["all"]
+    for one in told.values():
+        assert one["retained_branch"] == 1.0
+        assert one["error_mm"]["mpjpe"]["best"]["mean"] < 1
+        assert one["survivors"]["mean"] == pytest.approx(told["walk.npz"]["survivors"]["mean"], rel=0.1)
+
+
+def test_views_with_truth_are_taken_as_they_are(run: Run) -> None:
+    write_view("seq1.json", view_of(seq1()))
+    outcome = run("seq1.json", "-o", "r.md")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "5 views of seq1.json" in outcome.out
+    assert Path("r.md").read_text().splitlines()[0] in outcome.out
+    write_view("random.json", view_of(random_views(FIGURE, 4, np.random.default_rng(0))))
+    assert run("random.json", "-o", "r.json", "--noise", "0,1", "--root", "given").code == 0
+    report = json.loads(Path("r.json").read_text())
+    assert report["frames"] == 8
+    assert [row["yaw"] for row in report["conditions"]] == [None, None]
+
+
+def test_the_seed_decides(run: Run) -> None:
+    save("walk.npz")
+    told = []
+    for seed in ("1", "1", "2"):
+        assert run("walk.npz", "-o", "r.json", *QUICK, "--seed", seed).code == 0
+        told.append(json.loads(Path("r.json").read_text())["by_noise"][1])
+    assert told[0] == told[1] != told[2]
+
+
+def test_frames_in_a_row_and_placed_necks(run: Run) -> None:
+    save("walk.npz")
+    assert run("walk.npz", "-o", "r.json", *QUICK, "--consecutive", "--noise", "0").code == 0
+    assert json.loads(Path("r.json").read_text())["settings"]["consecutive"] is True
+    assert (
+        run("walk.npz", "-o", "r.json", *QUICK, "--root", "auto", "--yaw-step", "180", "--noise", "1").code
+        == 0
+    )
+    report = json.loads(Path("r.json").read_text())
+    assert report["settings"]["root"] == "auto"
+    assert report["all"]["retained_within_35mm"] > 0
+
+
+@pytest.mark.parametrize(
+    ("options", "parts"),
+    [
+        (("--noise", "x"), ("--noise", "0,1,2")),
+        (("--noise", "nan"), ("--noise", "finite")),
+        (("--noise", "-1"), ("--noise", ">= 0")),
+        (("--noise", ","), ("--noise", "one or more")),
+        (("--yaw-step", "0"), ("--yaw-step", "1 to 180")),
+        (("--yaw-step", "nan"), ("--yaw-step",)),
+        (("--heights", "9m"), ("--heights: 9 m", "--distance")),
+        (("--heights", "9"), ("--heights",)),
+        (("--heights", ","), ("--heights", "one or more")),
+        (("--distance", "0m"), ("distance",)),
+        (("--f", "nan"), ("focal length",)),
+        (("--f", "90000"), ("leaves every picture",)),
+        (("--size", "9"), ("--size", "1920x1080")),
+        (("--size", "0x9"), ("0 x 9",)),
+        (("--frames-per-clip", "0"), ("--frames-per-clip",)),
+        (("--clips", "swim"), ("--clips", "walk")),
+        (("--actions", "swimming"), ("--actions", "walking")),
+        (("--root", "search"), ("--root", "given or auto")),
+        (("--checks", "gravity"), ("gravity", "rigid-parts")),
+        (("--ranges", "nowhere"), ("--ranges", "table1")),
+        (("--rules", "9"), ("--rules", "9")),
+        (("--rigid-tolerance", "3"), ("--rigid-tolerance", "unit")),
+        (("--jobs", "0"), ("--jobs",)),
+        (("--up", "up"), ("--up", "+x")),
+        (("--skeleton", "nobody"), ("nobody",)),
+        (("--format", "nothing"), ("--format", "trc")),
+        (("-o", "report.txt"), ("report.txt", ".csv")),
+        (("-o", "nowhere/report.json"), ("nowhere",)),
+        (("-o", "walk.npz"), ("walk.npz", "written over")),
+        (("-o", "report.json"), ("report.json", "written over")),
+    ],
+)
+def test_bad_options_are_one_line(run: Run, options: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    save("walk.npz")
+    before = sorted(Path().iterdir())
+    assert_refused(run("walk.npz", "-o", "report.json", *options), *parts)
+    assert sorted(Path().iterdir()) == before
+
+
+def test_bad_files_are_one_line(run: Run) -> None:
+    assert_refused(run("nothing.npz", "-o", "r.json"), "nothing.npz")
+    Path("cut.npz").write_bytes(b"PK\x03\x04 and no more")
+    assert_refused(run("cut.npz", "-o", "r.json"), "cut.npz")
+    Path("key.json").write_text('{"annotations": [], "images": [], "categories": []}')
+    assert_refused(run("key.json", "-o", "r.json"), "key.json")
+    save("nan.npz", joints=np.full((FRAMES, 14, 3), np.nan))
+    assert_refused(run("nan.npz", "-o", "r.json"), "nan.npz")
+    unknown = joints()
+    unknown[:, 4] = np.nan
+    save("hipless.npz", joints=unknown)
+    assert_refused(run("hipless.npz", "-o", "r.json"), "hipless.npz", "no frame has all 14 joints")
+    view = view_of(seq1())
+    write_view("seen.json", view)
+    for options in (("--heights", "1m"), ("--consecutive",), ("--clips", "a")):
+        assert_refused(run("seen.json", "-o", "r.json", *options), options[0], "leave the option out")
+    assert_refused(run("seen.json", "-o", "r.json", "--noise", "1"), "lee-chen")
+    document = json.loads(Path("seen.json").read_text())
+    for frame in document["frames"]:
+        del frame["truth"]
+    Path("blind.json").write_text(json.dumps(document))
+    assert_refused(run("blind.json", "-o", "r.json"), "blind.json", "no frame has a truth")
+    assert not Path("r.json").exists()
+
+
+def test_charts_say_what_they_need(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    save("walk.npz")
+    real = builtins.__import__
+
+    def without(name: str, *rest: Any, **more: Any) -> Any:
+        if name.startswith("matplotlib"):
+            raise ImportError(name)
+        return real(name, *rest, **more)
+
+    monkeypatch.setattr(builtins, "__import__", without)
+    assert_refused(run("walk.npz", "-o", "r.json", *QUICK, "--plots"), "matplotlib", "posekit[pictures]")
+    assert not Path("r.json").exists()
+
+
+def test_help_names_the_options(run: Run) -> None:
+    outcome = run("--help")
+    assert outcome.code == 0
+    for option in ("--yaw-step", "--heights", "--noise", "--frames-per-clip", "--plots", "--jobs"):
+        assert option in outcome.out
