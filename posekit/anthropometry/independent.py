@@ -10,14 +10,18 @@ from posekit.cameras import Array
 
 FADED: Final = 0.05
 """Correlation at which neighbours count as strangers."""
+ALIKE: Final = 0.15
+"""Root mean square of the differences of squared cosines at which two frames show the same; among isotropic ones it is
+0.42."""
 ENOUGH: Final = 0.5
 """Share of the usual variance at which a segment has turned enough: samples scatter, and so does the noise."""
 
 
 def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Array:
-    r"""Estimate how many independent, directions a segment has shown.
+    r"""Estimate how many independent directions a segment has shown.
 
-    Two things make them fewer than frames. Neighbours in a film are alike (`unlike_neighbours`). And a segment that
+    Three things make them fewer than frames. Neighbours in a film are alike (`unlike_neighbours`). Somebody who walks
+    shows the same postures at every step (`unlike_frames`). And a segment that
     keeps to one direction, as the shoulders of somebody who walks by, shows one however long it is filmed: where the
     squared cosine varies less than half of what is usual, any two frames are taken to be correlated by what is
     missing, and n frames so correlated by r count as :math:`n / (1 + (n - 1) r)`.
@@ -40,8 +44,28 @@ def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Arr
     count = known.sum(axis=0)
     blur = np.where(known, noise, 0.0).sum(axis=0) / np.maximum(count, 1)
     neighbours, variance = unlike_neighbours(squared_cosine, blur)
+    neighbours = np.minimum(neighbours, unlike_frames(squared_cosine))
     shared = np.clip(1 - variance / (ENOUGH * usual), 0.0, 1.0)
-    return np.where(count > 0, np.maximum(neighbours / (1 + (neighbours - 1) * shared), 1.0), 0.0)
+    more = np.maximum(neighbours, 1.0) - 1
+    return np.where(count > 0, np.maximum(neighbours / (1 + more * shared), 1.0), 0.0)
+
+
+def unlike_frames(squared_cosine: Array) -> int:
+    """Count frames less those that repeat any earlier one: their squared cosines (T, M) are within `ALIKE` of it."""
+    known = np.isfinite(squared_cosine)
+    values = np.where(known, squared_cosine, 0.0)
+    left = known.any(axis=1)
+    count = 0
+    while left.any():
+        one = int(np.argmax(left))
+        both = known & known[one]
+        off = np.where(both, values - values[one], 0.0)
+        # A frame that shares no segment with this one repeats nothing of it.
+        apart = (off * off).sum(axis=1) > ALIKE**2 * both.sum(axis=1)
+        left &= apart | ~both.any(axis=1)
+        left[one] = False
+        count += 1
+    return count
 
 
 def unlike_neighbours(values: Array, noise: Array) -> tuple[Array, Array]:

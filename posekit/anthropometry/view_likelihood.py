@@ -69,6 +69,8 @@ class ViewLikelihood:
         Metres in depth by which a segment is off the body's middle: so much nearer it is, and seen larger.
     loose : array (M,)
         How much a length changes with posture, as a fraction of it; 0 for a bone.
+    shorter : array (M,)
+        How much shorter than the dimension a length is on average, in logarithms: the trunk of a bent back.
     focal : float, optional
         Focal length, pixels, which gives the distance; without it `DISTANCE` is assumed.
     noise : float, optional
@@ -82,6 +84,7 @@ class ViewLikelihood:
     scale_known: bool
     relief: Array
     loose: Array
+    shorter: Array
     focal: float | None
     noise: float | None
     concentration: Array
@@ -91,26 +94,26 @@ class ViewLikelihood:
         """Logarithms of the scales to integrate over (T, S)."""
         return self.first[:, None] + (np.zeros(1) if self.scale_known else GRID)
 
+    # Noise and distance come of the first guess of the scale, not of the scale that is integrated over: what is known
+    # of them in metres would otherwise say something of the size.
+
     @cached_property
     def _nearness(self) -> Array:
-        """One over the distance (T, S), 1/m."""
+        """One over the distance (T, 1), 1/m."""
         if self.focal is None:
-            return np.full_like(self.scales, 1 / DISTANCE)
-        return np.asarray(np.exp(self.scales) / self.focal)
+            return np.full((len(self.first), 1), 1 / DISTANCE)
+        return np.asarray(np.exp(self.first[:, None]) / self.focal)
 
     @cached_property
     def _blur(self) -> Array:
-        return self.blur(self.scales)
-
-    def blur(self, scales: Array) -> Array:
-        """Return the noise of a key point's coordinate at some scales (their logarithms), pixels."""
+        """Standard deviation of a key point's coordinate (T, 1), pixels."""
         if self.noise is None:
-            return np.asarray(JOINT_NOISE * np.exp(scales))
-        return np.full_like(scales, self.noise)
+            return np.asarray(JOINT_NOISE * np.exp(self.first[:, None]))
+        return np.full((len(self.first), 1), self.noise)
 
     def of_length(self, m: int, dimension: float) -> Array:
         """Return the logarithm of the density of the m-th length (T, S), 0 where it was not seen."""
-        full = np.exp(self.scales + dimension)
+        full = np.exp(self.scales + dimension - self.shorter[m])
         seen = self.seen[:, m, None]
         apart = 2 * self._blur**2 / full**2  # both ends are off
         density = log_density(
@@ -175,7 +178,7 @@ class ViewLikelihood:
         )
         full = np.maximum(full, 1e-6)
         x = np.minimum(metres / full, 1.0)
-        return 1 - x * x, (2 * x) ** 2 * 2 * (self.blur(scale) / np.exp(scale))[:, None] ** 2 / full**2
+        return 1 - x * x, (2 * x) ** 2 * 2 * (self._blur / np.exp(scale)[:, None]) ** 2 / full**2
 
     def posterior_scales(self, y: Array) -> Array:
         """Return the mean of the logarithm of each picture's scale (T,)."""

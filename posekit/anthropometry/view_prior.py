@@ -20,8 +20,8 @@ KNOWN: Final = 0.002
 """Relative deviation of a length that is given."""
 STACK: Final = 0.02
 """Relative deviation of the way from ankles to shoulders at a known stature: head, neck and feet are the rest."""
-ASYMMETRY: Final = 0.25
-"""How much left and right differ, as a share of the spread among people, where they are told apart: some 2 % of l."""
+ASYMMETRY: Final = 0.4
+"""How much left and right differ, as a share of the spread among people, where they are told apart: some 3 % of l."""
 
 
 def prior_covariance(deviation: Array, both_sides: bool) -> Array:

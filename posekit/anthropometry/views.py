@@ -61,6 +61,8 @@ Capture Database): 0.17, 0.32, 0.06, 0.11, 0.50, 0.50, 0.02; somewhat less for t
 """
 LOOSE: Final = {SHOULDERS: 0.03, HIPS: 0.02, TRUNK: 0.05}
 """How much widths and trunk change with posture, as a fraction: the girdle moves, the back bends."""
+BENT: Final = 0.042
+"""How much the trunk is shorter than when straight, among random legal postures; while people walk it is not."""
 LIMB_JOINTS: Final = tuple(name for name in JOINTS if name not in ("neck", "pelvis"))
 LEAST_NOISE: Final = 0.05
 """Pixels."""
@@ -185,6 +187,7 @@ def lengths_from_views(
         scale_known=scale is not None,
         relief=np.array([relief.get(name, RELIEF.get(name, np.nan)) for name in DIMENSIONS]),
         loose=np.array([LOOSE.get(name, 0.0) for name in DIMENSIONS]),
+        shorter=np.array([0.0 if upright or name != TRUNK else BENT for name in DIMENSIONS]),
         focal=None if focal is None else positive("focal", focal),
         noise=None
         if noise is None

@@ -155,27 +155,37 @@ def test_the_variance_of_a_squared_cosine(concentration: float) -> None:
 
 
 def test_frames_that_repeat_count_once(rng: np.random.Generator) -> None:
-    isotropic = np.full(1, 4 / 45)
-    still = np.full((400, 1), 0.3)
-    fresh = rng.uniform(0, 1, (400, 1)) ** 2
+    isotropic = np.full(8, 4 / 45)
+    still = np.full((400, 8), 0.3)
+    fresh = rng.uniform(0, 1, (400, 8)) ** 2
     slow = np.repeat(fresh[:40], 10, axis=0)
-    # Noise makes frames differ that show the same direction.
-    shaken = still + 0.02 * rng.normal(size=(400, 1))
-    counts = [
-        float(independent_frames(one, np.full_like(one, noise), isotropic)[0])
-        for one, noise in ((still, 0.0), (fresh, 0.0), (slow, 0.0), (shaken, 4e-4))
-    ]
-    assert counts[0] == 1 and counts[3] < 2
-    assert counts[1] > 250
-    assert 15 < counts[2] < 80
-    assert independent_frames(np.full((5, 1), np.nan), np.zeros((5, 1)), isotropic).tolist() == [0]
+    steps = np.tile(fresh[:40], (10, 1))
+    # Noise makes frames differ that show the same direction, and so does a little turning.
+    shaken = still + 0.02 * rng.normal(size=still.shape)
+    swaying = still + 0.05 * np.sin(np.arange(400))[:, None]
+
+    def count(squared_cosine: np.ndarray, noise: float = 0.0) -> float:
+        found = independent_frames(squared_cosine, np.full_like(squared_cosine, noise), isotropic)
+        return float(np.median(found))
+
+    assert count(fresh) > 200
+    assert count(still) == 1
+    assert count(shaken, 4e-4) < 1.5
+    assert count(swaying) < 1.5
+    assert 15 < count(slow) <= 40
+    assert 25 < count(steps) <= 40
+    half = fresh.copy()
+    half[:, 0] = 0.5
+    found = independent_frames(half, np.zeros_like(half), isotropic)
+    assert found[0] == 1 and found[1:].min() > 100
+    assert independent_frames(np.full((5, 8), np.nan), np.zeros((5, 8)), isotropic).tolist() == [0] * 8
 
 
 def test_the_order_of_frames_matters_to_neighbours_alone(rng: np.random.Generator) -> None:
     walk = np.cumsum(rng.normal(size=(500, 1)), axis=0)
     in_order, _ = unlike_neighbours(walk, np.zeros(1))
     shuffled, _ = unlike_neighbours(rng.permutation(walk), np.zeros(1))
-    assert in_order[0] < 20 < 300 < shuffled[0]
+    assert in_order[0] < 20 and shuffled[0] > 300
 
 
 # Views
@@ -183,7 +193,7 @@ def test_the_order_of_frames_matters_to_neighbours_alone(rng: np.random.Generato
 
 def test_views_beat_the_proportions() -> None:
     found, prior, scores = [], [], []
-    for seed in range(6):
+    for seed in range(3):
         figure, stature = somebody(seed)
         image = seen_from_everywhere(figure, 60, seed) + 2 * np.random.default_rng(seed).normal(
             size=(60, 14, 2)
@@ -238,7 +248,9 @@ def test_a_known_length_fixes_the_size() -> None:
     image = seen_from_everywhere(figure, 60, 5)
     known = {"right_hip-right_knee": figure.lengths["right_hip-right_knee"]}
     views = lengths_from_views(image, known=known, upright=False)
-    assert views.lengths.lengths["right_hip-right_knee"] == pytest.approx(*known.values(), rel=0.005)
+    assert views.lengths.lengths["right_hip-right_knee"] == pytest.approx(
+        known["right_hip-right_knee"], rel=0.005
+    )
     large = lengths_from_views(
         image, known={"right_hip-right_knee": 1.5 * known["right_hip-right_knee"]}, upright=False
     )
@@ -288,7 +300,7 @@ def test_missing_points_and_outliers_are_allowed_for(rng: np.random.Generator) -
     image[::16, JOINT["left_ankle"]] += 900.0
     image[5] = np.nan
     views = lengths_from_views(image, stature=stature, proportions="drillis-contini", upright=False)
-    assert np.isnan(views.scale[5]) and views.frames == 79
+    assert np.isnan(views.scale[5]) and 70 <= views.frames <= 79
     assert np.abs(errors(dict(views.lengths.lengths), figure)).max() < 0.12
     image[:, [JOINT["left_wrist"], JOINT["right_wrist"]]] = np.nan
     views = lengths_from_views(image, stature=stature, proportions="drillis-contini", upright=False)
