@@ -1,1 +1,23 @@
-"""x"""
+"""Noise: the most likely posture for each survivor, how sure it is, and what noise cannot explain.
+
+`Sight` says what was seen and how well; `find_trunks` finds the torsos and hips that the noise allows, from which
+the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves into
+the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge` makes
+one of those that became one. See docs/noise.md.
+"""
+
+from posekit.refinement.allowance import NoisyRange as NoisyRange
+from posekit.refinement.allowance import under_noise as under_noise
+from posekit.refinement.merging import Merged as Merged
+from posekit.refinement.merging import merge as merge
+from posekit.refinement.optics import project as project
+from posekit.refinement.prior import RootPrior as RootPrior
+from posekit.refinement.refine import refine as refine
+from posekit.refinement.refined import LEVEL as LEVEL
+from posekit.refinement.refined import Refined as Refined
+from posekit.refinement.sight import Sight as Sight
+from posekit.refinement.survival import chi2_survival as chi2_survival
+from posekit.refinement.tolerance import NoiseTolerance as NoiseTolerance
+from posekit.refinement.tolerance import tolerance_of as tolerance_of
+from posekit.refinement.trunk import Trunks as Trunks
+from posekit.refinement.trunk import find_trunks as find_trunks

@@ -12,12 +12,14 @@ from posekit.figure import Figure
 from posekit.figure.angles import Limits
 from posekit.skeleton import DOFS, HEAD, JOINT, segment_name
 
-TRUNK: Final = tuple(JOINT[name] for name in ("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip"))
+TRUNK: Final = tuple(
+    JOINT[name] for name in ("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip")
+)
 """The joints of torso and hips: the first six of the tree."""
 
 LIMBS: Final = tuple(
-    tuple(JOINT[f"{side}_{name}"] for name in names)
-    for names in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{middle}"], JOINT[f"{side}_{end}"])
+    for start, middle, end in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
     for side in ("right", "left")
 )
 """Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
@@ -78,11 +80,26 @@ class Anatomy:
         points = figure.neutral_points
         pelvis = points[3]
         right_hip, left_hip = points[4] - pelvis, points[5] - pelvis
-        shape = [-pelvis[2], points[1, 0], *points[1, 1:], *points[2, 1:], -right_hip[2], right_hip[1], left_hip[1]]
+        shape = [
+            -pelvis[2],
+            points[1, 0],
+            *points[1, 1:],
+            *points[2, 1:],
+            -right_hip[2],
+            right_hip[1],
+            left_hip[1],
+        ]
         lengths = figure.lengths
-        limbs = [[lengths[segment_name((a, b))] for a, b in ((limb[0], limb[1]), (limb[1], limb[2]))] for limb in LIMBS]
+        limbs = [
+            [lengths[segment_name((a, b))] for a, b in ((limb[0], limb[1]), (limb[1], limb[2]))]
+            for limb in LIMBS
+        ]
         limits = limits or figure.limits
-        first = [DOFS.index(f"{side}_{joint}.flexion") for joint in ("shoulder", "hip") for side in ("right", "left")]
+        first = [
+            DOFS.index(f"{side}_{joint}.flexion")
+            for joint in ("shoulder", "hip")
+            for side in ("right", "left")
+        ]
         return Anatomy(
             shape=np.array(shape),
             limbs=np.array(limbs),

@@ -55,7 +55,9 @@ def _covariances(problem: Problem, state: State, here: Equations) -> Array:
     limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
     arrow = assemble(here._replace(limbs=limbs), 0.0, ANY**-2 * 1e-6)
     index = np.arange(width)
-    arrow.matrix[index, index] += np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))[:, None]
+    arrow.matrix[index, index] += np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))[
+        :, None
+    ]
     trunk = cholesky(arrow.matrix)
     out = np.empty((14, 3, 3, n))
     # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
@@ -92,7 +94,10 @@ def _with_priors(problem: Problem, state: State, terms: LimbTerms) -> Array:
             limb[i, i] += ANY**-2
         seen = turned(A[list(ends)], state.directions[:, segment])
         ray = joints[list(ends)] if problem.optics.perspective else np.array([0.0, 0.0, 1.0])[:, None]
-        c, s = (dot(terms.tangents[:, segment, k], np.broadcast_to(ray, seen.shape[:1] + (3,) + seen.shape[2:])) for k in range(2))
+        c, s = (
+            dot(terms.tangents[:, segment, k], np.broadcast_to(ray, (*seen.shape[:1], 3, *seen.shape[2:])))
+            for k in range(2)
+        )
         size = np.maximum(np.sqrt(c * c + s * s), TINY)
         known = CAP * state.limbs[:, segment] * np.sqrt(dot(seen, seen)) / (size * size)
         for (i, x), (j, y) in (((a, p), (b, q)) for a, p in ((0, c), (1, s)) for b, q in ((0, c), (1, s))):

@@ -49,13 +49,10 @@ class Watch(NamedTuple):
         """Return some postures."""
         return Watch(*(array[..., rows] for array in self))
 
-    def any(self) -> NDArray[np.bool_]:
-        """Return which postures have any (N,)."""
-        return (self.limbs != 0).any(axis=(0, 1)) | (self.hips != 0).any(axis=0) | (self.head != 0).any(axis=0)
-
-    def count(self) -> NDArray[np.intp]:
+    def passed(self) -> NDArray[np.intp]:
         """Count the limits of each posture (N,)."""
-        return (self.limbs != 0).sum(axis=(0, 1)) + (self.hips != 0).sum(axis=0) + (self.head != 0).sum(axis=0)
+        count = (self.limbs != 0).sum(axis=(0, 1))
+        return np.asarray(count + (self.hips != 0).sum(axis=0) + (self.head != 0).sum(axis=0), dtype=np.intp)
 
 
 class Equations(NamedTuple):
@@ -133,16 +130,22 @@ class Reduced(NamedTuple):
     damped: Array
 
 
-def eliminate(matrix: Array, coupling: Array, gradient: Array, damping: Array | float, floor: float) -> Reduced:
+def eliminate(
+    matrix: Array, coupling: Array, gradient: Array, damping: Array | float, floor: float
+) -> Reduced:
     """Factor a block (k, k, ...), damped by a fraction of its diagonal."""
     factor = matrix.copy()
     damped = _damp(factor, damping, floor)
     right = np.concatenate([coupling, gradient[:, None]], axis=1)
-    return Reduced(cholesky(factor), forward(factor, right), damped) if len(factor) else Reduced(factor, right, damped)
+    return (
+        Reduced(cholesky(factor), forward(factor, right), damped)
+        if len(factor)
+        else Reduced(factor, right, damped)
+    )
 
 
 def left_over(reduced: Reduced, matrix: Array, gradient: Array) -> tuple[Array, Array]:
-    """Return what an eliminated block leaves of the matrix (6, 6, ...) and gradient (6, ...) that it is coupled with."""
+    """Return what an eliminated block leaves of the matrix (6, 6, ...) and gradient (6, ...) that it touches."""
     coupling, own = reduced.right[:, :-1], reduced.right[:, -1]
     return matrix - np.einsum("ki...,kj...->ij...", coupling, coupling), gradient - np.einsum(
         "ki...,k...->i...", coupling, own

@@ -43,12 +43,14 @@ def factor_postures(frames: NDArray[np.intp], postures: Array) -> Factors:
     trunks, and each trunk at most four of each limb.
     """
     n = len(postures)
-    key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, -1)], axis=1)
+    key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, 18)], axis=1)
     trunk, trunk_of = distinct(key)
     count = np.zeros((4, len(trunk)), dtype=np.intp)
     found = []
     for kind, (_, middle, end) in enumerate(LIMBS):
-        own = np.concatenate([trunk_of[:, None].astype(np.float64), postures[:, middle], postures[:, end]], axis=1)
+        own = np.concatenate(
+            [trunk_of[:, None].astype(np.float64), postures[:, middle], postures[:, end]], axis=1
+        )
         one, which = distinct(own)
         order = np.argsort(trunk_of[one], kind="stable")
         rank = np.empty(len(one), dtype=np.intp)

@@ -13,6 +13,9 @@ from posekit.refinement.anatomy import LIMBS, TRUNK_SEGMENTS
 from posekit.refinement.prior import RootPrior
 from posekit.skeleton import SEGMENT_NAMES, segment_name
 
+LEAST = 1e-9
+"""Pixels: the least standard deviation of a key point."""
+
 EXACT = 1e-5
 """Relative deviation of a length that is known exactly, where others are not."""
 
@@ -41,7 +44,9 @@ def frames_of(frame: ArrayLike | None, survivors: int, count: int) -> NDArray[np
         return np.arange(count)
     frames = np.asarray(frame)
     if frames.shape != (survivors,) or frames.dtype.kind not in "iu":
-        raise InputError(f"frame has shape {frames.shape} of {frames.dtype}; expected ({survivors},) whole numbers")
+        raise InputError(
+            f"frame has shape {frames.shape} of {frames.dtype}; expected ({survivors},) whole numbers"
+        )
     if survivors and not (0 <= int(frames.min()) and int(frames.max()) < count):
         raise InputError(f"frame runs from {frames.min()} to {frames.max()}; expected 0 to {count - 1}")
     return frames.astype(np.intp)
@@ -55,9 +60,10 @@ def weights(name: str, deviation: ArrayLike, points: Array) -> Array:
     except ValueError:
         raise InputError(f"{name} has shape {given.shape}; expected a number or {points.shape[:2]}") from None
     seen = np.isfinite(points).all(axis=2)
-    if not (given[seen] > 0).all():
+    if not (given[seen] >= LEAST).all():
         raise InputError(
-            f"{name} must be positive where a point was seen, pixels; give infinity for a point not to be used"
+            f"{name} is {float(given[seen].min()):g} pixels where a point was seen; expected {LEAST:g} or more, "
+            "and infinity for a point not to be used"
         )
     return np.where(seen, 1.0 / np.where(seen, given, 1.0), 0.0)
 
@@ -82,7 +88,9 @@ def length_weights(deviation: Mapping[str, float] | float) -> tuple[Array | None
                 f"length_deviation: {name} is {value!r}; expected a fraction of the length, zero or more and below one"
             )
     trunk = np.array([by_name[segment_name(pair)] for pair in TRUNK_SEGMENTS])
-    limbs = np.array([[by_name[segment_name(pair)] for pair in (limb[:2], limb[1:])] for limb in LIMBS])
+    limbs = np.array(
+        [[by_name[segment_name(pair)] for pair in ((limb[0], limb[1]), (limb[1], limb[2]))] for limb in LIMBS]
+    )
     return (
         1.0 / np.maximum(trunk, EXACT) if trunk.any() else None,
         1.0 / np.maximum(limbs, EXACT) if limbs.any() else None,

@@ -73,7 +73,7 @@ def _advance(
     step = -backward(block.factor, block.right[:, -1].copy())
     gain = (block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0) - terms.slack
     watching = (watched != 0).any(axis=0)
-    done = (damped > MOST) | ((gain <= precision) & (damped <= LIGHT) & ~watching)
+    done = (damped > MOST) | ((gain <= precision) & ((damped <= LIGHT) | watching))
     done |= (value > hopeless) & (gain < 0.5 * value) & ~watching
     if done.all():
         return np.zeros(len(rows), dtype=np.bool_)
@@ -85,7 +85,9 @@ def _advance(
     ran = new.any(axis=0)
     with np.errstate(invalid="ignore"):
         ratio = np.clip((value - trial) / np.maximum(gain, TINY), 0.0, 1.0)
-    change = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), np.where(ran | done, 1.0, SLOWER))
+    change = np.where(
+        better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), np.where(ran | done, 1.0, SLOWER)
+    )
     damping[:, rows] = np.maximum(damped * change, LEAST)
     watch[..., rows] = np.where(better | done, 0, watched + new)
     chi2[:, rows] = np.where(better, trial, value)

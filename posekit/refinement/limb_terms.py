@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.refinement.anatomy import END, MIDDLE
-from posekit.refinement.limits import Signs, limb_angles, limb_limits, limb_rows, tangents_of
+from posekit.refinement.limits import Limbs, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import dot
 from posekit.refinement.state import place_limbs
@@ -124,24 +124,33 @@ def limb_terms(problem: Problem, chains: Chains, watch: Signs | None = None) -> 
             matrix[4 + segment, 4 + segment] += weight[:, segment] ** 2
             gradient[4 + segment] += weight[:, segment] * stretch[:, segment]
     crossed, slack = np.zeros((4, 4, n), dtype=np.int8), np.zeros((4, n))
+    terms = LimbTerms(
+        chi2, matrix, coupling, start, gradient, start_gradient, tangents, folds, crossed, slack
+    )
     if problem.limited:
-        out = limb_limits(found, problem.anatomy.limb_bounds, watch)
-        if out is not None:
-            k, m = out.limb, out.row
-            scale = 1.0 / problem.limit_deviation
-            judged = out.residual() * scale
-            J = limb_rows(found, out, tangents[k, 1, 0, :, m], tangents[k, 1, 1, :, m]) * scale
-            normal, push = np.einsum("aim,ajm->ijm", J, J), np.einsum("aim,am->im", J, judged)
-            matrix[:4, :4, k, m] += normal[:4, :4]
-            coupling[:4, 3:, k, m] += normal[:4, 4:]
-            start[3:, 3:, k, m] += normal[4:, 4:]
-            gradient[:4, k, m] += push[:4]
-            start_gradient[3:, k, m] += push[4:]
-            crossed[:, k, m] = out.crossed
-            cost = out.cost() * scale * scale
-            chi2[k, m] += cost
-            slack[k, m] = (judged * judged).sum(axis=0) - cost
-    return LimbTerms(chi2, matrix, coupling, start, gradient, start_gradient, tangents, folds, crossed, slack)
+        _add_limits(problem, found, watch, terms)
+    return terms
+
+
+def _add_limits(problem: Problem, found: Limbs, watch: Signs | None, terms: LimbTerms) -> None:
+    """Add the limits that are passed or watched, in place."""
+    out = limb_limits(found, problem.anatomy.limb_bounds, watch)
+    if out is None:
+        return
+    k, m = out.limb, out.row
+    scale = 1.0 / problem.limit_deviation
+    judged = out.residual() * scale
+    J = limb_rows(found, out, terms.tangents[k, 1, 0, :, m], terms.tangents[k, 1, 1, :, m]) * scale
+    normal, push = np.einsum("aim,ajm->ijm", J, J), np.einsum("aim,am->im", J, judged)
+    terms.matrix[:4, :4, k, m] += normal[:4, :4]
+    terms.coupling[:4, 3:, k, m] += normal[:4, 4:]
+    terms.start[3:, 3:, k, m] += normal[4:, 4:]
+    terms.gradient[:4, k, m] += push[:4]
+    terms.start_gradient[3:, k, m] += push[4:]
+    terms.crossed[:, k, m] = out.crossed
+    cost = out.cost() * scale * scale
+    terms.chi2[k, m] += cost
+    terms.slack[k, m] = (judged * judged).sum(axis=0) - cost
 
 
 def limb_chi2(problem: Problem, chains: Chains) -> tuple[Array, Signs]:

@@ -1,9 +1,10 @@
 r"""Soft limits: how far limbs, hips and head are outside their joints' ranges, and how that changes.
 
-Inside the limits the residual is zero; outside it is the distance, in standard deviations, by which the segment's
-direction would have to turn to be inside. An axial rotation outside by v costs no more than
-:math:`\sin\varepsilon \sin v` of the lower segment, at a bend of :math:`\varepsilon`: a straight limb has none to be
-judged. Likewise the first angle of an upper segment that points along the abduction axis.
+Inside the limits the residual is zero; outside it is about the distance, in standard deviations, by which the
+segment's direction would have to turn to be inside. An axial rotation outside by v counts
+:math:`\sin\varepsilon \; v / \sqrt{1 + v^2}` at a bend of :math:`\varepsilon`: a straight limb has none to be judged,
+and no direction is farther from the allowed ones than the straight limb's. Likewise the first angle of an upper segment
+that points along the abduction axis.
 
 With the angles of `posekit.figure.angles` the tangents of the upper direction d are the directions in which
 :math:`\alpha` and :math:`\beta` carry it, :math:`a = \partial d / \cos\beta\, \partial\alpha` and
@@ -115,7 +116,9 @@ def tangents_of(found: Limbs, upper: Array) -> Array:
     out = np.empty((4, 2, 2, 3, upper.shape[2]))
     out[:, 0, 0], out[:, 0, 1] = found.a, found.b
     out[:, 1, 0] = -sin_g[:, None] * found.a - cos_g[:, None] * found.b
-    out[:, 1, 1] = (cos_e * cos_g)[:, None] * found.a - (cos_e * sin_g)[:, None] * found.b - sin_e[:, None] * upper
+    out[:, 1, 1] = (
+        (cos_e * cos_g)[:, None] * found.a - (cos_e * sin_g)[:, None] * found.b - sin_e[:, None] * upper
+    )
     return out
 
 
@@ -137,7 +140,9 @@ def limb_limits(found: Limbs, bounds: Bounds, watch: Signs | None = None) -> Out
     """
     lower, upper = bounds.lower.T[..., None], bounds.upper.T[..., None]
     middle, half = (lower + upper) / 2, (upper - lower) / 2
-    outer = (np.abs(found.angles - middle) > half).any(axis=0)  # a full turn, or another branch, may bring them inside
+    outer = (np.abs(found.angles - middle) > half).any(
+        axis=0
+    )  # a full turn, or another branch, may bring them inside
     limb, row = np.nonzero(outer if watch is None else outer | (watch != 0).any(axis=0))
     if not limb.size:
         return None
@@ -192,13 +197,13 @@ def limb_rows(found: Limbs, out: Outside, f: Array, e: Array) -> Array:
     rotation += per_alpha * (cos_b * cos_e * sin_g + sin_b * sin_e) + beta * (cos_e * cos_g)
     bend[3], bend[4:] = 1.0, f.T
     bend += beta * sin_g - per_alpha * (cos_b * cos_g)
-    sine = np.sin(np.clip(over, -np.pi / 2, np.pi / 2))
-    cosine = np.where(np.abs(over) < np.pi / 2, np.cos(over), 0.0)
+    judged = _shortened(over)
+    slope = (1.0 + over * over) ** -1.5
     felt = over != 0
     rows = np.empty((4, 7, len(limb)))
-    rows[0] = felt[0] * (cosine[0] * alpha - sine[0] * sin_b * beta)
+    rows[0] = felt[0] * (slope[0] * alpha - judged[0] * sin_b * beta)
     rows[1] = felt[1] * np.where(out.euler > 0, -1.0, 1.0) * beta
-    rows[2] = felt[2] * (cosine[2] * rotation + sine[2] * cos_e * bend)
+    rows[2] = felt[2] * (slope[2] * rotation + judged[2] * cos_e * bend)
     rows[3] = felt[3] * out.side * bend
     return rows
 
@@ -211,18 +216,23 @@ def _beyond(away: Array, half: Array) -> Array:
 
 
 def _shortened(over: Array) -> Array:
-    """Return angles outside the limits as they are judged: the sines of first angle and axial rotation."""
+    """Return angles outside the limits as they are judged: see the module, for first angle and axial rotation."""
     out = over.copy()
-    out[::2] = np.sin(np.minimum(np.maximum(over[::2], -np.pi / 2), np.pi / 2))
+    judged = out[::2]
+    judged /= np.sqrt(1.0 + judged * judged)
     return out
 
 
 def _possible(bounds: Bounds) -> list[tuple[int, float]]:
     """Return the branches into which any limb's limits reach."""
-    over_the_top = (np.abs(bounds.lower[:, 1]) > np.pi / 2).any() or (np.abs(bounds.upper[:, 1]) > np.pi / 2).any()
+    over_the_top = (np.abs(bounds.lower[:, 1]) > np.pi / 2).any() or (
+        np.abs(bounds.upper[:, 1]) > np.pi / 2
+    ).any()
     either = ((bounds.upper[:, 3] > 0).any(), (bounds.lower[:, 3] < 0).any())
     return [
-        (branch, hinge) for branch, hinge in BRANCHES if (over_the_top or not branch) and either[int(hinge < 0)]
+        (branch, hinge)
+        for branch, hinge in BRANCHES
+        if (over_the_top or not branch) and either[int(hinge < 0)]
     ]
 
 
@@ -256,7 +266,10 @@ def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None
     sin_a, cos_a = -x * inverse, np.where(h > 0, -z * inverse, 1.0)
     axis = cos_a * parent[:, 0] - sin_a * parent[:, 2]
     forward = child[:, 0]
-    sine, cosine = np.stack([sin_a, y, dot(cross(up, axis), forward)]), np.stack([cos_a, h, dot(axis, forward)])
+    sine, cosine = (
+        np.stack([sin_a, y, dot(cross(up, axis), forward)]),
+        np.stack([cos_a, h, dot(axis, forward)]),
+    )
     lower, upper = bounds.lower[0, :, None], bounds.upper[0, :, None]
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     away = np.arctan2(sine, cosine) - middle

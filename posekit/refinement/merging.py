@@ -15,6 +15,9 @@ from posekit.refinement.refined import Refined
 WITHIN = 0.005
 """Metres: survivors none of whose joints are farther apart became one, unless told otherwise."""
 
+DIRECTION = np.array([0.48, 0.6, 0.64])
+"""A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Merged:
@@ -36,6 +39,8 @@ class Merged:
 
     def members(self) -> list[NDArray[np.intp]]:
         """List for each of them the survivors that it stands for, itself among them."""
+        if not len(self.rows):
+            return []
         order = np.argsort(self.group, kind="stable")
         order = order[np.searchsorted(self.group[order], 0) :]
         return np.split(order, np.cumsum(np.bincount(self.group[order], minlength=len(self.rows)))[:-1])
@@ -43,7 +48,9 @@ class Merged:
     def codes(self, branches: Sequence[str]) -> list[list[str]]:
         """List for each of them the branch codes that it stands for, of all survivors' codes (N)."""
         if len(branches) != len(self.group):
-            raise InputError(f"{len(branches)} branch codes for {len(self.group)} survivors; expected one each")
+            raise InputError(
+                f"{len(branches)} branch codes for {len(self.group)} survivors; expected one each"
+            )
         return [[branches[int(row)] for row in rows] for rows in self.members()]
 
 
@@ -74,7 +81,9 @@ def merge(refined: Refined, *, within: float = WITHIN, keep: NDArray[np.bool_] |
     rows = np.flatnonzero(chosen)
     joints = refined.joints[rows]
     # Ties are broken by where the joints are: by nothing that depends on the order.
-    order = np.lexsort((*joints.reshape(len(rows), -1).T[:3], joints.sum(axis=(1, 2)), -refined.p[rows], refined.frame[rows]))
+    shadow = joints @ DIRECTION
+    ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
+    order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
     leader = groups_of(refined.frame[rows], joints, within)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
@@ -86,18 +95,51 @@ def merge(refined: Refined, *, within: float = WITHIN, keep: NDArray[np.bool_] |
 
 
 def groups_of(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:
-    """Find for each posture (N, P, 3) the first of its frame that stands for it; frames are together, the best first.
+    """Find for each posture (N, P, 3) the one of its frame that stands for it; the best come first in each frame.
 
-    In each round the first posture of every frame that is left takes in all that are near it.
+    A posture stands for itself unless one before it that does so is near; it goes to the first such.
     """
-    leader = np.full(len(frame), -1)
-    left = np.arange(len(frame))
-    while left.size:
-        first = np.flatnonzero(np.diff(frame[left], prepend=-1))
-        mine = left[np.repeat(first, np.diff(np.append(first, len(left))))]
-        apart = joints[left] - joints[mine]
-        near = np.einsum("npi,npi->np", apart, apart).max(axis=1) <= within * within
-        near |= mine == left
-        leader[left[near]] = mine[near]
-        left = left[~near]
+    n = len(frame)
+    first, second = _near(frame, joints, within)
+    open_ = np.zeros(n, dtype=np.bool_)
+    open_[second] = True
+    stands = ~open_
+    while open_.any():
+        # Those near one that stands for itself are taken in; those whose earlier neighbours are all taken stand.
+        open_[second[stands[first] & open_[second]]] = False
+        waiting = open_[first] & open_[second]
+        held = np.zeros(n, dtype=np.bool_)
+        held[second[waiting]] = True
+        new = open_ & ~held
+        stands |= new
+        open_ &= ~new
+    taken = stands[first] & ~stands[second]
+    leader = np.where(stands, np.arange(n), n)
+    np.minimum.at(leader, second[taken], first[taken])
     return leader
+
+
+def _near(frame: NDArray[np.intp], joints: Array, within: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return pairs of postures of a frame, the earlier first, none of whose joints are farther apart.
+
+    Only those are compared whose joints' projections on one direction, which differ by no more than the joints do, are
+    that near.
+    """
+    n, count = len(frame), joints.shape[1]
+    shadow = joints @ DIRECTION
+    key = shadow[:, count // 2 :].mean(axis=1)  # of the far ends of the body, which differ most
+    order = np.lexsort((key, frame))
+    spread = float(np.ptp(key)) + 2 * within + 1.0 if n else 1.0
+    line = (key + frame * 2 * spread)[order]
+    slack = 1e-9 * (1.0 + np.abs(line).max(initial=0.0))
+    pairs = np.searchsorted(line, line + within + slack, side="right") - np.arange(n) - 1
+    begin = np.repeat(np.arange(n), pairs)
+    other = begin + 1 + np.arange(len(begin)) - np.repeat(np.cumsum(pairs) - pairs, pairs)
+    a, b = order[begin], order[other]
+    for joint in range(count - 1, -1, -1):
+        maybe = np.abs(shadow[a, joint] - shadow[b, joint]) <= within + slack
+        a, b = a[maybe], b[maybe]
+    apart = joints[a] - joints[b]
+    near = np.einsum("npi,npi->np", apart, apart).max(axis=1, initial=0.0) <= within * within
+    a, b = a[near], b[near]
+    return np.minimum(a, b), np.maximum(a, b)

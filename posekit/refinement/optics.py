@@ -75,7 +75,11 @@ class Optics:
         inverse = 1.0 / np.where(depth > 0, depth, np.nan)
         x, y = points[:, 0] * inverse, points[:, 1] * inverse
         if self.distortion is None:
-            jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 1] = fx * inverse, skew * inverse, fy * inverse
+            jacobian[:, 0, 0], jacobian[:, 0, 1], jacobian[:, 1, 1] = (
+                fx * inverse,
+                skew * inverse,
+                fy * inverse,
+            )
             jacobian[:, 0, 2] = -(fx * x + skew * y) * inverse
             jacobian[:, 1, 2] = -fy * y * inverse
         else:
@@ -156,7 +160,9 @@ def project(camera: Camera, points: Array) -> tuple[Array, Array]:
     return image.transpose(2, 0, 1), jacobian.transpose(3, 0, 1, 2)
 
 
-def _distorted(x: Array, y: Array, distortion: Array) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
+def _distorted(
+    x: Array, y: Array, distortion: Array
+) -> tuple[tuple[Array, Array], tuple[Array, Array, Array]]:
     """Distort (x/z, y/z); with the derivative, which is symmetric: xx, xy, yy."""
     k1, k2, p1, p2, k3 = distortion
     r2 = x * x + y * y

@@ -9,6 +9,9 @@ import numpy as np
 from posekit.cameras import Array, Camera, PinholeCamera
 from posekit.errors import InputError
 
+FARTHEST = 1e6
+"""Metres beyond which a root is taken for a mistake."""
+
 LEAST = 1e-6
 """Metres: least standard deviation that a root is given; a root that is known exactly is known to a micrometre."""
 
@@ -38,19 +41,29 @@ class RootPrior:
         if mean.ndim != 2 or mean.shape[1] != 3:
             raise InputError(f"the root's mean has shape {mean.shape}; expected (F, 3), metres")
         if covariance.shape != (len(mean), 3, 3):
-            raise InputError(f"the root's covariance has shape {covariance.shape}; expected ({len(mean)}, 3, 3)")
+            raise InputError(
+                f"the root's covariance has shape {covariance.shape}; expected ({len(mean)}, 3, 3)"
+            )
         known = np.isfinite(mean).all(axis=1)
+        if (np.abs(mean[known]) > FARTHEST).any():
+            raise InputError(
+                f"a root is {np.abs(mean[known]).max():g} m away; expected at most {FARTHEST:g} m"
+            )
         part = covariance[known]
         if not np.isfinite(part).all() or np.abs(part - part.transpose(0, 2, 1)).max(initial=0.0) > 1e-9:
             raise InputError("the root's covariance must be finite and symmetric where the root is known")
         if len(part) and float(np.linalg.eigvalsh(part).min()) < -1e-12:
-            raise InputError("the root's covariance has a negative variance; expected square metres, zero or more")
+            raise InputError(
+                "the root's covariance has a negative variance; expected square metres, zero or more"
+            )
         for name, value in (("mean", mean), ("covariance", covariance)):
             value.flags.writeable = False
             object.__setattr__(self, name, value)
 
     @staticmethod
-    def along_ray(camera: Camera, mean: Array, *, depth: Array | float, lateral: Array | float = 0.0) -> RootPrior:
+    def along_ray(
+        camera: Camera, mean: Array, *, depth: Array | float, lateral: Array | float = 0.0
+    ) -> RootPrior:
         """Make the prior of roots (F, 3) whose depth is known to `depth` and whose place beside the ray to `lateral`.
 
         Parameters
@@ -62,7 +75,9 @@ class RootPrior:
             Standard deviations along the ray and across it, metres.
         """
         mean = np.asarray(mean, dtype=np.float64)
-        along, across = (np.broadcast_to(np.asarray(value, dtype=np.float64), len(mean)) for value in (depth, lateral))
+        along, across = (
+            np.broadcast_to(np.asarray(value, dtype=np.float64), len(mean)) for value in (depth, lateral)
+        )
         if not (np.isfinite(along) & (along >= 0) & np.isfinite(across) & (across >= 0)).all():
             raise InputError("the root's standard deviations must be finite, zero or more, metres")
         if isinstance(camera, PinholeCamera):

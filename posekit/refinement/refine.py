@@ -18,6 +18,9 @@ from posekit.refinement.sight import Sight
 from posekit.refinement.state import head_points, place
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
+FARTHEST = 1e6
+"""Metres beyond which a survivor is not refined."""
+
 FAR = 1e3
 """Metres: stands for the joints of survivors that cannot be placed."""
 
@@ -50,7 +53,7 @@ def refine(
         What was seen.
     postures : array (N, 14, 3) or (N, nq)
         Survivors, camera frame, metres; or configurations. NaN for joints that are not known; a survivor without a
-        neck is not refined.
+        neck, or beyond 1000 km, is not refined.
     frame : int array (N,), optional
         The frame of each survivor; without it survivors and frames are the same.
     head : array (F, 5, 3) or (N, 5, 3), optional
@@ -79,12 +82,16 @@ def refine(
     positions = numbers("postures", given, (None, len(JOINTS), 3))
     count = len(sight.points())
     frames = frames_of(frame, len(positions), count)
-    placeable = np.isfinite(positions[:, 0]).all(axis=1)
+    near = ~(np.abs(positions) > FARTHEST).any(axis=(1, 2))
+    placeable = np.asarray(np.isfinite(positions[:, 0]).all(axis=1) & near)
     positions = np.where(placeable[:, None, None], positions, FAR)
     problem = sight.problem(frames, positions[:, 0])
     skull = None if head is None else _heads(head, count, frames)
     factors = factor_postures(frames, positions)
-    found = search(problem, positions, skull, factors, steps=steps, precision=precision, hopeless=hopeless)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of joints at the very lens
+        found = search(
+            problem, positions, skull, factors, steps=steps, precision=precision, hopeless=hopeless
+        )
     return _refined(figure, problem, frames, found, placeable)
 
 

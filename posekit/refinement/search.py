@@ -1,4 +1,4 @@
-"""The search in stages: different trunks, different limbs on them, and then survivors, each of one trunk and four limbs."""
+"""The search in stages: different trunks, different limbs on them, and the survivors that they make up."""
 
 from __future__ import annotations
 
@@ -61,7 +61,9 @@ def search(
         found.chi2[back] = first[back]
     rest = np.flatnonzero(worse | (~found.settled & (found.chi2 <= hopeless)))
     if rest.size:
-        more = descend(problem.take(rest), found.state.take(rest), steps=steps, precision=precision, hopeless=hopeless)
+        more = descend(
+            problem.take(rest), found.state.take(rest), steps=steps, precision=precision, hopeless=hopeless
+        )
         found.state.put(rest, more.state)
         found.steps[rest] += more.steps
         found.chi2[rest], found.settled[rest] = more.chi2, more.settled
@@ -82,4 +84,3 @@ def _first(alone: Problem, rows: Problem, begin: State, limbs: Chains, factors: 
     for k in range(4):
         chi2 = chi2 + limb[k, factors.row_of[k]]
     return np.asarray(chi2)
-

@@ -22,6 +22,9 @@ from posekit.skeleton import HEAD_POINTS, JOINTS
 LIMIT_DEVIATION = 2.0
 """Degrees: standard deviation with which limits of joints are known, unless told otherwise."""
 
+FARTHEST = 1e8
+"""Pixels beyond which key points are taken for as far: no posture is seen there, and squares stay finite."""
+
 HELD = 1e6
 """One over metres: what holds the depth of a root that the camera does not see."""
 
@@ -70,25 +73,29 @@ class Sight:
 
     def points(self) -> Array:
         """Return the key points (F, 14, 2)."""
-        return numbers("image", self.image, (None, len(JOINTS), 2))
+        return np.clip(numbers("image", self.image, (None, len(JOINTS), 2)), -FARTHEST, FARTHEST)
 
     def problem(self, frames: NDArray[np.intp], necks: Array) -> Problem:
         """Lay out the data of survivors in some frames (N,); their necks (N, 3) are where a root is held."""
         points = self.points()
         count = len(points)
         if not self.limit_deviation > 0:
-            raise InputError(f"the limits' deviation is {self.limit_deviation!r} degrees; expected a positive number")
+            raise InputError(
+                f"the limits' deviation is {self.limit_deviation!r} degrees; expected a positive number"
+            )
         weight = weights("deviation", self.deviation, points)
         shape_weight, limb_weight = length_weights(self.length_deviation)
         optics = optics_of(self.camera, frames)
         mean, whitening = root_of(self.root, count)
         held = np.zeros((3, 3))
         held[2, 2] = 0.0 if optics.perspective else HELD
-        known = np.isfinite(mean).all(axis=1)[frames]
+        known = np.asarray(np.isfinite(mean).all(axis=1))[frames]
         root = np.where(known[:, None], mean[frames], necks)
         head = head_weight = None
         if self.head_image is not None:
-            head = numbers("head_image", self.head_image, (count, len(HEAD_POINTS), 2))
+            head = np.clip(
+                numbers("head_image", self.head_image, (count, len(HEAD_POINTS), 2)), -FARTHEST, FARTHEST
+            )
             given = 1.0 if self.head_deviation is None else self.head_deviation
             head_weight = weights("head_deviation", given, head)
         seen = head is not None and head_weight is not None and bool(head_weight.any())

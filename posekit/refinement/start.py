@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.figure.frames import fit_rotation
+from posekit.figure.frames import fit_rotation, hips_frame, torso_frame
 from posekit.refinement.anatomy import END, LIMBS, MIDDLE, Anatomy
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
@@ -27,10 +27,18 @@ def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> St
     offsets = postures[:, :6] - postures[:, :1]
     shape = np.repeat(anatomy.shape[:, None], n, axis=1)
     b, a, right_y, right_z, left_y, left_z, h, hip_right, hip_left = anatomy.shape
-    torso = _laid(np.array([[a, right_y, right_z], [a, left_y, left_z], [0.0, 0.0, -b]]), offsets[:, 1:4])
-    torso = np.where(np.isnan(torso), np.eye(3), torso)
-    hips = _laid(np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]]), offsets[:, 4:6] - offsets[:, 3:4])
-    hips = np.where(np.isnan(hips), torso, hips)
+    torso = torso_frame(*(postures[:, joint] for joint in range(4)))
+    part = np.isnan(torso[:, 0, 0])
+    if part.any():
+        own = np.array([[a, right_y, right_z], [a, left_y, left_z], [0.0, 0.0, -b]])
+        torso[part] = _laid(own, offsets[part, 1:4])
+        torso = np.where(np.isnan(torso), np.eye(3), torso)
+    hips = hips_frame(*(postures[:, joint] for joint in range(3, 6)))
+    part = np.isnan(hips[:, 0, 0])
+    if part.any():
+        own = np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]])
+        hips[part] = _laid(own, offsets[part, 4:6] - offsets[part, 3:4])
+        hips = np.where(np.isnan(hips), torso, hips)
     skull = torso
     if head is not None:
         skull = _laid(anatomy.head, head - postures[:, :1])
@@ -65,7 +73,7 @@ def limb_directions(postures: Array, rows: NDArray[np.intp], state: State) -> Ar
 
 def _laid(own: Array, seen: Array) -> Array:
     """Lay a part's points (P, 3) onto seen ones (N, P, 3), the unknown left out; NaN where none is known."""
-    known = np.isfinite(seen).all(axis=2)
+    known = np.asarray(np.isfinite(seen).all(axis=2))
     rotation = fit_rotation(own, np.where(known[..., None], seen, 0.0))
     rotation[~known.any(axis=1)] = np.nan
     return rotation

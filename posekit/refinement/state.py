@@ -76,6 +76,11 @@ class Step(NamedTuple):
     limbs: Array | None = None
     head: Array | None = None
 
+    def take(self, rows: Rows) -> Step:
+        """Return the steps of some postures."""
+        limbs = None if self.limbs is None else self.limbs[..., rows]
+        return Step(self.trunk[..., rows], limbs, None if self.head is None else self.head[..., rows])
+
 
 def trunk_offsets(state: State) -> Array:
     """Place torso and hips relative to the root (6, 3, N), metres."""

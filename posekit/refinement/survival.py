@@ -21,7 +21,10 @@ MOST = 1000
 FARTHEST = 740.0
 """Half a sum of squares from which on the exponential is no number; the probability is then zero to 1e-14."""
 
-_erfc = np.frompyfunc(math.erfc, 1, 1)
+
+def _erfc(x: Array) -> Array:
+    """Return the complementary error function."""
+    return np.array([math.erfc(value) for value in x.ravel().tolist()]).reshape(x.shape)
 
 
 def chi2_survival(chi2: ArrayLike, dof: ArrayLike) -> Array:
@@ -58,7 +61,7 @@ def chi2_survival(chi2: ArrayLike, dof: ArrayLike) -> Array:
     # The terms y^a e^-y / Gamma(a + 1), each from the one before; in logarithms they would lose digits.
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         decay = np.exp(-y)
-        first = np.where(odd, _erfc(np.sqrt(y)).astype(np.float64), decay)
+        first = np.where(odd, _erfc(np.sqrt(y)), decay)
         term = np.where(odd, decay * np.sqrt(y) / math.gamma(1.5), decay * y)
         a = np.where(odd, 0.5, 1.0)
         total = np.where(freedom == 0, np.where(np.isnan(y), np.nan, 1.0), first)

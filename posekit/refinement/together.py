@@ -25,7 +25,8 @@ from posekit.refinement.state import State, Step, moved
 from posekit.refinement.trunk_terms import start_ways, trunk_terms
 
 AGREES = 20.0
-"""Times the precision by which chi2 may differ from what the quadratic promised: a further step would gain no more."""
+"""Times the precision that a further step may gain where a survivor is taken for done. The quadratic's error e, of its
+promise g, leaves about e^2 / g."""
 
 
 class Together(NamedTuple):
@@ -48,17 +49,33 @@ class Together(NamedTuple):
 
 
 class _Trunks(NamedTuple):
-    """Of each trunk, a row each: matrix (T, C, C), gradient (T, C), the head's step (T, 3) and its slope (T, 3, 6)."""
+    """Of each trunk.
+
+    Attributes
+    ----------
+    matrix, gradient : array (T, C, C), (T, C)
+    head, head_slope : array (T, 3), (T, 3, 6), or (T, 0), (T, 0, 6) without a head
+        The head's own step, and how that follows the trunk's.
+    """
 
     matrix: Array
     gradient: Array
-    head: Array | None
-    head_slope: Array | None
+    head: Array
+    head_slope: Array
 
 
 class _Limbs(NamedTuple):
-    """Of each limb of each row: what it adds to the trunk's matrix (4, M, C, C) and gradient (4, M, C), its step
-    (4, M, U) and the step's slope (4, M, U, C), and its tangents (4, 2, 2, 3, M)."""
+    """Of each limb of each row.
+
+    Attributes
+    ----------
+    matrix, gradient : array (4, M, C, C), (4, M, C)
+        What it adds to the trunk's.
+    step, slope : array (4, M, U), (4, M, U, C)
+        Its own step, and how that follows the trunk's.
+    tangents : array (4, 2, 2, 3, M)
+    folds, active : bool array (4, 2, M), int array (4, M)
+    """
 
     matrix: Array
     gradient: Array
@@ -100,7 +117,9 @@ def join(
     chi2 = trunks.chi2[factors.trunk_of] + by_limb.sum(axis=0)
     limbs = _limb_tables(rows, trunks.state.take(factors.row_trunk), fit.chains)
     folds = np.sum([limbs.folds[k][:, factors.row_of[k]].sum(axis=0) for k in range(4)], axis=0)
-    active = trunks.active[factors.trunk_of] + np.sum([limbs.active[k, factors.row_of[k]] for k in range(4)], axis=0)
+    active = trunks.active[factors.trunk_of] + np.sum(
+        [limbs.active[k, factors.row_of[k]] for k in range(4)], axis=0
+    )
     settled = trunks.settled[factors.trunk_of] & (by_limb <= precision).all(axis=0)
     busy = np.flatnonzero(~settled & (by_limb < hopeless).all(axis=0) & np.isfinite(chi2))
     trunk_tables = _trunk_tables(problem.take(factors.trunk), trunks.state) if busy.size else None
@@ -112,7 +131,8 @@ def join(
             trial = moved(state.take(part), step, tangents)
             value, _ = evaluate(problem.take(part), trial)
             better = value <= chi2[part]
-            settled[part] = better & (np.abs(value - (chi2[part] - gain)) <= AGREES * precision)
+            off = value - (chi2[part] - gain)
+            settled[part] = better & (off * off <= AGREES * precision * np.maximum(gain, precision))
             good = np.flatnonzero(better)
             state.put(part[good], trial.take(good))
             chi2[part[good]] = value[good]
@@ -126,7 +146,9 @@ def put_together(trunks: State, chains: Chains, factors: Factors) -> State:
     return trunks.take(factors.trunk_of)._replace(directions=directions, limbs=lengths)
 
 
-def _joint_step(trunks: _Trunks, limbs: _Limbs, factors: Factors, part: NDArray[np.intp]) -> tuple[Step, Array]:
+def _joint_step(
+    trunks: _Trunks, limbs: _Limbs, factors: Factors, part: NDArray[np.intp]
+) -> tuple[Step, Array]:
     """Solve for the joint step of some survivors, and the decrease of chi2 that it promises."""
     which, rows = factors.trunk_of[part], factors.row_of[:, part]
     matrix, gradient = trunks.matrix[which], trunks.gradient[which]
@@ -137,9 +159,11 @@ def _joint_step(trunks: _Trunks, limbs: _Limbs, factors: Factors, part: NDArray[
     gain = -np.einsum("nc,nc->n", trunk[..., 0], gradient)
     steps = np.stack([limbs.step[k, rows[k]] + (limbs.slope[k, rows[k]] @ trunk)[..., 0] for k in range(4)])
     head = None
-    if trunks.head is not None and trunks.head_slope is not None:
+    if trunks.head.shape[1]:
         head = (trunks.head[which] + (trunks.head_slope[which] @ trunk[:, :6])[..., 0]).T
-    return Step(np.ascontiguousarray(trunk[..., 0].T), np.ascontiguousarray(steps.transpose(2, 0, 1)), head), gain
+    return Step(
+        np.ascontiguousarray(trunk[..., 0].T), np.ascontiguousarray(steps.transpose(2, 0, 1)), head
+    ), gain
 
 
 def _trunk_tables(problem: Problem, state: State) -> _Trunks:
@@ -151,12 +175,12 @@ def _trunk_tables(problem: Problem, state: State) -> _Trunks:
         arrow = assemble(linearise(alone.take(rows), state.take(rows)), 0.0)
         index = np.arange(len(arrow.gradient))
         arrow.matrix[index, index] += FLOOR
-        head = slope = None
+        head, slope = np.zeros((0, len(rows))), np.zeros((0, 6, len(rows)))
         if arrow.head is not None:
-            slope = -backward(arrow.head.factor, arrow.head.right.copy())
-            head, slope = _rows_first(slope[:, -1]), _rows_first(slope[:, :-1])
-        parts.append(_Trunks(_rows_first(arrow.matrix), _rows_first(arrow.gradient), head, slope))
-    return _Trunks(*(None if arrays[0] is None else np.concatenate(arrays) for arrays in zip(*parts, strict=True)))  # type: ignore[arg-type]
+            both = -backward(arrow.head.factor, arrow.head.right.copy())
+            head, slope = both[:, -1], both[:, :-1]
+        parts.append(_Trunks(*(_rows_first(array) for array in (arrow.matrix, arrow.gradient, head, slope))))
+    return _Trunks(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 def _limb_tables(problem: Problem, trunks: State, chains: Chains) -> _Limbs:
@@ -183,7 +207,12 @@ def _limb_tables(problem: Problem, trunks: State, chains: Chains) -> _Limbs:
             )
         )
     axes = (1, 1, 1, 1, 4, 2, 1)
-    return _Limbs(*(np.concatenate(arrays, axis=axis) for arrays, axis in zip(zip(*parts, strict=True), axes, strict=True)))
+    return _Limbs(
+        *(
+            np.concatenate(arrays, axis=axis)
+            for arrays, axis in zip(zip(*parts, strict=True), axes, strict=True)
+        )
+    )
 
 
 def _rows_first(array: Array) -> Array:

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.cameras import Array, ScaledOrthographicCamera
 from posekit.errors import InputError
+from posekit.figure import Figure
 from posekit.refinement.descent import BLOCK, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.freedom import degrees_of_freedom
@@ -32,18 +33,24 @@ from posekit.refinement.small import product, unit
 from posekit.refinement.start import state_of
 from posekit.refinement.state import State, trunk_offsets
 from posekit.refinement.survival import chi2_survival
-from posekit.skeleton import PARENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 
 TRIED = 2
 """Near and far choices that are followed to their minima, the likeliest first."""
 
-STEPS = 15
+STEPS = 20
 
 WITHIN = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
 
-PROMISING = 100.0
-"""A chi2 beyond which a start is followed only while its steps promise to halve it."""
+TRUNK = 6
+"""Joints of torso and hips."""
+
+SAME = 1e-5
+"""Metres by which a trunk may be lifted otherwise than it was found: rounding, tangent to a ray."""
+
+PROMISING = 300.0
+"""A chi2 beyond which a mirrored start is followed only while its steps promise to halve it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,6 +84,32 @@ class Trunks:
         """The necks (H, 3)."""
         return self.joints[:, 0]
 
+    def tree_lengths(self, figure: Figure) -> Array:
+        """Return what a tree of all H trunks lifts with (14, H, 1): the trunks' own lengths, the figure's limbs.
+
+        They are the figure's all, unless the lengths of torso and hips are varied.
+        """
+        out = np.zeros((len(JOINTS), len(self), 1))
+        for joint, (parent, _) in enumerate(TREE_SEGMENTS, start=1):
+            if joint < TRUNK:
+                out[joint, :, 0] = np.linalg.norm(self.joints[:, joint] - self.joints[:, parent], axis=1)
+            else:
+                out[joint] = figure.lengths[segment_name((parent, joint))]
+        return out
+
+    def carries(self, hypothesis: NDArray[np.integer], postures: Array) -> NDArray[np.bool_]:
+        """Return which leaves (N, 14, 3) of a tree grown on these trunks have the trunk itself, no twin of it.
+
+        Parameters
+        ----------
+        hypothesis : int array (N,)
+            The trunk of each leaf.
+        postures : array (N, 14, 3)
+        """
+        apart = postures[:, :TRUNK] - self.joints[hypothesis]
+        with np.errstate(invalid="ignore"):
+            return np.asarray(~(np.abs(apart) > SAME).any(axis=(1, 2)))
+
 
 def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -> Trunks:
     """Find the trunks that the noise can explain.
@@ -93,7 +126,7 @@ def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -
     Returns
     -------
     Trunks
-        None in frames whose root is not known.
+        None in frames whose root is not known, or behind a pinhole camera.
 
     Raises
     ------
@@ -102,7 +135,8 @@ def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -
     """
     if sight.root is None:
         raise InputError("find_trunks: no root was given; expected a RootPrior that says where necks are")
-    known = np.flatnonzero(np.isfinite(sight.root.mean).all(axis=1))
+    in_front = isinstance(sight.camera, ScaledOrthographicCamera) | (sight.root.mean[:, 2] > 0)
+    known = np.flatnonzero(np.isfinite(sight.root.mean).all(axis=1) & in_front)
     starts = _lifts(sight, known)
     frames = np.repeat(known, starts.shape[1])
     flat = starts.reshape(-1, 14, 3)
@@ -113,17 +147,22 @@ def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -
     for at in range(0, len(frames), BLOCK):
         rows = np.arange(at, min(at + BLOCK, len(frames)))
         chi2[rows] = evaluate(one.take(every[rows]), begin.take(rows))[0]
-    order = np.argsort(chi2.reshape(len(known), -1), axis=1, kind="stable")[:, :TRIED]
+    order = np.argsort(chi2.reshape(len(known), starts.shape[1]), axis=1, kind="stable")[:, :TRIED]
     chosen = (np.arange(len(known))[:, None] * starts.shape[1] + order).reshape(-1)
     which = np.repeat(np.arange(len(known)), order.shape[1])
-    first = descend(one.take(which), begin.take(chosen), steps=STEPS, hopeless=PROMISING)
-    best = np.argmin(first.chi2.reshape(len(known), -1), axis=1) + np.arange(len(known)) * order.shape[1]
-    turned = _reflections(first.state.take(best))
+    first = descend(one.take(which), begin.take(chosen), steps=STEPS)
+    best = (
+        np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
+        + np.arange(len(known)) * order.shape[1]
+    )
+    turned = _reflections(first.state.take(best), one.optics.perspective)
     again = np.tile(np.arange(len(known)), 3)
     second = descend(one.take(again), turned, steps=STEPS, hopeless=PROMISING)
     state = State(*(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True)))
     row = np.concatenate([which, again])
-    value, active = (np.concatenate([a, b]) for a, b in ((first.chi2, second.chi2), (first.active, second.active)))
+    value, active = (
+        np.concatenate([a, b]) for a, b in ((first.chi2, second.chi2), (first.active, second.active))
+    )
     dof = degrees_of_freedom(one)[row] + active
     finite = np.isfinite(value)
     p = np.where(finite, chi2_survival(np.where(finite, value, 0.0), dof), 0.0)
@@ -163,7 +202,9 @@ def _lifts(sight: Sight, frames: NDArray[np.intp]) -> Array:
         pixels = np.broadcast_to(image[joint], (len(start), *image.shape[1:]))
         ray, foot = optics.rays(pixels, start)
         apart = foot - start
-        half = np.sqrt(np.maximum(length * length - np.einsum("cin,cin->cn", apart, apart), 0.0))[:, None] * ray
+        half = (
+            np.sqrt(np.maximum(length * length - np.einsum("cin,cin->cn", apart, apart), 0.0))[:, None] * ray
+        )
         ends = np.stack([foot - half, foot + half], axis=1).reshape(2 * len(start), 3, -1)
         placed.append(np.where(seen[joint], ends, np.nan))
     out = np.full((len(frames), 32, 14, 3), np.nan)
@@ -176,9 +217,13 @@ def _lifts(sight: Sight, frames: NDArray[np.intp]) -> Array:
     return out
 
 
-def _reflections(state: State) -> State:
+def _reflections(state: State, perspective: bool) -> State:
     """Return torsos, hips, and both, as a mirror at right angles to the ray shows them: (3 N)."""
-    ray = unit(state.root)
+    ray = (
+        unit(state.root)
+        if perspective
+        else np.broadcast_to(np.array([[0.0], [0.0], [1.0]]), state.root.shape)
+    )
     mirror = np.eye(3)[:, :, None] - 2 * ray[:, None] * ray[None]
     flipped = np.array([-1.0, 1.0, 1.0])[None, :, None]
     torso, hips = (product(mirror, rotation) * flipped for rotation in (state.torso, state.hips))

@@ -11,7 +11,7 @@ from posekit.cameras import Array
 from posekit.refinement.anatomy import LEGS, START, TRUNK_SEGMENTS
 from posekit.refinement.limits import Ball, Signs, ball_limits
 from posekit.refinement.problem import Problem
-from posekit.refinement.small import cross, dot, turned
+from posekit.refinement.small import dot, turned
 from posekit.refinement.state import State, trunk_offsets
 
 

@@ -1,0 +1,383 @@
+"""Noise on the image points: what is kept, what refinement makes of it, how sure it is, and what it costs.
+
+    python benchmarks/refinement.py [--views 200] [--truths 4000] [--capture CAPTURE.npz --frames 300]
+
+Random legal postures seen from 2.5 to 6 m with f = 1500 px. The neck is given, exactly or with a deviation of 10 cm
+along its ray. Three ways to grow the tree: with the fixed tolerances for measured points, with tolerances derived from
+the noise, and on trunks found first. Its leaves are refined, those that the noise cannot explain rejected at 1e-3, and
+those that became one merged. With a capture the same is asked of real motion, whose lengths are uncertain.
+Prints Markdown tables.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi2_distribution
+
+from posekit.figure import Figure, load_figure
+from posekit.pipeline import MEASURED, Tolerance
+from posekit.pipeline.markdown import table_lines
+from posekit.refinement import RootPrior, Sight, Trunks, find_trunks, merge, refine, tolerance_of, under_noise
+from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
+from posekit.tree import Check, InterpretationTree
+from posekit.validators import PHYSICAL, load_ranges, make_checks
+
+NEAR = 0.035
+"""Metres of mean joint error within which a survivor counts as near the truth."""
+
+PIXELS = (0.5, 1.0, 2.0, 5.0)
+ROOT_DEPTH = 0.1
+HOPELESS = 60.0
+MOST_LEAVES = 350_000
+TRUNK_LENGTHS, LIMB_LENGTHS = 0.04, 0.01
+"""Relative deviations of lengths for real bodies: torsos give, limbs hardly."""
+
+CONTACT = -0.03
+"""Metres: what bodies may overlap under noise."""
+
+Leaves = tuple[NDArray[np.intp], np.ndarray]
+Way = Callable[[Sight, float], Leaves]
+
+
+def lengths_of(figure: Figure) -> np.ndarray:
+    return np.array([0.0, *(figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)])
+
+
+def checks_of(figure: Figure, tolerance: Tolerance, contact: float) -> list[Check]:
+    return make_checks(
+        figure,
+        PHYSICAL,
+        ranges=load_ranges("urdf"),
+        rigid_tolerance=tolerance.rigid,
+        rigid_mode="distances",
+        angle_tolerance=tolerance.angle,
+        contact_margin=contact,
+    )
+
+
+def depth_of(sight: Sight) -> float:
+    assert sight.root is not None
+    return float(sight.root.mean[:, 2].max())
+
+
+def grow(sight: Sight, tolerance: Tolerance, contact: float) -> Leaves:
+    """Grow trees from the noisy points."""
+    assert sight.root is not None
+    tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=lengths_of(sight.figure))
+    leaves = tree.grow(
+        sight.camera,
+        sight.root.mean,
+        sight.points(),
+        checks_of(sight.figure, tolerance, contact),
+        tolerance=tolerance.tangent,
+    )
+    return leaves.frame.astype(np.intp), leaves.postures()
+
+
+def fixed(sight: Sight, _: float) -> Leaves:
+    return grow(sight, MEASURED, 0.0)
+
+
+def derived(sight: Sight, pixels: float) -> Leaves:
+    allowed = tolerance_of(
+        pixels, sight.camera, sight.figure, depth_of(sight), root_depth_deviation=root_deviation(sight)
+    )
+    tolerance = Tolerance(
+        rigid=allowed.rigid, tangent=allowed.tangent, placement=False, angle=min(allowed.angle, 180.0)
+    )
+    return grow(sight, tolerance, CONTACT)
+
+
+def on_trunks(sight: Sight, pixels: float, trunks: Trunks | None = None) -> Leaves:
+    """Grow trees on trunks that were found first, every angle with its own allowance."""
+    trunks = find_trunks(sight) if trunks is None else trunks
+    varied = bool(sight.length_deviation)
+    allowed = tolerance_of(
+        pixels,
+        sight.camera,
+        sight.figure,
+        depth_of(sight),
+        length_deviation=LIMB_LENGTHS if varied else 0.0,
+        root_depth_deviation=root_deviation(sight),
+        trunks=True,
+    )
+    rigid = 0.5 * TRUNK_LENGTHS if varied else allowed.rigid
+    tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=1.0)
+    tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=trunks.tree_lengths(sight.figure))
+    leaves = tree.grow(
+        sight.camera,
+        trunks.root,
+        trunks.image,
+        under_noise(checks_of(sight.figure, tolerance, CONTACT), allowed.bound),
+        tolerance=tolerance.tangent,
+    )
+    postures = leaves.postures()
+    own = trunks.carries(leaves.frame, postures)
+    return trunks.frame[leaves.frame[own]], postures[own]
+
+
+def root_deviation(sight: Sight) -> float:
+    assert sight.root is not None
+    return float(np.sqrt(np.linalg.eigvalsh(sight.root.covariance).max()))
+
+
+@dataclass
+class Outcome:
+    """What became of the truth in F frames."""
+
+    leaves: float
+    leaves_near: float
+    empty: float
+    refined_near: float
+    explained: float
+    merged: float
+    kept_near: float
+    median_error: float
+
+    def row(self) -> list[str]:
+        return [
+            f"{self.empty:.1%}",
+            f"{self.leaves:.0f}",
+            f"{self.leaves_near:.1%}",
+            f"{self.refined_near:.1%}",
+            f"{self.explained:.0f}",
+            f"{self.merged:.0f}",
+            f"{self.kept_near:.1%}",
+            f"{self.median_error * 1000:.0f}",
+        ]
+
+
+HEAD = (
+    "frames without a posture",
+    "leaves, median",
+    "within 3.5 cm",
+    "refined: within 3.5 cm",
+    "explained by noise, median",
+    "merged, median",
+    "kept: within 3.5 cm",
+    "best kept, median error, mm",
+)
+
+
+def best(frame: NDArray[np.intp], joints: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Return the mean joint error of each frame's best posture, metres; infinite where there is none."""
+    error = np.linalg.norm(joints - truth[frame], axis=-1).mean(axis=1)
+    out = np.full(len(truth), np.inf)
+    np.minimum.at(out, frame, error)
+    return out
+
+
+def outcome(sight: Sight, leaves: Leaves, truth: np.ndarray) -> Outcome:
+    frame, postures = leaves
+    n = len(truth)
+    refined = refine(sight, postures, frame=frame, hopeless=HOPELESS)
+    explained = refined.explained()
+    merged = merge(refined, keep=explained).refined
+    kept = best(merged.frame, merged.joints, truth)
+    return Outcome(
+        leaves=float(np.median(np.bincount(frame, minlength=n))),
+        leaves_near=float((best(frame, postures, truth) < NEAR).mean()),
+        empty=float((np.bincount(merged.frame, minlength=n) == 0).mean()),
+        refined_near=float((best(frame, refined.joints, truth) < NEAR).mean()),
+        explained=float(np.median(np.bincount(frame[explained], minlength=n))),
+        merged=float(np.median(np.bincount(merged.frame, minlength=n))),
+        kept_near=float((kept < NEAR).mean()),
+        median_error=float(np.median(kept[np.isfinite(kept)])) if np.isfinite(kept).any() else np.inf,
+    )
+
+
+def root_prior(scene: Scene, depth: float, rng: np.random.Generator) -> RootPrior:
+    neck = scene.joints_cam[:, 0]
+    ray = neck / np.linalg.norm(neck, axis=1, keepdims=True)
+    mean = neck + depth * rng.standard_normal(len(neck))[:, None] * ray
+    return RootPrior.along_ray(scene.camera, mean, depth=depth)
+
+
+def retention(views: int) -> None:
+    print("\nWhat is kept: random legal postures, exact lengths\n")
+    scene = random_views(load_figure(), views, np.random.default_rng(0))
+    rows = []
+    for pixels in PIXELS:
+        image = scene.with_noise(pixels, np.random.default_rng(1)).image
+        for name, depth in (("exact", 0.0), ("10 cm", ROOT_DEPTH)):
+            root = root_prior(scene, depth, np.random.default_rng(2))
+            sight = Sight(figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root)
+            for label, way in (("fixed", fixed), ("derived", derived), ("on trunks", on_trunks)):
+                leaves = way(sight, pixels)
+                if len(leaves[0]) > MOST_LEAVES:
+                    near = (best(*leaves, scene.joints_cam) < NEAR).mean()
+                    count = np.median(np.bincount(leaves[0], minlength=views))
+                    rows.append([f"{pixels:g}", name, label, "-", f"{count:.0f}", f"{near:.1%}", *["-"] * 5])
+                    continue
+                rows.append([f"{pixels:g}", name, label, *outcome(sight, leaves, scene.joints_cam).row()])
+            truth = refine(sight, scene.joints_cam)
+            error = np.linalg.norm(truth.joints - scene.joints_cam, axis=-1).mean(axis=1)
+            cells = ["-", "1", "100.0%", f"{(error < NEAR).mean():.1%}", "1", "1", "-"]
+            rows.append([f"{pixels:g}", name, "from the truth", *cells, f"{np.median(error) * 1000:.0f}"])
+    print("\n".join(table_lines(["noise, px", "neck", "tree", *HEAD], rows)))
+
+
+def calibration(truths: int) -> None:
+    print("\nHow sure: true postures refined from themselves\n")
+    scene = random_views(load_figure(), truths, np.random.default_rng(3))
+    rows = []
+    for pixels in PIXELS:
+        seen = scene.with_noise(pixels, np.random.default_rng(4))
+        root = root_prior(scene, 0.0, np.random.default_rng(5))
+        sight = Sight(figure=scene.figure, camera=scene.camera, image=seen.image, deviation=pixels, root=root)
+        refined = refine(sight, scene.joints_cam)
+        off = refined.joints - scene.joints_cam
+        covariance = refined.covariance[:, 6:]
+        square = np.linalg.solve(covariance + 1e-12 * np.eye(3), off[:, 6:, :, None])[..., 0]
+        inside = (np.einsum("nji,nji->nj", square, off[:, 6:]) < chi2_distribution.ppf(0.95, 3)).mean()
+        rows.append(
+            [
+                f"{pixels:g}",
+                *(f"{(refined.p < level).mean():.2%}" for level in (1e-3, 1e-2, 1e-1, 0.5)),
+                f"{np.sqrt((off**2).sum(axis=-1).mean()) * 1000:.1f}",
+                f"{np.sqrt((refined.deviation**2).mean()) * 1000:.1f}",
+                f"{inside:.1%}",
+                f"{refined.converged.mean():.1%}",
+                f"{refined.steps.mean():.1f}",
+            ]
+        )
+    head = [
+        "noise, px",
+        "p < 0.001",
+        "p < 0.01",
+        "p < 0.1",
+        "p < 0.5",
+        "joint error, rms, mm",
+        "stated, rms, mm",
+        "limb joints in their 95 % ellipsoid",
+        "converged",
+        "steps, mean",
+    ]
+    print("\n".join(table_lines(head, rows)))
+
+
+def timed(run: Callable[[], object], repeats: int = 3) -> float:
+    run()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def cost(views: int) -> None:
+    print("\nWhat it costs: CPU time, ratios to growing the tree on noisy points with fixed tolerances\n")
+    scene = random_views(load_figure(), views, np.random.default_rng(6))
+    rows = []
+    for pixels in PIXELS:
+        image = scene.with_noise(pixels, np.random.default_rng(7)).image
+        root = root_prior(scene, 0.0, np.random.default_rng(8))
+        sight = Sight(figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root)
+        base = timed(lambda sight=sight: fixed(sight, 0.0))  # type: ignore[misc]
+        wide = timed(lambda sight=sight, pixels=pixels: derived(sight, pixels))  # type: ignore[misc]
+        trunks = find_trunks(sight)
+        frame, postures = on_trunks(sight, pixels, trunks)
+        refined = refine(sight, postures, frame=frame, hopeless=HOPELESS)
+        explained = refined.explained()
+        kept = merge(refined, keep=explained).refined
+        parts = (
+            timed(lambda sight=sight: find_trunks(sight)),  # type: ignore[misc]
+            timed(lambda sight=sight, pixels=pixels, trunks=trunks: on_trunks(sight, pixels, trunks)),  # type: ignore[misc]
+            timed(lambda s=sight, p=postures, f=frame: refine(s, p, frame=f, hopeless=HOPELESS)),  # type: ignore[misc]
+            timed(lambda r=refined, k=explained: merge(r, keep=k)),  # type: ignore[misc]
+            timed(lambda r=kept: replace(r).covariance),  # type: ignore[misc]
+        )
+        each = parts[2] / max(len(frame), 1)
+        rows.append(
+            [
+                f"{pixels:g}",
+                f"{len(frame) / views:.0f}",
+                f"{wide / base:.2f}",
+                *(f"{part / base:.2f}" for part in parts),
+                f"{(sum(parts[:4])) / base:.2f}",
+                f"{base / views * 1e6:.0f}",
+                f"{each * 1e6:.0f}",
+            ]
+        )
+    head = [
+        "noise, px",
+        "leaves a frame",
+        "derived tree",
+        "trunks",
+        "tree on trunks",
+        "refine",
+        "merge",
+        "covariances of the kept",
+        "all but covariances",
+        "fixed tree, us a frame",
+        "refine, us a leaf",
+    ]
+    print("\n".join(table_lines(head, rows)))
+
+
+def real(capture: Path, frames: int) -> None:
+    print("\nReal motion: lengths are each clip's medians, with deviations\n")
+    scenes = mocap_scenes(read_capture(capture), frames, np.random.default_rng(0))
+    rows = []
+    for pixels in PIXELS:
+        for label in ("fixed", "on trunks"):
+            total = []
+            for k, scene in enumerate(scenes):
+                image = scene.with_noise(pixels, np.random.default_rng(10 + k)).image
+                root = root_prior(scene, 0.0, np.random.default_rng(2))
+                deviation = {
+                    segment_name(pair): TRUNK_LENGTHS if max(pair) < 6 else LIMB_LENGTHS
+                    for pair in TREE_SEGMENTS
+                }
+                deviation |= {
+                    name: TRUNK_LENGTHS
+                    for name in (
+                        "right_shoulder-left_shoulder",
+                        "right_shoulder-pelvis",
+                        "left_shoulder-pelvis",
+                        "right_hip-left_hip",
+                    )
+                }
+                sight = Sight(
+                    figure=scene.figure,
+                    camera=scene.camera,
+                    image=image,
+                    deviation=pixels,
+                    root=root,
+                    length_deviation=deviation,
+                )
+                leaves = (fixed if label == "fixed" else on_trunks)(sight, pixels)
+                total.append((len(scene), outcome(sight, leaves, scene.joints_cam)))
+            weight = np.array([count for count, _ in total]) / sum(count for count, _ in total)
+            fields = [[*vars(result).values()] for _, result in total]
+            rows.append([f"{pixels:g}", label, *Outcome(*(weight @ np.array(fields)).tolist()).row()])
+    print("\n".join(table_lines(["noise, px", "tree", *HEAD], rows)))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--views", type=int, default=200)
+    parser.add_argument("--truths", type=int, default=4000)
+    parser.add_argument("--capture", type=Path)
+    parser.add_argument("--frames", type=int, default=300)
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    retention(given.views)
+    calibration(given.truths)
+    cost(given.views)
+    if given.capture is not None:
+        real(given.capture, given.frames)
+
+
+if __name__ == "__main__":
+    main()

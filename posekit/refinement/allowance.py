@@ -1,0 +1,139 @@
+r"""Joint ranges under noise: every angle is allowed what the noise of its own segments may have done to it.
+
+A segment of length l that looks d long stands at :math:`\varphi = \arccos(d / l)` to the image plane. With d off by
+no more than :math:`\delta`, it stands between :math:`\arccos((d + \delta) / l)` and
+:math:`\arccos((d - \delta) / l)`: off by :math:`\delta / (l \sin\varphi)` where it points well away from the plane,
+:math:`\sqrt{2 \delta / l}` and no more where it lies in it. One tolerance for all segments would have to be the
+latter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.skeleton import JOINTS, PARENTS, TORSO
+from posekit.tree import Check, Findings
+
+LEAST = 0.02
+"""Cosine of the abduction down to which the other angles' allowance is reckoned."""
+
+TRUNK = len(TORSO) + 2
+"""Joints of torso and hips: the first six."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NoisyRange:
+    """A check of joint ranges that allows for the noise of the points that it reads.
+
+    Parameters
+    ----------
+    inner : Check
+        The same check with a tolerance of one degree.
+    bound : float
+        How far a point may be off beside its ray, times one metre over its depth (its standard deviations' multiple
+        over the focal length, pixels); absolute, metres, where the camera is orthographic.
+    perspective : bool
+    """
+
+    inner: Check
+    bound: float
+    perspective: bool = True
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.bound < np.inf:
+            raise InputError(
+                f"the noise's bound is {self.bound!r}; expected zero or a positive, finite number"
+            )
+
+    @property
+    def name(self) -> str:
+        """The check's name."""
+        return self.inner.name
+
+    @property
+    def where(self) -> tuple[str, ...]:
+        """Its places."""
+        return self.inner.where
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return self.inner.unit
+
+    @property
+    def points(self) -> tuple[int, ...]:
+        """The points that it reads."""
+        return self.inner.points
+
+    def judge(self, points: Array) -> Findings:
+        """Judge postures; see `posekit.tree.Check`."""
+        findings = self.inner.judge(points)
+        tolerance = np.broadcast_to(findings.tolerance, findings.value.shape).copy()
+        if len(self.where) > 1 and self.where[1].endswith(".abduction"):
+            # Beside the abduction axis the first angle turns faster than the direction, and the rotation with it.
+            abduction = np.radians(findings.value[:, 1])
+            level = np.maximum(np.abs(np.cos(abduction)), LEAST)
+            tolerance[:, 0] /= level
+            if len(self.where) > 2:
+                tolerance[:, 2] += np.abs(np.sin(abduction)) / level
+        allowed = np.maximum(np.degrees(self.allowance(points)), 1e-3)[:, None]
+        return replace(findings, tolerance=tolerance * allowed)
+
+    def allowance(self, points: Array) -> Array:
+        """Return by what angle the noise may turn the segments of postures (N, len(points), 3): (N,), radians."""
+        square = np.zeros(len(points))
+        for segments, share in ((self._trunk, 1.0), (self._limb, np.sqrt(2.0))):
+            worst = np.zeros(len(points))
+            for start, end in segments:
+                worst = np.fmax(worst, self._off(points[:, start], points[:, end], share))
+            square += worst * worst
+        return np.sqrt(square)
+
+    def _off(self, start: Array, end: Array, share: float) -> Array:
+        along = end - start
+        length = np.sqrt(np.einsum("ni,ni->n", along, along))
+        if self.perspective:
+            depth = np.sqrt(np.einsum("ni,ni->n", end, end))
+            away = np.einsum("ni,ni->n", along, end) / depth
+            delta = share * self.bound * depth
+        else:
+            away, delta = along[:, 2], np.full(len(along), share * self.bound)
+        seen = np.sqrt(np.maximum(length * length - away * away, 0.0))
+        angle = np.arctan2(np.abs(away), seen)
+        least = np.arccos(np.minimum((seen + delta) / length, 1.0))
+        most = np.arccos(np.maximum((seen - delta) / length, -1.0))
+        return np.asarray(np.maximum(angle - least, most - angle))
+
+    @cached_property
+    def _limb(self) -> list[tuple[int, int]]:
+        return [pair for pair in self._segments if self.points[pair[1]] >= TRUNK]
+
+    @cached_property
+    def _trunk(self) -> list[tuple[int, int]]:
+        return [pair for pair in self._segments if self.points[pair[1]] < TRUNK]
+
+    @cached_property
+    def _segments(self) -> list[tuple[int, int]]:
+        """Pairs of the check's own points that are ends of a segment."""
+        place = {point: index for index, point in enumerate(self.points)}
+        return [
+            (place[PARENTS[joint]], place[joint])
+            for joint in range(1, len(JOINTS))
+            if joint in place and PARENTS[joint] in place
+        ]
+
+
+def under_noise(checks: Sequence[Check], bound: float, *, perspective: bool = True) -> list[Check]:
+    """Let those of some checks that judge joint ranges allow for the noise: they must have a tolerance of a degree."""
+    return [
+        NoisyRange(inner=check, bound=bound, perspective=perspective)
+        if check.name == "joint_range"
+        else check
+        for check in checks
+    ]
