@@ -35,6 +35,7 @@ EXAMPLES = examples(
     "posekit convert keypoints/ view.json --camera calibration.toml:cam_01 --stature 175cm",
     "posekit convert keypoints/ people.json --to coco",
     "posekit convert postures.json walk.bvh",
+    "posekit convert postures.json walk.trc --view view.json",
     "posekit convert postures.json survivors.csv --posture all",
     "posekit convert trial.c3d trial.trc",
 )
@@ -43,7 +44,12 @@ EXAMPLES = examples(
 def convert(
     given: Annotated[Path, typer.Argument(metavar="IN", help="A file or folder of any format that is read.")],
     output: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The end of its name says the format, unless --to does.")
+        Path,
+        typer.Argument(
+            metavar="OUT",
+            help="The end of its name says the format, unless --to does; a name without an end is a folder with the "
+            "person's URDF.",
+        ),
     ],
     to: Annotated[
         str,
@@ -79,7 +85,8 @@ def convert(
         typer.Option(
             "--input-up",
             metavar="AXIS",
-            help="The axis that points up in IN, where a file of motion does not say it or is wrong.",
+            help="The axis that points up in IN, where it does not say it or is wrong: of a result, in the camera's "
+            "frame (-y where the camera is level), or with --view in its world.",
         ),
     ] = "",
     clip: Annotated[

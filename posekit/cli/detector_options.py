@@ -66,7 +66,12 @@ Rate = Annotated[
 ]
 MinConfidence = Annotated[
     float,
-    typer.Option("--min-confidence", min=0.0, help="Points that are less sure than this count as not seen."),
+    typer.Option(
+        "--min-confidence",
+        metavar="VALUE",
+        min=0.0,
+        help="Points that are less sure than this count as not seen.",
+    ),
 ]
 Deviation = Annotated[
     float | None,

@@ -63,10 +63,14 @@ def compare(recovery: Recovery, truth: Array) -> Comparison:
     count = len(recovery.frames)
     found = {name: np.full((count, 3), np.nan) for name in ("best", "first", "middle")}
     for k, frame in enumerate(recovery.frames):
-        if not len(frame) or not np.isfinite(truth[k]).any():
+        joints = frame.joints
+        both = np.isfinite(joints[..., 0]) & np.isfinite(truth[k, :, 0])
+        if not both.any(axis=1).all() or not len(
+            frame
+        ):  # the joints that are known are the same in all survivors
             continue
-        errors = np.stack(_errors(frame.joints, truth[k]), axis=-1)
-        first = rank_by_fit(frame.joints, frame.length_residual, recovery.figure.lengths)[0]
+        errors = np.stack(_errors(joints, truth[k]), axis=-1)
+        first = rank_by_fit(joints, frame.length_residual, recovery.figure.lengths)[0]
         found["best"][k] = np.nanmin(errors, axis=0)
         found["first"][k] = errors[first]
         found["middle"][k] = np.nanmedian(errors, axis=0)

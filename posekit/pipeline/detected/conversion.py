@@ -6,36 +6,50 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from posekit import files
 from posekit.calibration import read_cameras, write_cameras
 from posekit.errors import InputError
-from posekit.files import Postures, View
-from posekit.intake import refusal
-from posekit.keypoints import KeyPoints, choose, formats, is_format, write_keypoints
-from posekit.motion import (
-    UPS,
-    Motion,
-    motion_format,
-    motion_formats,
-    with_up,
-    write_configurations,
-    write_motion,
-    write_survivors,
-)
-from posekit.motion.glb import write_postures_glb
+from posekit.files import View
+from posekit.intake import nearest, refusal, shown
+from posekit.keypoints import KeyPoints, formats, is_format, write_keypoints
+from posekit.motion import UPS, motion_formats
 from posekit.pipeline.detected.kinds import Kind, kind_of
-from posekit.pipeline.detected.moving import Moving, moving, one_clip
-from posekit.pipeline.detected.opening import Opened, open_views, read_detections
+from posekit.pipeline.detected.motion_output import (
+    Output,
+    by_suffix,
+    carries_points,
+    write_moving,
+    write_points,
+)
+from posekit.pipeline.detected.moving import moving, one_clip
+from posekit.pipeline.detected.opening import Opened, choose_person, open_views, read_detections
 from posekit.pipeline.detected.source import Source
 from posekit.pipeline.detected.view_keypoints import view_keypoints
 
-CUSTOM: Final = {"trc": "+y", "c3d": "+z", "csv": "", "npz": "", "parquet": ""}
-"""The axis that points up in a format's files by custom; empty where it stays as it is."""
+OWN: Final = ("view", "postures")
+"""Files of posekit that can be converted to."""
 
-TABLES: Final = ("csv", "npz", "parquet")
-"""Formats that carry all survivors of a frame."""
+MOTION: Final = ("--format", "--skeleton", "--up", "--input-up", "--clip", "--unit")
+DETECTOR: Final = ("--format", "--skeleton", "--person", "--swap-sides", "--size")
+CAMERA_AND_PERSON: Final = (
+    "--camera",
+    "--fov",
+    "--focal35",
+    "--fps",
+    "--min-confidence",
+    "--deviation",
+    "--stature",
+    "--lengths",
+    "--calibrate",
+    "--proportions",
+)
+TELLING: Final = {
+    Kind.MOTION: MOTION,
+    Kind.RESULT: ("--posture", "--view", "--up", "--input-up"),
+    Kind.VIEW: ("--skeleton", "--up", "--input-up"),
+    Kind.POSTURES: ("--up", "--input-up"),
+}
+"""The options that say something about a kind of file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,9 +68,16 @@ class Conversion:
     view : View, optional
         What a result was recovered from.
     up : str
-        The axis that shall point up; the format's custom if empty.
+        The axis that shall point up in the output; the format's custom if empty.
+    input_up : str
+        The axis that points up in what is read, where the file does not say it or is wrong.
     clip, unit : str
         Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
+
+    Raises
+    ------
+    InputError
+        Where the format to write or an axis is none.
     """
 
     given: Path
@@ -66,8 +87,37 @@ class Conversion:
     posture: str = "first"
     view: View | None = None
     up: str = ""
+    input_up: str = ""
     clip: str = ""
     unit: str = ""
+
+    def __post_init__(self) -> None:
+        if self.to and self.to not in (*OWN, *motion_formats()) and not is_format(self.to):
+            near = nearest(self.to, [*OWN, *formats(), *motion_formats()])
+            raise refusal("--to", "", shown(self.to), "a known format", near)
+        for option, axis in (("--up", self.up), ("--input-up", self.input_up)):
+            if axis not in ("", *UPS):
+                raise refusal(option, "", shown(axis), ", ".join(UPS), "name an axis")
+
+    def check_options(self, kind: Kind, telling: tuple[str, ...]) -> None:
+        """Refuse options that say nothing about such a file: whoever gave them expects something of them."""
+        given = {
+            **self.source.given,
+            "--posture": self.posture != "first",
+            "--view": self.view is not None,
+            "--up": bool(self.up),
+            "--input-up": bool(self.input_up),
+            "--clip": bool(self.clip),
+            "--unit": bool(self.unit),
+        }
+        for name, is_given in given.items():
+            if is_given and name not in telling:
+                to = f" to {self.to}" if self.to else ""
+                expected = ", ".join(telling) or "no option but --to"
+                raise InputError(
+                    f"{name}: says nothing of {kind.value} that {'are' if kind.value.endswith('s') else 'is'} "
+                    f"converted{to}; expected {expected}; leave it out"
+                )
 
 
 def convert(job: Conversion) -> list[str]:
@@ -81,14 +131,19 @@ def convert(job: Conversion) -> list[str]:
     what = kind_of(job.given, job.source.format)
     if what.kind is Kind.KEY_POINTS:
         return _key_points(job)
+    job.check_options(what.kind, TELLING.get(what.kind, ()))
     if what.kind is Kind.CAMERA:
-        cameras = read_cameras(job.given)
-        write_cameras(job.output, cameras)
-        return [f"{len(cameras)} cameras: {', '.join(cameras)}"]
-    if what.kind is Kind.VIEW and is_format(job.to):
-        return _write_key_points(job, view_keypoints(files.read_view(job.given), job.to, job.source.skeleton))
-    if what.kind is Kind.MOTION and _carries_points(job):
-        return _points(job, one_clip(job.given, what, clip=job.clip, unit=job.unit))
+        return _cameras(job)
+    if is_format(job.to):
+        return _view_as_key_points(job, what.kind)
+    if job.to == "view":
+        raise refusal(
+            job.given, "--to", f"view, of {what.kind.value}", "key points", "convert to postures or motion"
+        )
+    output = Output(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
+    if what.kind is Kind.MOTION and carries_points(output.to):
+        motion = one_clip(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
+        return write_points(output, motion, job.source.skeleton)
     found = moving(
         job.given,
         what,
@@ -97,32 +152,9 @@ def convert(job: Conversion) -> list[str]:
         skeleton=job.source.skeleton,
         clip=job.clip,
         unit=job.unit,
+        up=job.input_up,
     )
-    return [*found.says, *_write_moving(job, found)]
-
-
-def _key_points(job: Conversion) -> list[str]:
-    """Write key points as a view, or in another detector's format."""
-    to = job.to or ("view" if job.output.suffix.lower() == ".json" else "")
-    if is_format(to):
-        found = read_detections(job.given, job.source)
-        one = job.source.person not in ("", "all")
-        return _write_key_points(job, choose(found, job.source.person) if one else found)
-    if to != "view":
-        raise refusal(
-            job.output,
-            "--to",
-            to or f"a name that ends in {job.output.suffix or 'nothing'}",
-            f"view (.json), {', '.join(formats())}: key points are of a picture, and not yet in space",
-            "recover the view, and convert the result",
-        )
-    says = []
-    people = open_views(job.given, job.source)
-    for each in people:
-        path = of_person(job.output, each, alone=len(people) == 1)
-        files.write_view(path, each.view)
-        says += [*each.says, f"{path}: {len(each.view)} frames"]
-    return says
+    return [*found.says, *write_moving(output, found, every=job.posture == "all")]
 
 
 def of_person(path: Path, one: Opened, *, alone: bool) -> Path:
@@ -130,79 +162,59 @@ def of_person(path: Path, one: Opened, *, alone: bool) -> Path:
     return path if alone else path.with_name(f"{path.stem}.person{one.person}{path.suffix}")
 
 
+def _key_points(job: Conversion) -> list[str]:
+    """Write key points as a view, or in another detector's format."""
+    to = job.to or ("view" if job.output.suffix.lower() == ".json" else "")
+    if job.given.is_dir() and job.output.resolve().parent == job.given.resolve():
+        raise refusal(
+            job.output, "", "a place among the files that are read", "another folder", "name one beside it"
+        )
+    if is_format(to):
+        job.check_options(Kind.KEY_POINTS, DETECTOR)
+        found = read_detections(job.given, job.source)
+        one = job.source.person not in ("", "all")
+        return _write_key_points(job, choose_person(found, job.source.person) if one else found)
+    job.check_options(Kind.KEY_POINTS, (*DETECTOR, *CAMERA_AND_PERSON))
+    if to != "view":
+        raise refusal(
+            job.output,
+            "",
+            to or f"a name that ends in {job.output.suffix or 'nothing'}",
+            f"--to view (.json), {', '.join(formats())}: key points are of a picture, and not yet in space",
+            "recover the view, and convert the result",
+        )
+    people = open_views(job.given, job.source)
+    says = list(dict.fromkeys(line for each in people for line in each.says))
+    for each in people:
+        path = of_person(job.output, each, alone=len(people) == 1)
+        files.write_view(path, each.view)
+        says.append(f"{path}: {len(each.view)} frames")
+    return says
+
+
+def _view_as_key_points(job: Conversion, kind: Kind) -> list[str]:
+    """Write the image points of a view."""
+    if kind is not Kind.VIEW:
+        raise refusal(
+            job.given,
+            "--to",
+            f"{job.to}, of {kind.value}",
+            "a view or a detector's file: only they have points in a picture",
+            f"choose postures, {', '.join(motion_formats())}",
+        )
+    return _write_key_points(job, view_keypoints(files.read_view(job.given), job.to, job.source.skeleton))
+
+
 def _write_key_points(job: Conversion, found: KeyPoints) -> list[str]:
     write_keypoints(job.output, found, job.to)
     return [f"{len(found)} detections in {len(found.pictures)} pictures"]
 
 
-def _write_moving(job: Conversion, found: Moving) -> list[str]:
-    suffix = job.output.suffix.lower()
-    if job.to == "postures" or (not job.to and suffix == ".json"):
-        head = found.points[:, 14:]
-        files.write_postures(
-            job.output,
-            Postures(joints=found.points[:, :14], head=head if np.isfinite(head).any() else None),
-        )
-        return [f"{len(found.points)} postures"]
-    name = job.to or _by_suffix(job.output)
-    chosen = motion_format(name)
-    several = len(np.unique(found.frame)) < len(found.frame)
-    if several:
-        return _write_survivors(job, found, name)
-    if chosen.write_points is not None:
-        return _points(job, found.motion(str(job.given)))
-    q, off = found.configurations()
-    write_configurations(job.output, found.figure, q, found.time, name)
-    return [
-        f"{len(q)} frames of joint angles; the figure's joints are within {off * 100:.2g} cm of the postures'"
-    ]
-
-
-def _carries_points(job: Conversion) -> bool:
-    """Tell whether the output has any points, and not only a body's joints or angles."""
-    if job.to == "postures" or (not job.to and job.output.suffix.lower() == ".json"):
-        return False
-    return motion_format(job.to or _by_suffix(job.output)).write_points is not None
-
-
-def _points(job: Conversion, motion: Motion) -> list[str]:
-    """Write points, all that there are."""
-    name = job.to or _by_suffix(job.output)
-    up = job.up or CUSTOM.get(name, "") or motion.up
-    if up not in ("", *UPS):
-        raise refusal("--up", "", up, ", ".join(UPS), "name an axis")
-    turned = with_up(motion, up) if up else motion
-    write_motion(job.output, turned, name)
-    return [
-        f"{len(motion)} frames of {len(motion.names)} points, {turned.up or 'an axis that is not said'} up"
-    ]
-
-
-def _write_survivors(job: Conversion, found: Moving, name: str) -> list[str]:
-    if name in TABLES:
-        write_survivors(job.output, found.table())
-        return [f"{len(found.points)} survivors of {len(np.unique(found.frame))} frames"]
-    if name == "glb":
-        first = found.frame == found.frame[0]
-        q, _ = found.configurations()
-        write_postures_glb(job.output, found.figure, q[first])
-        return [f"the {int(first.sum())} survivors of the first frame that has any"]
-    raise InputError(
-        f"--posture: all, but {name} carries one posture a frame; expected {', '.join(TABLES)} or glb; choose one of "
-        "them, or --posture first"
-    )
-
-
-def _by_suffix(path: Path) -> str:
-    suffix = path.suffix.lower()
-    named = [one.name for one in motion_formats().values() if suffix in one.suffixes]
-    if len(named) != 1:
-        known = ", ".join(end for one in motion_formats().values() for end in one.suffixes)
+def _cameras(job: Conversion) -> list[str]:
+    if job.to:
         raise refusal(
-            path,
-            "",
-            f"a name that ends in {suffix or 'nothing'}",
-            f"one of {known}, .json",
-            "name it so, or say --to",
+            job.given, "--to", f"{job.to}, of cameras", "a name that ends in .toml or .yml", "leave it out"
         )
-    return named[0]
+    cameras = read_cameras(job.given)
+    write_cameras(job.output, cameras)
+    return [f"{len(cameras)} cameras: {', '.join(cameras)}"]

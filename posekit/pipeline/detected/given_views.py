@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
@@ -15,6 +17,9 @@ from posekit.pipeline.detected.opening import Opened, open_views
 from posekit.pipeline.detected.source import Source
 from posekit.pipeline.detected.truth import with_truth
 from posekit.skeleton import JOINT
+
+OF_VIEWS: Final = ("--proportions", "--deviation")
+"""Options that say something of a view too."""
 
 
 def given_views(path: Path, source: Source, truth: Path | None = None) -> list[Opened]:
@@ -35,12 +40,11 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
     """
     what = kind_of(path, source.format)
     if what.kind is Kind.VIEW:
-        said = replace(source, proportions="figure", deviation=None)
-        if said != Source():
+        said = [name for name, given in source.given.items() if given and name not in OF_VIEWS]
+        if said:
             raise InputError(
-                f"{path}: a view says camera, person and lengths itself; expected a detector's file for --format, "
-                "--skeleton, --person, --swap-sides, --camera, --fov, --focal35, --size, --fps, --min-confidence, "
-                "--stature, --lengths and --calibrate; leave them out"
+                f"{said[0]}: {path} is a view, which says camera, person and lengths itself; expected a detector's "
+                "file; leave it out"
             )
         opened = [Opened(person=0, view=read_view(path), says=())]
     elif what.kind is Kind.KEY_POINTS:
@@ -48,8 +52,24 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
             source = replace(source, rate=read_motion(truth).rate)
         opened = open_views(path, source)
     else:
-        raise InputError(f"{path}: {what.kind.value}; expected a view or key points")
-    return opened if truth is None else [_with_truth(one, truth) for one in opened]
+        raise InputError(
+            f"{path}: {what.kind.value}; expected a view or key points, which a posture can be recovered from; give "
+            "another file"
+        )
+    if truth is None:
+        return opened
+    if len(opened) == 1:
+        return [_with_truth(opened[0], truth)]
+    return [_with_truth_if_theirs(one, truth) for one in opened]
+
+
+def _with_truth_if_theirs(one: Opened, truth: Path) -> Opened:
+    """Give one of several people the truth, where it is theirs."""
+    try:
+        return _with_truth(one, truth)
+    except InputError as error:
+        warnings.warn(f"person {one.person} has no truth: {error}", UserWarning, stacklevel=2)
+        return one
 
 
 def _with_truth(one: Opened, truth: Path) -> Opened:

@@ -12,8 +12,9 @@ from posekit.calibration import CalibratedCamera, read_cameras
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.files import OpenCVModel, Result, ScaledOrthographicModel, View
+from posekit.files.postures_q import read_configurations
 from posekit.keypoints import KeyPoints, check_sides, choose, list_people
-from posekit.motion import Motion, guess_up, postures_of, read_motion, read_survivors
+from posekit.motion import Motion, guess_up, motion_format, postures_of, read_motion, read_survivors
 from posekit.pipeline.detected.kinds import Kind, What, kind_of
 from posekit.pipeline.detected.opening import read_detections
 from posekit.pipeline.detected.source import Source
@@ -38,6 +39,8 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     if what.kind is Kind.KEY_POINTS:
         return lines + _key_points(read_detections(path, source))
     if what.kind is Kind.MOTION:
+        if what.formats and motion_format(what.formats[0]).read is None:
+            return [*lines, f"{motion_format(what.formats[0]).says}: written, and not read by itself"]
         motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None)
         return lines + _motion(motion, source.skeleton)
     if what.kind is Kind.CAMERA:
@@ -49,7 +52,12 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     if what.kind is Kind.POSTURES:
         return lines + _postures(files.read_postures(path).joints)
     if what.kind is Kind.SURVIVORS:
-        return lines + _postures(read_survivors(path).joints)
+        table = read_survivors(path)
+        return [*lines, f"{len(np.unique(table.frame))} frames", *_postures(table.joints)]
+    if what.kind is Kind.CONFIGURATIONS:
+        found = read_configurations(path)
+        named = f" of {_listed(found.names)}" if found.names else ""
+        return [*lines, f"{len(found)} configurations{named}"]
     return lines
 
 
@@ -68,8 +76,9 @@ def _key_points(found: KeyPoints) -> list[str]:
         if np.isnan(sizes).all()
         else "of different sizes"
     )
+    fewest, most = (int(counts.min()), int(counts.max())) if pictures else (0, 0)
     lines = [
-        f"{pictures} pictures {size}, {len(found)} detections, {counts.min(initial=0)} to {counts.max(initial=0)} a "
+        f"{pictures} pictures {size}, {len(found)} detections, {fewest} to {most} a "
         f"picture; {len(found.layout.points)} points: {found.layout.name}"
     ]
     if found.normalised:
@@ -84,7 +93,7 @@ def _key_points(found: KeyPoints) -> list[str]:
             one.pictures,
             one.first,
             one.last,
-            f"{one.confidence:.2f}",
+            "-" if np.isnan(one.confidence) else f"{one.confidence:.2f}",
             f"{one.seen * 100:.0f} %",
             f"{one.height:.0f} px" if not found.normalised else f"{one.height:.2f}",
         )
@@ -113,7 +122,8 @@ def _seen(landmarks: Array, sure: Array) -> list[str]:
 
 
 def _motion(motion: Motion, skeleton: str) -> list[str]:
-    seconds = float(motion.time[-1] - motion.time[0]) if len(motion) else 0.0
+    spans = [np.ptp(motion.time[motion.clip == k]) for k in np.unique(motion.clip)]
+    seconds = float(sum(spans))
     clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
     lines = [
         f"{len(motion)} frames{clips} at {motion.rate:g} a second ({seconds:.2f} s), {len(motion.names)} points, "
@@ -127,7 +137,10 @@ def _motion(motion: Motion, skeleton: str) -> list[str]:
     derived = f"; {' and '.join(found.derived)} placed from shoulders and hips" if found.derived else ""
     lines.append(f"skeleton map {found.layout.name}{derived}")
     if not motion.up:
-        lines.append(f"{guess_up(found.joints, motion.source)} is up by where heads and ankles are")
+        try:
+            lines.append(f"{guess_up(found.joints, motion.source)} is up by where heads and ankles are")
+        except InputError as error:
+            lines.append(str(error))
     return lines + _postures(found.joints)
 
 

@@ -13,6 +13,7 @@ from posekit.intake import cut, nearest, refusal, shown
 from posekit.intake.regular_file import check_file, unreadable
 from posekit.keypoints import Given, formats, is_format
 from posekit.motion import motion_formats
+from posekit.motion.urdf_folder import FIGURE, NPZ
 from posekit.pipeline.detected.structure import (
     LARGEST,
     first_line,
@@ -79,7 +80,8 @@ def kind_of(path: str | Path, format: str = "") -> What:
         return _said(path, format)
     if folder:
         return _of_folder(path)
-    named = schema(path)
+    given = Given(path)
+    named = schema(given)
     if named.startswith("posekit."):
         return What(kind=SCHEMAS.get(named.partition("/")[0], Kind.OTHER), schema=named)
     if is_survivors(path):
@@ -87,12 +89,12 @@ def kind_of(path: str | Path, format: str = "") -> What:
     if is_camera_npz(path):
         return What(kind=Kind.CAMERA)
     found = [
-        *((Kind.KEY_POINTS, name) for name in _suiting(path)),
+        *((Kind.KEY_POINTS, name) for name in _suiting(given)),
         *((Kind.MOTION, name) for name in _motions(path)),
     ]
     found = found or _by_name(path)
     if not found:
-        return _nothing_known(path)
+        return _nothing_known(given)
     kinds = {kind for kind, _ in found}
     names = tuple(dict.fromkeys(name for _, name in found))
     if len(kinds) > 1:
@@ -126,11 +128,8 @@ def _of_folder(path: Path) -> What:
     """Tell what a folder is: a person as a robot, COLMAP's cameras, or pictures of key points."""
     if (path / "cameras.txt").is_file():
         return What(kind=Kind.CAMERA)
-    motions = [
-        one.name for one in motion_formats().values() if not one.suffixes and one.suits and one.suits(path)
-    ]
-    if motions:
-        return What(kind=Kind.MOTION, formats=tuple(motions))
+    if (path / FIGURE).is_file() and (path / NPZ).is_file():
+        return What(kind=Kind.MOTION, formats=("urdf",))
     given = Given(path)
     names = tuple(one.name for one in formats().values() if one.suits(given))
     if not names:
@@ -140,13 +139,12 @@ def _of_folder(path: Path) -> What:
     return What(kind=Kind.KEY_POINTS, formats=names)
 
 
-def _suiting(path: Path) -> list[str]:
+def _suiting(given: Given) -> list[str]:
     """List the formats of key points that a file looks like."""
-    given = Given(path)
     if given.suffix not in (".json", ".csv", ".h5"):
         return []
     names = [one.name for one in formats().values() if one.suits(given)]
-    if given.suffix == ".csv" and "mediapipe" in names and is_in_space(first_line(path)):
+    if given.suffix == ".csv" and "mediapipe" in names and is_in_space(first_line(given.path)):
         names.remove("mediapipe")
     return names
 
@@ -164,16 +162,14 @@ def _by_name(path: Path) -> list[tuple[Kind, str]]:
     return [(Kind.MOTION, named[0].name)] if alone else []
 
 
-def _nothing_known(path: Path) -> What:
+def _nothing_known(given: Given) -> What:
     """Take a file for a camera's, where it can be one; else refuse it."""
-    suffix = path.suffix.lower()
+    path, suffix = given.path, given.suffix
     known = ", ".join([*formats(), *motion_formats()])
     if suffix == ".json":
-        document = Given(path).document
-        if not has_matrix(document):
-            raise refusal(
-                path, "", f"JSON of no known format, {shown(document)}", known, "say which with --format"
-            )
+        if not has_matrix(given.document):
+            got = f"JSON of no known format, {shown(given.document)}"
+            raise refusal(path, "", got, known, "say which with --format")
     elif suffix == ".npz" and not zipfile.is_zipfile(path):
         raise refusal(
             path, "", "a damaged file: no NPZ", "arrays that NumPy saved", "check how it was written"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -50,9 +50,11 @@ class Moving:
     says : tuple of str
         What was done, a line each.
     values : mapping
-        More numbers (N,) by name.
+        More numbers (N,) by name; of a result also ``rank``, 1 for the survivor of a frame whose lengths fit best.
     branches : tuple of str
         The branch code of each row; empty where there is none.
+    gaps : int
+        How many frames have no posture, and are left out.
     """
 
     points: Array
@@ -64,6 +66,23 @@ class Moving:
     says: tuple[str, ...] = ()
     values: dict[str, Array]
     branches: tuple[str, ...] = ()
+    gaps: int = 0
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.points)
+
+    def take(self, rows: NDArray[np.intp]) -> Moving:
+        """Take some rows."""
+        return replace(
+            self,
+            points=self.points[rows],
+            time=self.time[rows],
+            frame=self.frame[rows],
+            survivor=self.survivor[rows],
+            values={name: values[rows] for name, values in self.values.items()},
+            branches=tuple(self.branches[k] for k in rows.tolist()) if self.branches else (),
+        )
 
     def turned(self, up: str) -> Array:
         """Return the points with another axis up (N, 19, 3)."""
@@ -105,7 +124,7 @@ class Moving:
         )
 
 
-def one_clip(path: Path, what: What, *, clip: str = "", unit: str = "") -> Motion:
+def one_clip(path: Path, what: What, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
     """Read motion, and of several clips the one that is named.
 
     Raises
@@ -113,10 +132,10 @@ def one_clip(path: Path, what: What, *, clip: str = "", unit: str = "") -> Motio
     InputError
         Where it cannot be read, or has several clips and none is named.
     """
-    motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None)
+    motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None, up=up or None)
     if not clip and len(motion.clips) > 1:
-        names = ", ".join(motion.clips[:8])
-        raise InputError(f"{path}: {len(motion.clips)} clips ({names}, …); expected one; choose with --clip")
+        names = ", ".join(motion.clips[:8]) + (", …" if len(motion.clips) > 8 else "")
+        raise InputError(f"{path}: {len(motion.clips)} clips ({names}); expected one; choose with --clip")
     return motion.of_clip(clip) if clip else motion
 
 
@@ -129,6 +148,7 @@ def moving(
     skeleton: str = "",
     clip: str = "",
     unit: str = "",
+    up: str = "",
 ) -> Moving:
     """Read what moves in a file.
 
@@ -145,6 +165,9 @@ def moving(
         Of motion capture: a skeleton map by name or file.
     clip, unit : str
         Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
+    up : str
+        The axis that points up, where the file does not say it or is wrong; of a result, that of the camera's frame,
+        or of its world where there is a view.
 
     Raises
     ------
@@ -152,53 +175,58 @@ def moving(
         Where nothing in it moves, or it cannot be read.
     """
     if what.kind is Kind.RESULT:
-        return _of_result(files.read_result(path), posture, view)
+        return _of_result(files.read_result(path), posture, view, up)
     if what.kind is Kind.VIEW:
-        return _of_truth(files.read_view(path), str(path))
+        return _of_truth(files.read_view(path), str(path), up)
     if what.kind is Kind.MOTION:
         layout = load_skeleton_map(skeleton) if skeleton else None
-        return _of_motion(one_clip(path, what, clip=clip, unit=unit), layout)
+        return _of_motion(one_clip(path, what, clip=clip, unit=unit, up=up), layout)
     if what.kind is Kind.POSTURES:
         given = files.read_postures(path)
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
         points = np.concatenate([given.joints, head], axis=1)
-        up = guess_up(given.joints, str(path))
+        up = up or _guessed(given.joints, str(path))
         return _recorded(points, np.arange(len(points)) / RATE, up)
+    remedy = "; convert the result that it is of" if what.kind is Kind.SURVIVORS else ""
     raise InputError(
-        f"{path}: {what.kind.value}, in which nothing moves; expected a result, postures or motion"
+        f"{path}: {what.kind.value}, in which nothing moves; expected a result, postures or motion{remedy}"
     )
 
 
-def _of_result(result: Result, posture: str, view: View | None) -> Moving:
+def _of_result(result: Result, posture: str, view: View | None, stated: str) -> Moving:
     figure, _ = recovered_with(result)
     rows: list[tuple[int, int]] = []
+    ranks: list[int] = []
     empty = 0
     for k, frame in enumerate(result.frames):
         order = rank_by_fit(frame.joints, frame.length_residual, figure.lengths)
         if not len(order):
             empty += 1
-        elif posture == "first":
-            rows.append((k, int(order[0])))
-        elif posture == "all":
-            rows += [(k, row) for row in range(len(order))]
+            continue
+        if posture == "all":
+            chosen = list(range(len(order)))
         else:
-            rows.append((k, _number(posture, len(order), k)))
+            chosen = [int(order[0]) if posture == "first" else _number(posture, len(order), k)]
+        rows += [(k, row) for row in chosen]
+        ranks += (np.argsort(order)[chosen] + 1).tolist()
     if not rows:
         raise InputError("result: no frame has a posture; nothing to convert")
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
     says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
-    up = CAMERA_UP
+    up = stated or CAMERA_UP
     if view is not None:
         points = _in_world(points, view)
-        up = guess_up(points[:, :14])
+        up = stated or _guessed(points[:, :14], "the camera's world")
         says.append(f"in the camera's world, where {up} is up")
     else:
-        says.append("in the camera's frame, as if it were held level; with --view, in its world")
+        level = f"{up} up" if stated else "as if it were held level"
+        says.append(f"in the camera's frame, {level}; with --view, in its world")
     names = list(dict.fromkeys(name for frame in result.frames for name in frame.margins))
     values = {
         f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
     }
+    values["rank"] = np.array(ranks, dtype=np.float64)
     values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
     return Moving(
         points=points,
@@ -210,7 +238,16 @@ def _of_result(result: Result, posture: str, view: View | None) -> Moving:
         says=tuple(says),
         values=values,
         branches=tuple(result.frames[k].branches[row] for k, row in rows),
+        gaps=empty,
     )
+
+
+def _guessed(joints: Array, source: str) -> str:
+    """Guess which axis points up, or name the option that says it."""
+    try:
+        return guess_up(joints, source)
+    except InputError as error:
+        raise InputError(f"{error}: --input-up") from None
 
 
 def _number(posture: str, count: int, frame: int) -> int:
@@ -228,17 +265,17 @@ def _in_world(points: Array, view: View) -> Array:
     return np.asarray((points - model.t) @ model.R)
 
 
-def _of_truth(view: View, source: str) -> Moving:
+def _of_truth(view: View, source: str, stated: str) -> Moving:
     known = np.isfinite(view.truth).any(axis=(1, 2))
     if not known.any():
         raise InputError(
             f"{source}: a view without truth: pictures do not move in space; expected a result; recover it first"
         )
     points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
-    up = CAMERA_UP
+    up = stated or CAMERA_UP
     if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
         points = _in_world(points, view)
-        up = guess_up(points[:, :14], source)
+        up = stated or _guessed(points[:, :14], source)
     return _recorded(points, view.time[known], up)
 
 
@@ -248,7 +285,7 @@ def _of_motion(motion: Motion, layout: SkeletonMap | None) -> Moving:
     says = [f"skeleton map {found.layout.name}"]
     if found.derived:
         says.append(f"{' and '.join(found.derived)} placed from shoulders and hips")
-    up = motion.up or guess_up(found.joints, motion.source)
+    up = motion.up or _guessed(found.joints, motion.source)
     if not motion.up:
         says.append(f"{up} is taken as up, along which heads are above ankles")
     return _recorded(points, motion.time, up, says)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -20,21 +21,27 @@ from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure
 from posekit.files import CameraModel, OpenCVModel
-from posekit.keypoints import KeyPoints, choose, read_keypoints
+from posekit.keypoints import KeyPoints, choose, read_keypoints, swap
 from posekit.motion import postures_of, read_motion
+from posekit.pipeline.detected.camera import in_pixels
 from posekit.pipeline.detected.kinds import Kind, kind_of
 from posekit.pipeline.detected.source import Source
 from posekit.skeleton import JOINTS
-from posekit.skeleton_map import SkeletonMap
+from posekit.skeleton_map import SkeletonMap, load_skeleton_map
 
 BUILT_IN: Final = (
     "lengths of the built-in figure (Lee & Chen 1985, Table A.1), not this person's: give --stature"
 )
-DEFAULT_PROPORTIONS: Final = "drillis-contini"
+DEFAULT_PROPORTIONS: Final = "de-leva"
+"""Of those that are built in the one whose ends are the joints' centres, where key points are too."""
 
 
-def person(source: Source, camera: CameraModel, layout: SkeletonMap) -> tuple[Figure, str]:
+def person(
+    source: Source, camera: CameraModel, layout: SkeletonMap, given: Path | None = None
+) -> tuple[Figure, str]:
     """Make the person's figure, and say in a line where its lengths come from.
+
+    `given` is the file of the person: where it is the recording too, the same person of it is meant.
 
     Where the detector has no neck, the figure's is between its shoulders too (`middle_neck`): the two then mean the
     same point.
@@ -44,7 +51,7 @@ def person(source: Source, camera: CameraModel, layout: SkeletonMap) -> tuple[Fi
     InputError, FigureError
         Where a file cannot be read, or what it says makes no body.
     """
-    lengths = _lengths(source, camera)
+    lengths = _lengths(source, camera, given)
     figure, says = load_figure(), BUILT_IN
     if lengths is not None:
         off = max(lengths.deviation.values(), default=0.0)
@@ -73,33 +80,55 @@ def middle_neck(lengths: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _lengths(source: Source, camera: CameraModel) -> SegmentLengths | None:
+def _lengths(source: Source, camera: CameraModel, given: Path | None) -> SegmentLengths | None:
     if source.lengths is not None:
-        return read_lengths(source.lengths)
+        read = read_lengths(source.lengths)
+        if read.lengths or read.stature is None:
+            return read
+        source = replace(source, lengths=None, stature=source.stature or read.stature)
     if source.calibrate is not None:
-        return _from_recording(source.calibrate, source, camera)
+        return _from_recording(source.calibrate, source, camera, given)
     if source.stature is None:
         return None
     name = DEFAULT_PROPORTIONS if source.proportions in ("figure", "taylor") else source.proportions
     return lengths_from_proportions(name, source.stature)
 
 
-def _from_recording(path: Path, source: Source, camera: CameraModel) -> SegmentLengths:
+def _from_recording(path: Path, source: Source, camera: CameraModel, given: Path | None) -> SegmentLengths:
     """Estimate the lengths from motion capture, or from key points of the same kind of camera."""
-    kind = kind_of(path).kind
-    if kind is Kind.MOTION:
+    what = kind_of(path)
+    if what.kind is Kind.MOTION:
         return lengths_from_postures(postures_of(read_motion(path)).joints).lengths
-    if kind is not Kind.KEY_POINTS:
+    if what.kind is not Kind.KEY_POINTS:
         raise InputError(
-            f"--calibrate: {path} is {kind.value}; expected motion capture or a detector's file of the same person"
+            f"--calibrate: {path} is {what.kind.value}; expected motion capture or a detector's file of the same "
+            "person; give another file"
         )
-    one = choose(read_keypoints(path), source.person if source.person not in ("", "all") else "largest")
-    focal = float(np.sqrt(camera.K[0, 0] * camera.K[1, 1])) if isinstance(camera, OpenCVModel) else None
     if source.stature is None:
         raise InputError(
             "--calibrate: pictures tell proportions, not the size; expected a height too; give --stature"
         )
+    same = given is not None and given.resolve() == path.resolve()
+    found = in_pixels(
+        read_keypoints(path, source.format or None if same else None, _map(source) if same else None),
+        source.size,
+    )
+    if found.normalised:
+        raise InputError(
+            f"--calibrate: points of {path} are fractions of the picture, whose size is not known; expected pixels; "
+            "give --size WIDTHxHEIGHT"
+        )
+    if same and source.swap_sides:
+        found = swap(found)
+    # A number is of the file that is to be recovered; in another the same number is somebody else.
+    by_rule = not source.person.isdigit() and source.person not in ("", "all")
+    one = choose(found, source.person if by_rule or (same and source.person.isdigit()) else "largest")
+    focal = float(np.sqrt(camera.K[0, 0] * camera.K[1, 1])) if isinstance(camera, OpenCVModel) else None
     return lengths_from_views(limbs(one), stature=source.stature, focal=focal).lengths
+
+
+def _map(source: Source) -> SkeletonMap | None:
+    return load_skeleton_map(source.skeleton) if source.skeleton else None
 
 
 def limbs(keypoints: KeyPoints) -> Array:

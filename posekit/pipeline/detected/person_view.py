@@ -86,18 +86,21 @@ def person_view(
     points[keypoints.frame] = found[:, : len(POINTS)]
     confidence[keypoints.frame] = sure[:, : len(POINTS)]
     kept = np.isfinite(points[:, : len(JOINTS), 0]).any(axis=1)
-    if not isinstance(camera, ScaledOrthographicModel):
+    needs_neck = not isinstance(camera, ScaledOrthographicModel)
+    if needs_neck:
         kept &= np.isfinite(points[:, JOINT["neck"], 0])
     if not kept.any():
+        needed = "both shoulders, between which the neck is, are" if needs_neck else "joints are"
         raise InputError(
-            f"{keypoints.source}: both shoulders, between which the neck is, are seen in none of {count} pictures; "
-            "expected at least one; choose another --person, or a smaller --min-confidence"
+            f"{keypoints.source}: {needed} seen in none of {count} pictures; expected at least one; choose another "
+            "--person, or a smaller --min-confidence"
         )
-    if not kept.all():
+    if keypoints.sequence and not kept.all():  # in a collection of photographs nobody is in all of them
         names = [keypoints.pictures[k] for k in np.flatnonzero(~kept)]
+        lacking = "the person's neck is not known" if needs_neck else "the person is not seen"
         warnings.warn(
-            f"{keypoints.source}: {len(names)} of {count} pictures are left out, in which the person's neck is not "
-            f"known ({', '.join(names[:3])}{', …' if len(names) > 3 else ''})",
+            f"{keypoints.source}: {len(names)} of {count} pictures are left out, in which {lacking} "
+            f"({', '.join(names[:3])}{', …' if len(names) > 3 else ''})",
             UserWarning,
             stacklevel=3,
         )

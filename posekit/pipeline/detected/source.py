@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
+from typing import Final
 
 from posekit.errors import InputError
+
+OPTIONS: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
+"""The options that are called otherwise than what they set."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,8 +76,27 @@ class Source:
         }
         _one_of(cameras, "one camera")
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
-        if self.rate is not None and not 0 < self.rate < float("inf"):
-            raise InputError(f"--fps: {self.rate!r}; expected a positive number of frames a second")
+        inf = float("inf")
+        bounds = (
+            ("--fps", self.rate, 0.0, inf, "a positive number of frames a second"),
+            ("--fov", self.fov, 0.0, 180.0, "degrees, more than 0 and less than 180"),
+            ("--focal35", self.focal35, 0.0, 10_000.0, "millimetres, more than 0 and less than 10,000"),
+            ("--deviation", self.deviation, 0.0, inf, "a positive number of pixels"),
+            ("--min-confidence", self.minimum_confidence, -inf, inf, "a number, mostly 0 to 1"),
+        )
+        for name, value, lower, upper, expected in bounds:
+            if value is not None and not lower < value < upper:
+                raise InputError(f"{name}: {value!r}; expected {expected}")
+
+    @property
+    def given(self) -> dict[str, bool]:
+        """Which options are given, by name."""
+        nothing = Source()
+        return {
+            OPTIONS.get(one.name, f"--{one.name.replace('_', '-')}"): getattr(self, one.name)
+            != getattr(nothing, one.name)
+            for one in fields(self)
+        }
 
 
 def _one_of(given: Mapping[str, object], what: str) -> None:

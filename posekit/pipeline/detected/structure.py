@@ -20,17 +20,16 @@ FIRST: Final = 100_000
 """Bytes of a table in which its first line is looked for."""
 
 
-def schema(path: Path) -> str:
+def schema(given: Given) -> str:
     """Return the schema that a file names; empty where it names none."""
-    suffix = path.suffix.lower()
+    path, suffix = given.path, given.suffix
     if suffix == ".npz" and zipfile.is_zipfile(path):
         with open_npz(path, limit=MAX_PADDED) as archive:
             return str(archive.array("schema", "U", ())) if "schema" in archive.names else ""
     if suffix == ".toml":
         return str(read_toml(path, limit=10_000_000).get("schema", ""))
     if suffix == ".json":
-        document = Given(path).document
-        return str(document.get("schema", "")) if isinstance(document, dict) else ""
+        return str(given.document.get("schema", "")) if isinstance(given.document, dict) else ""
     return ""
 
 
