@@ -42,11 +42,12 @@ from posekit.cli.options import (
     signed_length,
     split,
 )
-from posekit.errors import InputError
+from posekit.errors import InputError, PosekitError
 
 if TYPE_CHECKING:
     from posekit.files import View
     from posekit.pipeline import Recovery, Rooting, Tolerance
+    from posekit.pipeline.detected import Opened
     from posekit.validators import Ranges
 
 EXAMPLES = examples(
@@ -176,7 +177,12 @@ def recover(
     from posekit.pipeline.detected.conversion import of_person
     from posekit.pipeline.detected.given_views import given_views
 
-    distinct(view, output, write_urdf, nearer)
+    for read in (view, nearer, truth, calibrate, lengths):
+        distinct(output, write_urdf, read)
+    if view.is_dir() and output.resolve().parent == view.resolve():
+        raise InputError(
+            f"-o {output}: is in the folder of key points, which would read it as a picture; choose another folder"
+        )
     if linkage:
         for name, given, default in (
             ("--write-urdf", write_urdf, None),
@@ -233,11 +239,11 @@ def recover(
         explain=explain,
     )
     people = given_views(view, source, truth)
-    for one in people:
-        alone = len(people) == 1
+    alone = len(people) == 1
+    recovered = asked.recover_all(people, view)
+    for one, recovery in recovered:
         for line in one.says:
             typer.echo(line)
-        recovery = asked.recover(one.view, view)
         if write_urdf is not None:
             recovery.figure.write(of_person(write_urdf, one, alone=alone))
         path = of_person(output, one, alone=alone)
@@ -267,6 +273,18 @@ class Asked:
     infer: bool
     rooting: Rooting
     explain: bool
+
+    def recover_all(self, people: Sequence[Opened], path: Path) -> list[tuple[Opened, Recovery]]:
+        """Recover everybody before anything is written; of several people, warn of those who cannot be."""
+        recovered = []
+        for one in people:
+            try:
+                recovered.append((one, self.recover(one.view, path)))
+            except PosekitError as error:
+                if len(people) == 1 or (one is people[-1] and not recovered):
+                    raise
+                typer.echo(f"posekit: warning: person {one.person} is left out: {error}", err=True)
+        return recovered
 
     def recover(self, seen: View, path: Path) -> Recovery:
         """Recover a view that comes from `path`."""

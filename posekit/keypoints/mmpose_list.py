@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.intake import refusal, shown, write_text
 from posekit.keypoints.format import Format
 from posekit.keypoints.given import Given
+from posekit.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
 from posekit.keypoints.keypoints import KeyPoints
 from posekit.keypoints.mmpose_instances import (
     add_frames,
@@ -31,8 +31,6 @@ from posekit.keypoints.rows import Rows
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
 
 BY_COUNT = {17: "coco_17", 26: "halpe_26", 133: "coco_wholebody_133", 136: "halpe_136"}
-HEAD_COCO, HEAD_H36M = 0.33, 0.45
-"""How large the first five points are against all: in COCO's order they are the head, in Human3.6M's a leg and more."""
 
 
 def suits(given: Given) -> bool:
@@ -84,21 +82,6 @@ def _layout(rows: Rows, layout: SkeletonMap | None) -> SkeletonMap:
             )
     usual = {number: load_skeleton_map(name) for number, name in BY_COUNT.items()}
     return by_count(count, layout, rows.source, usual)
-
-
-def head_share(points: Array) -> float:
-    """Return how large the first five points (D, 17, 2) are against all: the median ratio of the diagonals."""
-    known = ~np.isnan(points[..., 0])
-    rows = (known[:, :5].sum(axis=1) >= 2) & (known[:, 5:].sum(axis=1) >= 2)
-    if not rows.any():
-        return float("nan")
-    first, whole = (_diagonal(points[rows][:, part]) for part in (slice(0, 5), slice(None)))
-    return float(np.median(first / np.maximum(whole, 1e-9)))
-
-
-def _diagonal(points: Array) -> Array:
-    spans = np.nanmax(points, axis=1) - np.nanmin(points, axis=1)
-    return np.asarray(np.hypot(spans[:, 0], spans[:, 1]))
 
 
 def write(path: Path, keypoints: KeyPoints) -> None:

@@ -101,11 +101,15 @@ class Body(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FigureBody:
-    """The stick figure itself: 14 joints from the neck, 13 segments, and the four distances of torso and hips."""
+    """The stick figure itself: 14 joints from the neck, 13 segments, and the four distances of torso and hips.
+
+    Where some image points are `derived` from others, distances come out right by construction, and are no evidence.
+    """
 
     figure: Figure
     stature: float
     inferred: tuple[str, ...] = ()
+    derived: tuple[str, ...] = ()
 
     @cached_property
     def tree(self) -> InterpretationTree:
@@ -126,7 +130,9 @@ class FigureBody:
 
     @property
     def evidence(self) -> Sequence[tuple[tuple[int, int], float]]:
-        """The four distances inside torso and hips."""
+        """The four distances inside torso and hips; none where joints are derived."""
+        if self.derived:
+            return ()
         return [(segment, self.figure.lengths[segment_name(segment)]) for segment in RIGID_SEGMENTS]
 
     def image(self, seen: Array) -> Array:

@@ -175,7 +175,11 @@ def body_of(view: View, figure: Figure, proportions: str) -> Body:
     """Choose what the view's points are lifted into."""
     if proportions == "figure":
         person = person_of(view, figure)
-        return FigureBody(figure=person, stature=view.stature or stature_from_lengths(person.lengths))
+        return FigureBody(
+            figure=person,
+            stature=view.stature or stature_from_lengths(person.lengths),
+            derived=view.derived,
+        )
     if proportions == "taylor":
         if not isinstance(view.camera, ScaledOrthographicModel):
             raise InputError(

@@ -458,6 +458,18 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
             assert part in done.out, (path, part, done.out)
 
 
+@pytest.mark.parametrize("name", ["csv", "npz", "parquet"])
+def test_clips_go_into_tables_together(name: str, there: Path, command: Run, tmp_path: Path) -> None:
+    done = command("convert", there / "clips.npz", tmp_path / f"clips.{name}")
+    assert done.code == 0, done.err
+    assert "6 frames in 2 clips of 14 points" in done.out
+    told = command("inspect", tmp_path / f"clips.{name}")
+    assert "6 frames in 2 clips" in told.out
+    one = command("convert", tmp_path / f"clips.{name}", tmp_path / "fast.trc", "--clip", "fast")
+    assert one.code == 0, one.err
+    assert "3 frames of 14 points" in one.out
+
+
 @pytest.mark.parametrize("kind", ["json", "npz", "colmap", "view"])
 def test_cameras_are_known_in_whatever_file(kind: str, there: Path, command: Run, tmp_path: Path) -> None:
     path = tmp_path / f"camera.{kind}"

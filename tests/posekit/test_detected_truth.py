@@ -11,11 +11,10 @@ import posekit
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.files import OpenCVModel, View
-from posekit.pipeline import view_of
+from posekit.pipeline import result_of, view_of
 from posekit.pipeline.detected.compare import compare
-from posekit.pipeline.detected.ranking import rank_by_fit
 from posekit.pipeline.detected.truth import TURNS, with_truth
-from posekit.skeleton import JOINT
+from posekit.pipeline.ranked import ranked, rigid_of
 from posekit.synthesis import random_views
 
 FIGURE = posekit.load_figure()
@@ -94,12 +93,24 @@ def test_a_frame_without_truth_or_survivor_is_not_counted() -> None:
     ]
 
 
-def test_survivors_are_ranked_by_what_their_lengths_miss() -> None:
-    points = np.repeat(FIGURE.neutral_points[None, :14], 3, axis=0)
-    points[0, JOINT["left_shoulder"], 1] += 0.03
-    points[2, JOINT["left_shoulder"], 1] += 0.01
-    assert rank_by_fit(points, np.zeros(3), FIGURE.lengths).tolist() == [1, 2, 0]
-    assert rank_by_fit(points, np.array([0.0, 0.02, 0.0]), FIGURE.lengths).tolist() == [2, 1, 0]
-    unknown = points.copy()
-    unknown[:, JOINT["left_shoulder"]] = np.nan
-    assert rank_by_fit(unknown, np.zeros(3), FIGURE.lengths).tolist() == [0, 1, 2]
+def test_the_likeliest_comes_first_and_probabilities_are_of_each_frame() -> None:
+    view = view_of(random_views(FIGURE, 5, np.random.default_rng(4)))
+    recovery = posekit.recover(view)
+    ranking = ranked(recovery.frames, FIGURE.lengths, 1e-8)
+    for k, frame in enumerate(recovery.frames):
+        part = ranking.of(k)
+        assert part.probability.sum() == pytest.approx(1.0)
+        assert sorted(part.order.tolist()) == list(range(len(frame)))
+        assert (np.diff(part.probability[part.order]) <= 1e-15).all()
+    told = rigid_of(result_of(recovery).settings, 5)
+    np.testing.assert_allclose(told, 1e-8, rtol=0, atol=0)
+
+
+def test_a_results_settings_say_what_its_frames_were_judged_with() -> None:
+    settings = {
+        "judged": ["exact", "noisy", "given", None],
+        "noisy": {"rigid": 0.12},
+        "tolerance": {"rigid": 0.5},
+    }
+    assert rigid_of(settings, 4).tolist() == [1e-8, 0.12, 0.5, 1e-8]
+    assert rigid_of({}, 2).tolist() == [1e-8, 1e-8]

@@ -19,7 +19,7 @@ from posekit.pipeline.evaluation import (
     Ranking,
     Sampling,
     Sweep,
-    by_fit,
+    by_probability,
     evaluate,
     write_evaluation,
 )
@@ -119,7 +119,7 @@ def test_errors_are_those_of_the_survivors(capture: Capture) -> None:
             if len(frame):
                 assert found.error("best", "mpjpe")[place] == pytest.approx(errors.min(), abs=1e-12)
                 assert np.isclose(errors, found.error("random", "mpjpe")[place], atol=1e-12).any()
-                order = by_fit([frame], FIGURE)[0].order
+                order = by_probability([frame], FIGURE)[0].order
                 assert found.error("first", "mpjpe")[place] == pytest.approx(errors[order[0]], abs=1e-9)
             else:
                 assert np.isnan(found.error("best", "mpjpe")[place])
@@ -387,7 +387,10 @@ def test_reports_hold_the_same_numbers(exact: Any, tmp_path: Path) -> None:
     assert read["frames"] == len(exact.frames) == sum(row["frames"] for row in read["conditions"])
     assert [row["noise"] for row in read["by_noise"]] == [0.0, 2.0]
     assert len(read["curves"][0]["correct_poses"]["first"]["aligned"]) == 301
-    assert read["curves"][0]["reliability"] is None
+    reliability = read["curves"][0]["reliability"]["branch"]
+    assert sum(reliability["frames"]) == sum(
+        row["frames"] for row in read["conditions"] if row["noise"] == 0.0
+    )
     head, *rows = (line.split(",") for line in (tmp_path / "report.csv").read_text().splitlines())
     assert len(rows) == len(read["conditions"])
     for row, condition in zip(rows, read["conditions"], strict=True):

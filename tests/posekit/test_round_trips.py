@@ -26,8 +26,8 @@ from posekit.files import OpenCVModel, View
 from posekit.keypoints import chosen, formats, read_keypoints, write_keypoints
 from posekit.motion.urdf_folder import LINK_OF
 from posekit.pipeline import result_of
-from posekit.pipeline.detected.ranking import rank_by_fit
 from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.pipeline.ranked import ranked, rigid_of
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, POINTS
 from posekit.synthesis import Walker, walker_scene
 
@@ -229,12 +229,9 @@ def recovered(tmp_path_factory: pytest.TempPathFactory) -> Recovered:
     files.write_result(folder / "result.json", result)
     files.write_view(folder / "view.json", seen)
     result = files.read_result(folder / "result.npz")
-    ranked = np.stack(
-        [
-            frame.joints[rank_by_fit(frame.joints, frame.length_residual, recovery.figure.lengths)[0]]
-            for frame in result.frames
-        ]
-    )
+    rigid = rigid_of(result.settings, len(result.frames))
+    ranking = ranked(result.frames, recovery.figure.lengths, rigid)
+    first = np.stack([frame.joints[ranking.of(k).order[0]] for k, frame in enumerate(result.frames)])
     model = seen.camera
     assert isinstance(model, OpenCVModel)
     assert model.R is not None
@@ -242,8 +239,8 @@ def recovered(tmp_path_factory: pytest.TempPathFactory) -> Recovered:
     return Recovered(
         folder=folder,
         joints=np.stack([frame.joints[0] for frame in result.frames]),
-        ranked=ranked,
-        world=(ranked - model.t) @ model.R,
+        ranked=first,
+        world=(first - model.t) @ model.R,
         counts=[len(frame.joints) for frame in result.frames],
         time=seen.time,
     )

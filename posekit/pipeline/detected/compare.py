@@ -9,8 +9,8 @@ import numpy as np
 
 from posekit.cameras import Array
 from posekit.measures import mpjpe, pa_mpjpe
-from posekit.pipeline.detected.ranking import rank_by_fit
 from posekit.pipeline.markdown import table_lines
+from posekit.pipeline.ranked import ranked
 from posekit.pipeline.recovery import Recovery
 
 MEASURES: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
@@ -27,7 +27,7 @@ class Comparison:
     ----------
     survivors : int array (F,)
     best, first, middle : array (F, 3)
-        Of the best survivor by that measure, of the one that `rank_by_fit` puts first, and the median over all;
+        Of the best survivor by that measure, of the likeliest (`posekit.pipeline.ranked`), and the median over all;
         NaN where there is no survivor or no truth.
     """
 
@@ -62,6 +62,8 @@ def compare(recovery: Recovery, truth: Array) -> Comparison:
     """Compare the survivors of every frame with the truth (F, 14, 3), camera frame, metres."""
     count = len(recovery.frames)
     found = {name: np.full((count, 3), np.nan) for name in ("best", "first", "middle")}
+    rigid = [frame.tolerance.rigid if frame.tolerance else 0.0 for frame in recovery.frames]
+    ranking = ranked(recovery.frames, recovery.figure.lengths, rigid)
     for k, frame in enumerate(recovery.frames):
         joints = frame.joints
         both = np.isfinite(joints[..., 0]) & np.isfinite(truth[k, :, 0])
@@ -70,7 +72,7 @@ def compare(recovery: Recovery, truth: Array) -> Comparison:
         ):  # the joints that are known are the same in all survivors
             continue
         errors = np.stack(_errors(joints, truth[k]), axis=-1)
-        first = rank_by_fit(joints, frame.length_residual, recovery.figure.lengths)[0]
+        first = ranking.of(k).order[0]
         found["best"][k] = np.nanmin(errors, axis=0)
         found["first"][k] = errors[first]
         found["middle"][k] = np.nanmedian(errors, axis=0)

@@ -15,13 +15,14 @@ from posekit.keypoints import KeyPoints, formats, is_format, write_keypoints
 from posekit.motion import UPS, motion_formats
 from posekit.pipeline.detected.kinds import Kind, kind_of
 from posekit.pipeline.detected.motion_output import (
+    TABLES,
     Output,
     by_suffix,
     carries_points,
     write_moving,
     write_points,
 )
-from posekit.pipeline.detected.moving import moving, one_clip
+from posekit.pipeline.detected.moving import moving, one_clip, read_clips
 from posekit.pipeline.detected.opening import Opened, choose_person, open_views, read_detections
 from posekit.pipeline.detected.source import Source
 from posekit.pipeline.detected.view_keypoints import view_keypoints
@@ -142,8 +143,9 @@ def convert(job: Conversion) -> list[str]:
         )
     output = Output(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
     if what.kind is Kind.MOTION and carries_points(output.to):
-        motion = one_clip(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
-        return write_points(output, motion, job.source.skeleton)
+        motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
+        carried = motion if output.to in TABLES else one_clip(motion)
+        return write_points(output, carried, job.source.skeleton)
     found = moving(
         job.given,
         what,

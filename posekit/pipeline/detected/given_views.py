@@ -46,6 +46,10 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
                 f"{said[0]}: {path} is a view, which says camera, person and lengths itself; expected a detector's "
                 "file; leave it out"
             )
+        if source.proportions not in ("figure", "taylor"):
+            raise InputError(
+                f"--proportions: {source.proportions!r}; expected figure or taylor: a view says lengths itself"
+            )
         opened = [Opened(person=0, view=read_view(path), says=())]
     elif what.kind is Kind.KEY_POINTS:
         if truth is not None and source.rate is None:

@@ -125,9 +125,9 @@ def _motion(motion: Motion, skeleton: str) -> list[str]:
     spans = [np.ptp(motion.time[motion.clip == k]) for k in np.unique(motion.clip)]
     seconds = float(sum(spans))
     clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
+    up = f"{motion.up} up" if motion.up else "which way is up is not said"
     lines = [
-        f"{len(motion)} frames{clips} at {motion.rate:g} a second ({seconds:.2f} s), {len(motion.names)} points, "
-        f"{motion.up or 'an axis that is not said'} up",
+        f"{len(motion)} frames{clips} at {motion.rate:g} a second ({seconds:.2f} s), {len(motion.names)} points, {up}",
         f"points: {_listed(motion.names)}",
     ]
     try:

@@ -39,7 +39,7 @@ EVEN: Final = ("bvh", "c3d")
 """Formats that have one time from frame to frame."""
 
 TABLES: Final = ("csv", "npz", "parquet")
-"""Formats that carry all survivors of a frame."""
+"""Formats that carry all survivors of a frame, and motion in several clips."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,7 +122,8 @@ def write_points(output: Output, motion: Motion, skeleton: str = "") -> list[str
     turned = with_up(motion, up) if up else motion
     write_motion(output.path, turned, output.to)
     axis = f"{turned.up} up" if turned.up else "which way is up is not known, and axes stay as they are"
-    return [*says, f"{len(motion)} frames of {len(motion.names)} points, {axis}"]
+    clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
+    return [*says, f"{len(motion)} frames{clips} of {len(motion.names)} points, {axis}"]
 
 
 def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[str]:

@@ -19,7 +19,7 @@ from posekit.files import OpenCVModel, Result, View
 from posekit.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
 from posekit.motion.motion_axes import up_rotation
 from posekit.pipeline.detected.kinds import Kind, What
-from posekit.pipeline.detected.ranking import rank_by_fit
+from posekit.pipeline.ranked import ranked, rigid_of
 from posekit.pipeline.validate import recovered_with
 from posekit.skeleton import POINTS
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
@@ -124,19 +124,32 @@ class Moving:
         )
 
 
-def one_clip(path: Path, what: What, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
-    """Read motion, and of several clips the one that is named.
+def read_clips(path: Path, what: What, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
+    """Read motion: all of its clips, or the one that is named.
 
     Raises
     ------
     InputError
-        Where it cannot be read, or has several clips and none is named.
+        Where it cannot be read, or there is no such clip.
     """
     motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None, up=up or None)
-    if not clip and len(motion.clips) > 1:
-        names = ", ".join(motion.clips[:8]) + (", …" if len(motion.clips) > 8 else "")
-        raise InputError(f"{path}: {len(motion.clips)} clips ({names}); expected one; choose with --clip")
     return motion.of_clip(clip) if clip else motion
+
+
+def one_clip(motion: Motion) -> Motion:
+    """Refuse several clips, where one is needed.
+
+    Raises
+    ------
+    InputError
+        Where there are several: they are named.
+    """
+    if len(motion.clips) > 1:
+        names = ", ".join(motion.clips[:8]) + (", …" if len(motion.clips) > 8 else "")
+        raise InputError(
+            f"{motion.source}: {len(motion.clips)} clips ({names}); expected one; choose with --clip"
+        )
+    return motion
 
 
 def moving(
@@ -180,7 +193,7 @@ def moving(
         return _of_truth(files.read_view(path), str(path), up)
     if what.kind is Kind.MOTION:
         layout = load_skeleton_map(skeleton) if skeleton else None
-        return _of_motion(one_clip(path, what, clip=clip, unit=unit, up=up), layout)
+        return _of_motion(one_clip(read_clips(path, what, clip=clip, unit=unit, up=up)), layout)
     if what.kind is Kind.POSTURES:
         given = files.read_postures(path)
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
@@ -198,8 +211,9 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
     empty = 0
-    for k, frame in enumerate(result.frames):
-        order = rank_by_fit(frame.joints, frame.length_residual, figure.lengths)
+    ranking = ranked(result.frames, figure.lengths, rigid_of(result.settings, len(result.frames)))
+    for k in range(len(result.frames)):
+        order = ranking.of(k).order
         if not len(order):
             empty += 1
             continue
@@ -226,6 +240,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     values = {
         f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
     }
+    values["probability"] = np.array([ranking.of(k).probability[row] for k, row in rows])
     values["rank"] = np.array(ranks, dtype=np.float64)
     values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
     return Moving(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
 
+from posekit.anthropometry import proportion_names
 from posekit.errors import InputError
 
 OPTIONS: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
@@ -75,6 +76,9 @@ class Source:
             "--focal35": self.focal35,
         }
         _one_of(cameras, "one camera")
+        names = ("figure", "taylor", *proportion_names())
+        if self.proportions not in names:
+            raise InputError(f"--proportions: {self.proportions!r}; expected one of {', '.join(names)}")
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
         inf = float("inf")
         bounds = (

@@ -6,7 +6,7 @@ from posekit.pipeline.evaluation.method import Method as Method
 from posekit.pipeline.evaluation.ranking import Chooser as Chooser
 from posekit.pipeline.evaluation.ranking import Ranker as Ranker
 from posekit.pipeline.evaluation.ranking import Ranking as Ranking
-from posekit.pipeline.evaluation.ranking import by_fit as by_fit
+from posekit.pipeline.evaluation.ranking import by_probability as by_probability
 from posekit.pipeline.evaluation.report import write_evaluation as write_evaluation
 from posekit.pipeline.evaluation.sampling import Sampling as Sampling
 from posekit.pipeline.evaluation.sweep import Sweep as Sweep

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from posekit.errors import InputError, PosekitError
 from posekit.figure import Figure, load_figure
 from posekit.files import View
-from posekit.pipeline.evaluation.ranking import Chooser, Ranker, by_fit
+from posekit.pipeline.evaluation.ranking import Chooser, Ranker, by_probability
 from posekit.pipeline.recover import person_of, recover
 from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.rooting import Rooting
@@ -67,7 +67,7 @@ class Method:
     rules: Sequence[int] = DEFAULT_RULES
     tolerance: Tolerance | None = None
     seed: int = 0
-    rank: Ranker = by_fit
+    rank: Ranker = by_probability
     choose: Chooser | None = field(default=None)
 
     def __post_init__(self) -> None:

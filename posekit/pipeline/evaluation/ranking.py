@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure
-from posekit.pipeline.detected.ranking import rank_by_fit
+from posekit.pipeline.ranked import ranked
 from posekit.pipeline.recovery import FrameRecovery
 
 
@@ -49,11 +49,14 @@ class Chooser(Protocol):
         ...
 
 
-def by_fit(frames: Sequence[FrameRecovery], figure: Figure) -> list[Ranking]:
-    """Rank by the agreement with the person's lengths, without probabilities (`rank_by_fit`)."""
-    return [
-        Ranking(order=rank_by_fit(frame.joints, frame.length_residual, figure.lengths)) for frame in frames
-    ]
+def by_probability(frames: Sequence[FrameRecovery], figure: Figure) -> list[Ranking]:
+    """Rank by probability, of a camera held level (`posekit.ranking.rank`)."""
+    if not frames:
+        return []
+    rigid = [frame.tolerance.rigid if frame.tolerance else 0.0 for frame in frames]
+    ranking = ranked(frames, figure.lengths, rigid)
+    parts = [ranking.of(k) for k in range(len(frames))]
+    return [Ranking(order=part.order, probability=part.probability) for part in parts]
 
 
 def first_ranked(rankings: Sequence[Ranking], counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:

@@ -1,0 +1,83 @@
+r"""A posture as unit vectors in the torso's frame: smooth where angles are not, and turning with it.
+
+The torso's axes are those of `posekit.figure.frames.torso_frame`: x forward, y left, z from the pelvis to the neck. In
+them are told the hips' left and down, the eight segments of the limbs, and, where it is known, which way is up.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.ranking.vectors import across, cross, dot, unit
+from posekit.skeleton import JOINT, SIDES, segment_name
+
+LIMBS: Final = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+
+SEGMENTS: Final = tuple(
+    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{end}"]) for side in SIDES for start, end in LIMBS
+)
+"""The segments of the limbs: upper arm, forearm, thigh and shank, the right ones first."""
+
+DIRECTIONS: Final = ("hips.left", "hips.down", *map(segment_name, SEGMENTS), "up")
+"""The eleven directions; `up` is the last, so that what is known without it comes first."""
+
+UP: Final = len(DIRECTIONS) - 1
+
+
+def directions(joints: Array, up: Array | None = None) -> Array:
+    """Tell postures by their directions.
+
+    Parameters
+    ----------
+    joints : array (14, 3, N)
+        Any right-handed frame; NaN where a joint is not known.
+    up : array (3, N) or (3, 1), optional
+        Unit vectors against gravity, in the same frame.
+
+    Returns
+    -------
+    array (11, 3, N), or (10, 3, N) without `up`
+        Unit vectors in the torso's frame, in the order of `DIRECTIONS`; NaN where one of their joints is not known, all
+        of them where neck, a shoulder or the pelvis is not.
+    """
+    neck, right, left, pelvis = joints[:4]
+    down = unit(pelvis - neck)
+    left_axis = unit(across(left - right, down))
+    axes = np.stack([cross(down, left_axis), left_axis, -down])
+    hips_left, hips_down = _hips(joints)
+    found = np.empty((UP + (up is not None), 3, joints.shape[2]))
+    vectors = [hips_left, hips_down, *(unit(joints[end] - joints[start]) for start, end in SEGMENTS)]
+    if up is not None:
+        vectors.append(up)
+    for k, vector in enumerate(vectors):
+        for axis in range(3):
+            found[k, axis] = dot(vector, axes[axis])
+    return found
+
+
+def mirrored(found: Array) -> Array:
+    """Return the directions (D, 3, N) of the same postures with left and right exchanged.
+
+    In a mirror y turns round; the hips' left is drawn from the other hip to the one, and so turns round once more.
+    """
+    image = found * np.array([1.0, -1.0, 1.0])[:, None]
+    image[0] *= -1.0
+    order = [0, 1, *range(6, 10), *range(2, 6), *range(10, len(found))]
+    return np.asarray(image[order])
+
+
+def rows_of(names: tuple[str, ...]) -> NDArray[np.intp]:
+    """Return where the components of some directions stand among all (3 a direction)."""
+    first = 3 * np.array([DIRECTIONS.index(name) for name in names], dtype=np.intp)
+    return np.asarray((first[:, None] + np.arange(3)).ravel())
+
+
+def _hips(joints: Array) -> tuple[Array, Array]:
+    """Return the hips' left, and their down square to it, (3, N)."""
+    pelvis, right, left = joints[JOINT["pelvis"]], joints[JOINT["right_hip"]], joints[JOINT["left_hip"]]
+    left_axis = unit(left - right)
+    return left_axis, unit(across(right - pelvis, left_axis))

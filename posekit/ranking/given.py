@@ -1,0 +1,157 @@
+"""What `rank` is given, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.ranking.depth import Depth
+from posekit.ranking.image import rigid_lengths
+from posekit.ranking.prior import TERMS
+from posekit.ranking.upright import Up
+from posekit.skeleton import JOINTS
+
+FARTHEST: Final = 1e6
+"""Metres."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Given:
+    """Survivors and the evidence on them.
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3)
+    frame : int array (N,)
+    deviation : array (F,)
+        F is one more than the highest frame.
+    lengths : array (4,), optional
+        The person's distances inside torso and hips.
+    length_residual, chi2 : array (N,), optional
+    up : Up, optional
+    depth : Depth, optional
+    """
+
+    joints: Array
+    frame: NDArray[np.intp]
+    deviation: Array
+    lengths: Array | None
+    length_residual: Array | None
+    chi2: Array | None
+    up: Up | None
+    depth: Depth | None
+
+    @staticmethod
+    def checked(
+        joints: ArrayLike,
+        lengths: Mapping[str, float] | None,
+        frame: ArrayLike | None,
+        length_residual: ArrayLike | None,
+        chi2: ArrayLike | None,
+        deviation: ArrayLike,
+        up: Up | None,
+        depth: Depth | None,
+    ) -> Given:
+        """Check everything against everything else.
+
+        Raises
+        ------
+        InputError
+            Where a shape is wrong, a joint is out of the world or something is given for too few frames.
+        """
+        positions = numbers("joints", joints, (None, len(JOINTS), 3))
+        if (np.abs(positions) > FARTHEST).any():
+            raise InputError(
+                f"joints: a coordinate beyond {FARTHEST:g} m; expected metres, NaN where a joint is not known"
+            )
+        count = len(positions)
+        frames = _frames(frame, count)
+        highest = int(frames.max(initial=-1)) + 1
+        for what, values in (
+            ("up", None if up is None or up.direction.ndim == 1 else up.direction),
+            ("depth", None if depth is None else depth.estimate),
+        ):
+            if values is not None and len(values) < highest:
+                raise InputError(
+                    f"{what} is given for {len(values)} frames; expected {highest}, as survivors are of"
+                )
+        likelihood = None if chi2 is None else numbers("chi2", chi2, (count,))
+        if likelihood is not None and (likelihood < 0).any():
+            raise InputError(
+                "chi2: a negative sum of squares; expected zero or more, NaN where there is none"
+            )
+        return Given(
+            joints=positions,
+            frame=frames,
+            deviation=_deviation(deviation, highest),
+            lengths=None if lengths is None else rigid_lengths(lengths),
+            length_residual=None
+            if length_residual is None
+            else numbers("length_residual", length_residual, (count,)),
+            chi2=likelihood,
+            up=up,
+            depth=depth,
+        )
+
+    @property
+    def possible(self) -> list[str]:
+        """The terms for which there is something to go by."""
+        upright = self.up is not None
+        there = {
+            "image": self.lengths is not None or self.chi2 is not None,
+            "gravity": upright,
+            "balance": upright,
+            "contact": upright,
+            "depth": self.depth is not None,
+        }
+        return [name for name in TERMS if there.get(name, True)]
+
+
+def numbers(name: str, given: ArrayLike, shape: tuple[int | None, ...]) -> Array:
+    """Return an array of a shape, None for any size.
+
+    Raises
+    ------
+    InputError
+        Where it has another shape or is no array of numbers.
+    """
+    spelled = ", ".join("N" if size is None else str(size) for size in shape) + (
+        "," if len(shape) == 1 else ""
+    )
+    try:
+        values = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{name} is no array of numbers; expected shape ({spelled})") from None
+    if values.ndim != len(shape) or any(
+        wanted not in (None, size) for wanted, size in zip(shape, values.shape, strict=True)
+    ):
+        raise InputError(f"{name} has shape {values.shape}; expected ({spelled})")
+    return values
+
+
+def _frames(frame: ArrayLike | None, count: int) -> NDArray[np.intp]:
+    if frame is None:
+        return np.zeros(count, dtype=np.intp)
+    given = np.array(frame)
+    if given.shape != (count,) or (count and given.dtype.kind not in "iu") or (given < 0).any():
+        raise InputError(
+            f"frame is {given.dtype} of shape {given.shape}; expected whole numbers from 0, ({count},)"
+        )
+    return given.astype(np.intp)
+
+
+def _deviation(given: ArrayLike, frames: int) -> Array:
+    values = np.asarray(given, dtype=np.float64)
+    if values.ndim > 1 or (values.ndim == 1 and len(values) < frames):
+        raise InputError(
+            f"deviation has shape {values.shape}; expected one number, or one a frame, ({frames},)"
+        )
+    if not (np.isfinite(values) & (values >= 0)).all():
+        raise InputError("deviation: expected finite metres, zero or more")
+    return np.broadcast_to(values, frames) if values.ndim == 0 else values[:frames]

@@ -1,0 +1,179 @@
+"""What is known of postures before the picture is looked at, and how much each kind of evidence counts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from types import MappingProxyType
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.intake import nearest
+from posekit.ranking.directions import DIRECTIONS, UP, rows_of
+from posekit.ranking.student import Student
+
+TERMS: Final = ("image", "posture", "gravity", "balance", "contact", "depth")
+"""What a survivor is judged by."""
+
+WEIGHTS: Final = (*TERMS, "chi2")
+"""What has a weight: the terms, and the chi2 of a refinement where it is the image's term."""
+
+
+class Spread(NamedTuple):
+    r"""A distance that is mostly small: its log-density is :math:`-\log(1 + (d/s)^2)`, but for a constant.
+
+    Attributes
+    ----------
+    scale : float
+        Metres: s.
+    usual : float
+        The average of the logarithm over real postures.
+    """
+
+    scale: float
+    usual: float
+
+    def judge(self, distance: Array, blur: float = 0.0) -> Array:
+        """Return the log-density of distances (N,) above what is usual; 0 where one is not known.
+
+        Parameters
+        ----------
+        distance : array (N,)
+            Metres.
+        blur : float
+            Metres by which the distance may be wrong.
+        """
+        found = self.usual - np.log1p(distance**2 / (self.scale**2 + blur**2))
+        return np.where(np.isnan(found), 0.0, found)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Block:
+    """Directions that are judged together, apart from those of other blocks.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Some of `DIRECTIONS`, in their order.
+    student : Student
+        Of their components, three a direction.
+    """
+
+    names: tuple[str, ...]
+    student: Student
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.names if name not in DIRECTIONS]
+        if unknown:
+            raise InputError(f"{unknown[0]!r} is no direction; {nearest(unknown[0], DIRECTIONS)}")
+        if list(self.names) != sorted(set(self.names), key=DIRECTIONS.index) or not self.names:
+            raise InputError(f"directions of a block must be in the order {', '.join(DIRECTIONS)}")
+        size = 3 * len(self.names)
+        if self.student.mean.shape != (size,) or self.student.scale.shape != (size, size):
+            raise InputError(
+                f"a block of {len(self.names)} directions needs {size} means and {size} x {size} scales"
+            )
+
+    @cached_property
+    def without_up(self) -> int:
+        """How many components are left where nobody knows which way is up."""
+        return 3 * sum(name != DIRECTIONS[UP] for name in self.names)
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Where the components stand among all."""
+        return rows_of(self.names)
+
+    @cached_property
+    def marginal(self) -> Student:
+        """The distribution without `up`."""
+        part = slice(self.without_up)
+        student = self.student
+        return Student(mean=student.mean[part], scale=student.scale[part, part], dof=student.dof)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prior:
+    r"""A prior on postures, and the weights of the terms.
+
+    Parameters
+    ----------
+    blocks : tuple of Block
+        Each direction at most once.
+    temperature : float
+        Metres: the postures' log-density is divided by 1 + deviation / temperature. A survivor that is a centimetre off
+        is no draw from a distribution that is sharp to a degree.
+    weights : mapping
+        Of each of `WEIGHTS`, zero or more.
+    balance, contact : Spread
+        Of the centre of mass beside the feet's support, and of one ankle above the other.
+    name, source : str
+        What it is called, and what it is from.
+
+    Raises
+    ------
+    InputError
+        Where a number is impossible.
+    """
+
+    blocks: tuple[Block, ...]
+    temperature: float
+    weights: Mapping[str, float]
+    balance: Spread
+    contact: Spread
+    name: str = ""
+    source: str = field(default="", repr=False)
+
+    def __post_init__(self) -> None:
+        names = [name for block in self.blocks for name in block.names]
+        if len(set(names)) != len(names):
+            raise InputError(f"{self.name}: a direction is in more than one block; expected each once")
+        if set(self.weights) != set(WEIGHTS):
+            raise InputError(
+                f"{self.name}: weights of {', '.join(self.weights)}; expected {', '.join(WEIGHTS)}"
+            )
+        for what, value in (
+            *((f"weights.{name}", value) for name, value in self.weights.items()),
+            ("temperature", self.temperature - 1e-6),
+            ("balance.scale", self.balance.scale - 1e-6),
+            ("contact.scale", self.contact.scale - 1e-6),
+        ):
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(f"{self.name}: {what} is {value!r}; expected a finite number, not negative")
+        object.__setattr__(self, "weights", MappingProxyType(dict(self.weights)))
+
+    def judge(self, found: Array, sine: float = 0.0) -> tuple[Array, Array]:
+        """Return the log-densities of directions (10 or 11, 3, N), each above its average.
+
+        Parameters
+        ----------
+        found : array
+            Of `posekit.ranking.directions.directions`, with `up` or without.
+        sine : float
+            Of the deviation of `up`: its variance is added.
+
+        Returns
+        -------
+        posture, gravity : array (N,)
+            Of the posture by itself, and of `up` given the posture; 0 where nothing is known.
+        """
+        flat = found.reshape(-1, found.shape[2])
+        posture, gravity = np.zeros(flat.shape[1]), np.zeros(flat.shape[1])
+        for block in self.blocks:
+            alone = block.without_up
+            if len(found) > UP and alone < len(block.rows):
+                student = block.student
+                if sine > 0:
+                    student = student.widened(np.where(np.arange(len(block.rows)) < alone, 0.0, sine**2))
+                one, both = student.excess(flat[block.rows], (alone, len(block.rows)))
+                posture += one
+                gravity += both - one
+            elif alone:
+                posture += block.marginal.excess(flat[block.rows[:alone]], (alone,))[0]
+        return posture, gravity

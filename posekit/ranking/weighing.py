@@ -1,0 +1,119 @@
+r"""How much each term counts: the weights with which probabilities are calibrated.
+
+Conditional logit (McFadden 1974, in Frontiers in econometrics): of a frame's survivors one is nearest to the truth; the
+weights are those under which these choices were most likely,
+
+.. math::
+
+    \max_{w \ge 0} \sum_f \log \frac{e^{w \cdot x_{f}}}{\sum_j e^{w \cdot x_j}} - r |w|^2,
+
+a concave problem in as many unknowns as there are terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.cameras import Array
+from posekit.errors import InputError
+from posekit.ranking.ranking import Ranking, softmax
+
+RIDGE: Final = 1e-3
+STEPS: Final = 100
+PRECISION: Final = 1e-9
+
+
+class Choices(NamedTuple):
+    """Terms (N, K) of survivors in the order of frames (N,), where frames start, and which survivor is the truth."""
+
+    terms: Array
+    frame: NDArray[np.intp]
+    starts: NDArray[np.intp]
+    chosen: NDArray[np.intp]
+
+
+def fit_weights(
+    rankings: Sequence[Ranking], nearest: Sequence[ArrayLike], *, names: Sequence[str] | None = None
+) -> dict[str, float]:
+    """Fit one weight a term; each ranking counts the same, however many frames it has.
+
+    Parameters
+    ----------
+    rankings : sequence of Ranking
+        Made with a prior whose weights are all one.
+    nearest : sequence of int array (F,)
+        For each ranking the survivor that is nearest to the truth, frame by frame; -1 for frames that do not count.
+    names : sequence of str, optional
+        The terms; by default all that some ranking has. A term that a ranking has not is 0 there.
+
+    Returns
+    -------
+    dict
+        Zero or more, by name.
+
+    Raises
+    ------
+    InputError
+        Where a survivor is not of its frame, or nothing is left to fit.
+    """
+    wanted = (
+        tuple(names) if names is not None else tuple(dict.fromkeys(n for one in rankings for n in one.terms))
+    )
+    sets = [
+        _choices(ranking, np.asarray(rows), wanted) for ranking, rows in zip(rankings, nearest, strict=True)
+    ]
+    sets = [one for one in sets if len(one.chosen)]
+    if not wanted or not sets:
+        raise InputError("no terms or no frames to fit weights to")
+    weights = np.full(len(wanted), 0.5)
+    value, slope, curve = _objective(sets, weights)
+    for _ in range(STEPS):
+        free = (weights > 0) | (slope > 0)
+        step = np.zeros(len(wanted))
+        step[free] = np.linalg.solve(-curve[np.ix_(free, free)], slope[free])
+        size = 1.0
+        while True:
+            tried = np.maximum(weights + size * step, 0.0)
+            better, next_slope, next_curve = _objective(sets, tried)
+            if better >= value or size < 1e-6:
+                break
+            size /= 2
+        gain, weights, value, slope, curve = better - value, tried, better, next_slope, next_curve
+        if gain < PRECISION:
+            break
+    return dict(zip(wanted, weights.tolist(), strict=True))
+
+
+def _choices(ranking: Ranking, nearest: NDArray[np.intp], names: Sequence[str]) -> Choices:
+    rows = nearest[nearest >= 0]
+    if (rows >= len(ranking)).any() or (ranking.frame[rows] != np.flatnonzero(nearest >= 0)).any():
+        raise InputError("the survivor nearest to the truth is not of its frame; expected its row, or -1")
+    counted = np.zeros(int(ranking.frame.max(initial=-1)) + 1, dtype=bool)
+    counted[ranking.frame[rows]] = True
+    kept = np.flatnonzero(counted[ranking.frame])
+    kept = kept[np.argsort(ranking.frame[kept], kind="stable")]
+    place = np.empty(len(ranking), dtype=np.intp)
+    place[kept] = np.arange(len(kept))
+    absent = np.zeros(len(ranking))
+    terms = np.stack([ranking.terms.get(name, absent)[kept] for name in names], axis=1)
+    frame = ranking.frame[kept]
+    return Choices(terms, frame, np.flatnonzero(np.diff(frame, prepend=-1)), place[rows])
+
+
+def _objective(sets: Sequence[Choices], weights: Array) -> tuple[float, Array, Array]:
+    """Return the mean log-likelihood of the choices less the ridge, its gradient and its Hessian."""
+    value = -RIDGE * float(weights @ weights)
+    slope, curve = -2 * RIDGE * weights, -2 * RIDGE * np.eye(len(weights))
+    for one in sets:
+        p = softmax(one.terms @ weights, one.frame)
+        count = len(one.chosen)
+        weighted = p[:, None] * one.terms
+        mean = np.add.reduceat(weighted, one.starts)
+        value += float(np.log(np.maximum(p[one.chosen], 1e-300)).sum()) / count
+        slope = slope + (one.terms[one.chosen].sum(axis=0) - mean.sum(axis=0)) / count
+        curve = curve - (one.terms.T @ weighted - mean.T @ mean) / count
+    return value, slope, curve
