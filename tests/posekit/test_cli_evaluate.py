@@ -98,10 +98,9 @@ def test_reports_and_charts_are_written(run: Run) -> None:
         rows = list(csv.DictReader(file))
     assert len(rows) == len(report["conditions"]) == 6
     assert {row["yaw"] for row in rows} == {"0.0", "90.0", "180.0"}
-    for name in ("yaw", "survivors", "correct-poses"):
+    for name in ("yaw", "survivors", "correct-poses", "reliability"):
         assert Path(f"report-{name}.png").read_bytes().startswith(b"\x89PNG")
         assert f"report-{name}.png" in outcome.out
-    assert not Path("report-reliability.png").exists()  # the ranking states no probability
 
 
 def test_motion_of_other_formats_is_the_same(run: Run) -> None:

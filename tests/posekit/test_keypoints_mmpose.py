@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.keypoints import KeyPoints
-from posekit.keypoints.mmpose_list import HEAD_COCO, HEAD_H36M, head_share
+from posekit.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
 from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
 from posekit.skeleton_map import load_skeleton_map, parse_skeleton_map
 
