@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 PYTHON ?= python3
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 DEMO_RESULTS := demo-results
+BENCH_RESULTS := bench-results
 WORKERS := 2
 
 .DEFAULT_GOAL := help
@@ -135,7 +136,7 @@ lint: $(VENV)/dev.stamp ## ruff: format and rules
 
 .PHONY: types
 types: $(VENV)/dev.stamp ## mypy --strict
-	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py examples/*.py)
+	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/comparison/*.py examples/*.py)
 
 .PHONY: layers
 layers: $(VENV)/dev.stamp ## import-linter: who may import whom
@@ -150,11 +151,19 @@ docs: $(VENV)/dev.stamp ## build the documentation, warnings are errors
 check: lint types layers docs test ## all of the above, as CI does
 
 .PHONY: bench
-bench: $(VENV)/dev.stamp ## run every benchmark
+bench: $(VENV)/dev.stamp ## compare with other ways: one report with charts, in bench-results/
+	$(BIN)/python -m benchmarks -o $(BENCH_RESULTS)
+
+.PHONY: bench-gate
+bench-gate: $(VENV)/dev.stamp ## the same, quickly: warn where a ratio fell below benchmarks/baseline.json
+	$(BIN)/python -m benchmarks --quick --gate -o $(BENCH_RESULTS)
+
+.PHONY: bench-all
+bench-all: $(VENV)/dev.stamp ## run every file of benchmarks/
 	@for file in benchmarks/[a-z]*.py; do echo "== $$file"; $(BIN)/python "$$file" || exit 1; done
 
 .PHONY: clean
 clean: ## remove everything that make made
-	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS)
+	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS) $(BENCH_RESULTS)
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find posekit validators urdf viewer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

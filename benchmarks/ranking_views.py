@@ -18,7 +18,7 @@ from posekit.files import View
 from posekit.pipeline import MEASURED, Rooting, Tolerance, recover, view_of
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance, fit_prior
 from posekit.ranking.fitting import TEMPERATURE
-from posekit.refinement import RootPrior, Sight, refine
+from posekit.refinement import GIVING, RootPrior, Sight, merge, refine
 from posekit.synthesis import Capture, Scene, mocap_scenes
 from posekit.validators import load_ranges
 from posekit.validators.anatomical_plausibility import plausibility
@@ -30,8 +30,8 @@ SOURCE = (
     "clip counting the same, left and right exchanged; fitted by benchmarks/ranking.py"
 )
 BEFORE_REFINEMENT = Tolerance(rigid=0.05, tangent=0.03, placement=False, angle=5.0)
-ROOT_GIVES, LENGTHS_GIVE = 0.01, 0.02
-"""Deviations of a given root (m) and of lengths (relative) in the refinement."""
+ROOT_GIVES, HOPELESS = 0.01, 60.0
+"""Deviation of a given root, m, and the chi2 beyond which a survivor is given up."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +149,7 @@ def _refined(
     frame: NDArray[np.intp],
     noise: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Refine survivors: their joints, and chi2."""
+    """Refine survivors: their joints, and chi2; NaN for those that noise cannot explain or that became another."""
     root = RootPrior.along_ray(scene.camera, view.root, depth=ROOT_GIVES, lateral=ROOT_GIVES)
     sight = Sight(
         figure=figure,
@@ -157,10 +157,12 @@ def _refined(
         image=view.image,
         deviation=noise,
         root=root,
-        length_deviation=LENGTHS_GIVE,
+        length_deviation=GIVING,
     )
-    found = refine(sight, joints, frame=frame, hopeless=200.0)
-    return found.joints, found.chi2
+    found = refine(sight, joints, frame=frame, hopeless=HOPELESS)
+    kept = np.zeros(len(found), dtype=np.bool_)
+    kept[merge(found, keep=found.explained()).rows] = True
+    return np.where(kept[:, None, None], found.joints, np.nan), found.chi2
 
 
 class Priors:

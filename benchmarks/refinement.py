@@ -25,7 +25,17 @@ from scipy.stats import chi2 as chi2_distribution
 from posekit.figure import Figure, load_figure
 from posekit.pipeline import MEASURED, Tolerance
 from posekit.pipeline.markdown import table_lines
-from posekit.refinement import RootPrior, Sight, Trunks, find_trunks, merge, refine, tolerance_of, under_noise
+from posekit.refinement import (
+    GIVING,
+    RootPrior,
+    Sight,
+    Trunks,
+    find_trunks,
+    merge,
+    refine,
+    tolerance_of,
+    under_noise,
+)
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
@@ -38,8 +48,11 @@ PIXELS = (0.5, 1.0, 2.0, 5.0)
 ROOT_DEPTH = 0.1
 HOPELESS = 60.0
 MOST_LEAVES = 350_000
-TRUNK_LENGTHS, LIMB_LENGTHS = 0.04, 0.01
-"""Relative deviations of lengths for real bodies: torsos give, limbs hardly."""
+LIMB_LENGTHS = 0.01
+"""Relative deviation of limbs' lengths for real bodies."""
+
+TORSO = 0.02
+"""Metres that distances inside a found trunk may be off where its lengths are varied."""
 
 CONTACT = -0.03
 """Metres: what bodies may overlap under noise."""
@@ -110,7 +123,7 @@ def on_trunks(sight: Sight, pixels: float, trunks: Trunks | None = None) -> Leav
         root_depth_deviation=root_deviation(sight),
         trunks=True,
     )
-    rigid = 0.5 * TRUNK_LENGTHS if varied else allowed.rigid
+    rigid = TORSO if varied else allowed.rigid
     tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=1.0)
     tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=trunks.tree_lengths(sight.figure))
     leaves = tree.grow(
@@ -335,26 +348,13 @@ def real(capture: Path, frames: int) -> None:
             for k, scene in enumerate(scenes):
                 image = scene.with_noise(pixels, np.random.default_rng(10 + k)).image
                 root = root_prior(scene, 0.0, np.random.default_rng(2))
-                deviation = {
-                    segment_name(pair): TRUNK_LENGTHS if max(pair) < 6 else LIMB_LENGTHS
-                    for pair in TREE_SEGMENTS
-                }
-                deviation |= {
-                    name: TRUNK_LENGTHS
-                    for name in (
-                        "right_shoulder-left_shoulder",
-                        "right_shoulder-pelvis",
-                        "left_shoulder-pelvis",
-                        "right_hip-left_hip",
-                    )
-                }
                 sight = Sight(
                     figure=scene.figure,
                     camera=scene.camera,
                     image=image,
                     deviation=pixels,
                     root=root,
-                    length_deviation=deviation,
+                    length_deviation=GIVING,
                 )
                 leaves = (fixed if label == "fixed" else on_trunks)(sight, pixels)
                 total.append((len(scene), outcome(sight, leaves, scene.joints_cam)))

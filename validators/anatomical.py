@@ -2,7 +2,8 @@
 
 What a person can do ends somewhere, and people differ in where. An end is a mean over people with a standard deviation;
 a limit is the mean moved outward by a stated number of spreads. A coupling is an end of one angle that depends on
-another, piecewise linearly (hamstrings: hip flexion on knee flexion).
+another, piecewise linearly (hamstrings: hip flexion on knee flexion). A sinus takes the corners off a ball joint's
+ranges: nobody reaches the ends of all three angles at once.
 """
 
 from __future__ import annotations
@@ -86,6 +87,26 @@ class Coupling:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Sinus:
+    r"""A ball joint's ranges rounded off: what is possible of one angle shrinks where the others near their ends.
+
+    With :math:`u` how far an angle is from the middle of its range, as a fraction of half the range, a joint reaches
+    :math:`|u_1|^p + |u_2|^p + |u_3|^p \le 1` instead of the whole box :math:`|u_i| \le 1`.
+
+    Parameters
+    ----------
+    joint : {"hip"}
+    power : float
+        The p, from 1: 2 is an ellipsoid, infinity the box.
+    source : tuple of str
+    """
+
+    joint: str
+    power: float
+    source: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
 class Anatomy:
     """Ranges of motion of all angles, their couplings, and how many spreads beyond the means is still possible.
 
@@ -94,6 +115,8 @@ class Anatomy:
     motions : mapping
         Each of `ANGLES`.
     couplings : tuple of Coupling
+    sinuses : tuple of Sinus
+        At most one of a joint.
     spreads : float
         The k of mean + k spread.
     sources : mapping
@@ -104,6 +127,7 @@ class Anatomy:
     couplings: tuple[Coupling, ...]
     spreads: float
     sources: Mapping[str, str]
+    sinuses: tuple[Sinus, ...] = ()
 
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits (lower, upper), degrees, of the 22 angles of `posekit.skeleton.DOFS`, couplings aside."""
@@ -112,6 +136,10 @@ class Anatomy:
     def couplings_of(self, angle: str, side: Side | None = None) -> tuple[Coupling, ...]:
         """Return the couplings that bound an angle."""
         return tuple(c for c in self.couplings if c.angle == angle and side in (None, c.side))
+
+    def sinus_of(self, joint: str) -> Sinus | None:
+        """Return the sinus of a ball joint, if it has one."""
+        return next((sinus for sinus in self.sinuses if sinus.joint == joint), None)
 
     def coupled(self, coupling: Coupling, of: Array) -> tuple[Array, float]:
         """Return mean (of `of`'s shape) and spread of a coupled end where the other angle is `of`, figure's degrees."""

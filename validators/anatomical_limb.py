@@ -7,7 +7,8 @@ in several ways (both branches of the ball joint, both signs of the hinge); wall
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 
@@ -17,8 +18,12 @@ from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_off
 
 BALL = ("flexion", "abduction", "rotation")
 HINGES: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
+ROTATION = BALL.index("rotation")
 ENDS: tuple[Side, Side] = ("lower", "upper")
 ELEVATION, PLANE, TURN = DERIVED
+
+LEAST_LEFT = 0.1
+"""The fraction of a range that a sinus leaves at the very end of another angle: below it spreads lose their meaning."""
 
 
 def writings(angles: Array) -> Array:
@@ -58,14 +63,18 @@ class Wall:
     side : {"lower", "upper"}
     mean : float or array broadcastable to (N, W)
         Degrees.
-    spread : float
+    spread : float or array, as `mean`
         One standard deviation over people, degrees.
     """
 
     place: int
     side: Side
     mean: Array | float
-    spread: float
+    spread: Array | float
+
+    def limit(self, spreads: float) -> Array | float:
+        """Return the mean moved outward by so many spreads."""
+        return self.mean + OUTWARD[self.side] * spreads * self.spread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,7 +104,7 @@ class LimbWalls:
         lower, upper = np.full(self.values.shape, -np.inf), np.full(self.values.shape, np.inf)
         for wall in self.walls:
             column = (..., wall.place)
-            bound = wall.mean + OUTWARD[wall.side] * spreads * wall.spread
+            bound = wall.limit(spreads)
             if wall.side == "lower":
                 lower[column] = np.maximum(lower[column], bound)
             else:
@@ -123,7 +132,7 @@ def judged_names(anatomy: Anatomy, joint: str, count: int) -> tuple[str, ...]:
     return (*names[2:], ELEVATION)
 
 
-def limb_walls(anatomy: Anatomy, joint: str, angles: Array) -> LimbWalls:
+def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0.0) -> LimbWalls:
     """Set up the walls of a limb.
 
     Parameters
@@ -132,6 +141,8 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array) -> LimbWalls:
     joint : {"shoulder", "hip"}
     angles : array (N, 4) or (N, 2)
         In one of its writings, degrees: ball joint and hinge, or the first two of the ball joint.
+    tolerance : float
+        Degrees by which ends are moved outward where a sinus narrows another angle's.
 
     Returns
     -------
@@ -140,8 +151,9 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array) -> LimbWalls:
     """
     by_elevation = _by_elevation(anatomy, joint)
     written = writings(angles)
-    if by_elevation:  # elevation and turn are the same in both branches of the ball joint
-        written = written[:, : written.shape[1] // 2]
+    turn_sides = {c.side for c in anatomy.couplings_of(TURN)}
+    if by_elevation and (turn_sides == set(ENDS) or angles.shape[1] == 2):
+        written = written[:, : written.shape[1] // 2]  # elevation and turn are the same in both branches
     names = [*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion"][: angles.shape[1]]
     ends = {(name, side): anatomy.motions[name].end(side) for name in names for side in ENDS}
     columns = [
@@ -170,7 +182,44 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array) -> LimbWalls:
             )
     if "shoulder.rotation" in readings:
         walls += _turn_walls(anatomy, angles, readings)
+    sinus = anatomy.sinus_of(joint)
+    if sinus is not None:
+        walls = _round_off(walls, columns, anatomy.spreads, sinus.power, tolerance)
     return LimbWalls(names=tuple(names), values=np.stack(columns, axis=-1), walls=tuple(walls))
+
+
+def _round_off(
+    walls: list[Wall], columns: list[Array], spreads: float, power: float, tolerance: float
+) -> list[Wall]:
+    """Draw the ends of each angle of the ball joint toward its middle, as far as the angles before it are from theirs.
+
+    Abduction's by flexion, rotation's by both. All three conditions together are the sinus; two of them, which need
+    no rotation, are judged before the limb's end is known. So flexion and abduction are measured against their own
+    ranges (the first two walls of each), whatever else is known: the upper segment alone rejects nothing that the
+    whole limb would pass. Middles lie between the means: more spreads or tolerance only widen.
+    """
+    used: Array = np.zeros(columns[0].shape)
+    rounded = list(walls)
+    for place in range(min(len(columns), len(BALL))):
+        own = [k for k, wall in enumerate(walls) if wall.place == place]
+        # Of rotation all walls count; it is not among what is judged early.
+        below, above = (
+            [walls[k] for k in own if walls[k].side == side][: None if place == ROTATION else 1]
+            for side in ENDS
+        )
+        lower = reduce(np.maximum, (wall.mean for wall in below))
+        upper = reduce(np.minimum, (wall.mean for wall in above))
+        middle = (lower + upper) / 2
+        if place:
+            left = np.maximum(1.0 - used, LEAST_LEFT**power) ** (1 / power)
+            for k in own:
+                mean = middle + (walls[k].mean - middle) * left
+                rounded[k] = replace(walls[k], mean=mean, spread=walls[k].spread * left)
+        if place < ROTATION:
+            off = columns[place] - middle
+            half = np.where(off < 0, middle - below[0].limit(spreads), above[0].limit(spreads) - middle)
+            used = used + (np.abs(off) / (half + tolerance)) ** power
+    return rounded
 
 
 def _by_elevation(anatomy: Anatomy, joint: str) -> bool:

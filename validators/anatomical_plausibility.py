@@ -7,12 +7,13 @@ With :math:`z` the number of spreads by which an angle is beyond the mean of the
     \log p = -\tfrac12 z^2 - \log\left(u - l + \sqrt{\pi/2}\,(\sigma_l + \sigma_u)\right),
 
 which integrates to one over the angle, in degrees, where no coupling narrows it. Under a coupling :math:`z` counts from
-the coupled end, and the constant is left as it is.
+the coupled end, and the constant is left as it is. A sinus is a wall and no density: it is left out.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,7 +74,7 @@ def plausibility(angles: Array, anatomy: Anatomy) -> Array:
 
 
 def _limb_excess(anatomy: Anatomy, joint: str, angles: Array) -> Array:
-    excess = limb_walls(anatomy, joint, angles).excess()
+    excess = limb_walls(replace(anatomy, sinuses=()), joint, angles).excess()
     excess[..., 0] = np.fmax.reduce(excess[..., [0, *range(4, excess.shape[2])]], axis=-1)  # the elevation
     bend = np.abs(np.sin(np.radians(angles[:, 3])))
     excess[..., 2] *= np.where(np.isnan(bend), 1.0, bend)[:, None]

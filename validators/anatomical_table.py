@@ -9,7 +9,7 @@ from typing import Any, cast
 
 from posekit.errors import InputError
 from posekit.intake import cut, one_line
-from posekit.validators.anatomical import ANGLES, DERIVED, Anatomy, Coupling, End, Motion, Side
+from posekit.validators.anatomical import ANGLES, DERIVED, Anatomy, Coupling, End, Motion, Side, Sinus
 
 ELEVATION, PLANE, TURN = DERIVED
 
@@ -29,7 +29,11 @@ ALLOWED: Mapping[str, tuple[str, ...]] = {
 }
 """The angles that a coupling may bound, and those of the same limb on which it may depend."""
 
+SINUSES = ("hip",)
+"""The ball joints that may have a sinus: those whose three angles are judged, all in one check."""
+
 MAX_COUPLINGS = 100
+MAX_POWER = 100.0
 MAX_SPREADS = 10.0
 FULL_TURN = 360.0
 
@@ -53,6 +57,7 @@ def parse_anatomy(table: dict[str, Any], source: str) -> Anatomy:
     couplings = table.pop("coupling", [])
     if not isinstance(couplings, list) or len(couplings) > MAX_COUPLINGS:
         raise InputError(f"{source}: coupling: expected [[coupling]] tables, at most {MAX_COUPLINGS}")
+    sinuses = _sinuses(table.pop("sinus", []), sources, source)
     motions = {}
     for joint, angles in table.items():
         if not isinstance(angles, dict):
@@ -76,6 +81,7 @@ def parse_anatomy(table: dict[str, Any], source: str) -> Anatomy:
         ),
         spreads=spreads,
         sources=sources,
+        sinuses=sinuses,
     )
 
 
@@ -128,6 +134,26 @@ def _coupling(given: object, sources: Mapping[str, str], where: str) -> Coupling
         spread=_spread(table["spread"], f"{where}.spread"),
         source=_sources(table.get("source", []), sources, where),
     )
+
+
+def _sinuses(given: object, sources: Mapping[str, str], source: str) -> tuple[Sinus, ...]:
+    if not isinstance(given, list) or len(given) > len(SINUSES):
+        raise InputError(
+            f"{source}: sinus: expected [[sinus]] tables, at most one for each of {', '.join(SINUSES)}"
+        )
+    sinuses: list[Sinus] = []
+    for k, each in enumerate(given):
+        where = f"{source}: sinus {k + 1}"
+        table = _table(each, {"joint", "power", "source"}, set(), where)
+        joint, power = table["joint"], _number(table["power"], f"{where}.power")
+        if joint not in SINUSES:
+            raise InputError(
+                one_line(f"{where}: joint is {cut(str(joint))!r}; expected {', '.join(SINUSES)}")
+            )
+        if not 1 <= power <= MAX_POWER:
+            raise InputError(f"{where}: power is {power:g}; expected 1 to {MAX_POWER:g} (2 is an ellipsoid)")
+        sinuses.append(Sinus(joint=joint, power=power, source=_sources(table["source"], sources, where)))
+    return tuple(sinuses)
 
 
 def _table(given: object, needed: set[str], optional: set[str], where: str) -> dict[str, Any]:

@@ -20,6 +20,8 @@ from posekit.figure.capsules import Capsule
 from posekit.figure.frames import cross
 from posekit.figure.pool import collides, make_pool
 from posekit.tree import Check, Findings
+from posekit.tree.compiled import compiled
+from posekit.validators import kernels
 
 CONTACT_TOLERANCE = 1e-9
 """Metres of penetration below which the verdict would be rounding noise: not a collision."""
@@ -96,6 +98,23 @@ class PairCollision:
             tolerance=CONTACT_TOLERANCE,
             rejects=rejects[:, None],
         )
+
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array]:
+        """Tell which pairs are clear of contact, and which seem to penetrate; see `posekit.tree.Screened`."""
+        places, placed = compiled(kernels).capsules(points, *self._shapes)
+        return places, placed
+
+    def confirm(self, presumed: Array) -> bool:
+        """Ask coal whether pairs that seem to penetrate do; see `posekit.tree.Screened`."""
+        return bool(collides(self._pool, presumed.T).all())
+
+    @cached_property
+    def _shapes(self) -> tuple[NDArray[np.int64], Array, float]:
+        """How the kernel takes the two capsules."""
+        a, b = self.a, self.b
+        sizes = np.array([len(a.start), len(a.end), len(b.start), len(b.end)], dtype=np.int64)
+        shape = np.array([a.center, a.half_length, b.center, b.half_length])
+        return sizes, shape, a.radius + b.radius + self.contact_margin
 
     def _coal(self, middle_a: Array, axis_a: Array, middle_b: Array, axis_b: Array) -> NDArray[np.bool_]:
         q = np.empty((14, len(middle_a)))

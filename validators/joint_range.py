@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure import Figure
@@ -17,6 +19,8 @@ from posekit.figure.closed_form import ClosedForm
 from posekit.figure.frames import hips_frame, torso_frame
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
+from posekit.tree.compiled import compiled
+from posekit.validators import kernels
 from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges
@@ -78,6 +82,13 @@ def _limited(ik: ClosedForm, limits: Mapping[str, Range]) -> ClosedForm:
     return replace(ik, limits=Limits(sign=ik.limits.sign, lower=lower, upper=upper))
 
 
+def _limits(ik: ClosedForm, where: tuple[str, ...]) -> Array:
+    """Return signs and limits of some angles (3, K), as the kernels take them."""
+    rows = [DOFS.index(dof) for dof in where]
+    limits = ik.limits
+    return np.ascontiguousarray(np.stack([limits.sign[rows], limits.lower[rows], limits.upper[rows]]))
+
+
 def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
     rows = [DOFS.index(dof) for dof in where]
     return Findings(
@@ -105,6 +116,21 @@ class Neck:
         angles = self.ik.neck(R_torso, points[:, 0], points[:, 4:])
         return _findings(self.ik, self.where, angles, self.tolerance)
 
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+        """Tell what is clear; see `posekit.tree.Screened`."""
+        places: NDArray[np.int8] = compiled(kernels).neck(
+            points, self._offsets, self._limits, np.radians(self.tolerance)
+        )
+        return places, None
+
+    @cached_property
+    def _offsets(self) -> Array:
+        return np.array(self.ik.head_offsets, order="C")
+
+    @cached_property
+    def _limits(self) -> Array:
+        return _limits(self.ik, self.where)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pelvis:
@@ -123,6 +149,15 @@ class Pelvis:
         R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
         angles = self.ik.pelvis(R_torso, R_hips)
         return _findings(self.ik, self.where, angles, self.tolerance)
+
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+        """Tell what is clear; see `posekit.tree.Screened`."""
+        places: NDArray[np.int8] = compiled(kernels).pelvis(points, self._limits, np.radians(self.tolerance))
+        return places, None
+
+    @cached_property
+    def _limits(self) -> Array:
+        return _limits(self.ik, self.where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,3 +209,15 @@ class Limb:
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
             angles[tolerance[:, 2] > UNSEEN, 2] = np.nan
         return _findings(self.figure.ik, self.where, angles, tolerance)
+
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+        """Tell what is clear; see `posekit.tree.Screened`."""
+        places: NDArray[np.int8] = compiled(kernels).limb(
+            points, len(self._parent), self._limits, np.radians(self.tolerance), np.radians(UNSEEN)
+        )
+        return places, None
+
+    @cached_property
+    def _limits(self) -> Array:
+        first = DOFS.index(f"{self.limb[0]}.flexion")
+        return _limits(self.figure.ik, DOFS[first : first + 4])

@@ -2,22 +2,78 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from posekit.cameras import Array
+from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.figure.frames import torso_frame
-from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
+from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Check, Findings
 
 Mode = Literal["distances", "placement"]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RigidTolerance:
+    """How far each distance inside torso and hips may be off: not all of them give alike.
+
+    See docs, "A torso that gives".
+
+    Parameters
+    ----------
+    shoulders : float
+        From shoulder to shoulder, metres: what clavicles give.
+    sides : float
+        From each shoulder to the pelvis, metres: what the spine gives when it bends, too.
+    hips : float
+        From hip to hip, metres. The pelvis is bone; it is off where its depth is, which the spine's length lifts.
+    """
+
+    shoulders: float
+    sides: float
+    hips: float
+
+    def __post_init__(self) -> None:
+        for name, metres in vars(self).items():
+            if not (math.isfinite(metres) and metres >= 0):
+                raise InputError(
+                    f"the rigid tolerance of {name} is {metres!r} m; expected zero or a positive, finite number"
+                )
+
+    @staticmethod
+    def uniform(metres: float) -> RigidTolerance:
+        """Allow all distances the same."""
+        return RigidTolerance(shoulders=metres, sides=metres, hips=metres)
+
+    @property
+    def widest(self) -> float:
+        """The largest of them, metres: that of whatever is none of the four."""
+        return max(self.shoulders, self.sides, self.hips)
+
+    def of(self, segment: tuple[int, int]) -> float:
+        """Return what a distance between two joints may be off, metres."""
+        if segment not in RIGID_SEGMENTS:
+            return self.widest
+        if not set(segment) - HIP_JOINTS:
+            return self.hips
+        return self.sides if PELVIS in segment else self.shoulders
+
+
+PELVIS = JOINT["pelvis"]
+HIP_JOINTS = {JOINT[name] for name in HIPS}
+
+
 def rigid_parts(
-    figure: Figure, *, tolerance: float, mode: Mode = "placement", limbs: bool = False
+    figure: Figure,
+    *,
+    tolerance: float | RigidTolerance,
+    mode: Mode = "placement",
+    limbs: bool = False,
 ) -> list[Check]:
     """Make the checks of the rigid parts.
 
@@ -25,8 +81,9 @@ def rigid_parts(
 
     Parameters
     ----------
-    tolerance : float
-        Metres by which a distance, or a point of the torso, may be off.
+    tolerance : float or RigidTolerance
+        Metres by which a distance may be off: all the same, or each its own. Lifted segments, and points of the torso
+        in the mode ``placement``, may be off by the widest.
     mode : {"distances", "placement"}
         ``distances`` compares the four distances inside torso and hips, as the paper does; they cannot tell
         a torso from its mirror image. ``placement`` also lays the figure's own torso onto the posture's,
@@ -34,17 +91,18 @@ def rigid_parts(
     limbs : bool
         Judge the thirteen lifted segments too, which a tree's postures have right by construction and others need not.
     """
+    allowed = tolerance if isinstance(tolerance, RigidTolerance) else RigidTolerance.uniform(tolerance)
     checks: list[Check] = [
         Distance(
             where=(segment_name(segment),),
             points=segment,
             length=figure.lengths[segment_name(segment)],
-            tolerance=tolerance,
+            tolerance=allowed.of(segment),
         )
         for segment in (SEGMENTS if limbs else RIGID_SEGMENTS)
     ]
     if mode == "placement":
-        checks.append(Placement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=tolerance))
+        checks.append(Placement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=allowed.widest))
     return checks
 
 

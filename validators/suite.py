@@ -16,7 +16,7 @@ from posekit.tree import Check
 from posekit.validators.collision import collision
 from posekit.validators.joint_range import TOLERANCE, joint_range
 from posekit.validators.ranges import Ranges
-from posekit.validators.rigid_parts import Mode, rigid_parts
+from posekit.validators.rigid_parts import Mode, RigidTolerance, rigid_parts
 from posekit.validators.walking import DEFAULT_RULES, walking
 
 CHECKS = ("rigid-parts", "joint-range", "collision", "walking")
@@ -37,7 +37,7 @@ def make_checks(
     names: Iterable[str],
     *,
     ranges: Ranges,
-    rigid_tolerance: float,
+    rigid_tolerance: float | RigidTolerance,
     rigid_mode: Mode = "placement",
     limbs: bool = False,
     angle_tolerance: float = TOLERANCE,
@@ -47,6 +47,8 @@ def make_checks(
 ) -> list[Check]:
     """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance.
 
+    Distances inside torso and hips may be off by `rigid_tolerance` metres: all the same, or each its own.
+
     Raises
     ------
     InputError
@@ -54,6 +56,8 @@ def make_checks(
         every posture would pass.
     """
     for what, value in (("rigid tolerance", rigid_tolerance), ("angle tolerance", angle_tolerance)):
+        if isinstance(value, RigidTolerance):
+            continue  # it has checked itself
         if not (math.isfinite(value) and value >= 0):
             raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
     if not math.isfinite(contact_margin):

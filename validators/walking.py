@@ -30,11 +30,12 @@ LIMBS = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"
 class WalkingThresholds:
     """When a swing is evidence, and what counts as parallel, flexed and vertical.
 
-    The paper gives no numbers; these are posekit's.
+    The paper gives no numbers; these are posekit's. The defaults take the rules by their word, for figures that walk
+    like Lee & Chen's; real walkers keep them as `PEOPLE` says.
 
     Parameters
     ----------
-    limb_swing : float
+    elbow_swing, knee_swing : float
         Metres that elbow or knee must be out of the body plane: nearer they are "too close to the torso".
     girdle_swing : float
         The same for shoulder and hip.
@@ -46,11 +47,19 @@ class WalkingThresholds:
         Rule 5: degrees that the other leg may lean from the body axis.
     """
 
-    limb_swing: float = 0.02
+    elbow_swing: float = 0.02
+    knee_swing: float = 0.02
     girdle_swing: float = 0.01
     out_of_plane: float = 10.0
     flexed_knee: float = 15.0
     vertical: float = 30.0
+
+
+PEOPLE = WalkingThresholds(
+    elbow_swing=0.10, knee_swing=0.25, girdle_swing=0.06, out_of_plane=35.0, flexed_knee=40.0, vertical=35.0
+)
+"""For real walkers (docs, "Rules of walking"): their shoulders lie behind, their hips before the figure's, arms turned
+outward leave the moving plane, and while one leg passes the other both knees are in front, and bent."""
 
 
 def walking(
@@ -112,8 +121,10 @@ class _Rule:
     def swing(self, points: Array, body: Body, k: int) -> Array:
         """Return the swing of the k-th joint (N,), metres; NaN where it is not clearly other than zero."""
         index = self.joints[k]
-        girdle = JOINTS[index].endswith(("shoulder", "hip"))
-        least = self.thresholds.girdle_swing if girdle else self.thresholds.limb_swing
+        limits = self.thresholds
+        least = {"elbow": limits.elbow_swing, "knee": limits.knee_swing}.get(
+            JOINTS[index].split("_")[1], limits.girdle_swing
+        )
         displacement = np.einsum("ni,ni->n", self.joint(points, k) - points[:, 0], body.forward)
         swing = displacement - self.figure.neutral_points[index, 0]
         return np.where(np.abs(swing) < least, np.nan, swing)

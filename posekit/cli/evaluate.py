@@ -33,6 +33,7 @@ EXAMPLES = examples(
     "posekit evaluate motion.npz -o report.json -o report.csv --plots",
     "posekit evaluate walk.trc -o report.json --noise 0,2 --heights 1.5m --yaw-step 45",
     "posekit evaluate motion.npz -o report.json --actions walking,running --ranges table1 --jobs 2",
+    "posekit evaluate motion.npz -o report.json --sequences --noise 0,2 --yaw-step 45 --heights 1.5m",
     "posekit evaluate view.json -o report.json",
 )
 
@@ -82,8 +83,13 @@ def evaluate(
         str, typer.Option("--size", metavar="WxH", help="Size of their pictures, pixels.")
     ] = "1920x1080",
     frames_per_clip: Annotated[
-        int, typer.Option("--frames-per-clip", metavar="N", help="Evenly over each clip.")
-    ] = 10,
+        int | None,
+        typer.Option(
+            "--frames-per-clip",
+            metavar="N",
+            help="Evenly over each clip. Default: 10; with --sequences 60, in a row.",
+        ),
+    ] = None,
     clips: Annotated[
         str, typer.Option("--clips", metavar="LIST", help="Only these, by commas. Default: all.")
     ] = "",
@@ -95,6 +101,13 @@ def evaluate(
         typer.Option(
             "--consecutive",
             help="Frames in a row from the middle of each clip, seen by cameras that stand still.",
+        ),
+    ] = False,
+    sequences: Annotated[
+        bool,
+        typer.Option(
+            "--sequences",
+            help="Follow the person through frames in a row, and tell how good the path is.",
         ),
     ] = False,
     root: Annotated[
@@ -153,7 +166,10 @@ def evaluate(
         size=_size(size),
     )
     sampling = evaluation.Sampling(
-        frames_per_clip=frames_per_clip, clips=split(clips), actions=split(actions), consecutive=consecutive
+        frames_per_clip=(60 if sequences else 10) if frames_per_clip is None else frames_per_clip,
+        clips=split(clips),
+        actions=split(actions),
+        consecutive=consecutive or sequences,
     )
     options: dict[str, Any] = {
         "root": root or None,
@@ -162,6 +178,7 @@ def evaluate(
         "rules": rule_numbers(rules),
         "tolerance": _tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
         "seed": seed,
+        "choose": evaluation.by_path if sequences else None,
     }
     if noise:
         options["noise"] = _noise(noise)

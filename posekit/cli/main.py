@@ -8,7 +8,19 @@ from typing import Annotated, Any, TextIO
 
 import typer
 
-from posekit.cli import convert, demo, evaluate, inspect, recover, render, reproduce, synth, validate, view
+from posekit.cli import (
+    batch,
+    convert,
+    demo,
+    evaluate,
+    inspect,
+    recover,
+    render,
+    reproduce,
+    synth,
+    validate,
+    view,
+)
 from posekit.cli.options import examples
 from posekit.errors import PosekitError
 
@@ -36,6 +48,7 @@ app.command("inspect", epilog=inspect.EXAMPLES)(inspect.inspect)
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.add_typer(synth.app, name="synth")
 app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
+app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("render", epilog=render.EXAMPLES)(render.render)
 app.command("view", epilog=view.EXAMPLES)(view.view)
 app.command("demo", epilog=demo.EXAMPLES)(demo.demo)

@@ -146,6 +146,22 @@ def recover(
         ),
     ] = "auto",
     deviation: Deviation = None,
+    refine: Annotated[
+        bool | None,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Turn survivors into the likeliest postures near them, and reject what the noise cannot explain. "
+            "Default: where the view, a detector or --deviation says how noisy its points are.",
+        ),
+    ] = None,
+    length_deviation: Annotated[
+        float | None,
+        typer.Option(
+            "--length-deviation",
+            metavar="FRACTION",
+            help="Then: how far lengths may be off, standard deviation. Default: 0.01, from shoulder to pelvis 0.02.",
+        ),
+    ] = None,
     truth: Annotated[
         Path | None,
         typer.Option(
@@ -195,6 +211,8 @@ def recover(
             ("--angle-tolerance", angle_tolerance, None),
             ("--proportions", proportions, "figure"),
             ("--no-infer", infer, True),
+            ("--refine", refine, None),
+            ("--length-deviation", length_deviation, None),
         ):
             if given != default:
                 raise InputError(f"{name} is for persons; leave it out with --linkage")
@@ -236,6 +254,8 @@ def recover(
         nearer=None if nearer is None else files.read_nearer(nearer),
         infer=infer,
         rooting=pipeline.Rooting(method=root, deviation=deviation),  # type: ignore[arg-type]
+        refine=refine,
+        length_deviation=length_deviation,
         explain=explain,
     )
     people = given_views(view, source, truth)
@@ -272,6 +292,8 @@ class Asked:
     nearer: Sequence[Mapping[str, str]] | None
     infer: bool
     rooting: Rooting
+    refine: bool | None
+    length_deviation: float | None
     explain: bool
 
     def recover_all(self, people: Sequence[Opened], path: Path) -> list[tuple[Opened, Recovery]]:
@@ -308,6 +330,8 @@ class Asked:
                 infer=self.infer,
                 nearer=self.nearer,
                 rooting=pipeline.Rooting(method=self.rooting.method) if uncalibrated else self.rooting,
+                refine=self.refine,
+                length_deviation=self.length_deviation,
                 progress=done,
             )
 

@@ -170,6 +170,8 @@ def _check_name(output: Path) -> None:
 
 def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated: bool = False) -> None:
     """Add noise, write the view, say so."""
+    from dataclasses import replace
+
     import numpy as np
 
     from posekit import files, pipeline
@@ -178,5 +180,7 @@ def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated:
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
     view = pipeline.view_of(scene)
+    if noise > 0 and scene.lee_chen_f is None:
+        view = replace(view, deviation=noise)
     files.write_view(output, pipeline.forget_camera(view) if uncalibrated else view)
     typer.echo(f"written: {output} ({len(scene)} frames)")

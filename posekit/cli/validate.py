@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
 import typer
 
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from posekit.files.postures_q import Configurations
 
 SOME_INVALID = 1
+DETAIL: Final[Mapping[str, Literal["findings", "margins"]]] = {".json": "findings", ".csv": "margins"}
+"""What a report of each kind shows of every posture; others show what is behind those that are not valid."""
+
 UPS = {
     f"{sign}{axis}": (k, -1.0 if sign == "-" else 1.0)
     for k, axis in enumerate("xyz")
@@ -148,7 +152,8 @@ def validate(
         bool | None,
         typer.Option(
             "--distances/--no-distances",
-            help="Measure the nearest pair of bodies in every posture of a robot (default: where none is a mesh).",
+            help="Whether JSON and CSV have the nearest pair of bodies in every posture of a robot (default: where "
+            "none is a mesh).",
         ),
     ] = None,
     up: Annotated[
@@ -221,6 +226,7 @@ def validate(
             every=every,
             sequence=_clips(given) if sequence else None,
             distances=distances,
+            detail=DETAIL.get("" if output is None else output.suffix.lower(), "verdicts"),
         )
     if output is not None:
         files.write_report(output, report)

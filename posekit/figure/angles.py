@@ -30,6 +30,9 @@ STRAIGHT = 1e-10
 LIMB = 4
 """Angles of a whole limb: three of its ball joint and one of its hinge."""
 
+TIE = 1e-8
+"""Radians within which branches violate the limits equally, as both do where the hinge is the worst of the four."""
+
 WORTH = 1e-5
 """Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
 
@@ -201,8 +204,10 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least; the first of equals."""
+    """Choose among branches (N, B, K) the one that violates the limits least; the first of those within `TIE`."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
-    best = np.argmin(np.where(np.isnan(violation), np.inf, violation), axis=1)
+    violation = np.where(np.isnan(violation), np.inf, violation)
+    least = violation.min(axis=1, keepdims=True)
+    best = np.argmax(violation <= least + np.where(least > 0, TIE, 0.0), axis=1)
     return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]

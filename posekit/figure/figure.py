@@ -25,6 +25,7 @@ from posekit.figure.lengths import check_lengths
 from posekit.figure.pool import collides, make_pool
 from posekit.figure.stature import lengths_from_stature
 from posekit.figure.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
+from posekit.robot.kinematics import Kinematics, body_points
 from posekit.robot.srdf import check_srdf
 from posekit.skeleton import (
     DOFS,
@@ -54,6 +55,10 @@ FRAMES = {
     },
 }
 """The URDF link whose origin is each point; points that are not listed have a link of their own name."""
+
+
+NO_VELOCITY = np.arange(0)
+"""No entries of v: positions alone are wanted, no Jacobian."""
 
 
 class Configurations(NamedTuple):
@@ -242,7 +247,7 @@ class Figure:
         write_texts(Path(path), self.urdf, self.srdf)
 
     def forward_kinematics(self, q: Array) -> Array:
-        """Place the 19 points by Pinocchio's forward kinematics.
+        """Place the 19 points by forward kinematics: Pinocchio's, for a batch.
 
         Parameters
         ----------
@@ -268,14 +273,7 @@ class Figure:
                 f"the quaternion of configuration {int(np.argmax(np.abs(norm - 1)))} has length "
                 f"{norm[np.argmax(np.abs(norm - 1))]:g}; expected 1; normalise q[3:7]"
             )
-        model, data = self.model, self._data
-        frames = [(model.getFrameId(_frame_name(name))) for name in POINTS]
-        points = np.empty((len(q), len(POINTS), 3))
-        for k, row in enumerate(q):
-            pin.framesForwardKinematics(model, data, row)
-            oMf = data.oMf
-            points[k] = [oMf[frame].translation for frame in frames]
-        return points
+        return self._kinematics.place(q, NO_VELOCITY).positions
 
     def collides(self, q: Array) -> NDArray[np.bool_]:
         """Ask coal which configurations (N, nq) penetrate in a pair that the SRDF leaves to be checked (N,)."""
@@ -324,8 +322,8 @@ class Figure:
         return make_pool(self.model, self.geometry)
 
     @cached_property
-    def _data(self) -> pin.Data:
-        return self.model.createData()
+    def _kinematics(self) -> Kinematics:
+        return Kinematics(model=self.model, points=body_points([_frame_name(name) for name in POINTS]))
 
     @cached_property
     def _head_offsets(self) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
+from posekit.files.likelihoods import Likelihoods
 from posekit.files.root import Root
 from posekit.files.units import Unit
 from posekit.intake.refusal import refusal
@@ -62,6 +63,10 @@ class ResultFrame:
         How the neck's depth was found, where the frame is calibrated and it was not given.
     inferred : sequence of N mappings, optional
         By survivor, then by joint that was not seen: what is known of its position (`posekit.files.Inferred`).
+    probability : array (N,), optional
+        That each survivor is the one nearest to the truth; they sum to one.
+    refined : Likelihoods, optional
+        How likely and how sure each survivor is, where the noise is known and they were refined.
     """
 
     time: float
@@ -80,9 +85,22 @@ class ResultFrame:
     scales: Array | None = None
     root: Root | None = None
     inferred: Sequence[Mapping[str, Inferred]] | None = None
+    probability: Array | None = None
+    refined: Likelihoods | None = None
+
+    @property
+    def chi2(self) -> Array | None:
+        """How badly each survivor fits what was seen (N,), where they were refined."""
+        return None if self.refined is None else self.refined.chi2
 
     def __post_init__(self) -> None:
         count = len(self.joints)
+        if self.probability is not None:
+            self._set("probability", self.probability, (count,))
+            if not ((self.probability >= 0) & (self.probability <= 1)).all():
+                raise _refused("probability", "a number that is none", "numbers from 0 to 1")
+        if self.refined is not None and len(self.refined) != count:
+            raise _refused("refined", f"{len(self.refined)} entries", f"{count}, one a posture")
         if self.scales is not None:
             self._set("scales", self.scales, (count,))
         if self.inferred is not None and len(self.inferred) != count:
@@ -136,7 +154,7 @@ class Result:
     settings : mapping
         Everything that decided the result, of plain values.
     frames : sequence of ResultFrame
-        All with the same margins; all with groups or none.
+        All with the same margins; all with groups or none, and with probabilities or none.
     """
 
     unit: Unit
@@ -167,8 +185,9 @@ class Result:
                     ", ".join(frame.margins) or "none",
                     f"those of frames[0]: {', '.join(first.margins)}",
                 )
-            if (frame.groups is None) != (first.groups is None):
-                raise _refused(f"{where}.groups", "groups in some frames", "groups in all frames or in none")
+            for name in ("groups", "probability"):
+                if (getattr(frame, name) is None) != (getattr(first, name) is None):
+                    raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
 
 
 def _array(name: str, values: Array, shape: tuple[int, ...]) -> Array:

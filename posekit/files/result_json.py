@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
+from posekit.files.likelihoods import Likelihoods
 from posekit.files.reading import read_json
 from posekit.files.result import Result, ResultFrame
 from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
@@ -37,14 +38,30 @@ def result_of(document: object, path: str | Path) -> Result:
     postures = [posture for frame in file.frames for posture in frame.postures]
     margins = list(dict.fromkeys(name for posture in postures for name in posture.margins))
     grouped = {posture.group is not None for posture in postures}
+    told = {posture.probability is not None for posture in postures}
     inferred = any(posture.inferred is not None for posture in postures)
     if len(grouped) > 1:
         raise refusal(path, "frames", "postures with and without a group", "all or none", "group all or none")
+    if len(told) > 1:
+        raise refusal(
+            path, "frames", "postures with and without a probability", "all or none", "write it again"
+        )
     return Result(
         unit=file.unit,
         configuration_names=file.configuration_names,
         settings=file.settings,
-        frames=[_frame(frame, file.unit, nq, margins, True in grouped, inferred) for frame in file.frames],
+        frames=[
+            _frame(
+                frame,
+                file.unit,
+                nq,
+                margins,
+                grouped=True in grouped,
+                inferred=inferred,
+                told=True in told,
+            )
+            for frame in file.frames
+        ],
     )
 
 
@@ -85,6 +102,10 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
             columns["inferred"] = [
                 {name: one.fields(unit) for name, one in joints.items()} for joints in frame.inferred
             ]
+        if frame.probability is not None:
+            columns["probability"] = frame.probability.tolist()
+        if frame.refined is not None:
+            columns["refined"] = frame.refined.rows(unit)
         fields: dict[str, Any] = {
             "time": float(frame.time),
             "camera": {
@@ -138,7 +159,14 @@ def _check_frame(path: str | Path, where: str, frame: ResultFrameFields, nq: int
 
 
 def _frame(
-    frame: ResultFrameFields, unit: Unit, nq: int, margins: list[str], grouped: bool, inferred: bool
+    frame: ResultFrameFields,
+    unit: Unit,
+    nq: int,
+    margins: list[str],
+    *,
+    grouped: bool,
+    inferred: bool,
+    told: bool,
 ) -> ResultFrame:
     postures, camera = frame.postures, frame.camera
     count = len(postures)
@@ -170,11 +198,22 @@ def _frame(
         scales=_scales(postures, unit) if frame.family is not None else None,
         root=None if frame.root is None else Root.of(frame.root.model_dump(), unit),
         inferred=[_inferred(posture, unit) for posture in postures] if inferred else None,
+        probability=np.array([posture.probability for posture in postures], dtype=np.float64)
+        if told
+        else None,
+        refined=_refined(postures, unit),
     )
 
 
 def _scales(postures: list[ResultPosture], unit: Unit) -> Array:
     return np.array([posture.scale for posture in postures], dtype=np.float64) * PER_METRE[unit]
+
+
+def _refined(postures: list[ResultPosture], unit: Unit) -> Likelihoods | None:
+    """Gather what is said of refined survivors: of all of a frame, or of none."""
+    rows = [posture.refined for posture in postures]
+    known = [row.model_dump() for row in rows if row is not None]
+    return Likelihoods.of(known, unit) if known and len(known) == len(rows) else None
 
 
 def _inferred(posture: ResultPosture, unit: Unit) -> dict[str, Inferred]:

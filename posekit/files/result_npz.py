@@ -7,7 +7,8 @@ there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names`
 ``length_residual`` (F, N) in ``unit``; ``q`` (F, N, nq) in metres and radians; ``branches`` (F, N);
 ``groups`` (F, N); ``margins/<name>`` (F, N); ``rejected/names`` (R,), ``rejected/counts`` (F, R). Padding and
 what is not known are NaN, -1 or an empty text. Uncalibrated: ``scales`` (F, N) and ``families`` (JSON text); with
-joints that were not seen: ``inferred`` (JSON text).
+joints that were not seen: ``inferred`` (JSON text). ``probability`` (F, N). Refined: ``refined/chi2``,
+``refined/dof``, ``refined/p``, ``refined/merged`` (F, N), ``refined/covariance`` (F, N, 14, 6) in square units.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from pydantic import ValidationError
 
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
+from posekit.files.likelihoods import NUMBERS, Likelihoods
 from posekit.files.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.files.reading import parse_json
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
@@ -38,7 +40,19 @@ Array = NDArray[Any]
 MAX_PADDED: Final = 16_000_000_000
 """Bytes that a result may declare with its padding, which is passed over and never held."""
 _MARGIN = "margins/"
-_PADDED = ("joints", "q", "branches", "groups", "fk_distance", "length_residual", "scales", _MARGIN)
+_REFINED = "refined/"
+_PADDED = (
+    "joints",
+    "q",
+    "branches",
+    "groups",
+    "fk_distance",
+    "length_residual",
+    "scales",
+    "probability",
+    _MARGIN,
+    _REFINED,
+)
 
 
 def write_result_npz(path: str | Path, result: Result) -> None:
@@ -90,6 +104,15 @@ def write_result_npz(path: str | Path, result: Result) -> None:
             for frame in frames
         ]
         arrays["inferred"] = np.array(json.dumps(inferred, allow_nan=False))
+    if frames[0].probability is not None:
+        given = [np.empty(0) if frame.probability is None else frame.probability for frame in frames]
+        arrays["probability"] = Ragged(rows=given, fill=np.nan)
+    if any(frame.refined is not None for frame in frames):
+        likelihoods = [frame.refined or Likelihoods.nothing(len(frame.joints)) for frame in frames]
+        for name in NUMBERS:
+            arrays[_REFINED + name] = Ragged(rows=[getattr(each, name) for each in likelihoods], fill=np.nan)
+        packed = [each.packed(unit) for each in likelihoods]
+        arrays[_REFINED + "covariance"] = Ragged(rows=packed, fill=np.nan)
     with replacing(path) as file:
         write_npz(file, arrays)
 
@@ -134,6 +157,10 @@ def result_in(archive: Archive) -> Result:
     pruned = _json(archive, "pruned") if "pruned" in archive.names else [None] * len(time)
     families, roots, inferred = _details(archive, count, unit)
     scales = _ragged_floats(archive, "scales", count, ()) if families is not None else None
+    probability = (
+        _ragged_floats(archive, "probability", count, ()) if "probability" in archive.names else None
+    )
+    refined = _likelihoods(archive, count, unit)
     settings = _json(archive, "settings")
     if not isinstance(settings, dict):
         raise refusal(path, "settings", shown(settings), "an object", "write the file again")
@@ -163,6 +190,8 @@ def result_in(archive: Archive) -> Result:
                 else scales[index] * PER_METRE[unit],
                 root=None if roots is None else roots[index],
                 inferred=None if inferred is None else inferred[index],
+                probability=None if probability is None else probability[index],
+                refined=None if refined is None else refined[index],
             )
             for index in range(len(time))
         ],
@@ -201,6 +230,23 @@ def _expect(archive: Archive, name: str, accepted: Sequence[str]) -> str:
 def _json(archive: Archive, name: str) -> Any:
     text = str(archive.array(name, "U", ()))
     return parse_json(f"{archive.path}: {name}", text.encode("utf-8", "surrogatepass"))
+
+
+def _likelihoods(archive: Archive, count: Array, unit: Unit) -> list[Likelihoods | None] | None:
+    """Read how likely and how sure survivors are; None in frames that were not refined."""
+    if _REFINED + "chi2" not in archive.names:
+        return None
+    numbers = {name: _ragged_floats(archive, _REFINED + name, count, ()) for name in NUMBERS}
+    packed = _ragged_floats(archive, _REFINED + "covariance", count, (len(JOINTS), 6))
+    return [
+        None
+        if np.isnan(numbers["chi2"][k]).any()
+        else Likelihoods(
+            covariance=Likelihoods.unpacked(packed[k], unit),
+            **{name: numbers[name][k] for name in NUMBERS},
+        )
+        for k in range(len(count))
+    ]
 
 
 def _details(

@@ -72,6 +72,21 @@ class ResultInferred(FileModel):
     fraction: float = Field(description="How much of the circle or sphere is feasible.")
 
 
+Upper = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class ResultRefined(FileModel):
+    """How likely and how sure a survivor is that was refined."""
+
+    chi2: float = Field(description="Sum of squares of what is off over its standard deviations.")
+    dof: Count = Field(description="Its degrees of freedom.")
+    p: float = Field(description="The probability that noise alone gives a chi2 as large.")
+    merged: Count = Field(description="How many other branches became the same posture.")
+    covariance: Annotated[list[Upper | None], Field(min_length=14, max_length=14)] = Field(
+        description="Of every joint: xx, xy, xz, yy, yz, zz, in the square of `unit`."
+    )
+
+
 class ResultPosture(FileModel):
     """One survivor."""
 
@@ -94,6 +109,12 @@ class ResultPosture(FileModel):
     inferred: Annotated[dict[str, ResultInferred], named(JOINTS, "joint")] | None = Field(
         default=None,
         description="Joints that were not seen; those of `joints` are in the middle of their sets.",
+    )
+    probability: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        default=None, description="That it is the one nearest to the truth; over a frame they sum to one."
+    )
+    refined: ResultRefined | None = Field(
+        default=None, description="How likely and how sure, where the noise is known."
     )
 
 

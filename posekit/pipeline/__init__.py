@@ -1,6 +1,10 @@
 """Whole jobs: a view to certified postures, postures to verdicts, the papers' tables."""
 
 from posekit.pipeline.demo import demo as demo
+from posekit.pipeline.following import Following as Following
+from posekit.pipeline.following import follow as follow
+from posekit.pipeline.following import follow_frames as follow_frames
+from posekit.pipeline.following import survivor_frames as survivor_frames
 from posekit.pipeline.recover import recover as recover
 from posekit.pipeline.recovery import FrameRecovery as FrameRecovery
 from posekit.pipeline.recovery import Recovery as Recovery

@@ -44,7 +44,7 @@ class Judges:
             figure,
             self.checks,
             ranges=self.ranges,
-            rigid_tolerance=tolerance.rigid,
+            rigid_tolerance=tolerance.distances,
             rigid_mode="placement" if tolerance.placement else "distances",
             angle_tolerance=tolerance.angle,
             rules=self.rules,

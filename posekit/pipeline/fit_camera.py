@@ -104,7 +104,7 @@ def fit_camera(
     seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= len(names)
     rooting = rooting or Rooting()
     # A neck that was put between the shoulders is no point of the head.
-    if "neck" in view.derived or rooting.method != "auto":
+    if "neck" in view.derived or rooting.method != "auto" or not rooting.trust_head:
         seen[:] = False
     pose: HeadPose | None = None
     model = view.camera

@@ -52,7 +52,7 @@ class Grower:
 
     def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
         """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
-        suite, measured = self._suites_of(tolerance)
+        suite, measured = self.suites_of(tolerance)
         image = self.body.image(self.view.image[self.fit.frame[chosen]])
         tree = self.body.tree
         camera = self.fit.cameras(chosen)
@@ -71,7 +71,7 @@ class Grower:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts()
         leaves = tree.prune(leaves, motion)
-        leaves, completion = self._complete(leaves, camera, image, suite, tolerance, chosen)
+        leaves, completion = self.complete(leaves, camera, image, suite, tolerance, self.fit.frame[chosen])
         if not motion:  # a joint without a position is no matter of motion
             physical = leaves.counts()
         return Batch(
@@ -84,16 +84,18 @@ class Grower:
             completion=completion,
         )
 
-    def _complete(
+    def complete(
         self,
         leaves: Leaves,
         camera: Camera,
         image: Array,
         suite: Sequence[Check],
         tolerance: Tolerance,
-        chosen: NDArray[np.intp],
+        frame: NDArray[np.intp],
     ) -> tuple[Leaves, Completion | None]:
         """Complete survivors by the joints that were not seen, and drop those that cannot be.
+
+        `frame` is the view's frame of each hypothesis.
 
         Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
         where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
@@ -101,7 +103,6 @@ class Grower:
         unseen = np.asarray(np.isnan(image).any(axis=2))
         placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
         hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
-        frame = self.fit.frame[chosen]
         too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
         self._warn_of(frame[too_many & placed])
         worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
@@ -122,7 +123,7 @@ class Grower:
                 stacklevel=4,
             )
 
-    def _suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
+    def suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
         """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
         if tolerance not in self._suites:
             exact = self.judges.suite(self.body.figure, tolerance, exact=True)

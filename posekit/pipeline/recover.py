@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.metadata import version
 from typing import Any, Literal, get_args
 
@@ -13,25 +13,32 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.figure import Figure, load_figure, stature_from_lengths
-from posekit.files import ScaledOrthographicModel, View
+from posekit.files import OpenCVModel, ScaledOrthographicModel, View
 from posekit.pipeline.body import Body, FigureBody, Judges
 from posekit.pipeline.camera_record import camera_records
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.fit_scale import fit_scale
 from posekit.pipeline.grower import Grower
+from posekit.pipeline.grown import Grown, grown_of
 from posekit.pipeline.nearer import Nearer
-from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
+from posekit.pipeline.noise import Noise
+from posekit.pipeline.recovery import FrameRecovery, Recovery
+from posekit.pipeline.refiner import Refiner
 from posekit.pipeline.rooting import Rooting, tolerance_of
 from posekit.pipeline.scale import Scale
 from posekit.pipeline.taylor.body import TaylorBody
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.ranking import Up, load_prior
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
 from posekit.validators.walking import DEFAULT_RULES
 
 Proportions = Literal["figure", "taylor"]
 
-FRAMES_AT_ONCE = 250
-"""Frames grown together: enough to spread NumPy's overhead, few enough to stay in the cache."""
+FRAMES_AT_ONCE = 2000
+"""Frames grown together: enough to spread NumPy's overhead and to keep all cores busy."""
+
+VAGUE_AT_ONCE = 250
+"""Hypotheses grown together where depth or scale is open: each may have thousands of leaves."""
 
 
 def recover(
@@ -49,6 +56,8 @@ def recover(
     nearer: Sequence[Mapping[str, str]] | None = None,
     infer: bool = True,
     rooting: Rooting | None = None,
+    refine: bool | None = None,
+    length_deviation: float | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> Recovery:
     """Recover every posture behind a view that passes the checks.
@@ -84,6 +93,12 @@ def recover(
         which joints were inferred and what else they can be. Otherwise they are NaN.
     rooting : Rooting, optional
         How the neck is found in a calibrated view that neither gives it nor shows a head of six points.
+    refine : bool, optional
+        Whether frames that are not exact are grown as their noise demands, and every survivor becomes the likeliest
+        posture near it (`posekit.refinement`). By default where the noise is known: from `rooting`, from the view, or
+        because a detector saw the points; and no tolerance is given.
+    length_deviation : float, optional
+        Relative standard deviation of lengths, for that; by default what bodies give (`posekit.refinement.GIVING`).
     progress : callable, optional
         Called with the number of frames done since the last call.
 
@@ -110,33 +125,37 @@ def recover(
     body = body_of(view, figure or load_figure(), proportions)
     judges = Judges(checks=names, ranges=table, rules=tuple(rules), contact_margin=contact_margin)
     fit = _fit(view, body, scale, tolerance, rooting)
-    records = camera_records(view, fit)
+    noise = _noise(view, body, tolerance, rooting, refine, length_deviation)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
     grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand, infer=infer)
-    placed: dict[int, tuple[Batch, int]] = {}
+    refiner = None if noise is None else Refiner(grower=grower, noise=noise, rooting=rooting)
+    grown: dict[int, Grown] = {}
     for part in _parts(fit):
         batch = grower.grow(part, tolerance or EXACT)
-        _place(placed, batch, fit.frame[part])
+        grown |= grown_of(batch, fit, part)
         if tolerance is None:
             exact = set(fit.frame[part[batch.exact]].tolist())
             inexact = part[[k not in exact for k in fit.frame[part].tolist()]]
-            for rows, allowed in _by_tolerance(fit, inexact):
-                _place(placed, grower.grow(rows, allowed), fit.frame[rows])
+            if refiner is not None:
+                grown |= refiner.grow(np.unique(fit.frame[inexact]))
+            else:
+                for rows, allowed in _by_tolerance(fit, inexact):
+                    grown |= _grown(grower, rows, allowed)
         if progress is not None:
             progress(len(np.unique(fit.frame[part])))
-    hypotheses = np.bincount(fit.frame, minlength=len(view.time))
     frames = []
+    records = camera_records(view, fit)
     for k, time in enumerate(view.time.tolist()):
-        grown, index = placed.get(k, (None, 0))
+        one = grown.get(k) or Grown(batch=None, index=0, hypotheses=1, fit=fit)
         frames.append(
             FrameRecovery(
                 time=time,
-                batch=grown,
-                index=index,
-                hypotheses=int(hypotheses[k]),
+                batch=one.batch,
+                index=one.index,
+                hypotheses=one.hypotheses,
                 family=None if fit.families is None else fit.families[k],
-                placement=None if fit.placements is None else fit.placements[k],
-                reason=fit.reasons[k],
+                placement=None if one.fit.placements is None else one.fit.placements[k],
+                reason=one.fit.reasons[k],
                 group_within=group,
                 camera=records[k],
             )
@@ -157,6 +176,9 @@ def recover(
         "lengths": dict(body.figure.lengths),
         "judged": [frame.judged for frame in frames],
         "noisy": _widest([frame.tolerance for frame in frames if frame.judged == "noisy"]),
+        "refined": _widest([frame.tolerance for frame in frames if frame.judged == "refined"]),
+        "noise": None if noise is None else asdict(noise),
+        "ranking": {"up": Up.level().says, "prior": load_prior().name},
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings)
@@ -203,6 +225,39 @@ def _fit(
     return fit_camera(view, body.figure, rooting, tolerance)
 
 
+def _noise(
+    view: View,
+    body: Body,
+    tolerance: Tolerance | None,
+    rooting: Rooting | None,
+    refine: bool | None,
+    lengths: float | None,
+) -> Noise | None:
+    """Say what noise frames are refined with; None where they are not."""
+    able = isinstance(view.camera, OpenCVModel) and isinstance(body, FigureBody)
+    if refine and not able:
+        raise InputError("--refine: only views of a calibrated camera (opencv) are refined; leave it out")
+    if refine and tolerance is not None:
+        raise InputError("--refine: the noise says what is tolerated; leave out the tolerances, or --refine")
+    if refine is False or not able or tolerance is not None:
+        return None
+    deviation = None if rooting is None else rooting.deviation
+    return Noise.of(view, deviation, lengths, asked=bool(refine))
+
+
+def _grown(grower: Grower, rows: NDArray[np.intp], allowed: Tolerance) -> dict[int, Grown]:
+    """Grow hypotheses with a tolerance, and those of frames in which nothing is left with as much for the hips."""
+    batch = grower.grow(rows, allowed)
+    found = grown_of(batch, grower.fit, rows)
+    frame = grower.fit.frame[rows]
+    left = set(frame[batch.leaves.frame].tolist())
+    lost = rows[[k not in left for k in frame.tolist()]]
+    if allowed.hips < 1 and len(lost):
+        wide = replace(allowed, hips=1.0)
+        found |= grown_of(grower.grow(lost, wide), grower.fit, lost)
+    return found
+
+
 def _by_tolerance(fit: CameraFit, rows: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Tolerance]]:
     """Yield hypotheses of frames that are not exact with what they are judged with."""
     if fit.families is not None:
@@ -224,11 +279,12 @@ def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
         return
     frames = fit.frame[usable]
     first = np.flatnonzero(np.diff(frames, prepend=-1))
+    most = FRAMES_AT_ONCE if fit.families is None and fit.placements is None else VAGUE_AT_ONCE
     start = 0
     for k in range(1, len(first) + 1):
         end = int(first[k]) if k < len(first) else len(usable)
         following = int(first[k + 1]) if k + 1 < len(first) else len(usable)
-        if k == len(first) or following - start > FRAMES_AT_ONCE:
+        if k == len(first) or following - start > most:
             yield usable[start:end]
             start = end
 
@@ -237,12 +293,6 @@ def _widest(tolerances: Sequence[Tolerance | None]) -> dict[str, Any] | None:
     """Return the widest of some tolerances; None where there is none."""
     known = [asdict(one) for one in tolerances if one is not None]
     return {name: max(one[name] for one in known) for name in known[0]} if known else None
-
-
-def _place(placed: dict[int, tuple[Batch, int]], batch: Batch, frames: NDArray[np.intp]) -> None:
-    """Note for each frame of a batch where its first hypothesis is."""
-    for index in np.flatnonzero(np.diff(frames, prepend=-1)):
-        placed[int(frames[index])] = (batch, int(index))
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,27 @@ from posekit.occlusion import Completion
 from posekit.pipeline.body import Body
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.mirror import mirrored
+from posekit.pipeline.ranked import ranked
+from posekit.pipeline.refined import RefinedSurvivors
 from posekit.pipeline.rooting import root_of, tolerance_of
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.placement import Placement
-from posekit.skeleton import JOINT, JOINTS
+from posekit.ranking import Ranking, deviation_of_tolerance
+from posekit.skeleton import JOINT, JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
 
 LEVEL = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""
+
+
+JUDGED: Final = {
+    EXACT: "exact",
+    MEASURED: "measured",
+    replace(MEASURED, hips=1.0): "measured",  # where nothing is left with less for the hips
+    PHOTOGRAPH: "photograph",
+}
+"""What frames are said to be judged as, by their tolerance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +61,10 @@ class Batch:
         Where there is evidence that the image points are exact.
     completion : Completion, optional
         The survivors' joints that were not seen; of the leaves before the motion model.
+    refined : RefinedSurvivors, optional
+        The likeliest postures near the leaves, where the noise is known.
+    spread : float
+        How far off these are, metres (`posekit.ranking.deviation_of_noise`).
     """
 
     leaves: Leaves
@@ -58,10 +74,19 @@ class Batch:
     tolerance: Tolerance
     exact: NDArray[np.bool_]
     completion: Completion | None = None
+    refined: RefinedSurvivors | None = None
+    spread: float = 0.0
+
+    @cached_property
+    def judged(self) -> str:
+        """How its frames were judged: see `FrameRecovery.judged`."""
+        return "refined" if self.refined is not None else JUDGED.get(self.tolerance, "given")
 
     @cached_property
     def points(self) -> Array:
         """All survivors with their heads (N, 19, 3), camera frame, metres."""
+        if self.refined is not None:
+            return np.concatenate([self.refined.joints, self.refined.head], axis=1)
         points = self.body.points(self.leaves)
         if self.completion is not None:
             filled = self.completion.postures
@@ -107,8 +132,16 @@ class Batch:
 
     @cached_property
     def length_residual(self) -> Array:
-        """How much too short each survivor's worst segment was (N,), metres."""
-        return self.leaves.length_residual()
+        """How much too short each survivor's worst segment was (N,), metres: what refinement lengthened it by."""
+        if self.refined is None:
+            return self.leaves.length_residual()
+        lengths = self.body.figure.lengths
+        longer = [
+            np.linalg.norm(self.refined.joints[:, a] - self.refined.joints[:, b], axis=1)
+            - lengths[segment_name((a, b))]
+            for a, b in SEGMENTS
+        ]
+        return np.asarray(np.fmax.reduce([np.zeros(len(self.refined)), *longer]))
 
 
 def _inferred(completion: Completion, row: int) -> dict[str, Inferred]:
@@ -163,7 +196,8 @@ class FrameRecovery:
     index : int
         The place in its batch of the frame's first hypothesis.
     hypotheses : int
-        How many there are: one, or for an uncalibrated frame as many as scales were taken.
+        How many there are: one; for an uncalibrated frame as many as scales were taken, for a placed neck as depths,
+        under noise as trunks, which may be none.
     family : Family, optional
         The scales that an uncalibrated frame can have.
     placement : Placement, optional
@@ -203,7 +237,8 @@ class FrameRecovery:
     @property
     def head(self) -> Array:
         """The head's points (5, 3), camera frame, metres; NaN where it was not seen."""
-        return self.batch.leaves.given[self.index] if self.batch else np.full((5, 3), np.nan)
+        known = self.batch is not None and self.hypotheses
+        return self.batch.leaves.given[self.index] if self.batch and known else np.full((5, 3), np.nan)
 
     @property
     def scales(self) -> Array | None:
@@ -259,6 +294,25 @@ class FrameRecovery:
         return {name: values[self._rows] for name, values in self.batch.margins.items()}
 
     @property
+    def refined(self) -> RefinedSurvivors | None:
+        """How likely and how sure each survivor is; None where the frame was not refined."""
+        if self.batch is None or self.batch.refined is None:
+            return None
+        return self.batch.refined.part(self._rows)
+
+    @property
+    def chi2(self) -> Array | None:
+        """How badly each survivor fits what was seen (N,), where the frame was refined."""
+        return None if self.refined is None else self.refined.chi2
+
+    @property
+    def spread(self) -> float:
+        """How far off survivors are, metres: from the noise where it is known, else from what was tolerated."""
+        if self.batch is not None and self.batch.refined is not None:
+            return self.batch.spread
+        return float(deviation_of_tolerance(self.tolerance.rigid if self.tolerance else 0.0))
+
+    @property
     def branches(self) -> list[str]:
         """The branch code of each survivor: 0 near, 1 far, joints in tree order from the second."""
         if self.batch is None:
@@ -292,6 +346,8 @@ class FrameRecovery:
         """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
         if self.batch is None:
             return {"root/not_known": 8192}
+        if not self.hypotheses:
+            return {"noise/no_trunk": 8192}
         lost: Counter[str] = Counter()
         for one in self.batch.rejected[self.index : self.index + self.hypotheses]:
             lost.update(one)
@@ -306,14 +362,14 @@ class FrameRecovery:
     def judged(self) -> str | None:
         """How the frame was judged; None where nothing was grown.
 
-        As ``exact``, ``measured``, a ``photograph``, ``noisy`` (what the deviation of its image points leads to), or
-        with tolerances that were ``given``.
+        As ``exact``, ``measured``, a ``photograph``, ``noisy`` (what the deviation of its image points leads to),
+        ``refined`` (the same, and to the likeliest postures), or with tolerances that were ``given``.
         """
-        names = {None: None, EXACT: "exact", MEASURED: "measured", PHOTOGRAPH: "photograph"}
+        if self.batch is None:
+            return None
         placement = self.placement
-        if placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement):
-            return "noisy"
-        return names.get(self.tolerance, "given")
+        noisy = placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement)
+        return "noisy" if noisy and self.batch.refined is None else self.batch.judged
 
     @property
     def root(self) -> Root | None:
@@ -322,7 +378,7 @@ class FrameRecovery:
 
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""
-        if self.batch is None:
+        if self.batch is None or not self.hypotheses:
             return None
         leaves = self.batch.leaves
         found = leaves.candidates.too_short(self.index) if self.hypotheses == 1 else None
@@ -372,3 +428,13 @@ class Recovery:
     fit: CameraFit
     frames: list[FrameRecovery]
     settings: Mapping[str, Any]
+
+    @cached_property
+    def ranking(self) -> Ranking:
+        """The probability of every survivor of every frame (`posekit.ranking.rank`), of a camera held level."""
+        return ranked(self.frames, self.figure.lengths, [frame.spread for frame in self.frames])
+
+    @cached_property
+    def probability(self) -> list[Array]:
+        """The same, by frame."""
+        return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])

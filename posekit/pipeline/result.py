@@ -6,9 +6,12 @@ from dataclasses import asdict, replace
 
 import numpy as np
 
+from posekit.cameras import Array
 from posekit.files import Result, ResultFrame
+from posekit.files.likelihoods import Likelihoods
 from posekit.files.units import Unit
 from posekit.pipeline.recovery import FrameRecovery, Recovery
+from posekit.pipeline.refined import RefinedSurvivors
 
 
 def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) -> Result:
@@ -28,11 +31,16 @@ def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) ->
         unit=unit,
         configuration_names=recovery.figure.configuration_names,
         settings=recovery.settings,
-        frames=[_frame(frame, margins, nq, explain) for frame in recovery.frames],
+        frames=[
+            _frame(frame, margins, nq, explain, probability)
+            for frame, probability in zip(recovery.frames, recovery.probability, strict=True)
+        ],
     )
 
 
-def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> ResultFrame:
+def _frame(
+    frame: FrameRecovery, margins: list[str], nq: int, explain: bool, probability: Array
+) -> ResultFrame:
     own = frame.margins
     return ResultFrame(
         time=frame.time,
@@ -57,6 +65,18 @@ def _frame(frame: FrameRecovery, margins: list[str], nq: int, explain: bool) -> 
         scales=frame.scales,
         root=frame.root,
         inferred=frame.inferred,
+        probability=probability,
+        refined=None if frame.refined is None else _likelihoods(frame.refined),
+    )
+
+
+def _likelihoods(refined: RefinedSurvivors) -> Likelihoods:
+    return Likelihoods(
+        chi2=refined.chi2,
+        dof=refined.dof.astype(np.float64),
+        p=refined.p,
+        merged=refined.merged.astype(np.float64),
+        covariance=refined.covariance,
     )
 
 

@@ -38,10 +38,13 @@ class Rooting:
     method : {"auto", "head", "torso", "search"}
     deviation : float, optional
         Standard deviation of image points, pixels; the view's own if not given.
+    trust_head : bool
+        Whether six head points tell the neck, without asking how well: right where they are exact.
     """
 
     method: Method = "auto"
     deviation: float | None = None
+    trust_head: bool = True
 
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):

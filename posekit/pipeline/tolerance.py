@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from posekit.errors import InputError
+from posekit.validators.rigid_parts import RigidTolerance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,12 +26,16 @@ class Tolerance:
         image. With centimetres of tolerance that question has no answer.
     angle : float
         Degrees by which the direction of a segment may be off, for joint ranges.
+    hips : float
+        What part of `rigid` the distance from hip to hip may be off, 0 to 1: shoulders and spines give, the pelvis is
+        bone.
     """
 
     rigid: float
     tangent: float
     placement: bool
     angle: float = 1e-3
+    hips: float = 1.0
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.angle) and self.angle >= 0):
@@ -41,13 +46,22 @@ class Tolerance:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(f"--{name}-tolerance: {value!r} m; expected zero or a positive length")
+        if not 0 <= self.hips <= 1:
+            raise InputError(
+                f"the hips' part of the rigid tolerance is {self.hips!r}; expected a number from 0 to 1"
+            )
+
+    @property
+    def distances(self) -> RigidTolerance:
+        """What each distance inside torso and hips may be off."""
+        return RigidTolerance(shoulders=self.rigid, sides=self.rigid, hips=self.hips * self.rigid)
 
 
 EXACT: Final = Tolerance(rigid=1e-8, tangent=1e-9, placement=True)
 """For exact image points: rounding only."""
 
-MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False, angle=2.0)
-"""For measured image points and bodies: what real torsos give (docs, "Tolerances")."""
+MEASURED: Final = Tolerance(rigid=0.03, tangent=0.01, placement=False, angle=2.0, hips=0.25)
+"""For measured image points and bodies: what real torsos give (docs, "A torso that gives")."""
 
 PHOTOGRAPH: Final = Tolerance(rigid=0.10, tangent=0.05, placement=False, angle=10.0)
 """For uncalibrated pictures: what took them was no scaled orthographic camera, and from a few metres the scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +26,13 @@ from posekit.validators.robot.settings import OF_POSITIONS
 BATCH: Final = 4096
 """Postures that are judged at once."""
 
+QUICK: Final = 4
+"""Times as many configurations, which need no search: the fewer calls, the less time is lost between threads."""
+
 LISTED: Final = 10_000
 """Postures that a report lists one by one: all of a file that has no more, else the first that are not valid."""
+
+Detail = Literal["findings", "margins", "verdicts"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +56,7 @@ def validate(
     every: bool = False,
     sequence: NDArray[np.intp] | None = None,
     distances: bool | None = None,
+    detail: Detail = "findings",
 ) -> Report:
     """Judge a file of postures.
 
@@ -65,16 +71,18 @@ def validate(
     sequence : int array (N,), optional
         Which sequence in time each posture belongs to: see `Validator.check`.
     distances : bool, optional
-        Whether to measure the nearest pair of bodies of every posture of a robot; by default where none is a mesh.
+        Whether to measure the nearest pair of bodies of every posture of a robot that `detail` shows; by default
+        where none is a mesh. Of those that collide it is measured in any case.
+    detail : {"findings", "margins", "verdicts"}
+        What is wanted of the postures: findings one by one, as JSON has them; the least margin of each, as CSV; or
+        the verdicts alone, with what is behind those that are not valid, as summaries and Markdown have them.
 
     Returns
     -------
     posekit.files.Report
     """
     if isinstance(postures, Configurations):
-        given = _Given(
-            joints=None, head=None, q=postures.in_order_of(validator.configuration_names), sequence=None
-        )
+        given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
     else:
         given = _Given(joints=postures.joints, head=postures.head, q=None, sequence=sequence)
     applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
@@ -84,9 +92,11 @@ def validate(
     listed: list[PostureReport] = []
     all_listed = len(given) <= LISTED
     for first, verdicts in _batches(validator, given):
-        contacts = _contacts(verdicts, distances)
-        columns = columns_of(verdicts, contacts, places, checks)
+        contacts = _contacts(verdicts, distances, every=detail != "verdicts")
+        columns = columns_of(verdicts, contacts, places, checks, margins=detail != "verdicts")
         parts.append(columns)
+        if detail != "findings" or (not all_listed and len(listed) == LISTED):
+            continue
         rows = (
             np.arange(len(columns)) if all_listed else np.flatnonzero(columns.verdict)[: LISTED - len(listed)]
         )
@@ -104,8 +114,10 @@ def validate(
         },
         postures=tuple(listed),
         checks=columns.by_check(),
-        listed=None if all_listed else f"the first {len(listed)} of {not_valid} that are not valid",
-        verdicts=None if all_listed else columns.letters,
+        listed=None
+        if all_listed or detail != "findings"
+        else f"the first {len(listed)} of {not_valid} that are not valid",
+        verdicts=None if all_listed and detail == "findings" else columns.letters,
         columns=columns,
     )
 
@@ -126,7 +138,7 @@ def recovered_with(result: Result) -> tuple[Figure, float]:
         tolerances.append(MEASURED.angle)
     if "photograph" in kinds:
         tolerances.append(PHOTOGRAPH.angle)
-    for kind, field in (("given", "tolerance"), ("noisy", "noisy")):
+    for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
         said = settings.get(field)
         if kind in kinds and isinstance(said, dict):
             tolerances.append(float(said.get("angle", EXACT.angle)))
@@ -138,8 +150,9 @@ def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdict
     lengths = behind = None
     if given.joints is not None and validator.lengths == "median":
         lengths, behind = segment_lengths(given.joints), shoulders_are_behind(given.joints)
-    for first in range(0, len(given), BATCH):
-        rows = slice(first, first + BATCH)
+    size = BATCH * (QUICK if given.q is not None else 1)
+    for first in range(0, len(given), size):
+        rows = slice(first, first + size)
         if given.q is not None:
             yield first, validator.check(q=given.q[rows])
         elif given.joints is not None:
@@ -149,6 +162,14 @@ def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdict
                 first,
                 validator.check(given.joints[rows], head, sequence=which, lengths=lengths, behind=behind),
             )
+
+
+def _ordered(validator: Validator, given: Configurations) -> NDArray[np.float64]:
+    """Return q in the validator's order; as it is where that is the file's."""
+    names = validator.configuration_names
+    if given.q.shape[1] == len(names) and given.names in (None, tuple(names)):
+        return given.q
+    return given.in_order_of(names)
 
 
 def _lengths_of(validator: Validator, given: _Given) -> dict[str, Any]:
@@ -162,10 +183,14 @@ def _lengths_of(validator: Validator, given: _Given) -> dict[str, Any]:
     return settings
 
 
-def _contacts(verdicts: Verdicts, distances: bool | None) -> Contacts | None:
-    """Ask which bodies touch, of a robot; a figure's own check has said it pair by pair."""
+def _contacts(verdicts: Verdicts, distances: bool | None, *, every: bool) -> Contacts | None:
+    """Ask which bodies touch, of a robot; a figure's own check has said it pair by pair.
+
+    The nearest pair is asked for of `every` posture, or of those alone that are undecided: what is rejected has a
+    margin below zero anyway, and nothing is shown of what is valid.
+    """
     if not verdicts.colliders:
         return None
     if distances is None:
         distances = not any(collider.has_meshes for collider in verdicts.colliders)
-    return verdicts.contacts(nearest=distances)
+    return verdicts.contacts(nearest=distances if every else verdicts.undecided & distances)

@@ -11,11 +11,16 @@ from numpy.typing import NDArray
 from posekit.files.report_columns import PER_DEGREE, Columns, Place
 from posekit.validators import Judgement
 from posekit.validators import Report as Verdicts
-from posekit.validators.robot import Contacts
+from posekit.validators.robot import Contacts, Deferred
 
 
 def columns_of(
-    verdicts: Verdicts, contacts: Contacts | None, places: dict[Place, int], checks: Sequence[str]
+    verdicts: Verdicts,
+    contacts: Contacts | None,
+    places: dict[Place, int],
+    checks: Sequence[str],
+    *,
+    margins: bool = True,
 ) -> Columns:
     """Put the findings of a batch in columns.
 
@@ -28,14 +33,23 @@ def columns_of(
         The places known so far and their numbers; new ones are added.
     checks : sequence of str
         The checks that are applied, as findings name them.
+    margins : bool
+        Whether the least margin of every posture is wanted, or only of those that are rejected, where the others'
+        were not made yet; theirs is then NaN.
     """
     n = len(verdicts.complete)
+    judgements, asked = verdicts.judgements, np.arange(n)
+    if isinstance(judgements, Deferred) and not margins:
+        asked = np.flatnonzero(judgements.rejected)
+        judgements = judgements.of(asked)
     worst_place, worst_margin, least = np.full(n, -1, dtype=np.int32), np.full(n, np.nan), np.full(n, np.inf)
     found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]] = []
     silent = np.where(verdicts.complete, 0, 1).astype(np.int16)
-    for judgement in verdicts.judgements:
+    for judgement in judgements:
+        if not judgement.where:
+            continue  # a robot without limits is inside them
         says_nothing = np.isnan(judgement.worst) & ~judgement.violated.any(axis=1)
-        silent |= np.where(says_nothing, 2 << checks.index(judgement.check), 0).astype(np.int16)
+        silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
         if judgement.check == "collision" and contacts is not None:
             rows, margin = contacts.posture, contacts.distance - lower_margin(judgement)
             index = _indices(places, [Place("collision", name, "m") for name in contacts.names])[
@@ -52,15 +66,15 @@ def columns_of(
                 for where, unit in zip(judgement.where, judgement.unit, strict=True)
             ],
         )
-        rows, columns = np.nonzero(judgement.violated)
-        found.append((rows, index[columns], judgement.margin[rows, columns]))
+        some = np.flatnonzero(judgement.violated.any(axis=1))
+        at, columns = np.nonzero(judgement.violated[some])
+        found.append((asked[some[at]], index[columns], judgement.margin[some[at], columns]))
         each = np.array([PER_DEGREE.get(unit, 1.0) for unit in judgement.unit])
         scaled = np.where(np.isnan(judgement.margin), np.inf, judgement.margin / each)
-        if scaled.shape[1]:
-            column = scaled.argmin(axis=1)
-            every = np.arange(n)
+        if len(scaled):
+            column, every = scaled.argmin(axis=1), np.arange(len(asked))
             _take_least(
-                every,
+                asked,
                 index[column],
                 judgement.margin[every, column],
                 each[column],

@@ -3,11 +3,15 @@
 `Sight` says what was seen and how well; `find_trunks` finds the torsos and hips that the noise allows, from which
 the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves into
 the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge` makes
-one of those that became one. See docs/noise.md.
+one of those that became one. `GIVING` is how much real bodies' lengths give; `diagnose` names lengths that are wrong.
+See docs/noise.md.
 """
 
 from posekit.refinement.allowance import NoisyRange as NoisyRange
 from posekit.refinement.allowance import under_noise as under_noise
+from posekit.refinement.diagnosis import LengthDoubt as LengthDoubt
+from posekit.refinement.diagnosis import diagnose as diagnose
+from posekit.refinement.giving import GIVING as GIVING
 from posekit.refinement.merging import Merged as Merged
 from posekit.refinement.merging import merge as merge
 from posekit.refinement.optics import project as project

@@ -30,7 +30,7 @@ TINY = 1e-300
 BLOCK = 2048
 """Postures worked on at once: enough to spread the overhead of each operation."""
 
-PRECISION = 1e-3
+PRECISION = 1e-2
 """Promised decrease of chi2 that ends the search."""
 
 
@@ -53,6 +53,24 @@ class Descent(NamedTuple):
     settled: NDArray[np.bool_]
     folds: NDArray[np.intp]
     active: NDArray[np.intp]
+
+    @staticmethod
+    def nothing(like: State, n: int) -> Descent:
+        """Make room for n postures."""
+        none = np.zeros(n, dtype=np.intp)
+        state = State(*(np.zeros((*array.shape[:-1], n)) for array in like))
+        return Descent(state, np.full(n, np.inf), none, np.zeros(n, dtype=np.bool_), none.copy(), none.copy())
+
+    def take(self, rows: NDArray[np.intp]) -> Descent:
+        """Return some postures."""
+        return Descent(self.state.take(rows), *(array[rows] for array in self[1:]))  # type: ignore[arg-type]
+
+    def put(self, rows: NDArray[np.intp], other: Descent) -> None:
+        """Overwrite some postures; the steps that were taken add up."""
+        self.state.put(rows, other.state)
+        self.steps[rows] += other.steps
+        self.chi2[rows], self.settled[rows] = other.chi2, other.settled
+        self.folds[rows], self.active[rows] = other.folds, other.active
 
 
 def descend(

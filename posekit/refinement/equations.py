@@ -20,7 +20,7 @@ from posekit.refinement.limits import Signs
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import backward, cholesky, forward
 from posekit.refinement.state import State, Step, parents, trunk_offsets
-from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
+from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms, turn_of
 
 FLOOR = 1e-6
 """Added to diagonals, one over rad^2 or m^2: what nothing determines does not move."""
@@ -204,13 +204,14 @@ def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> A
 
 
 def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient: Array) -> None:
-    """Add how the limits of limbs depend on the rotation of the part on which they hang."""
-    place, turn = starts[:, :3], starts[:, 3:]
-    gradient += np.einsum("licn,iln->cn", turn, push[3:])
-    both = np.einsum("licn,ijln->ljcn", place, start[:3, 3:])
-    cross = np.einsum("ljcn,ljdn->cdn", both, turn)
-    matrix += cross + cross.transpose(1, 0, 2)
-    matrix += np.einsum("licn,ijln,ljdn->cdn", turn, start[3:, 3:], turn, optimize=True)
+    """Add how the limits of limbs depend on the rotation of the part on which they hang, in place."""
+    for limb in range(4):
+        turn = turn_of(limb)
+        gradient[turn] += push[3:, limb]
+        matrix[turn, turn] += start[3:, 3:, limb]
+        cross = np.einsum("jin,icn->jcn", start[3:, :3, limb], starts[limb, :3])
+        matrix[turn] += cross
+        matrix[:, turn] += cross.transpose(1, 0, 2)
 
 
 def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,9 +12,11 @@ from posekit.cameras import Array
 from posekit.refinement.anatomy import LIMBS
 from posekit.refinement.distinct import distinct
 
+Rows = NDArray[np.intp]
+
 
 class Factors(NamedTuple):
-    """N survivors of T different trunks, with M rows of four limbs each: row m has one limb of each kind.
+    """N survivors of T different trunks, and of L different limbs of each kind, each on its trunk.
 
     Attributes
     ----------
@@ -21,22 +24,19 @@ class Factors(NamedTuple):
         A survivor with each trunk.
     trunk_of : int array (N,)
         Each survivor's trunk.
-    row_trunk : int array (M,)
-        The trunk of each row.
-    row_from : int array (4, M)
-        For each limb of a row a survivor that has it.
-    row_of : int array (4, N)
-        For each limb of a survivor the row where it is.
+    limb : tuple of 4 int arrays (L,)
+        By kind, a survivor with each limb; sorted by trunk.
+    limb_of : int array (4, N)
+        Each survivor's limbs.
     """
 
-    trunk: NDArray[np.intp]
-    trunk_of: NDArray[np.intp]
-    row_trunk: NDArray[np.intp]
-    row_from: NDArray[np.intp]
-    row_of: NDArray[np.intp]
+    trunk: Rows
+    trunk_of: Rows
+    limb: tuple[Rows, ...]
+    limb_of: Rows
 
 
-def factor_postures(frames: NDArray[np.intp], postures: Array) -> Factors:
+def factor_postures(frames: Rows, postures: Array) -> Factors:
     """Find the different trunks of postures (N, 14, 3), frame by frame, and on each trunk its different limbs.
 
     A posture's leaves in the tree are nearly all ways of putting its limbs together: hundreds of survivors have a few
@@ -45,26 +45,47 @@ def factor_postures(frames: NDArray[np.intp], postures: Array) -> Factors:
     n = len(postures)
     key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, 18)], axis=1)
     trunk, trunk_of = distinct(key)
-    count = np.zeros((4, len(trunk)), dtype=np.intp)
-    found = []
+    limb, limb_of = [], np.empty((4, n), dtype=np.intp)
     for kind, (_, middle, end) in enumerate(LIMBS):
         own = np.concatenate(
             [trunk_of[:, None].astype(np.float64), postures[:, middle], postures[:, end]], axis=1
         )
         one, which = distinct(own)
         order = np.argsort(trunk_of[one], kind="stable")
-        rank = np.empty(len(one), dtype=np.intp)
-        count[kind] = np.bincount(trunk_of[one], minlength=len(trunk))
-        first = np.cumsum(count[kind]) - count[kind]
-        rank[order] = np.arange(len(one)) - first[trunk_of[one[order]]]
-        found.append((one, which, rank))
-    rows = count.max(axis=0) if n else np.zeros(len(trunk), dtype=np.intp)
-    begin = np.cumsum(rows) - rows
-    row_trunk = np.repeat(np.arange(len(trunk)), rows)
-    row_from = np.repeat(trunk[row_trunk][None], 4, axis=0)
-    row_of = np.empty((4, n), dtype=np.intp)
-    for kind, (one, which, rank) in enumerate(found):
-        place = begin[trunk_of[one]] + rank
-        row_from[kind, place] = one
-        row_of[kind] = place[which]
-    return Factors(trunk, trunk_of, row_trunk, row_from, row_of)
+        limb.append(one[order])
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        limb_of[kind] = rank[which]
+    return Factors(trunk, trunk_of, tuple(limb), limb_of)
+
+
+class Columns(NamedTuple):
+    """Limbs side by side: each of M columns has at most one of each kind, all on the same base.
+
+    Attributes
+    ----------
+    base : int array (M,)
+    of : tuple of 4 int arrays
+        By kind, the column of each limb.
+    """
+
+    base: Rows
+    of: tuple[Rows, ...]
+
+    @property
+    def used(self) -> NDArray[np.bool_]:
+        """Where there is a limb (4, M)."""
+        used = np.zeros((4, len(self.base)), dtype=np.bool_)
+        for kind, columns in enumerate(self.of):
+            used[kind, columns] = True
+        return used
+
+
+def columns_of(bases: Sequence[Rows], count: int) -> Columns:
+    """Set limbs side by side; `bases` are by kind the bases of its limbs, ascending, of `count`."""
+    each = np.stack([np.bincount(base, minlength=count) for base in bases])
+    width = each.max(axis=0, initial=0)
+    begin = np.cumsum(width) - width
+    first = np.cumsum(each, axis=1) - each
+    of = tuple(begin[base] + np.arange(len(base)) - first[kind, base] for kind, base in enumerate(bases))
+    return Columns(np.repeat(np.arange(count), width), of)

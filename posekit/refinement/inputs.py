@@ -17,7 +17,10 @@ LEAST = 1e-9
 """Pixels: the least standard deviation of a key point."""
 
 EXACT = 1e-5
-"""Relative deviation of a length that is known exactly, where others are not."""
+"""Relative deviation of a limb's length that is known exactly, where others are not."""
+
+RIGID = 1e-3
+"""The same for a distance of torso or hips, which are varied together: stiffer, and every step would be tiny."""
 
 
 def numbers(name: str, given: ArrayLike, shape: tuple[int | None, ...]) -> Array:
@@ -92,7 +95,7 @@ def length_weights(deviation: Mapping[str, float] | float) -> tuple[Array | None
         [[by_name[segment_name(pair)] for pair in ((limb[0], limb[1]), (limb[1], limb[2]))] for limb in LIMBS]
     )
     return (
-        1.0 / np.maximum(trunk, EXACT) if trunk.any() else None,
+        1.0 / np.maximum(trunk, RIGID) if trunk.any() else None,
         1.0 / np.maximum(limbs, EXACT) if limbs.any() else None,
     )
 

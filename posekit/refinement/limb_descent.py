@@ -1,8 +1,6 @@
-"""Limbs refined by themselves, with the trunk held: four independent searches in each row."""
+"""Limbs refined by themselves, with the trunk held: four independent searches in each column."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,57 +14,49 @@ from posekit.refinement.small import backward
 from posekit.refinement.state import moved_limbs
 
 
-class LimbFit(NamedTuple):
-    """Limbs where their searches ended.
-
-    Attributes
-    ----------
-    chains : Chains
-    chi2 : array (4, M)
-    """
-
-    chains: Chains
-    chi2: Array
-
-
-def fit_limbs(problem: Problem, start: Chains, steps: int, precision: float, hopeless: float) -> LimbFit:
-    """Minimise each limb's chi2 over its own directions and lengths; it never increases.
+def fit_limbs(
+    problem: Problem,
+    chains: Chains,
+    chi2: Array,
+    used: NDArray[np.bool_],
+    *,
+    steps: int,
+    precision: float,
+    hopeless: float,
+) -> None:
+    """Minimise each limb's chi2 (4, M) over its own directions and lengths, in place; it never increases.
 
     A limb is left where it is when its next step promises less than `precision`, or when its chi2 is beyond `hopeless`
-    and the next step does not promise to halve it.
+    and the next step does not promise to halve it. Only those that are `used` (4, M) are looked at.
     """
-    n = start.start.shape[2]
-    chains = Chains(start.start, start.parent, start.directions.copy(), start.lengths.copy())
-    chi2 = np.empty((4, n))
-    for at in range(0, n, BLOCK):
-        rows = np.arange(at, min(at + BLOCK, n))
-        chi2[:, rows] = limb_chi2(problem.take(rows), chains.take(rows))[0]
+    n = chains.start.shape[2]
     damping = np.full((4, n), DAMPING)
     watch = np.zeros((4, 4, n), dtype=np.int8)
-    rows = np.flatnonzero((chi2 > precision).any(axis=0))
+    rows = np.flatnonzero((used & (chi2 > precision)).any(axis=0))
     for _ in range(steps):
         left: list[NDArray[np.intp]] = []
         for at in range(0, len(rows), BLOCK):
             part = rows[at : at + BLOCK]
-            going = _advance(problem.take(part), chains, chi2, damping, watch, part, precision, hopeless)
+            going = _advance(problem, chains, chi2, used, damping, watch, part, precision, hopeless)
             left.append(part[going])
         rows = np.concatenate(left) if left else rows[:0]
         if not rows.size:
             break
-    return LimbFit(chains, chi2)
 
 
 def _advance(
     problem: Problem,
     chains: Chains,
     chi2: Array,
+    used: NDArray[np.bool_],
     damping: Array,
     watch: NDArray[np.int8],
     rows: NDArray[np.intp],
     precision: float,
     hopeless: float,
 ) -> NDArray[np.bool_]:
-    """Take a step with the limbs of some rows, in place; return which rows have limbs that are not done."""
+    """Take a step with the limbs of some columns, in place; return which columns have limbs that are not done."""
+    problem = problem.take(rows)
     now, watched, value, damped = chains.take(rows), watch[..., rows], chi2[:, rows], damping[:, rows]
     terms = limb_terms(problem, now, watched if watched.any() else None)
     block = eliminate(terms.matrix, terms.coupling[:, :0], terms.gradient, damped, FLOOR)
@@ -75,6 +65,7 @@ def _advance(
     watching = (watched != 0).any(axis=0)
     done = (damped > MOST) | ((gain <= precision) & ((damped <= LIGHT) | watching))
     done |= (value > hopeless) & (gain < 0.5 * value) & ~watching
+    done |= ~used[:, rows]
     if done.all():
         return np.zeros(len(rows), dtype=np.bool_)
     step *= ~done

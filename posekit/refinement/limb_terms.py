@@ -134,7 +134,7 @@ def limb_terms(problem: Problem, chains: Chains, watch: Signs | None = None) -> 
 
 def _add_limits(problem: Problem, found: Limbs, watch: Signs | None, terms: LimbTerms) -> None:
     """Add the limits that are passed or watched, in place."""
-    out = limb_limits(found, problem.anatomy.limb_bounds, watch)
+    out = limb_limits(found, problem.anatomy.limb_bounds, watch, problem.free)
     if out is None:
         return
     k, m = out.limb, out.row
@@ -166,7 +166,8 @@ def limb_chi2(problem: Problem, chains: Chains) -> tuple[Array, Signs]:
         chi2 += np.einsum("lsn,lsn->ln", stretch, stretch)
     crossed = np.zeros((4, 4, n), dtype=np.int8)
     if problem.limited:
-        out = limb_limits(limb_angles(chains.directions, chains.parent), problem.anatomy.limb_bounds)
+        found = limb_angles(chains.directions, chains.parent)
+        out = limb_limits(found, problem.anatomy.limb_bounds, free=problem.free)
         if out is not None:
             chi2[out.limb, out.row] += out.cost() / problem.limit_deviation**2
             crossed[:, out.limb, out.row] = out.crossed

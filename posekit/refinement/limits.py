@@ -122,7 +122,9 @@ def tangents_of(found: Limbs, upper: Array) -> Array:
     return out
 
 
-def limb_limits(found: Limbs, bounds: Bounds, watch: Signs | None = None) -> Outside | None:
+def limb_limits(
+    found: Limbs, bounds: Bounds, watch: Signs | None = None, free: NDArray[np.bool_] | None = None
+) -> Outside | None:
     """Judge limbs by their four angles; the branch that violates the limits least counts.
 
     Parameters
@@ -132,6 +134,8 @@ def limb_limits(found: Limbs, bounds: Bounds, watch: Signs | None = None) -> Out
         (4, 4).
     watch : int array (4, 4, N), optional
         By angle and limb, limits that a step would pass: 1 the upper, -1 the lower, 0 none.
+    free : bool array (4, N), optional
+        Limbs that are not judged.
 
     Returns
     -------
@@ -143,6 +147,8 @@ def limb_limits(found: Limbs, bounds: Bounds, watch: Signs | None = None) -> Out
     outer = (np.abs(found.angles - middle) > half).any(
         axis=0
     )  # a full turn, or another branch, may bring them inside
+    if free is not None:
+        outer &= ~free
     limb, row = np.nonzero(outer if watch is None else outer | (watch != 0).any(axis=0))
     if not limb.size:
         return None

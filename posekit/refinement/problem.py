@@ -31,6 +31,8 @@ class Problem:
     shape_weight, limb_weight : array (9,), (4, 2), optional
         One over the relative standard deviations of the trunk's nine distances, and of the limbs' lengths, where
         lengths are varied.
+    free : bool array (4, N), optional
+        Limbs without limits.
     trunk_only : bool
         Leave the limbs as they are, and unseen.
     """
@@ -46,6 +48,7 @@ class Problem:
     head_weight: Array | None = None
     shape_weight: Array | None = None
     limb_weight: Array | None = None
+    free: NDArray[np.bool_] | None = None
     trunk_only: bool = False
 
     def take(self, rows: NDArray[np.intp] | slice) -> Problem:
@@ -95,7 +98,7 @@ class Problem:
         return 4 if self.limb_weight is None else 6
 
 
-PER_POSTURE = ("image", "weight", "head_image", "head_weight", "root", "root_weight")
+PER_POSTURE = ("image", "weight", "head_image", "head_weight", "root", "root_weight", "free")
 
 
 def _residual(image: Array, seen: Array, weight: Array) -> Array:

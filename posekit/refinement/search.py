@@ -1,21 +1,30 @@
-"""The search in stages: different trunks, different limbs on them, and the survivors that they make up."""
+"""The search in rounds: different trunks, different limbs on them, and what of these pulls at each other.
+
+A limb that meets its image within its limits pulls at nothing. So survivors that differ only in such limbs share
+everything else: each trunk with those limbs that do pull is refined once (`bases`), and the others are laid on their
+rays from where it ends (`laying`). One that no longer can be joins those that pull, in the next round.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.refinement.bases import Tables, assemble
 from posekit.refinement.descent import BLOCK, Descent, descend
 from posekit.refinement.equations import chains_of, evaluate
-from posekit.refinement.factors import Factors
-from posekit.refinement.limb_descent import fit_limbs
+from posekit.refinement.factors import Columns, Factors, Rows, columns_of
+from posekit.refinement.laying import Bases, Laid, Limbs, Settings, lay
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.problem import Problem
-from posekit.refinement.start import limb_directions, relift, sides, state_of
+from posekit.refinement.start import limb_directions, sides, state_of
 from posekit.refinement.state import State
-from posekit.refinement.together import join, put_together
+
+ROUNDS = 3
+"""Times that limbs which turn out to pull are taken in, before survivors go on one by one."""
 
 
 class Found(NamedTuple):
@@ -35,52 +44,168 @@ def search(
     precision: float,
     hopeless: float,
 ) -> Found:
-    """Refine postures (N, 14, 3) and heads (N, 5, 3); chi2 is never more than it was.
-
-    Torso and hips alone first; then each limb, laid on its rays again to the sides that it had; then the survivors that
-    they make up, by one joint step, and from there by `descend` where the quadratic was not to be trusted.
-    """
+    """Refine postures (N, 14, 3) and heads (N, 5, 3); chi2 is never more than it was."""
+    settings = Settings(steps, precision, hopeless)
     one = factors.trunk
     begin = state_of(problem.anatomy, postures[one], None if skull is None else skull[one])
-    alone, rows = problem.take(one).trunk_alone(), problem.take(one[factors.row_trunk])
-    on_rows = begin.take(factors.row_trunk)
-    directions = limb_directions(postures, factors.row_from, on_rows)
-    limbs = chains_of(on_rows._replace(directions=directions))
-    first = _first(alone, rows, begin, limbs, factors)
+    own = np.repeat(one[None], 4, axis=0)
+    begin = begin._replace(directions=limb_directions(postures, own, begin))
+    alone = problem.take(one).trunk_alone()
+    columns = columns_of([factors.trunk_of[limb] for limb in factors.limb], len(one))
+    whose = np.repeat(one[columns.base][None], 4, axis=0)
+    for kind in range(4):
+        whose[kind, columns.of[kind]] = factors.limb[kind]
+    origin = np.stack([columns.of[kind][factors.limb_of[kind]] for kind in range(4)])
+    on_columns = begin.take(columns.base)
+    rows = problem.take(one[columns.base])
+    given = chains_of(on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
+    first = _first(alone, rows, begin, given, factors.trunk_of, origin)
+    limbs = Limbs(given.directions, sides(rows.optics, given))
     trunks = descend(alone, begin, steps=steps, precision=precision)
-    far = sides(rows.optics, limbs)
-    held = chains_of(trunks.state.take(factors.row_trunk)._replace(directions=directions))
-    fit = fit_limbs(rows, relift(rows, held, far), steps, precision, hopeless)
-    joined = join(problem, rows, trunks, fit, factors, precision=precision, hopeless=hopeless)
-    taken = trunks.steps[factors.trunk_of] + 1
-    found = Descent(joined.state, joined.chi2, taken, joined.settled, joined.folds, joined.active)
+    found, late = _grow(
+        problem,
+        Bases(trunks, one, np.zeros((4, len(one)), dtype=np.bool_)),
+        limbs,
+        factors.trunk_of,
+        columns,
+        origin,
+        settings,
+    )
     worse = ~(found.chi2 <= first)
     if worse.any():
         back = np.flatnonzero(worse)
-        found.state.put(back, put_together(begin, limbs, factors).take(back))
+        start = begin.take(factors.trunk_of[back])
+        found.state.put(back, start._replace(directions=limbs.gather(origin[:, back]).directions))
         found.chi2[back] = first[back]
-    rest = np.flatnonzero(worse | (~found.settled & (found.chi2 <= hopeless)))
+    worse[late] = True
+    rest = np.flatnonzero(worse & (found.chi2 <= hopeless))
     if rest.size:
-        more = descend(
-            problem.take(rest), found.state.take(rest), steps=steps, precision=precision, hopeless=hopeless
-        )
-        found.state.put(rest, more.state)
-        found.steps[rest] += more.steps
-        found.chi2[rest], found.settled[rest] = more.chi2, more.settled
-        found.folds[rest], found.active[rest] = more.folds, more.active
+        found.put(rest, descend(problem.take(rest), found.state.take(rest), **settings._asdict()))
     return Found(found, first)
 
 
-def _first(alone: Problem, rows: Problem, begin: State, limbs: Chains, factors: Factors) -> Array:
+def _grow(
+    problem: Problem,
+    bases: Bases,
+    limbs: Limbs,
+    base_of: Rows,
+    columns: Columns,
+    origin: Rows,
+    settings: Settings,
+) -> tuple[Descent, Rows]:
+    """Refine survivors (N,) from their bases outward, round by round; their limbs are `limbs` at `origin` (4, N).
+
+    Return them, and which have limbs that pull after the last round.
+    """
+    n = len(base_of)
+    found = Descent.nothing(bases.found.state, n)
+    leaves, column, late = np.arange(n), origin, np.arange(0)
+    which = np.repeat(np.arange(len(columns.base))[None], 4, axis=0)
+    for turn in range(ROUNDS + 1):
+        laid = lay(problem, bases, columns, limbs.gather(which), settings)
+        each = _at(laid.chi2, column, 0.0)
+        pull = each > settings.precision
+        total = bases.found.chi2[base_of] + each.sum(axis=0)
+        over = ~np.isfinite(total) | ~bases.open(settings)[base_of]
+        tables = None
+        if turn == 0 and pull.any():
+            tables = Tables.of(problem, bases, laid)
+            least = _at(tables.least(bases, laid), _at(laid.place, np.where(pull, column, -1), -1), 0.0)
+            over |= (least > settings.hopeless).any(axis=0)
+        going = pull.any(axis=0) & ~over
+        if turn == ROUNDS:
+            late, going = leaves[going], np.zeros_like(going)
+        done = np.flatnonzero(~going)
+        _write(found, leaves[done], bases, base_of[done], laid, column[:, done], total[done])
+        found.settled[leaves[done]] &= ~pull[:, done].any(axis=0)
+        left = np.flatnonzero(going)
+        if not left.size:
+            break
+        leaves, base_of, column, pull = leaves[left], base_of[left], column[:, left], pull[:, left]
+        group, one, slots = _groups(base_of, column, pull, laid)
+        bases = assemble(problem, bases, base_of[one], leaves[one], laid, slots, settings, tables)
+        base_of = group
+        columns, column, which = _columns(np.where(pull, -1, column), origin[:, leaves], base_of, len(one))
+    return found, late
+
+
+def _groups(base_of: Rows, column: Rows, pull: NDArray[np.bool_], laid: Laid) -> tuple[Rows, Rows, Rows]:
+    """Group survivors (n,) by their bases and by those of their limbs that pull.
+
+    Returns
+    -------
+    group : int array (n,)
+    one : int array (G,)
+        A survivor of each.
+    slots : int array (4, G)
+        Its limbs among those that pull, -1 where one does not.
+    """
+    slots = _at(laid.place, np.where(pull, column, -1), -1)
+    rank = np.where(pull, slots - np.searchsorted(laid.pulling.base, base_of) + 1, 0)
+    most = int(rank.max()) + 1
+    key = base_of.astype(np.int64)
+    for kind in range(4):
+        key = key * most + rank[kind]
+    _, one, group = np.unique(key, return_index=True, return_inverse=True)
+    return group.reshape(-1), one, slots[:, one]
+
+
+def _columns(column: Rows, origin: Rows, base_of: Rows, count: int) -> tuple[Columns, Rows, Rows]:
+    """Set limbs that are not yet held (`column` of 0 or more) side by side on `count` new bases.
+
+    Returns
+    -------
+    columns : Columns
+    column : int array (4, n)
+        Each survivor's, -1 where its limb is held.
+    which : int array (4, M)
+        The limb of each column.
+    """
+    out, bases, limbs, rows = np.full_like(column, -1), [], [], []
+    width = int(origin.max()) + 1
+    for kind in range(4):
+        own = np.flatnonzero(column[kind] >= 0)
+        pair, inverse = np.unique(base_of[own] * width + origin[kind, own], return_inverse=True)
+        bases.append(pair // width)
+        limbs.append(pair % width)
+        rows.append((own, inverse.reshape(-1)))
+    columns = columns_of(bases, count)
+    which = np.zeros((4, len(columns.base)), dtype=np.intp)
+    for kind, (own, inverse) in enumerate(rows):
+        which[kind, columns.of[kind]] = limbs[kind]
+        out[kind, own] = columns.of[kind][inverse]
+    return columns, out, which
+
+
+def _write(
+    found: Descent, rows: Rows, bases: Bases, base: Rows, laid: Laid, column: Rows, total: Array
+) -> None:
+    """Write down survivors: their bases, and the limbs in `column` (4, n) that those do not hold."""
+    part = bases.found.take(base)
+    for kind in range(4):
+        own = np.flatnonzero(column[kind] >= 0)
+        part.state.directions[kind][..., own] = laid.chains.directions[kind][..., column[kind, own]]
+        part.state.limbs[kind][..., own] = laid.chains.lengths[kind][..., column[kind, own]]
+    part.chi2[...] = total
+    found.put(rows, part)
+
+
+def _at(table: NDArray[Any], column: Rows, nothing: float) -> NDArray[Any]:
+    """Look up limbs (4, n) in a table (4, M) by their columns; -1 is nothing."""
+    out = np.full(column.shape, nothing, dtype=table.dtype)
+    for kind in range(4):
+        own = np.flatnonzero(column[kind] >= 0)
+        out[kind, own] = table[kind, column[kind, own]]
+    return out
+
+
+def _first(alone: Problem, rows: Problem, begin: State, limbs: Chains, trunk_of: Rows, origin: Rows) -> Array:
     """Return the chi2 of survivors as they were given (N,), from their trunks' and their limbs'."""
-    trunk, limb = np.empty(len(factors.trunk)), np.empty((4, len(factors.row_trunk)))
+    trunk, limb = np.empty(begin.root.shape[1]), np.empty((4, limbs.start.shape[2]))
     for at in range(0, len(trunk), BLOCK):
         part = np.arange(at, min(at + BLOCK, len(trunk)))
         trunk[part] = evaluate(alone.take(part), begin.take(part))[0]
     for at in range(0, limb.shape[1], BLOCK):
         part = np.arange(at, min(at + BLOCK, limb.shape[1]))
         limb[:, part] = limb_chi2(rows.take(part), limbs.take(part))[0]
-    chi2 = trunk[factors.trunk_of]
-    for k in range(4):
-        chi2 = chi2 + limb[k, factors.row_of[k]]
-    return np.asarray(chi2)
+    return np.asarray(trunk[trunk_of] + np.take_along_axis(limb, origin, axis=1).sum(axis=0))

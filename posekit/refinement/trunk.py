@@ -38,7 +38,7 @@ from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 TRIED = 2
 """Near and far choices that are followed to their minima, the likeliest first."""
 
-STEPS = 20
+STEPS = 12
 
 WITHIN = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
@@ -49,7 +49,7 @@ TRUNK = 6
 SAME = 1e-5
 """Metres by which a trunk may be lifted otherwise than it was found: rounding, tangent to a ray."""
 
-PROMISING = 300.0
+PROMISING = 150.0
 """A chi2 beyond which a mirrored start is followed only while its steps promise to halve it."""
 
 

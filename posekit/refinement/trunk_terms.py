@@ -127,10 +127,14 @@ def start_ways(terms: TrunkTerms) -> Array:
     out = np.zeros((4, 6, width, n))
     out[:, :3] = terms.ways[list(START)]
     for limb in range(4):
-        first = 6 if limb >= LEGS.start else 3
-        for i in range(3):
-            out[limb, 3 + i, first + i] = 1.0
+        for i, column in enumerate(range(9)[turn_of(limb)]):
+            out[limb, 3 + i, column] = 1.0
     return out
+
+
+def turn_of(limb: int) -> slice:
+    """Return which unknowns turn the part on which a limb hangs: torso or hips."""
+    return slice(6, 9) if limb >= LEGS.start else slice(3, 6)
 
 
 def _root(problem: Problem, state: State) -> Array:

@@ -1,9 +1,13 @@
 """The binary interpretation tree and the protocol of the checks that prune it."""
 
 from posekit.tree.candidates import Branch as Branch
+from posekit.tree.check import PASSED as PASSED
+from posekit.tree.check import UNSURE as UNSURE
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
+from posekit.tree.check import Screened as Screened
 from posekit.tree.enumeration import enumerate_leaves as enumerate_leaves
 from posekit.tree.interpretation_tree import InterpretationTree as InterpretationTree
 from posekit.tree.leaves import Leaves as Leaves
+from posekit.tree.leaves import Losses as Losses
 from posekit.tree.leaves import Pruned as Pruned

@@ -79,3 +79,33 @@ class Check(Protocol):
     def judge(self, points: Array) -> Findings:
         """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""
         ...
+
+
+PASSED = -1
+"""Of a screen: no place is violated."""
+
+UNSURE = -2
+"""Of a screen: only the judge can tell."""
+
+
+class Screened(Check, Protocol):
+    """A check that can also tell, quicker, what is clear.
+
+    Its findings are `judge`'s alone: where a screen says a place, `judge` finds that place violated first.
+    """
+
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
+        """Tell what is clear in postures (N, len(self.points), 3).
+
+        Returns
+        -------
+        places : int array (N,)
+            The first place violated, `PASSED` or `UNSURE`.
+        presumed : array (M, …), optional
+            Questions whose answer was presumed, for `confirm`.
+        """
+        ...
+
+    def confirm(self, presumed: Array) -> bool:
+        """Ask whoever has the last word whether all that was presumed (M, …) is so."""
+        ...

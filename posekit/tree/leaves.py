@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +48,51 @@ class Pruned:
     upper: Array
 
 
+Postponed = Callable[[], tuple[Array, Array, Array]]
+"""Finds value, lower and upper (P,) of pruned branches."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Losses:
+    """The same as `Pruned`, but value and bounds are found when they are first read.
+
+    Parameters
+    ----------
+    level, frame, code, check, where, unit, place
+        As of `Pruned`.
+    measure : callable
+        Finds value and bounds.
+    """
+
+    level: int
+    frame: NDArray[np.int32]
+    code: Codes
+    check: str
+    where: tuple[str, ...]
+    unit: str
+    place: NDArray[np.int8]
+    measure: Postponed
+
+    @cached_property
+    def _found(self) -> tuple[Array, Array, Array]:
+        return self.measure()
+
+    @property
+    def value(self) -> Array:
+        """What was found (P,)."""
+        return self._found[0]
+
+    @property
+    def lower(self) -> Array:
+        """The lower bound (P,)."""
+        return self._found[1]
+
+    @property
+    def upper(self) -> Array:
+        """The upper bound (P,)."""
+        return self._found[2]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Leaves:
     """Living nodes at one level of the tree, sorted by frame, then by code.
@@ -63,7 +109,7 @@ class Leaves:
         How many joints beyond the root the codes cover.
     frame, code : int array (N,)
         Frame and branch code of each node.
-    pruned : tuple of Pruned
+    pruned : tuple of Pruned or Losses
         What was pruned so far, in order.
     """
 
@@ -74,7 +120,7 @@ class Leaves:
     level: int
     frame: NDArray[np.int32]
     code: Codes
-    pruned: tuple[Pruned, ...]
+    pruned: tuple[Pruned | Losses, ...]
 
     @staticmethod
     def start(
@@ -107,10 +153,30 @@ class Leaves:
         frame: NDArray[np.int32],
         code: Codes,
         level: int,
-        pruned: tuple[Pruned, ...],
+        pruned: tuple[Pruned | Losses, ...],
     ) -> Leaves:
         """Keep the nodes that are alive."""
-        return replace(self, level=level, frame=frame[alive], code=code[alive], pruned=pruned)
+        return self.at(level, frame[alive], code[alive], pruned)
+
+    def at(
+        self, level: int, frame: NDArray[np.int32], code: Codes, pruned: tuple[Pruned | Losses, ...] = ()
+    ) -> Leaves:
+        """Return other nodes of the same trees."""
+        return Leaves(
+            joints=self.joints,
+            parents=self.parents,
+            candidates=self.candidates,
+            given=self.given,
+            level=level,
+            frame=frame,
+            code=code,
+            pruned=pruned,
+        )
+
+    def excess(self, joint: int) -> Array:
+        """Return how much too short the segment to a joint is in each node (N,), metres."""
+        path = select(self.level, path_of(joint, self.parents))[self.code]
+        return self.candidates.excess[joint][self.frame, path]
 
     def support(self, points: Sequence[int]) -> tuple[int, ...]:
         """Return the joints on whose branches the positions of some points depend, in tree order."""
@@ -143,8 +209,7 @@ class Leaves:
         """
         worst = np.zeros(len(self.code))
         for joint in range(1, self.level + 1):
-            path = select(self.level, path_of(joint, self.parents))[self.code]
-            worst = np.fmax(worst, self.candidates.excess[joint][self.frame, path])
+            worst = np.fmax(worst, self.excess(joint))
         return worst
 
     def branches(self) -> list[str]:

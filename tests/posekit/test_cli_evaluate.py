@@ -141,6 +141,21 @@ def test_the_seed_decides(run: Run) -> None:
     assert told[0] == told[1] != told[2]
 
 
+def test_sequences_are_followed(run: Run) -> None:
+    save("walk.npz")
+    options = ("--noise", "0", "--yaw-step", "90", "--heights", "1.5m", "--sequences")
+    done = run("walk.npz", "-o", "r.json", "-o", "r.csv", *options)
+    assert done.code == 0, done.err
+    assert "MPJPE path" in done.out
+    told = json.loads(Path("r.json").read_text())
+    assert told["settings"]["sequences"] == "by_path"
+    assert told["settings"]["frames_per_clip"] == 60
+    errors = told["all"]["error_mm"]["mpjpe"]
+    assert errors["best"]["mean"] <= errors["path"]["mean"] < errors["random"]["mean"]
+    with Path("r.csv").open() as file:
+        assert {"bridged", "limbs_right.path"} <= set(next(csv.reader(file)))
+
+
 def test_frames_in_a_row_and_placed_necks(run: Run) -> None:
     save("walk.npz")
     assert run("walk.npz", "-o", "r.json", *QUICK, "--consecutive", "--noise", "0").code == 0

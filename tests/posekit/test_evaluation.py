@@ -13,12 +13,14 @@ from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import OpenCVModel, View
 from posekit.measures import mpjpe
-from posekit.pipeline import Tolerance, forget_camera, view_of
+from posekit.pipeline import MEASURED, Tolerance, forget_camera, view_of
 from posekit.pipeline.evaluation import (
+    Choice,
     Method,
     Ranking,
     Sampling,
     Sweep,
+    by_path,
     by_probability,
     evaluate,
     write_evaluation,
@@ -240,9 +242,10 @@ def test_a_ranking_that_is_none_is_refused(seen: View, rank: Any, says: str) -> 
 def test_a_sequence_is_followed_camera_by_camera_in_order(capture: Capture) -> None:
     heard: list[list[float]] = []
 
-    def last(frames: Sequence[FrameRecovery]) -> np.ndarray:
+    def last(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Choice:
         heard.append([frame.time for frame in frames])
-        return np.array([len(frame) - 1 for frame in frames])
+        assert [len(one.order) for one in rankings] == [len(frame) for frame in frames]
+        return Choice(survivor=np.array([len(frame) - 1 for frame in frames]))
 
     method = Method(noise=(0.0, 1.0), choose=last)
     found = evaluate(capture, sampling=Sampling(frames_per_clip=6), sweep=SWEEP, method=method)
@@ -257,17 +260,63 @@ def test_a_sequence_is_followed_camera_by_camera_in_order(capture: Capture) -> N
     assert np.linalg.norm(moved, axis=1).min() > 0.01  # the camera stands, the walker does not
 
 
+def last(frames: Sequence[FrameRecovery]) -> np.ndarray:
+    return np.array([len(frame) - 1 for frame in frames])
+
+
 @pytest.mark.parametrize(
-    "choose", [lambda frames: [0], lambda frames: np.full(len(frames), 10**6), lambda frames: None]
+    "choose",
+    [
+        lambda frames, rankings: Choice(survivor=np.array([0])),
+        lambda frames, rankings: Choice(survivor=np.full(len(frames), 10**6)),
+        lambda frames, rankings: Choice(survivor=np.full(len(frames), 0.5)),
+        lambda frames, rankings: Choice(survivor=last(frames), joints=np.zeros((len(frames), 13, 3))),
+        lambda frames, rankings: None,
+    ],
 )
 def test_a_choice_that_is_none_is_refused(seen: View, choose: Any) -> None:
     with pytest.raises(InputError, match="sequence"):
         evaluate(seen, method=Method(noise=(0.0,), choose=choose))
 
 
+def test_a_person_is_followed(seen: View) -> None:
+    """A wrist that no forearm reaches leaves two frames without survivor: the path bridges them, and they count."""
+    image = seen.image.copy()
+    image[3:5, JOINTS.index("left_wrist")] += 700
+    odd = dataclasses.replace(seen, image=image)
+    evaluation = evaluate(odd, method=Method(noise=(0.0,), choose=by_path))
+    found, told = evaluation.frames, of(evaluation)
+    assert told["bridged"] == pytest.approx(2 / len(seen))
+    assert np.isnan(found.error("best", "mpjpe")[3:5]).all()
+    path = found.error("path", "mpjpe")
+    assert np.isfinite(path).all()
+    taken = found.measured.bridged == 0
+    assert (path[taken] >= found.error("best", "mpjpe")[taken] - 1e-12).all()
+    assert path.mean() < 0.6 * np.nanmean(found.error("random", "mpjpe"))
+    limbs = told["limbs_right"]
+    assert limbs["random"] < limbs["path"] <= limbs["best"] <= 1
+    text = "\n".join(summary(evaluation))
+    assert "limbs right: path" in text
+    assert evaluation.settings["sequences"] == "by_path"
+    single = of(evaluate(odd, method=Method(noise=(0.0,))))
+    assert "bridged" not in single
+    assert "path" not in single["limbs_right"]
+
+
+def test_a_sequence_without_survivors_has_no_path(seen: View) -> None:
+    none = [FrameRecovery(time=float(at), batch=None, index=0) for at in range(3)]
+    empty = Ranking(order=np.empty(0, dtype=np.intp))
+    assert by_path(none, [empty] * 3).survivor.tolist() == [-1, -1, -1]
+
+
 def test_functions_that_cannot_be_sent_need_one_process(capture: Capture) -> None:
     with pytest.raises(InputError, match="--jobs: the method cannot be sent"):
-        evaluate(capture, sampling=FEW, method=Method(choose=lambda frames: np.zeros(len(frames))), jobs=2)
+        evaluate(
+            capture,
+            sampling=FEW,
+            method=Method(choose=lambda frames, rankings: Choice(survivor=last(frames))),
+            jobs=2,
+        )
 
 
 def test_views_are_taken_as_they_are() -> None:
@@ -408,7 +457,7 @@ def test_reports_hold_the_same_numbers(exact: Any, tmp_path: Path) -> None:
 def test_tolerances_and_ranges_are_used(capture: Capture) -> None:
     wide = Tolerance(rigid=0.1, tangent=0.05, placement=False, angle=10.0)
     loose = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=wide))
-    strict = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,)))
+    strict = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=MEASURED))
     assert (loose.frames.measured.survivors >= strict.frames.measured.survivors).all()
     assert of(loose)["violations"]["ranges"] == 0
     table = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,), ranges="table1"))

@@ -516,10 +516,10 @@ BREAKS: dict[str, tuple[Callable[[str], str], str]] = {
     "empty": (lambda t: "", "not well-formed"),
     "another root": (lambda t: "<html/>", "expected <robot>"),
     "another robot": (lambda t: '<robot name="a"><link name="b"/></robot>', "not a stick figure"),
-    "NaN radius": (lambda t: t.replace('radius="0.1"', 'radius="nan"'), "'nan'; expected 1 finite number"),
+    "NaN radius": (lambda t: t.replace('radius="0.09"', 'radius="nan"'), "'nan'; expected 1 finite number"),
     "infinite length": (lambda t: t.replace('length="0.28"', 'length="inf"'), "expected 1 finite number"),
-    "negative radius": (lambda t: t.replace('radius="0.1"', 'radius="-0.1"'), "expected both positive"),
-    "no number": (lambda t: t.replace('radius="0.1"', 'radius="wide"'), "is not a number"),
+    "negative radius": (lambda t: t.replace('radius="0.09"', 'radius="-0.1"'), "expected both positive"),
+    "no number": (lambda t: t.replace('radius="0.09"', 'radius="wide"'), "is not a number"),
     "two numbers": (lambda t: t.replace('lower="0.0"', 'lower="0 1"', 1), "expected 1 finite number"),
     "two coordinates": (lambda t: t.replace('xyz="0 0 -0.26"', 'xyz="0 0"', 1), "expected 3 finite numbers"),
     "swapped limits": (
@@ -533,7 +533,7 @@ BREAKS: dict[str, tuple[Callable[[str], str], str]] = {
     ),
     "a mesh": (
         lambda t: t.replace(
-            '<cylinder radius="0.1" length="0.28"/>', '<mesh filename="file:///etc/hostname"/>'
+            '<cylinder radius="0.09" length="0.28"/>', '<mesh filename="file:///etc/hostname"/>'
         ),
         "a collision body is a mesh",
     ),

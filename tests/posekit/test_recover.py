@@ -579,8 +579,9 @@ def noisy(pixels: float, count: int = 40) -> Scene:
 def test_a_noisy_torso_is_judged_as_measured() -> None:
     scene = noisy(0.5)
     recovery = recover(view_of(scene))
-    flagged = [frame.tolerance == MEASURED for frame in recovery.frames]
-    assert all(flagged)
+    assert {frame.judged for frame in recovery.frames} == {"measured"}
+    strict = [frame.tolerance == MEASURED for frame in recovery.frames]
+    assert any(strict)
     assert {total(frame) for frame in recovery.frames} == {LEAVES}
     assert np.median(truth_at(recovery, scene.joints_cam)) < 0.05
     kept = np.concatenate([frame.joints for frame in recovery.frames])
@@ -589,7 +590,10 @@ def test_a_noisy_torso_is_judged_as_measured() -> None:
     assert "measured" in text
     assert "exact" not in text
     given = recover(view_of(scene), tolerance=MEASURED)
-    assert codes(given) == codes(recovery)
+    for own, frame, kept_so in zip(codes(given), recovery.frames, strict, strict=True):
+        # Where nothing is left with less for the hips, they are given as much as the rest.
+        assert (len(own) > 0) == kept_so
+        assert not kept_so or own == frame.branches
 
 
 def test_only_the_noisy_frame_is_judged_as_measured() -> None:

@@ -301,9 +301,9 @@ def test_an_uncertain_deviation_counts_for_less() -> None:
     view = scene()
     sight = sight_of(view, 1.0)
     image = sight.points().copy()
-    image[:, JOINT["left_hip"]] += 25.0
+    image[:, JOINT["left_hip"]] += 40.0
     wide = np.ones((len(view), 14))
-    wide[:, JOINT["left_hip"]] = 25.0
+    wide[:, JOINT["left_hip"]] = 40.0
     assert (~refine(replace(sight, image=image), view.joints_cam).explained()).mean() > 0.95
     assert refine(replace(sight, image=image, deviation=wide), view.joints_cam).explained().mean() > 0.95
     wide[:, JOINT["left_hip"]] = np.inf

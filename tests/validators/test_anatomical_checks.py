@@ -92,6 +92,30 @@ def legal_limb(joint: str, angles: tuple[float, float, float, float]) -> bool:
         mean, spread = ANATOMY.coupled(coupling, np.array(of))
         return float(mean) + (k if side == "upper" else -k) * spread
 
+    def ends(name: str, flexion: float) -> tuple[float, float, float]:
+        """Limits of an angle of the hip, and the middle between its means."""
+        motion = ANATOMY.motions[f"hip.{name}"]
+        (lower, below), (upper, above) = motion.end("lower"), motion.end("upper")
+        if name == "rotation":
+            (coupling,) = ANATOMY.couplings_of("hip.rotation")
+            mean, spread = ANATOMY.coupled(coupling, np.array(flexion))
+            lower, limit = max(lower, float(mean)), max(lower - k * below, float(mean) - k * spread)
+        else:
+            limit = lower - k * below
+        return limit, upper + k * above, (lower + upper) / 2
+
+    def in_sinus(ball: tuple[float, float, float]) -> bool:
+        (sinus,) = ANATOMY.sinuses
+        p, used = sinus.power, 0.0
+        for name, angle in zip(("flexion", "abduction", "rotation"), ball, strict=True):
+            lower, upper, middle = ends(name, ball[0])
+            off = middle + wrapped(angle - middle) - middle
+            share = abs(off) / ((upper - middle) if off > 0 else (middle - lower))
+            if share > max(1.0 - used, 0.1**p) ** (1 / p):
+                return False
+            used += share**p
+        return True
+
     for a1, b1, g1 in ((a, b, g), (a + 180, 180 - b, g + 180)):
         for g2, e2 in ((g1, e), (g1 + 180, -e)):
             if joint == "shoulder":
@@ -101,8 +125,8 @@ def legal_limb(joint: str, angles: tuple[float, float, float, float]) -> bool:
                     turn, end("shoulder.turn", "lower", elevation), end("shoulder.turn", "upper", elevation)
                 )
             else:
-                names = zip(("flexion", "abduction", "rotation"), (a1, b1, g2), strict=True)
-                ball = all(inside(x, *TABLE.limits[f"right_hip.{name}"]) for name, x in names)
+                middle = float(np.mean(TABLE.limits["right_hip.flexion"]))
+                ball = in_sinus((middle + wrapped(a1 - middle), b1, g2))
                 ball = ball and wrapped(a1) <= end("hip.flexion", "upper", e2)
             if ball and inside(e2, *TABLE.limits[f"right_{hinge}.flexion"]):
                 return True
@@ -117,8 +141,16 @@ def test_every_angle_is_judged_and_an_arms_direction_by_its_elevation() -> None:
         assert dof in ARMS or verdicts[dof][1] == pytest.approx(angle, abs=1e-6)
 
 
-# Shoulders and the straight leg's hip are bounded by couplings, below.
-PLAIN = [(dof, end) for dof in DOFS for end in ("lower", "upper") if "shoulder" not in dof]
+# Shoulders and hips are bounded by couplings and a sinus, below.
+PLAIN = [
+    (dof, end) for dof in DOFS for end in ("lower", "upper") if "shoulder" not in dof and "hip" not in dof
+]
+
+
+def middle(dof: str) -> float:
+    """Return the middle between the means of an angle's ends, where a sinus takes nothing from the others."""
+    (lower, _), (upper, _) = (ANATOMY.motion(dof).end(side) for side in ("lower", "upper"))
+    return (lower + upper) / 2
 
 
 @pytest.mark.parametrize(("dof", "end"), PLAIN)
@@ -128,16 +160,84 @@ PLAIN = [(dof, end) for dof in DOFS for end in ("lower", "upper") if "shoulder" 
 def test_each_limit_just_passes_and_just_fails(dof: str, end: str, outside: float, passes: bool) -> None:
     lower, upper = TABLE.limits[dof]
     angle = upper + outside if end == "upper" else lower - outside
-    changes = {dof: angle}
-    side = dof.split("_", maxsplit=1)[0]
-    if dof.endswith("hip.flexion"):
-        changes[f"{side}_knee.flexion"] = 90.0
-    verdicts = judged(posture(changes))
+    verdicts = judged(posture({dof: angle}))
     bad, value, margin = verdicts.pop(dof)
     assert bad == (not passes)
     assert value == pytest.approx(angle, abs=1e-6)
     assert margin == pytest.approx(-outside, abs=1e-6)
     assert not any(bad for bad, _, _ in verdicts.values())
+
+
+@pytest.mark.parametrize("side", SIDES)
+@pytest.mark.parametrize("name", ["hip.flexion", "hip.abduction", "hip.rotation"])
+@pytest.mark.parametrize("end", ["lower", "upper"])
+@pytest.mark.parametrize(("outside", "passes"), [(-0.01, True), (0.0005, True), (0.003, False), (1, False)])
+def test_each_end_of_the_hip_is_reached_where_the_other_angles_are_in_the_middle(
+    side: str, name: str, end: Side, outside: float, passes: bool
+) -> None:
+    outward = 1 if end == "upper" else -1
+    changes = {f"{side}_hip.{angle}": middle(f"{side}_hip.{angle}") for angle in ("flexion", "abduction")}
+    limit = TABLE.limits[f"{side}_{name}"][end == "upper"]
+    flexion = limit if name == "hip.flexion" else changes[f"{side}_hip.flexion"]
+    (outward_end,) = ANATOMY.couplings_of("hip.rotation", "lower")
+    lower = float(ANATOMY.coupled(outward_end, np.array(flexion))[0])
+    changes[f"{side}_hip.rotation"] = (lower + ANATOMY.motions["hip.rotation"].end("upper")[0]) / 2
+    changes[f"{side}_knee.flexion"] = 90.0
+    for coupling in ANATOMY.couplings_of(name, end):
+        if coupling.of == "hip.flexion":
+            mean, spread = ANATOMY.coupled(coupling, np.array(changes[f"{side}_hip.flexion"]))
+            limit = outward * min(outward * limit, outward * float(mean) + ANATOMY.spreads * spread)
+    changes[f"{side}_{name}"] = limit + outward * outside
+    verdicts = judged(posture(changes))
+    bad, value, margin = verdicts.pop(f"{side}_{name}")
+    assert bad == (not passes)
+    assert value == pytest.approx(limit + outward * outside, abs=1e-6)
+    assert margin == pytest.approx(-outside, abs=1e-6)
+    assert not any(bad for bad, _, _ in verdicts.values())
+
+
+HIP_POSTURES = {
+    "sitting cross-legged (Ganokroj et al. 2021)": ((90.0, 28.9, -62.0), 120.0, True),
+    "squatting (Ganokroj et al. 2021)": ((99.7, 15.0, -10.0), 130.0, True),
+    "sitting, turned inward (Kouyoumdjian et al. 2012)": ((90.0, 0.0, 37.9), 90.0, True),
+    "lying prone, turned inward (Kouyoumdjian et al. 2012)": ((0.0, 0.0, 35.2), 90.0, True),
+    "lying prone, turned outward (Kouyoumdjian et al. 2012)": ((0.0, 0.0, -41.8), 90.0, True),
+    "standing on one leg, the other abducted": ((0.0, 45.9, 0.0), 5.0, True),
+    "pushing off in a run": ((-20.0, -5.0, 8.0), 30.0, True),
+    "every end at once": ((120.0, 48.0, 36.0), 120.0, False),
+    "every other end at once": ((-25.0, -26.0, -41.0), 60.0, False),
+    "high flexion, adducted and turned inward: bone meets bone (Han et al.)": ((118, -25, 35), 120.0, False),
+}
+"""The clinic's flexion, abduction and rotation, the knee, and whether people do it."""
+
+
+@pytest.mark.parametrize("name", HIP_POSTURES)
+def test_the_hips_sinus_holds_what_people_do_and_no_corner(name: str) -> None:
+    ball, knee, possible = HIP_POSTURES[name]
+    zero = ANATOMY.motions["hip.flexion"].zero.mean
+    changes = {
+        "left_hip.flexion": ball[0] + zero,
+        "left_hip.abduction": ball[1],
+        "left_hip.rotation": ball[2],
+    }
+    bent = posture(changes | {"left_knee.flexion": knee})
+    assert rejected(bent)[0] == (not possible)
+    if not possible:  # and it is the sinus that says so
+        box = replace(TABLE, anatomy=replace(ANATOMY, sinuses=()))
+        assert not rejected(bent, joint_range(FIGURE, box))[0]
+
+
+def test_a_hip_near_one_end_has_less_left_of_the_others() -> None:
+    limits = []
+    for flexion in (80.0, 100.0, 115.0, 121.0):
+        points = posture(
+            {"right_hip.flexion": flexion, "right_hip.abduction": 0.0, "right_knee.flexion": 90.0}
+        )
+        check = next(c for c in CHECKS if c.where[:1] == ("right_hip.flexion",) and len(c.where) == 4)
+        findings = check.judge(points[:, check.points])
+        lower, upper = (np.broadcast_to(x, (1, 4))[0] for x in (findings.lower, findings.upper))
+        limits.append((upper - lower)[1:3])
+    assert (np.diff(limits, axis=0) < 0).all()
 
 
 @pytest.mark.parametrize("knee", [0.5, 5.0, 24.0, 40.0])
@@ -149,6 +249,7 @@ def test_the_straighter_the_knee_the_less_the_hip_flexes(side: str, knee: float)
     assert upper < TABLE.limits[f"{side}_hip.flexion"][1]
     for outside in (-0.01, 0.01, 5.0):
         changes = {f"{side}_hip.flexion": upper + outside, f"{side}_knee.flexion": knee}
+        changes |= {f"{side}_hip.abduction": middle(f"{side}_hip.abduction")}
         verdicts = judged(posture(changes))
         bad, _, margin = verdicts.pop(f"{side}_hip.flexion")
         assert bad == (outside > 0)
@@ -261,7 +362,7 @@ def test_the_verdict_does_not_depend_on_where_the_person_stands(rng: np.random.G
     turn *= np.sign(np.linalg.det(turn))
     there = here @ turn.T + rng.normal(size=3)
     np.testing.assert_array_equal(rejected(here), rejected(there))
-    assert 50 < rejected(here).sum() < 950
+    assert 50 < rejected(here).sum() < 990
 
 
 def test_right_and_left_are_mirror_images(rng: np.random.Generator) -> None:

@@ -55,7 +55,9 @@ def test_every_number_has_a_source_and_every_source_is_used() -> None:
     ends += [motion.zero for motion in ANATOMY.motions.values() if motion.zero.mean]
     assert all(end.source for end in ends)
     assert all(coupling.source for coupling in ANATOMY.couplings)
+    assert all(sinus.source for sinus in ANATOMY.sinuses)
     used = {key for end in ends for key in end.source} | {k for c in ANATOMY.couplings for k in c.source}
+    used |= {key for sinus in ANATOMY.sinuses for key in sinus.source}
     assert used == set(ANATOMY.sources)
 
 
@@ -143,6 +145,17 @@ WRONG = {
         TEXT + TEXT[TEXT.index("[[coupling]]") :] * MAX_COUPLINGS,
         f"at most {MAX_COUPLINGS}",
     ),
+    "a sinus of a joint without one": (changed('joint = "hip"', 'joint = "shoulder"'), "joint is 'shoulder'"),
+    "a sinus sharper than a diamond": (changed("power = 4.0", "power = 0.5"), "power is 0.5; expected 1 to"),
+    "a sinus without source": (
+        changed('power = 4.0\nsource = ["van_arkel", "han"]', "power = 4.0"),
+        "sinus 1: missing source",
+    ),
+    "a power that is none": (changed("power = 4.0", 'power = "x"'), "power: x; expected a finite number"),
+    "two sinuses of one joint": (
+        TEXT + TEXT[TEXT.index("[[sinus]]") :],
+        "sinus: expected [[sinus]] tables, at most one",
+    ),
     "a line break in a name": (changed("[neck.flexion]", '[neck."a\\nb"]'), "is not an angle"),
 }
 
@@ -165,3 +178,4 @@ def test_a_table_without_couplings_or_sources_is_a_table(tmp_path: Path) -> None
     assert set(table.limits.values()) == {(-40.0, 60.0)}
     assert table.anatomy is not None
     assert table.anatomy.couplings == ()
+    assert table.anatomy.sinuses == ()

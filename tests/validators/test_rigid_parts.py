@@ -1,16 +1,18 @@
 """Rigid parts: just passes, just fails, and the mirror image that distances cannot tell."""
 
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.errors import InputError
 from posekit.figure import load_figure
-from posekit.skeleton import JOINT, RIGID_SEGMENTS, TORSO, segment_name
+from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Findings
-from posekit.validators import rigid_parts
-from posekit.validators.rigid_parts import Mode
+from posekit.validators import load_ranges, make_checks, rigid_parts
+from posekit.validators.rigid_parts import Mode, RigidTolerance
 
 FIGURE = load_figure()
 NAMES = tuple(segment_name(segment) for segment in RIGID_SEGMENTS)
@@ -27,7 +29,13 @@ def postures(n: int, seed: int = 3) -> np.ndarray:
     return FIGURE.forward_kinematics(q)
 
 
-def judge(points: np.ndarray, *, tolerance: float, mode: Mode = "placement") -> dict[str, Findings]:
+EACH = RigidTolerance(shoulders=0.01, sides=0.04, hips=0.02)
+OWN = dict(zip(NAMES, (0.01, 0.04, 0.04, 0.02), strict=True))
+
+
+def judge(
+    points: np.ndarray, *, tolerance: float | RigidTolerance, mode: Mode = "placement"
+) -> dict[str, Findings]:
     return {
         check.where[0]: check.judge(points[:, check.points])
         for check in rigid_parts(FIGURE, tolerance=tolerance, mode=mode)
@@ -123,3 +131,67 @@ def test_a_missing_joint_leaves_its_places_undecided(missing: str) -> None:
 
 def test_a_collapsed_torso_is_rejected_without_a_warning() -> None:
     assert set(NAMES) <= set(violated(np.zeros((1, 19, 3)), tolerance=0.1))
+
+
+@pytest.mark.parametrize("segment", RIGID_SEGMENTS)
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("share", "passes"), [(0.999, True), (1.001, False)])
+def test_each_distance_has_its_own_tolerance(
+    segment: tuple[int, int], sign: int, share: float, passes: bool
+) -> None:
+    points = postures(20)
+    a, b = segment
+    along = points[:, b] - points[:, a]
+    own = OWN[segment_name(segment)]
+    points[:, b] += sign * share * own * along / np.linalg.norm(along, axis=1, keepdims=True)
+    findings = judge(points, tolerance=EACH, mode="distances")[segment_name(segment)]
+    assert (findings.violated == (not passes)).all()
+    np.testing.assert_allclose(findings.margin[:, 0], own * (1 - share), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("mode", ["distances", "placement"])
+def test_one_tolerance_is_the_same_for_every_distance(mode: Mode, rng: np.random.Generator) -> None:
+    points = postures(100) + rng.normal(size=(100, 19, 3)) * 0.01
+    each = judge(points, tolerance=RigidTolerance.uniform(0.015), mode=mode)
+    for name, findings in judge(points, tolerance=0.015, mode=mode).items():
+        np.testing.assert_array_equal(findings.violated, each[name].violated)
+        np.testing.assert_array_equal(findings.margin, each[name].margin)
+
+
+@pytest.mark.parametrize("name", [field.name for field in fields(RigidTolerance)])
+def test_a_looser_tolerance_of_one_distance_never_rejects_more(name: str, rng: np.random.Generator) -> None:
+    points = postures(200) + rng.normal(size=(200, 19, 3)) * 0.01
+    rejected = []
+    for tolerance in (0.0, 0.01, 0.03, 0.2):
+        findings = judge(points, tolerance=replace(EACH, **{name: tolerance}), mode="distances").values()
+        rejected.append(np.any([f.violated[:, 0] for f in findings], axis=0))
+    for strict, loose in pairwise(rejected):
+        assert (strict | ~loose).all()
+    assert rejected[0].sum() > rejected[-1].sum()
+
+
+def test_what_is_none_of_the_four_may_be_off_by_the_widest() -> None:
+    checks = rigid_parts(FIGURE, tolerance=EACH, limbs=True)
+    allowed = {check.where[0]: check.tolerance for check in checks}  # type: ignore[attr-defined]
+    assert allowed == {
+        **{segment_name(segment): 0.04 for segment in SEGMENTS},
+        **OWN,
+        "torso": 0.04,
+    }
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -0.001])
+@pytest.mark.parametrize("name", [field.name for field in fields(RigidTolerance)])
+def test_a_tolerance_that_is_no_length_is_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=rf"the rigid tolerance of {name} is {value!r} m; expected zero or"):
+        replace(EACH, **{name: value})
+
+
+def test_a_suite_takes_one_tolerance_or_one_each() -> None:
+    ranges = load_ranges("urdf")
+    points = postures(1)
+    points[:, JOINT["left_hip"]] *= 1.003  # 1 to 2 cm along the ray
+    for tolerance, passes in ((0.03, True), (0.001, False), (EACH, True), (replace(EACH, hips=0.001), False)):
+        checks = make_checks(FIGURE, ["rigid-parts"], ranges=ranges, rigid_tolerance=tolerance)
+        rejected = any(check.judge(points[:, check.points]).violated.any() for check in checks)
+        assert rejected == (not passes)

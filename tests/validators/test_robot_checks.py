@@ -196,7 +196,7 @@ def test_capsules_lie_on_the_segments_at_neutral(name: str) -> None:
         assert isinstance(capsule, coal.Capsule)
         knee, ankle = place[f"{side}_knee"], place[f"{side}_ankle"]
         length = float(np.linalg.norm(ankle - knee))
-        assert capsule.radius == pytest.approx(0.04 / 0.37 * length)
+        assert capsule.radius == pytest.approx(0.032 / 0.37 * length)  # the stick figure's, in proportion
         axis = oMg.rotation[:, 2]
         along = (ankle - knee) / length
         assert abs(axis @ along) == pytest.approx(1.0)

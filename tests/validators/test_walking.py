@@ -10,7 +10,7 @@ from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
 from posekit.validators import walking
-from posekit.validators.walking import DEFAULT_RULES, RULES, WalkingThresholds
+from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds
 
 FIGURE = load_figure()
 LIMITS = WalkingThresholds()
@@ -161,7 +161,7 @@ class TestTooCloseToTheTorso:
     def test_a_small_swing_is_no_evidence_for_rule_1(
         self, limb: str, hinge: str, joint: str, sign: int
     ) -> None:
-        for swing, decided in ((LIMITS.limb_swing - 1e-4, False), (LIMITS.limb_swing + 1e-4, True)):
+        for swing, decided in ((LIMITS.knee_swing - 1e-4, False), (LIMITS.knee_swing + 1e-4, True)):
             angle = sign * flexed(hinge, swing)
             points = posture(**{f"right_{joint}_flexion": angle, f"left_{joint}_flexion": sign * 30})
             assert (f"rule1.{limb}" in rejected(points, (1,))) == decided
@@ -170,7 +170,7 @@ class TestTooCloseToTheTorso:
                 assert values(points, (1,))[f"rule1.{limb}"] == pytest.approx(swing, abs=1e-9)
 
     def test_a_small_swing_is_no_evidence_for_rule_2(self) -> None:
-        for swing, decided in ((LIMITS.limb_swing - 1e-4, False), (LIMITS.limb_swing + 1e-4, True)):
+        for swing, decided in ((LIMITS.knee_swing - 1e-4, False), (LIMITS.knee_swing + 1e-4, True)):
             points = posture(left_shoulder_flexion=flexed("elbow", swing), left_hip_flexion=30)
             assert (rejected(points, (2,)) == {"rule2.left"}) == decided
 
@@ -183,10 +183,36 @@ class TestTooCloseToTheTorso:
             found = [rejected(points, (3,)) for points in (apart, together)]
             assert ({"rule3.right_arm"} in found) == decided
 
+    def test_elbows_and_knees_have_thresholds_of_their_own(self) -> None:
+        arms = posture(right_shoulder_flexion=flexed("elbow", 0.05), left_shoulder_flexion=30)
+        legs = posture(right_hip_flexion=flexed("knee", 0.05), left_hip_flexion=30)
+        for elbow, knee in ((0.04, 0.06), (0.06, 0.04)):
+            thresholds = WalkingThresholds(elbow_swing=elbow, knee_swing=knee)
+            assert rejected(arms, (1,), thresholds) == ({"rule1.arms"} if elbow < 0.05 else set())
+            assert rejected(legs, (1,), thresholds) == ({"rule1.legs"} if knee < 0.05 else set())
+
+    def test_people_are_given_more_than_the_papers_walker(self) -> None:
+        # One leg passes the other: both knees in front and bent, the elbows behind, the arms turned outward.
+        passing = {
+            "right_hip_flexion": 25,
+            "left_hip_flexion": 12,
+            "right_knee_flexion": 60,
+            "left_knee_flexion": 20,
+        }
+        arms = {f"{side}_shoulder_{name}": angle for side in ("right", "left")
+                for name, angle in (("flexion", -10), ("abduction", 12), ("rotation", 15))}  # fmt: skip
+        points = posture(**passing, **arms)
+        assert {"rule1.legs", "rule1.arms", "rule5.knees", "rule4.right_arm"} <= rejected(points)
+        assert rejected(points, thresholds=PEOPLE) == set()
+        # But not: both legs far in front, or an arm and a leg of one side.
+        assert rejected(posture(right_hip_flexion=60, left_hip_flexion=55), (1,), PEOPLE) == {"rule1.legs"}
+        together = posture(right_shoulder_flexion=40, right_hip_flexion=50)
+        assert rejected(together, (2,), PEOPLE) == {"rule2.right"}
+
     def test_thresholds_can_be_chosen(self) -> None:
         points = posture(right_hip_flexion=10, left_hip_flexion=10)
         assert rejected(points, (1,)) == {"rule1.legs"}
-        assert rejected(points, (1,), WalkingThresholds(limb_swing=0.1)) == set()
+        assert rejected(points, (1,), WalkingThresholds(knee_swing=0.1)) == set()
 
 
 class TestTheBodyPlane:

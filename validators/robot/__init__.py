@@ -5,6 +5,7 @@ configurations in batches. `RobotValidator` puts them together, and `posekit.val
 """
 
 from posekit.validators.robot.contacts import Contacts as Contacts
+from posekit.validators.robot.deferred import Deferred as Deferred
 from posekit.validators.robot.ranges import load_joint_limits as load_joint_limits
 from posekit.validators.robot.robot_validator import RobotValidator as RobotValidator
 from posekit.validators.robot.settings import ROBOT_CHECKS as ROBOT_CHECKS

@@ -83,13 +83,23 @@ class SelfCollision:
         There is one place, the nearest pair. Its value is a bound of the distance: at least the contact margin where
         nothing collides, at most that where something does; `contacts` measures.
         """
-        asked = slice(None) if undecided is None else ~undecided
+        if undecided is None:
+            return self.judgement(self.hits(q))
         hit = np.zeros(len(q), dtype=np.bool_)
-        value = np.full((len(q), 1), np.nan)
-        some = q[asked]
-        if len(some) and len(self.margins):
-            hit[asked] = collides(self._pool, some.T)
-        value[asked] = self.contact_margin
+        hit[~undecided] = self.hits(q[~undecided])
+        return self.judgement(hit, undecided)
+
+    def hits(self, q: Array) -> NDArray[np.bool_]:
+        """Tell which configurations (N, nq) collide."""
+        if not len(q) or not len(self.margins):
+            return np.zeros(len(q), dtype=np.bool_)
+        return collides(self._pool, q.T)
+
+    def judgement(self, hit: NDArray[np.bool_], undecided: NDArray[np.bool_] | None = None) -> Judgement:
+        """Put into a judgement which configurations collide (N,), and about which nothing was asked (N,)."""
+        value = np.full((len(hit), 1), self.contact_margin)
+        if undecided is not None:
+            value[undecided] = np.nan
         return Judgement(
             check="collision",
             where=(PLACE,),
@@ -106,6 +116,7 @@ class SelfCollision:
         subject = self.subject
         return find_contacts(
             subject.model,
+            self._data,
             self._bodies,
             q,
             rows,
@@ -113,6 +124,10 @@ class SelfCollision:
             names=subject.pair_names,
             nearest=nearest,
         )
+
+    @cached_property
+    def _data(self) -> pin.Data:
+        return self.subject.model.createData()
 
     @cached_property
     def _pool(self) -> pin.GeometryPool:

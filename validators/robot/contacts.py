@@ -40,6 +40,7 @@ class Contacts:
 
 def find_contacts(
     model: pin.Model,
+    data: pin.Data,
     geometry: pin.GeometryModel,
     q: Array,
     rows: NDArray[np.intp],
@@ -52,6 +53,8 @@ def find_contacts(
 
     Parameters
     ----------
+    model, data : pinocchio.Model, pinocchio.Data
+    geometry : pinocchio.GeometryModel
     q : array (N, nq)
     rows : int array
         Which configurations are asked about.
@@ -59,32 +62,32 @@ def find_contacts(
         Metres, of each pair of the geometry: what coal calls the security margin.
     names : tuple of str (P,)
     nearest : bool
-        List the nearest pair of every configuration asked about too. With meshes that takes long: each distance of
-        two meshes is a millisecond, and all of them are asked.
+        List the nearest pair of every configuration asked about too, the first of those that are equally near. With
+        meshes that takes long: each distance of two meshes is a millisecond, and all of them are asked.
     """
-    data, geometry_data = model.createData(), geometry.createData()
+    geometry_data = geometry.createData()  # a fresh one: coal starts its search where the one before ended
     for request, margin in zip(geometry_data.collisionRequests, margins.tolist(), strict=True):
         request.security_margin = margin
+    collide, measure = pin.computeCollision, pin.computeDistance
     pairs = range(len(names))
-    found: list[tuple[int, int, float, bool]] = []
-    for row in rows.tolist():
-        pin.updateGeometryPlacements(model, data, geometry, geometry_data, q[row])
-        hits = [pair for pair in pairs if pin.computeCollision(geometry, geometry_data, pair)]
-        depth = {pair: _distance(geometry, geometry_data, pair) for pair in hits}
-        if nearest and not hits:
-            depth = {pair: _distance(geometry, geometry_data, pair) for pair in pairs}
-            least = min(depth, key=lambda pair: depth[pair], default=None)
-            depth = {} if least is None else {least: depth[least]}
-        found += [(row, pair, distance, pair in hits) for pair, distance in depth.items()]
-    columns = list(zip(*found, strict=True)) if found else [(), (), (), ()]
+    posture: list[int] = []
+    named: list[int] = []
+    distance: list[float] = []
+    violated: list[bool] = []
+    for row, one in zip(rows.tolist(), q[rows], strict=True):
+        pin.updateGeometryPlacements(model, data, geometry, geometry_data, one)
+        asked = hits = [pair for pair in pairs if collide(geometry, geometry_data, pair)]
+        if nearest and not hits and names:
+            asked = [pin.computeDistances(geometry, geometry_data)]  # the index of the least
+        for pair in asked:
+            posture.append(row)
+            named.append(pair)
+            distance.append(measure(geometry, geometry_data, pair).min_distance)
+            violated.append(bool(hits))
     return Contacts(
-        posture=np.array(columns[0], dtype=np.intp),
-        pair=np.array(columns[1], dtype=np.intp),
-        distance=np.array(columns[2], dtype=np.float64),
-        violated=np.array(columns[3], dtype=np.bool_),
+        posture=np.array(posture, dtype=np.intp),
+        pair=np.array(named, dtype=np.intp),
+        distance=np.array(distance, dtype=np.float64),
+        violated=np.array(violated, dtype=np.bool_),
         names=names,
     )
-
-
-def _distance(geometry: pin.GeometryModel, geometry_data: pin.GeometryData, pair: int) -> float:
-    return float(pin.computeDistance(geometry, geometry_data, pair).min_distance)

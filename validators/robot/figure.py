@@ -17,7 +17,7 @@ from posekit.skeleton import DOFS, urdf_joint_name
 from posekit.tree import Check
 from posekit.validators.ranges import Ranges
 from posekit.validators.robot.collision import SelfCollision
-from posekit.validators.robot.joint_range import judge_joint_range
+from posekit.validators.robot.configurations import judge_quickly
 from posekit.validators.robot.subject import Subject
 from posekit.validators.suite import Judgement, judge
 
@@ -46,7 +46,7 @@ class FigureConfigurations:
     angle_tolerance: float
     contact_margin: float
 
-    def judge(self, q: ArrayLike, source: str = "q") -> tuple[Array, list[Judgement]]:
+    def judge(self, q: ArrayLike, source: str = "q") -> tuple[Array, Sequence[Judgement]]:
         """Return the checked configurations (N, nq), and what is said about them.
 
         Raises
@@ -55,25 +55,27 @@ class FigureConfigurations:
             Where they are none of the figure's, or no check is left to judge them.
         """
         checked = check_configurations(self.figure.model, q, source)
+        checked.flags.writeable = False  # its margins may be asked for later
         if set(self.checks) == {"rigid-parts"}:
             raise InputError(
                 "--checks: rigid-parts: a configuration's lengths are the figure's own, so nothing would be judged; "
                 "expected joint-range, collision or walking"
             )
-        judgements: list[Judgement] = []
+        limits = "joint-range" in self.checks and not self._of_postures
+        quick = judge_quickly(
+            self.subject,
+            self.collision if "collision" in self.checks else None,
+            checked,
+            tolerance=self.angle_tolerance if limits else None,
+        )
+        named = quick.renamed(self._under_its_names)
         of_points = [check for check in self.suite if check.name == "walking" or self._projects(check)]
-        by_name = {}
-        if of_points:
-            points = self.figure.forward_kinematics(checked)
-            by_name = {judgement.check: judgement for judgement in judge(of_points, points)}
-        for name in self.checks:
-            if name == "collision":
-                judgements.append(self.collision.judge(checked))
-            elif name == "joint-range" and not self._of_postures:
-                judgements.append(self._joint_range(checked))
-            elif name.replace("-", "_") in by_name:
-                judgements.append(by_name[name.replace("-", "_")])
-        return checked, judgements
+        if not of_points:
+            return checked, named
+        found = {one.check: one for one in judge(of_points, self.figure.forward_kinematics(checked))}
+        found |= {one.check: one for one in named}
+        order = [name.replace("-", "_") for name in self.checks]
+        return checked, [found[name] for name in order if name in found]
 
     @cached_property
     def subject(self) -> Subject:
@@ -103,7 +105,10 @@ class FigureConfigurations:
         """Whether ranges are of postures, and not only limits of single angles."""
         return self.ranges.kind == "projected" or self.ranges.anatomy is not None
 
-    def _joint_range(self, q: Array) -> Judgement:
-        judgement = judge_joint_range(self.subject, q, tolerance=self.angle_tolerance)
+    @staticmethod
+    def _under_its_names(judgement: Judgement) -> Judgement:
+        """Return a judgement with the figure's names of its angles."""
+        if judgement.check != "joint_range":
+            return judgement
         dofs = {urdf_joint_name(dof): dof for dof in DOFS}
         return replace(judgement, where=tuple(dofs[name] for name in judgement.where))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,27 @@ from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE, Subject
 from posekit.validators.suite import Judgement
 
 Bools = NDArray[np.bool_]
+
+ROWS: Final = 1024
+"""Configurations that are compared at once: they and the comparisons stay in the processor's cache."""
+
+
+def outside_limits(subject: Subject, q: Array, *, tolerance: float) -> Bools:
+    """Tell which configurations (N, nq) `judge_joint_range` calls violated, without their margins.
+
+    A number between its bounds has no negative margin in any unit, because multiplying by a positive number keeps
+    the order; only configurations with a number outside are asked again, by the formula of the margins themselves.
+    """
+    lower, upper = (np.full(q.shape[1], bound) for bound in (-np.inf, np.inf))
+    lower[subject.index], upper[subject.index] = subject.lower[subject.index], subject.upper[subject.index]
+    outside = np.zeros(len(q), dtype=np.bool_)
+    for start in range(0, len(q), ROWS):
+        part = q[start : start + ROWS]
+        some = np.flatnonzero(((part < lower) | (part > upper)).any(axis=1))
+        if len(some):
+            judged = judge_joint_range(subject, part[some], tolerance=tolerance)
+            outside[start + some] = judged.violated.any(axis=1)
+    return outside
 
 
 def beyond_limits(subject: Subject, q: Array) -> Array:

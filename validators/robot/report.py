@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.contacts import Contacts
+from posekit.validators.robot.deferred import Deferred
 from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE
 from posekit.validators.suite import Judgement
 
@@ -23,8 +25,8 @@ class Report:
 
     Parameters
     ----------
-    judgements : list of Judgement
-        By validator.
+    judgements : sequence of Judgement
+        By validator; of configurations each is made when it is looked at.
     complete : bool array (N,)
         Whether all joints that the model has are known.
     q : array (N, nq)
@@ -39,7 +41,7 @@ class Report:
         Who knows which bodies touch: one for all postures, or one a posture.
     """
 
-    judgements: list[Judgement]
+    judgements: Sequence[Judgement]
     complete: NDArray[np.bool_]
     q: Array
     fk_distance: Array
@@ -50,6 +52,8 @@ class Report:
     @cached_property
     def invalid(self) -> NDArray[np.bool_]:
         """Postures that some check rejects (N,)."""
+        if isinstance(self.judgements, Deferred):
+            return self.judgements.rejected
         invalid = np.zeros(len(self.complete), dtype=bool)
         for judgement in self.judgements:
             invalid |= judgement.violated.any(axis=1)
@@ -68,17 +72,16 @@ class Report:
     @cached_property
     def _decided(self) -> NDArray[np.bool_]:
         decided = self.complete.copy()
-        for judgement in self.judgements:
-            decided &= ~np.isnan(judgement.worst)
+        for judgement in () if isinstance(self.judgements, Deferred) else self.judgements:
+            if judgement.where:  # a robot without limits is inside them
+                decided &= ~np.isnan(judgement.worst)
         return decided
 
     @property
     def verdicts(self) -> list[str]:
         """``valid``, ``invalid`` or ``undecided``, a posture each."""
-        return [
-            "invalid" if bad else "valid" if good else "undecided"
-            for bad, good in zip(self.invalid, self.valid, strict=True)
-        ]
+        number = np.where(self.invalid, 1, np.where(self._decided, 0, 2))
+        return [VERDICTS[k] for k in number.tolist()]
 
     @cached_property
     def worst(self) -> Array:
@@ -92,27 +95,26 @@ class Report:
             worst = np.fmin(worst, np.fmin.reduce(judgement.margin * each, axis=1, initial=np.nan))
         return worst
 
-    def contacts(self, *, nearest: bool = False) -> Contacts:
+    def contacts(self, *, nearest: bool | NDArray[np.bool_] = False) -> Contacts:
         """List the pairs of bodies that collide in each posture, with their distances.
 
         Parameters
         ----------
-        nearest : bool
-            List the nearest pair of postures without a collision too; with meshes that takes long.
+        nearest : bool, or bool array (N,)
+            List the nearest pair of postures without a collision too, of all or of some; with meshes that takes long.
         """
-        hits = [judgement for judgement in self.judgements if judgement.check == "collision"]
-        if not self.colliders or not hits:
+        # The last but balance: what comes before need not be made.
+        judged = next((one for one in reversed(self.judgements) if one.check == "collision"), None)
+        if not self.colliders or judged is None:
             nothing = np.zeros(0, dtype=np.intp)
             return Contacts(
                 posture=nothing, pair=nothing, distance=np.zeros(0), violated=nothing.astype(bool), names=()
             )
-        asked = ~np.isnan(hits[0].value[:, 0]) if nearest else hits[0].violated[:, 0]
-        rows = np.flatnonzero(asked)
+        rows = np.flatnonzero(judged.violated[:, 0] | (nearest & ~np.isnan(judged.value[:, 0])))
+        some = bool(np.any(nearest))
         if len(self.colliders) == 1:
-            return self.colliders[0].contacts(self.q, rows, nearest=nearest)
-        parts = [
-            self.colliders[row].contacts(self.q, np.array([row]), nearest=nearest) for row in rows.tolist()
-        ]
+            return self.colliders[0].contacts(self.q, rows, nearest=some)
+        parts = [self.colliders[row].contacts(self.q, np.array([row]), nearest=some) for row in rows.tolist()]
         return Contacts(
             posture=np.concatenate([part.posture for part in parts] or [np.zeros(0, dtype=np.intp)]),
             pair=np.concatenate([part.pair for part in parts] or [np.zeros(0, dtype=np.intp)]),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final, NamedTuple
@@ -15,6 +15,7 @@ from posekit.errors import InputError
 from posekit.robot import Robot, check_configurations
 from posekit.robot.joint_map import targets_of
 from posekit.robot.scaling import segment_lengths, shoulders_are_behind
+from posekit.validators.robot.configurations import judge_quickly
 from posekit.validators.robot.fitting import Fit
 from posekit.validators.robot.joint_range import judge_joint_range
 from posekit.validators.robot.models import Judged, Models
@@ -40,7 +41,7 @@ class Verdict(NamedTuple):
 
     Attributes
     ----------
-    judgements : list of Judgement
+    judgements : sequence of Judgement
     complete : bool array (N,)
         Whether all joints that the model has are known.
     q : array (N, nq)
@@ -53,7 +54,7 @@ class Verdict(NamedTuple):
         The model that was judged: one for all, or one a posture.
     """
 
-    judgements: list[Judgement]
+    judgements: Sequence[Judgement]
     complete: Bools
     q: Array
     points: tuple[str, ...]
@@ -88,6 +89,7 @@ class RobotValidator:
             Where they are none of the robot's (`check_configurations`), or no check is left to judge them.
         """
         checked = check_configurations(self.robot.model, q, source)
+        checked.flags.writeable = False  # its margins may be asked for later
         if not set(self.settings.checks) - set(OF_POSITIONS):
             raise InputError(
                 f"--checks: {', '.join(self.settings.checks)}: a configuration's lengths are the model's own, so "
@@ -151,15 +153,17 @@ class RobotValidator:
         return self.models.with_lengths(lengths, shoulders_are_behind(postures) if behind is None else behind)
 
 
-def _of_configurations(judged: Judged, q: Array) -> list[Judgement]:
-    """Ask the checks of configurations."""
-    settings, judgements = judged.settings, []
-    if "joint-range" in settings.checks:
-        judgements.append(judge_joint_range(judged.subject, q, tolerance=settings.angle_tolerance))
-    if "collision" in settings.checks:
-        judgements.append(judged.collision.judge(q))
+def _of_configurations(judged: Judged, q: Array) -> Sequence[Judgement]:
+    """Ask the checks of configurations; balance, which costs the forward kinematics, has no quick verdict."""
+    settings = judged.settings
+    judgements = judge_quickly(
+        judged.subject,
+        judged.collision if "collision" in settings.checks else None,
+        q,
+        tolerance=settings.angle_tolerance if "joint-range" in settings.checks else None,
+    )
     if "balance" in settings.checks:
-        judgements.append(judged.balance.judge(q))
+        return [*judgements, judged.balance.judge(q)]
     return judgements
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.measures import mpjpe, pa_mpjpe
 from posekit.pipeline.markdown import table_lines
-from posekit.pipeline.ranked import ranked
 from posekit.pipeline.recovery import Recovery
 
 MEASURES: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
@@ -62,8 +61,7 @@ def compare(recovery: Recovery, truth: Array) -> Comparison:
     """Compare the survivors of every frame with the truth (F, 14, 3), camera frame, metres."""
     count = len(recovery.frames)
     found = {name: np.full((count, 3), np.nan) for name in ("best", "first", "middle")}
-    rigid = [frame.tolerance.rigid if frame.tolerance else 0.0 for frame in recovery.frames]
-    ranking = ranked(recovery.frames, recovery.figure.lengths, rigid)
+    ranking = recovery.ranking
     for k, frame in enumerate(recovery.frames):
         joints = frame.joints
         both = np.isfinite(joints[..., 0]) & np.isfinite(truth[k, :, 0])

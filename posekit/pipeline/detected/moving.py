@@ -19,7 +19,7 @@ from posekit.files import OpenCVModel, Result, View
 from posekit.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
 from posekit.motion.motion_axes import up_rotation
 from posekit.pipeline.detected.kinds import Kind, What
-from posekit.pipeline.ranked import ranked, rigid_of
+from posekit.pipeline.ranked import probabilities
 from posekit.pipeline.validate import recovered_with
 from posekit.skeleton import POINTS
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
@@ -211,9 +211,9 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
     empty = 0
-    ranking = ranked(result.frames, figure.lengths, rigid_of(result.settings, len(result.frames)))
+    probability = probabilities(result, figure.lengths)
     for k in range(len(result.frames)):
-        order = ranking.of(k).order
+        order = np.argsort(-probability[k], kind="stable")
         if not len(order):
             empty += 1
             continue
@@ -240,7 +240,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     values = {
         f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
     }
-    values["probability"] = np.array([ranking.of(k).probability[row] for k, row in rows])
+    values["probability"] = np.array([probability[k][row] for k, row in rows])
     values["rank"] = np.array(ranks, dtype=np.float64)
     values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
     return Moving(

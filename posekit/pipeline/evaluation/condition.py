@@ -58,9 +58,8 @@ def numbers(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
             }
             for role in roles_of(frames)
         },
-        "limbs_right": {
-            role: _mean(found.limbs[role][rows]) for role in roles_of(frames) if role in found.limbs
-        },
+        "limbs_right": {role: _mean(found.limbs[role][rows]) for role in roles_of(frames)},
+        **({"bridged": _mean(found.bridged[rows])} if "path" in roles_of(frames) else {}),
         "calibration": _calibration(frames, rows),
         "violations": {
             "certified": int(found.certified["all"][rows].sum()),

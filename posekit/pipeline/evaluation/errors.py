@@ -62,6 +62,25 @@ def best_of_frames(errors: Array, offsets: NDArray[np.intp]) -> Array:
     return best
 
 
+def best_rows(error: Array, offsets: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return which of each frame's survivors has the least error (F,); -1 where none has one.
+
+    Parameters
+    ----------
+    error : array (N,)
+    offsets : int array (F + 1,)
+        Where each frame's survivors start and the last ends.
+    """
+    counts = np.diff(offsets)
+    frame = np.repeat(np.arange(len(counts)), counts)
+    known = np.flatnonzero(np.isfinite(error))
+    order = known[np.lexsort((error[known], frame[known]))]
+    frames, first = np.unique(frame[order], return_index=True)
+    best = np.full(len(counts), -1, dtype=np.intp)
+    best[frames] = order[first] - offsets[frames]
+    return best
+
+
 def of_chosen(errors: Array, offsets: NDArray[np.intp], chosen: NDArray[np.intp]) -> Array:
     """Return the errors of one survivor a frame (F, 5); NaN where -1 was chosen."""
     rows = offsets[:-1] + np.maximum(chosen, 0)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from posekit.errors import InputError, PosekitError
 from posekit.figure import Figure, load_figure
 from posekit.files import View
-from posekit.pipeline.evaluation.ranking import Chooser, Ranker, by_probability
+from posekit.pipeline.evaluation.ranking import Ranker, by_probability
+from posekit.pipeline.evaluation.sequences import Chooser
 from posekit.pipeline.recover import person_of, recover
 from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.rooting import Rooting
@@ -52,7 +53,7 @@ class Method:
     rank : Ranker
         Orders the survivors of each frame.
     choose : Chooser, optional
-        Follows sequences. With it, frames are taken in a row.
+        Follows sequences, as `by_path` does. With it, frames are taken in a row.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What orders survivors, and what picks one a frame: functions that are given."""
+"""What orders the survivors of a frame: a function that is given."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.errors import InputError
@@ -41,20 +41,11 @@ class Ranker(Protocol):
         ...
 
 
-class Chooser(Protocol):
-    """Follows one person through the frames of one camera that stands still."""
-
-    def __call__(self, frames: Sequence[FrameRecovery]) -> ArrayLike:
-        """Return the index of one survivor a frame (F,), -1 where none is chosen."""
-        ...
-
-
 def by_probability(frames: Sequence[FrameRecovery], figure: Figure) -> list[Ranking]:
     """Rank by probability, of a camera held level (`posekit.ranking.rank`)."""
     if not frames:
         return []
-    rigid = [frame.tolerance.rigid if frame.tolerance else 0.0 for frame in frames]
-    ranking = ranked(frames, figure.lengths, rigid)
+    ranking = ranked(frames, figure.lengths, [frame.spread for frame in frames])
     parts = [ranking.of(k) for k in range(len(frames))]
     return [Ranking(order=part.order, probability=part.probability) for part in parts]
 
@@ -88,26 +79,3 @@ def first_ranked(rankings: Sequence[Ranking], counts: NDArray[np.intp]) -> tuple
             first[k] = order[0]
             probability[k] = np.nan if given is None else given[order[0]]
     return first, probability
-
-
-def chosen_by(chooser: Chooser, frames: Sequence[FrameRecovery]) -> NDArray[np.intp]:
-    """Return what a chooser chooses, checked.
-
-    Raises
-    ------
-    InputError
-        Where it is not one of each frame's survivors, or -1.
-    """
-    chosen = np.asarray(chooser(frames))
-    counts = np.array([len(frame) for frame in frames])
-    if chosen.shape != counts.shape or chosen.dtype.kind not in "iu":
-        raise InputError(
-            f"the choice through the sequence is {chosen.dtype} of shape {chosen.shape}; expected one whole number a "
-            f"frame, ({len(counts)},)"
-        )
-    if ((chosen < -1) | (chosen >= counts)).any():
-        k = int(np.argmax((chosen < -1) | (chosen >= counts)))
-        raise InputError(
-            f"frame {k} of the sequence: survivor {chosen[k]} was chosen; expected -1 to {counts[k] - 1}"
-        )
-    return chosen.astype(np.intp)

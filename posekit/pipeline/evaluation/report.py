@@ -19,6 +19,9 @@ from posekit.pipeline.markdown import table_lines
 SCHEMA: Final = "posekit.evaluation/1"
 SUFFIXES: Final = (".json", ".csv", ".md")
 
+FOLLOWED: Final = ("MPJPE path", "PA path", "limbs right: path", "best", "first", "random", "bridged")
+"""Columns of the tables where sequences are followed."""
+
 GROUPS: Final = {
     "all": (),
     "by_noise": ("noise",),
@@ -156,10 +159,20 @@ def _table(name: str, told: list[tuple[str, dict[str, Any]]]) -> list[str]:
                 *(_short(errors["mpjpe"][role]["mean"]) for role in ("best", "first", "random")),
                 *(_short(errors["pa"][role]["mean"]) for role in ("best", "first")),
                 *(_short(one["cps_mm"][role]["aligned"]) for role in ("first", "best")),
-                *([_short(errors["mpjpe"]["path"]["mean"])] if path else []),
+                *(_followed(one) if path else ()),
             ]
         )
-    return table_lines([*head, *(["MPJPE path"] if path else [])], rows)
+    return table_lines([*head, *(FOLLOWED if path else ())], rows)
+
+
+def _followed(one: Mapping[str, Any]) -> list[str]:
+    """Return the cells of a sequence that was followed."""
+    errors, limbs = one["error_mm"], one["limbs_right"]
+    return [
+        *(_short(errors[measure]["path"]["mean"]) for measure in ("mpjpe", "pa")),
+        *(_share(limbs[role]) for role in ("path", "best", "first", "random")),
+        _share(one["bridged"]),
+    ]
 
 
 def _share(value: float | None) -> str:

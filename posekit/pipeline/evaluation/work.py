@@ -14,16 +14,18 @@ from posekit.figure import Figure
 from posekit.files import ScaledOrthographicModel, View
 from posekit.pipeline.body import FigureBody
 from posekit.pipeline.evaluation.certificate import Certificate, certify
-from posekit.pipeline.evaluation.errors import best_of_frames, of_chosen, survivor_errors
+from posekit.pipeline.evaluation.errors import best_of_frames, best_rows, of_chosen, survivor_errors
 from posekit.pipeline.evaluation.method import Method, figure_of
-from posekit.pipeline.evaluation.ranking import chosen_by, first_ranked
+from posekit.pipeline.evaluation.ranking import Ranking, first_ranked
+from posekit.pipeline.evaluation.sequences import chosen_by
 from posekit.pipeline.evaluation.true_branch import killers, limbs_right, true_branch
 from posekit.pipeline.recovery import Batch, FrameRecovery
 from posekit.pipeline.tolerance import Tolerance
+from posekit.skeleton import JOINTS
 
 ROLES: Final = ("best", "first", "random", "path")
 """Whose errors are told: the best survivor by each measure, the one that is ranked first, one drawn by lot, and the one
-that was chosen by following the sequence."""
+that was chosen by following the sequence, or what bridges it there."""
 
 CERTIFIED: Final = 16
 """Survivors of a frame that are certified: evenly over them, all where there are no more."""
@@ -76,7 +78,9 @@ class Measured:
     branch : array (F,)
         1 where a survivor has the truth's branch code, 0 where none has, NaN where the truth has none to be known.
     limbs : mapping of str to array (F,)
-        By role, without ``best``: the share of the four limbs that take the true branch.
+        By role, the best by its mean joint error: the share of the four limbs that take the true branch.
+    bridged : array (F,)
+        1 where the path passes the frame over, 0 where it takes a survivor, NaN where sequences are not followed.
     probability : array (F,)
         Of the first-ranked survivor; NaN where none is given.
     first_branch : array (F,)
@@ -96,6 +100,7 @@ class Measured:
     errors: dict[str, Array]
     branch: Array
     limbs: dict[str, Array]
+    bridged: Array
     probability: Array
     first_branch: Array
     certified: dict[str, NDArray[np.intp]]
@@ -119,33 +124,40 @@ def measure(work: Work, method: Method) -> Measured:
     joints = np.concatenate([frame.joints for frame in frames])
     which = np.repeat(np.arange(len(frames)), counts)
     errors = survivor_errors(joints, work.view.truth[which])
+    rankings = method.rank(frames, figure)
+    first, probability = first_ranked(rankings, counts)
+    path, bridges = _followed(work, method, frames, rankings)
+    bridging = survivor_errors(bridges, work.view.truth)
     if isinstance(work.view.camera, ScaledOrthographicModel):
-        errors[:, [0, 3]] = errors[:, [1, 4]]  # it tells no place in space
-    first, probability = first_ranked(method.rank(frames, figure), counts)
+        for found in (errors, bridging):
+            found[:, [0, 3]] = found[:, [1, 4]]  # it tells no place in space
     chosen = {
+        "best": best_rows(errors[:, 0], offsets),
         "first": first,
         "random": _drawn(counts, np.random.default_rng((*work.seed, 1))),
-        "path": np.full(len(frames), -1, dtype=np.intp)
-        if method.choose is None
-        else _followed(work, method, frames),
+        "path": path,
     }
     true, retained, killer = _true_codes(frames, work.view.truth)
     codes = np.array([int(code, 2) for frame in frames for code in frame.branches], dtype=np.int32)
     of_frame = {role: np.where(rows >= 0, _taken(codes, offsets, rows), -1) for role, rows in chosen.items()}
+    if np.isfinite(bridges).any():
+        of_frame["path"] = np.where(path >= 0, of_frame["path"], _true_codes(frames, bridges)[0])
     known = np.isfinite(retained)
     certified, excess = _certified(frames, figure, method)
     first_branch = np.where(known, (of_frame["first"] == true) & (true >= 0) & (first >= 0), np.nan)
     return Measured(
         survivors=counts,
         errors={
-            "best": best_of_frames(errors, offsets),
             **{role: of_chosen(errors, offsets, rows) for role, rows in chosen.items()},
+            "best": best_of_frames(errors, offsets),
+            "path": np.where(path[:, None] >= 0, of_chosen(errors, offsets, path), bridging),
         },
         branch=retained,
         limbs={
-            role: np.where(known & (rows >= 0), limbs_right(of_frame[role], true), np.nan)
-            for role, rows in chosen.items()
+            role: np.where(known & (of_frame[role] >= 0), limbs_right(of_frame[role], true), np.nan)
+            for role in chosen
         },
+        bridged=np.full(len(frames), np.nan) if method.choose is None else (path < 0).astype(np.float64),
         probability=probability,
         first_branch=first_branch,
         certified=certified,
@@ -170,14 +182,20 @@ def _drawn(counts: NDArray[np.intp], rng: np.random.Generator) -> NDArray[np.int
     return np.where(counts > 0, np.minimum(lots, counts - 1), -1)
 
 
-def _followed(work: Work, method: Method, frames: Sequence[FrameRecovery]) -> NDArray[np.intp]:
-    """Let each camera's frames be followed in order."""
+def _followed(
+    work: Work, method: Method, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]
+) -> tuple[NDArray[np.intp], Array]:
+    """Let each camera's frames be followed in order: survivors (F,), and joints (F, 14, 3) where there is none."""
     chosen = np.full(len(frames), -1, dtype=np.intp)
+    bridges = np.full((len(frames), len(JOINTS), 3), np.nan)
     if method.choose is not None:
         for camera in np.unique(work.camera):
             rows = np.flatnonzero(work.camera == camera)
-            chosen[rows] = chosen_by(method.choose, [frames[k] for k in rows.tolist()])
-    return chosen
+            own = rows.tolist()
+            chosen[rows], bridges[rows] = chosen_by(
+                method.choose, [frames[k] for k in own], [rankings[k] for k in own]
+            )
+    return chosen, bridges
 
 
 def _batches(frames: Sequence[FrameRecovery]) -> Iterator[tuple[Batch, NDArray[np.intp]]]:

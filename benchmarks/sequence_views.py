@@ -1,0 +1,241 @@
+"""What `sequences.py` looks at: walkers and motion capture from all sides, recovered with and without noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posekit.errors import PosekitError
+from posekit.figure import Figure
+from posekit.files import OpenCVModel, View
+from posekit.pipeline import recover
+from posekit.ranking import Prior, Up, fit_prior, load_prior, rank
+from posekit.refinement import RootPrior, Sight, find_trunks, merge, refine, tolerance_of, under_noise
+from posekit.sequences import SurvivorFrame
+from posekit.skeleton import JOINTS, PARENTS, SEGMENT_NAMES, SEGMENTS
+from posekit.synthesis import Capture, Scene, Walker, mocap_scene
+from posekit.synthesis.camera_sphere import CameraSphere
+from posekit.synthesis.observe import observe
+from posekit.synthesis.viewpoints import look_at
+from posekit.tree import InterpretationTree
+from posekit.validators import PHYSICAL, load_ranges, make_checks
+
+HEIGHT = 1.4
+RATE = 30.0
+FRAMES = 60
+DISTANCES = (4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
+OTHERS = ("basketball_1", "basketball_signal_1", "jumping_1", "jumping_2", "soccer_1", "soccer_2")
+START = {"basketball_signal_1": 200}
+"""Frame that a clip is taken from; else the second, since the first is the rest posture."""
+
+TRUNK_LENGTHS, LIMB_LENGTHS = 0.04, 0.01
+"""Relative deviations of lengths of real bodies."""
+
+CONTACT = -0.03
+HOPELESS = 60.0
+PLACED = 0.06
+"""Metres that survivors are off where the neck was placed: so far apart are the places."""
+
+
+def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> Scene:
+    """Let the walker pass a standing camera."""
+    walker, sphere = Walker(), CameraSphere()
+    at = np.arange(frames) / RATE
+    q = walker.configurations(walker.phase(at, 0.1))
+    q[:, :3] += walker.travel(at, 0.1)
+    points = walker.figure.forward_kinematics(q)
+    middle = (points.min(axis=(0, 1)) + points.max(axis=(0, 1))) / 2
+    position = middle + distance * np.array([math.cos(math.radians(yaw)), 0.0, math.sin(math.radians(yaw))])
+    R = look_at(position, middle, np.array([0.0, 1.0, 0.0]))
+    return observe(
+        walker.figure,
+        sphere.camera,
+        points,
+        np.broadcast_to(R, (frames, 3, 3)),
+        np.broadcast_to(position, (frames, 3)),
+        time=at,
+        size=sphere.size,
+        labels=("synthetic walking",) * frames,
+    )
+
+
+def clip_scene(capture: Capture, clip: str, yaw: float) -> Scene:
+    """See a clip from a side: 0 is from ahead, 90 from its right."""
+    index = capture.clip_index(clip)
+    first = START.get(clip.rsplit("/", maxsplit=1)[-1], 1)
+    rows = capture.frames_of(index)[first : first + FRAMES]
+    part = replace(
+        capture,
+        points=capture.points[rows].copy(),
+        clip=np.zeros(len(rows), dtype=np.intp),
+        names=(clip,),
+        actions=(capture.actions[index],),
+        fps=capture.fps[index : index + 1].copy(),
+    )
+    way = part.points.reshape(-1, 3)
+    middle = (np.nanmin(way, axis=0) + np.nanmax(way, axis=0)) / 2
+    right = part.points[0, JOINTS.index("right_hip")] - part.points[0, JOINTS.index("left_hip")]
+    right = right - (right @ part.up) * part.up
+    right /= np.linalg.norm(right)
+    ahead = np.cross(part.up, right)
+    error: PosekitError | None = None
+    for distance in DISTANCES:
+        side = math.cos(math.radians(yaw)) * ahead + math.sin(math.radians(yaw)) * right
+        position = middle + distance * side
+        position += (HEIGHT - position @ part.up) * part.up
+        try:
+            return mocap_scene(part, clip, np.random.default_rng(0), position=position)
+        except PosekitError as found:
+            error = found
+    assert error is not None
+    raise error
+
+
+def scenes(capture: Capture | None, yaws: int) -> Iterator[tuple[str, str, int, Scene]]:
+    for yaw in range(0, 360, 60):
+        yield "synthetic walking", "", yaw, walker_scene(yaw)
+    if capture is None:
+        return
+    for clip, action in zip(capture.names, capture.actions, strict=True):
+        if action in ("walking", "running"):
+            for yaw in range(0, 360, 360 // yaws):
+                yield action, clip, yaw, clip_scene(capture, clip, yaw)
+        elif clip.split("/")[-1] in OTHERS:
+            for yaw in (20, 200):
+                yield "other", clip, yaw, clip_scene(capture, clip, yaw)
+
+
+def view_of(scene: Scene, figure: Figure, *, rooted: bool = True) -> View:
+    return View(
+        camera=OpenCVModel(K=scene.camera.K),
+        time=scene.time,
+        image=scene.image,
+        root=scene.joints_cam[:, 0] if rooted else np.full((len(scene), 3), np.nan),
+        lengths=dict(figure.lengths),
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recovered:
+    """A sequence with its survivors, which cost nothing yet, and what ranks them."""
+
+    frames: list[SurvivorFrame]
+    evidence: Callable[[Prior], np.ndarray]
+
+    def ranked(self, prior: Prior) -> list[SurvivorFrame]:
+        """Let survivors cost minus the logarithm of their probability."""
+        cost = -np.log(np.maximum(self.evidence(prior), 1e-300))
+        parts = np.split(cost, np.cumsum([len(frame) for frame in self.frames])[:-1])
+        return [replace(frame, cost=each) for frame, each in zip(self.frames, parts, strict=True)]
+
+
+def exact(scene: Scene, *, rooted: bool = True) -> Recovered:
+    """Recover exact points, with the neck given or placed."""
+    found = recover(view_of(scene, scene.figure, rooted=rooted)).frames
+    joints = np.concatenate([frame.joints for frame in found])
+    index = np.repeat(np.arange(len(found)), [len(frame) for frame in found])
+
+    def evidence(prior: Prior) -> np.ndarray:
+        return rank(
+            joints,
+            scene.figure.lengths,
+            frame=index,
+            length_residual=np.concatenate([frame.length_residual for frame in found]),
+            deviation=0.001 if rooted else 0.012,
+            up=Up.level(),
+            prior=prior,
+        ).probability
+
+    frames = [
+        SurvivorFrame(
+            time=frame.time,
+            joints=frame.joints,
+            deviation=np.full(frame.joints.shape[:2], 0.0 if rooted else PLACED),
+            branches=frame.branches,
+        )
+        for frame in found
+    ]
+    return Recovered(frames=frames, evidence=evidence)
+
+
+def noisy(scene: Scene, pixels: float, *, real: bool) -> Recovered:
+    """Recover noisy points: on trunks, refined, merged (docs, "Noise")."""
+    figure = scene.figure
+    deviation = {
+        name: TRUNK_LENGTHS if max(pair) < 6 else LIMB_LENGTHS
+        for name, pair in zip(SEGMENT_NAMES, SEGMENTS, strict=True)
+    }
+    sight = Sight(
+        figure=figure,
+        camera=scene.camera,
+        image=scene.image,
+        deviation=pixels,
+        root=RootPrior.along_ray(scene.camera, scene.joints_cam[:, 0], depth=1e-3),
+        length_deviation=deviation if real else 0.0,
+    )
+    trunks = find_trunks(sight)
+    allowed = tolerance_of(
+        pixels,
+        scene.camera,
+        figure,
+        float(scene.joints_cam[..., 2].max()),
+        length_deviation=LIMB_LENGTHS if real else 0.0,
+        trunks=True,
+    )
+    rigid = 0.5 * TRUNK_LENGTHS if real else allowed.rigid
+    checks = make_checks(
+        figure,
+        PHYSICAL,
+        ranges=load_ranges("urdf"),
+        rigid_tolerance=rigid,
+        rigid_mode="distances",
+        angle_tolerance=1.0,
+        contact_margin=CONTACT,
+    )
+    tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=trunks.tree_lengths(figure))
+    leaves = tree.grow(
+        scene.camera, trunks.root, trunks.image, under_noise(checks, allowed.bound), tolerance=allowed.tangent
+    )
+    postures = leaves.postures()
+    own = trunks.carries(leaves.frame, postures)
+    refined = refine(sight, postures[own], frame=trunks.frame[leaves.frame[own]], hopeless=HOPELESS)
+    kept = merge(refined, keep=refined.explained()).refined
+    spread = kept.deviation
+
+    def evidence(prior: Prior) -> np.ndarray:
+        return rank(kept.joints, frame=kept.frame, chi2=kept.chi2, up=Up.level(), prior=prior).probability
+
+    frames = [
+        SurvivorFrame(time=float(at), joints=kept.joints[kept.frame == k], deviation=spread[kept.frame == k])
+        for k, at in enumerate(scene.time)
+    ]
+    return Recovered(frames=frames, evidence=evidence)
+
+
+class Priors:
+    """Priors on postures that were fitted to what is not judged by them; the built-in one where there is no capture."""
+
+    def __init__(self, capture: Capture | None) -> None:
+        self.capture = capture
+        self.known: dict[tuple[str, str], Prior] = {}
+
+    def without(self, kind: str, name: str) -> Prior:
+        """Fit a prior without a clip, or without all clips of its action."""
+        if self.capture is None or name not in self.capture.names:
+            return load_prior()
+        action = self.capture.actions[self.capture.clip_index(name)]
+        key = (kind, action if kind == "action" else name)
+        if key not in self.known:
+            clips = zip(self.capture.names, self.capture.actions, strict=True)
+            rows = [
+                self.capture.points[self.capture.frames_of(k, complete=True)][1:, :14]
+                for k, (clip, label) in enumerate(clips)
+                if key[1] not in (clip, label)
+            ]
+            weight = np.concatenate([np.full(len(part), 1 / len(part)) for part in rows])
+            fitted = fit_prior(np.concatenate(rows), self.capture.up, weight)
+            self.known[key] = replace(fitted, weights=load_prior().weights)
+        return self.known[key]

@@ -1,0 +1,427 @@
+"""Sequences: how far the cheapest path is from the truth, from all sides, how sure it is, and how fast it is found.
+
+    OMP_NUM_THREADS=1 python benchmarks/sequences.py [CAPTURE.npz] [--yaws 8] [--only accuracy,sure,speed,scale,depth]
+
+A synthetic walker from six sides, and real motion capture (an NPZ as `posekit synth mocap` reads it): the first two
+seconds of every clip of walking and running seen from `--yaws` sides, and of six clips of other actions from two; a
+standing camera 1.4 m high, f = 1500 px, so far away that the whole way is in the picture; 30 frames a second; the neck
+is given. Exact points, recovered as `posekit recover` does; and 2 px of noise, recovered on trunks that the noise
+allows, refined and merged. Survivors cost nothing, or minus the log of their probability by a prior that was fitted to
+the other actions, or to the other clips, with a camera that is taken to be level.
+
+A limb-frame is right where both segments of an arm or a leg are on their true side, near or far; `told apart` leaves
+out segments within 15 degrees of the plane across their ray, whose sides 2 px do not tell apart. Prints Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import math
+import time
+import warnings
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from sequence_views import (  # type: ignore[import-not-found]  # the script beside this one
+    Priors,
+    Recovered,
+    clip_scene,
+    exact,
+    noisy,
+    scenes,
+    view_of,
+    walker_scene,
+)
+
+from posekit.errors import PosekitError
+from posekit.pipeline import Tolerance, recover
+from posekit.pipeline.markdown import table_lines
+from posekit.placement import place
+from posekit.ranking import load_prior
+from posekit.sequences import (
+    Beam,
+    Estimate,
+    Follower,
+    Paths,
+    SurvivorFrame,
+    best_paths,
+    choose_scale,
+    elevations,
+    smooth,
+)
+from posekit.skeleton import JOINTS, PARENTS
+from posekit.synthesis import Capture, Scene, read_capture
+
+TOLD_APART = math.radians(15.0)
+LIMBS = ((5, 7), (6, 8), (9, 11), (10, 12))
+"""Segments of the two arms and the two legs, in tree order."""
+
+RATE = 30.0
+LAG = 10
+COSTS = ("not ranked", "by action", "by clip")
+"""What the prior was not fitted to, where survivors are ranked."""
+
+
+def costed(found: Recovered, priors: Priors, clip: str, costs: str) -> list[SurvivorFrame]:
+    frames: list[SurvivorFrame] = (
+        found.frames
+        if costs == "not ranked"
+        else found.ranked(priors.without(costs.removeprefix("by "), clip))
+    )
+    return frames
+
+
+def error(joints: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Return the mean joint error (...,), mm."""
+    return np.asarray(np.linalg.norm(joints - truth, axis=-1).mean(axis=-1) * 1000)
+
+
+def limbs_right(joints: np.ndarray, truth: np.ndarray, least: float) -> np.ndarray:
+    """Tell which limb-frames (T, 4) have the true sides; segments that stand out by less than `least` pass."""
+    true = elevations(truth)
+    right = ((elevations(joints) > 0) == (true > 0)) | (np.abs(true) < least)
+    return np.stack([right[:, a] & right[:, b] for a, b in LIMBS], axis=1)
+
+
+def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict[str, float]:
+    """Measure a sequence."""
+    start = time.process_time()
+    path: Paths = best_paths(frames)
+    seconds = time.process_time() - start
+    joints = path.joints[0]
+    start = time.process_time()
+    live = np.stack([found.joints for found in follow(frames, LAG)])
+    live_seconds = time.process_time() - start
+    full = [k for k, frame in enumerate(frames) if len(frame)]
+    errors = {k: error(frames[k].joints, truth[k]) for k in full}
+    best = [limbs_right(frames[k].joints[[errors[k].argmin()]], truth[[k]], TOLD_APART).mean() for k in full]
+    return {
+        "survivors": float(np.median([len(frame) for frame in frames])),
+        "truth kept": float(np.mean([k in errors and errors[k].min() < near for k in range(len(frames))])),
+        "best": float(np.mean([errors[k].min() for k in full])),
+        "random": float(np.mean([errors[k].mean() for k in full])),
+        "first": float(np.mean([errors[k][int(np.argmin(frames[k].cost))] for k in full])),
+        "path": float(error(joints, truth).mean()),
+        "smoothed": float(error(smooth(path.time, joints, spread_of(frames, path))[0], truth).mean()),
+        "live": float(error(live, truth).mean()),
+        "limbs": float(limbs_right(joints, truth, 0.0).mean()),
+        "limbs of best": float(np.mean(best)),
+        "told apart": float(limbs_right(joints, truth, TOLD_APART).mean()),
+        "bridged": float(path.bridged[0].mean()),
+        "rate": len(frames) / seconds,
+        "live rate": len(frames) / live_seconds,
+    }
+
+
+def spread_of(frames: list[SurvivorFrame], path: Paths) -> np.ndarray:
+    """Return the deviations (T, 14) along a path; infinite where it is bridged."""
+    return np.stack(
+        [
+            frame.deviation[chosen] if chosen >= 0 else np.full(len(JOINTS), np.inf)
+            for frame, chosen in zip(frames, path.survivor[0].tolist(), strict=True)
+        ]
+    )
+
+
+def follow(frames: list[SurvivorFrame], lag: int, beam: Beam | None = None) -> Iterator[Estimate]:
+    """Follow live; the frames are made anew, as they come."""
+    follower = Follower(lag=lag, beam=beam)
+    for frame in frames:
+        fresh = SurvivorFrame(
+            time=frame.time, joints=frame.joints, cost=frame.cost, deviation=frame.deviation
+        )
+        estimate = follower.push(fresh)
+        if estimate is not None:
+            yield estimate
+    yield from follower.finish()
+
+
+HEAD = (
+    ("survivors", "survivors, median", "{:.0f}"),
+    ("truth kept", "frames with the truth", "{:.1%}"),
+    ("random", "random, mm", "{:.0f}"),
+    ("first", "first of each frame, mm", "{:.0f}"),
+    ("path", "path, mm", "{:.1f}"),
+    ("smoothed", "smoothed, mm", "{:.1f}"),
+    ("live", f"live, lag {LAG}, mm", "{:.1f}"),
+    ("best", "best of each frame, mm", "{:.1f}"),
+    ("limbs", "limb-frames right", "{:.1%}"),
+    ("told apart", "told apart: path", "{:.1%}"),
+    ("limbs of best", "told apart: best of each frame", "{:.1%}"),
+    ("bridged", "bridged", "{:.1%}"),
+    ("rate", "frames/s", "{:.0f}"),
+    ("live rate", "live, frames/s", "{:.0f}"),
+)
+
+
+def accuracy(capture: Capture | None, yaws: int, seed: int) -> None:
+    priors = Priors(capture)
+    table, sides, far = [], [], []
+    for pixels, near in ((0.0, 10.0), (2.0, 35.0)):
+        found: dict[tuple[str, str], list[dict[str, float]]] = defaultdict(list)
+        by_side: dict[tuple[str, int], list[tuple[float, float]]] = defaultdict(list)
+        for number, (action, clip, yaw, scene) in enumerate(scenes(capture, yaws)):
+            if pixels:
+                seen = scene.with_noise(pixels, np.random.default_rng(seed + number))
+                recovered = noisy(seen, pixels, real=bool(clip))
+            else:
+                recovered = exact(scene)
+            for costs in COSTS if clip else (COSTS[0], COSTS[2]):
+                result = outcome(costed(recovered, priors, clip, costs), scene.joints_cam, near)
+                found[action, costs].append(result)
+                if costs == COSTS[2]:
+                    by_side[action, yaw].append((result["path"], result["told apart"]))
+        for (action, costs), results in found.items():
+            cells = [form.format(np.mean([one[key] for one in results])) for key, _, form in HEAD]
+            table.append([f"{pixels:g}", action, costs, str(len(results)), *cells])
+            paths = np.array([one["path"] for one in results])
+            if costs == COSTS[2]:
+                far.append([f"{pixels:g}", action, f"{np.mean(paths > 40):.0%}", f"{paths.max():.0f}"])
+        for (action, yaw), values in by_side.items():
+            if action in ("walking", "running"):
+                path, told = np.mean(values, axis=0)
+                sides.append([f"{pixels:g}", action, str(yaw), f"{path:.1f}", f"{told:.1%}"])
+    head = ["noise, px", "motion", "ranked", "sequences", *(label for _, label, _ in HEAD)]
+    show("Accuracy", head, table)
+    if sides:
+        show(
+            "From every side, ranked by clip",
+            ["noise, px", "motion", "yaw, deg", "path, mm", "told apart: path"],
+            sides,
+        )
+    show(
+        "Sequences whose path is off by more than 40 mm, ranked by clip",
+        ["noise, px", "motion", "share", "worst, mm"],
+        far,
+    )
+
+
+def sure(capture: Capture | None, seed: int) -> None:
+    """Compare the odds between the two cheapest paths with which of them was nearer, where they differ."""
+    priors = Priors(capture)
+    stated, true = [], []
+    for number, (_, clip, _, scene) in enumerate(scenes(capture, 4)):
+        found = noisy(scene.with_noise(2.0, np.random.default_rng(seed + number)), 2.0, real=bool(clip))
+        for apart in (0.25, 0.5):
+            paths = best_paths(costed(found, priors, clip, COSTS[2]), k=2, apart=apart)
+            if len(paths) < 2:
+                continue
+            differ = np.linalg.norm(paths.joints[0] - paths.joints[1], axis=-1).max(axis=1) > apart
+            away = [error(joints[differ], scene.joints_cam[differ]).mean() for joints in paths.joints]
+            stated.append(1 / (1 + math.exp(paths.cost[0] - paths.cost[1])))
+            true.append(away[0] < away[1])
+    edges = (0.5, 0.6, 0.75, 0.9, 0.99, 1.01)
+    rows = []
+    for low, high in itertools.pairwise(edges):
+        pick = [k for k, value in enumerate(stated) if low <= value < high]
+        if pick:
+            said, came = (np.mean([values[k] for k in pick]) for values in (stated, true))
+            rows.append([f"{low:g} to {min(high, 1):g}", str(len(pick)), f"{said:.2f}", f"{came:.2f}"])
+    show(
+        "How sure: the first of two paths, 2 px, ranked by clip", ["stated", "pairs", "mean", "nearer"], rows
+    )
+
+
+def crowd(count: int, frames: int, seed: int) -> list[SurvivorFrame]:
+    """Make frames of a walker with wrong postures added: limbs mirrored in depth, all else the same."""
+    rng = np.random.default_rng(seed)
+    truth = walker_scene(30.0, frames).joints_cam
+    found = []
+    for k, joints in enumerate(truth):
+        postures = np.repeat(joints[None], count, axis=0)
+        for one in range(1, count):
+            for child in range(1, len(JOINTS)):
+                if rng.random() < 0.3:
+                    postures[one, child, 2] += 2 * (joints[PARENTS[child], 2] - joints[child, 2])
+        found.append(SurvivorFrame(time=k / RATE, joints=postures))
+    return found
+
+
+def timed(run: Callable[[], object], repeats: int = 3) -> float:
+    run()
+    times = []
+    for _ in range(repeats):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def speed(capture: Capture | None) -> None:
+    rows = []
+    for count in (10, 20, 50, 100, 200, 500):
+        frames = crowd(count, 60, 0)
+        cells = [str(count)]
+        for lag in (0, LAG):
+            cells.append(
+                f"{len(frames) / timed(lambda f=frames, lag=lag: list(follow(f, lag))):.0f}"  # type: ignore[misc]
+            )
+        cells.append(f"{len(frames) / timed(lambda frames=frames: best_paths(frames), 1):.0f}")  # type: ignore[misc]
+        rows.append(cells)
+    show(
+        "Speed: CPU time on one core, crowds of mirrored limbs",
+        ["survivors a frame", "live, lag 0, frames/s", f"lag {LAG}", "offline"],
+        rows,
+    )
+    chosen = [("synthetic walking", "", walker_scene(30.0))]
+    if capture is not None:
+        chosen += [
+            ("walking", clip, clip_scene(capture, clip, 30)) for clip in capture.names if "walking" in clip
+        ]
+    rows = []
+    for action, clip, scene in chosen:
+        for pixels in (0.0, 2.0):
+            seen = scene.with_noise(pixels, np.random.default_rng(0)) if pixels else scene
+            start = time.process_time()
+            found = noisy(seen, pixels, real=bool(clip)) if pixels else exact(seen)
+            recovering = time.process_time() - start
+            prior = load_prior()
+            ranking = timed(lambda found=found, prior=prior: found.ranked(prior), 1)  # type: ignore[misc]
+            frames = found.ranked(prior)
+            following = timed(lambda frames=frames: list(follow(frames, LAG)), 1)  # type: ignore[misc]
+            spent = (following, following + ranking, following + ranking + recovering)
+            median = np.median([len(frame) for frame in frames])
+            rows.append(
+                [
+                    f"{pixels:g}",
+                    f"{action} {clip}",
+                    f"{median:.0f}",
+                    *(f"{len(frames) / each:.0f}" for each in spent),
+                ]
+            )
+    show(
+        f"Live, lag {LAG}: frames a second of CPU time on one core (recovery and ranking of all frames at once)",
+        ["noise, px", "motion", "survivors, median", "followed", "and ranked", "and recovered"],
+        rows,
+    )
+
+
+def scale(capture: Capture | None) -> None:
+    scales = (0.94, 0.96, 0.98, 1.0, 1.02, 1.04, 1.06)
+    tolerance = Tolerance(rigid=0.03, tangent=0.01, placement=False, angle=2.0)
+    rows = []
+    for name, chosen in (
+        ("synthetic walking", [walker_scene(yaw, 40) for yaw in range(15, 360, 60)]),
+        ("walking, running", of_clips(capture, ("walking", "running"), (40, 220))),
+    ):
+        found, between = [], []
+        for scene in chosen:
+            sets = {}
+            for each in scales:
+                body = scene.figure.scaled(
+                    {name: length * each for name, length in scene.figure.lengths.items()}
+                )
+                try:
+                    recovery = recover(view_of(scene, body), tolerance=tolerance)
+                except PosekitError:  # no frame has a posture
+                    continue
+                sets[each] = [
+                    SurvivorFrame(time=frame.time, joints=frame.joints) for frame in recovery.frames
+                ]
+            choice = choose_scale(sets, beam=Beam(width=256))
+            found.append(choice.scale)
+            between.append(choice.between)
+        if found:
+            off = np.abs(np.array(between) - 1)
+            right = f"{np.mean(np.array(found) == 1.0):.0%}"
+            rows.append([name, str(len(found)), right, f"{np.median(off):.1%}", f"{off.max():.1%}"])
+    show(
+        "Scale of the lengths: recovered at each, chosen by the cheapest path",
+        ["motion", "sequences", "1.00 chosen", "off, median", "at most"],
+        rows,
+    )
+
+
+def of_clips(capture: Capture | None, actions: tuple[str, ...], yaws: tuple[int, ...]) -> list[Scene]:
+    if capture is None:
+        return []
+    return [
+        clip_scene(capture, clip, yaw)
+        for clip, action in zip(capture.names, capture.actions, strict=True)
+        if action in actions
+        for yaw in yaws
+    ]
+
+
+def depth(capture: Capture | None) -> None:
+    priors = Priors(capture)
+    chosen = [("synthetic walking", walker_scene(yaw, 40)) for yaw in range(15, 360, 60)]
+    chosen += [("walking", scene) for scene in of_clips(capture, ("walking",), (40, 130, 220, 310))]
+    found: dict[tuple[str, str], list[list[float]]] = defaultdict(list)
+    names = () if capture is None else tuple(clip for clip in capture.names if "walking" in clip)
+    clips = ["" for _ in range(6)] + [clip for clip in names for _ in range(4)]
+    for (action, scene), clip in zip(chosen, clips, strict=True):
+        true = scene.joints_cam
+        placements = place(scene.camera, scene.figure, scene.image, np.full((len(scene), 5, 2), np.nan))
+        told = np.array([one.estimate for one in placements])
+        recovered = exact(scene, rooted=False)
+        for costs in (COSTS[0], COSTS[2]):
+            frames = costed(recovered, priors, clip, costs)
+            path: Paths = best_paths(frames)
+            joints = path.joints[0]
+            smoothed, _ = smooth(path.time, joints, spread_of(frames, path))
+            found[action, costs].append(
+                [
+                    float(np.median([len(frame) for frame in frames])),
+                    *(
+                        float(np.nanmean(np.abs(at - true[:, 0, 2]))) * 1000
+                        for at in (told, joints[:, 0, 2], smoothed[:, 0, 2])
+                    ),
+                    float(error(joints - joints[:, :1], true - true[:, :1]).mean()),
+                    float(error(smoothed - smoothed[:, :1], true - true[:, :1]).mean()),
+                ]
+            )
+    rows = [
+        [action, name, str(len(values)), *(f"{value:.0f}" for value in np.mean(values, axis=0))]
+        for (action, name), values in found.items()
+    ]
+    head = [
+        "motion",
+        "ranked",
+        "sequences",
+        "survivors, median",
+        "neck's depth, the frame's estimate, mm",
+        "path, mm",
+        "smoothed, mm",
+        "joints relative to the neck, path, mm",
+        "smoothed, mm",
+    ]
+    show(
+        "Depth of the neck, which is not given: placed in every frame, chosen by the path, smoothed",
+        head,
+        rows,
+    )
+
+
+def show(title: str, head: list[str], rows: list[list[str]]) -> None:
+    print(f"\n{title}\n")
+    print("\n".join(table_lines(head, rows)), flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("capture", type=Path, nargs="?")
+    parser.add_argument("--yaws", type=int, default=8)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", default="accuracy,sure,speed,scale,depth")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    capture = None if given.capture is None else read_capture(given.capture)
+    parts = given.only.split(",")
+    if "accuracy" in parts:
+        accuracy(capture, given.yaws, given.seed)
+    if "sure" in parts:
+        sure(capture, given.seed)
+    if "speed" in parts:
+        speed(capture)
+    if "scale" in parts:
+        scale(capture)
+    if "depth" in parts:
+        depth(capture)
+
+
+if __name__ == "__main__":
+    main()

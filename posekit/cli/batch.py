@@ -1,0 +1,317 @@
+"""`posekit batch`: archives recovered by local processes or a cluster, into a folder of Parquet files."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from posekit.cli.detector_options import (
+    Calibrate,
+    CameraFile,
+    Deviation,
+    FieldOfView,
+    Focal35,
+    Format,
+    LengthsFile,
+    MinConfidence,
+    Person,
+    Proportions,
+    Rate,
+    Size,
+    Skeleton,
+    Stature,
+    SwapSides,
+)
+from posekit.cli.detector_source import source_of
+from posekit.cli.options import (
+    PHYSICAL,
+    AngleTolerance,
+    Checks,
+    ContactMargin,
+    RangesOption,
+    Rules,
+    examples,
+    rule_numbers,
+    signed_length,
+    split,
+)
+
+if TYPE_CHECKING:
+    from posekit.pipeline.batch import Progress, Summary
+
+EXAMPLES = examples(
+    "posekit batch archive/ -o results",
+    "posekit batch cam1/*.json -o results --camera calibration.toml:cam1 --stature 175cm --person all",
+    "posekit batch views.parquet -o results --jobs 16 --q --margins",
+    "posekit batch archive/ -o results --cluster 10.0.0.1:6379",
+)
+SOME_FAILED, INTERRUPTED = 1, 130
+EVERY = 10.0
+"""Seconds between two lines of progress where there is no terminal."""
+
+
+def batch(
+    inputs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="INPUT...",
+            help="Views, key points (a file, or a folder of a file a picture), Parquet or NPZ of image points, or "
+            "folders of those.",
+        ),
+    ],
+    output: Annotated[
+        Path,
+        typer.Option(
+            "-o",
+            "--output",
+            metavar="DIR",
+            help="The folder of results. A run that was stopped goes on there.",
+        ),
+    ],
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", metavar="N", help="Processes. Default: one a core.")
+    ] = None,
+    shard_frames: Annotated[
+        int, typer.Option("--shard-frames", metavar="N", help="Frames of one file of results, at most.")
+    ] = 2000,
+    retries: Annotated[
+        int,
+        typer.Option("--retries", metavar="N", help="How often a shard is tried again whose process died."),
+    ] = 2,
+    cluster: Annotated[
+        str,
+        typer.Option(
+            "--cluster",
+            metavar="ADDRESS",
+            help="Work on a Ray cluster (extra ray); `local` starts one here. All machines need the same paths.",
+        ),
+    ] = "",
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Remove results in DIR that are of other settings or other inputs."),
+    ] = False,
+    mixed: Annotated[bool, typer.Option("--mixed", help="Inputs of several formats are meant.")] = False,
+    rank: Annotated[
+        bool,
+        typer.Option("--rank/--no-rank", help="Also each survivor's probability among those of its frame."),
+    ] = True,
+    q: Annotated[
+        bool, typer.Option("--q", help="Also each survivor's configuration: several times the time.")
+    ] = False,
+    margins: Annotated[
+        bool,
+        typer.Option("--margins", help="Also each survivor's worst margin by check: several times the time."),
+    ] = False,
+    show_progress: Annotated[
+        bool | None,
+        typer.Option(
+            "--progress/--no-progress", help="Show rate and time left. Default: where stderr is a terminal."
+        ),
+    ] = None,
+    checks: Checks = PHYSICAL,
+    ranges: RangesOption = "urdf",
+    rules: Rules = "1,2",
+    rigid_tolerance: Annotated[
+        str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
+    ] = "",
+    tangent_tolerance: Annotated[
+        str, typer.Option("--tangent-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
+    ] = "",
+    angle_tolerance: AngleTolerance = None,
+    contact_margin: ContactMargin = "0cm",
+    scale: Annotated[
+        str, typer.Option("--scale", metavar="HOW", help="Uncalibrated views: as `posekit recover` has it.")
+    ] = "",
+    proportions: Proportions = "figure",
+    infer: Annotated[
+        bool, typer.Option("--infer/--no-infer", help="Complete joints that were not seen.")
+    ] = True,
+    root: Annotated[
+        str,
+        typer.Option("--root", metavar="HOW", help="As `posekit recover` has it: auto, head, torso, search."),
+    ] = "auto",
+    deviation: Deviation = None,
+    refine: Annotated[
+        bool | None, typer.Option("--refine/--no-refine", help="As `posekit recover` has it.")
+    ] = None,
+    length_deviation: Annotated[
+        float | None,
+        typer.Option("--length-deviation", metavar="FRACTION", help="As `posekit recover` has it."),
+    ] = None,
+    format: Format = "",
+    skeleton: Skeleton = "",
+    person: Person = "",
+    swap_sides: SwapSides = False,
+    camera: CameraFile = "",
+    fov: FieldOfView = None,
+    focal35: Focal35 = None,
+    size: Size = "",
+    fps: Rate = None,
+    min_confidence: MinConfidence = 0.0,
+    stature: Stature = "",
+    lengths: LengthsFile = None,
+    calibrate: Calibrate = None,
+) -> None:
+    """Recover an archive: every frame once, whatever dies on the way; exit 1 where some shards failed."""
+    from posekit.files import parse_length
+    from posekit.pipeline.batch import Recipe, run_batch
+
+    recipe = Recipe(
+        source=source_of(
+            format=format,
+            skeleton=skeleton,
+            person=person,
+            swap_sides=swap_sides,
+            camera=camera,
+            fov=fov,
+            focal35=focal35,
+            size=size,
+            fps=fps,
+            min_confidence=min_confidence,
+            deviation=deviation,
+            stature=stature,
+            lengths=lengths,
+            calibrate=calibrate,
+            proportions=proportions,
+        ),
+        checks=split(checks),
+        ranges=ranges,
+        rules=rule_numbers(rules),
+        rigid=parse_length(rigid_tolerance, name="--rigid-tolerance") if rigid_tolerance else None,
+        tangent=parse_length(tangent_tolerance, name="--tangent-tolerance") if tangent_tolerance else None,
+        angle=angle_tolerance,
+        contact_margin=signed_length(contact_margin, "--contact-margin"),
+        scale=scale,
+        proportions=proportions,
+        infer=infer,
+        root=root,
+        refine=refine,
+        length_deviation=length_deviation,
+        rank=rank,
+        q=q,
+        margins=margins,
+        shard_frames=shard_frames,
+    )
+    try:
+        with _shown(show_progress) as progress:
+            summary = run_batch(
+                inputs,
+                output,
+                recipe,
+                jobs=jobs,
+                retries=retries,
+                cluster=cluster,
+                overwrite=overwrite,
+                mixed=mixed,
+                progress=progress,
+            )
+    except KeyboardInterrupt:
+        typer.echo(f"posekit: error: interrupted; run it again to go on in {output}", err=True)
+        raise typer.Exit(INTERRUPTED) from None
+    _report(summary, output)
+    if summary.failures:
+        raise typer.Exit(SOME_FAILED)
+
+
+def _report(summary: Summary, output: Path) -> None:
+    """Print what is there, and what failed."""
+    there = f", {summary.skipped} of them from before" if summary.skipped else ""
+    typer.echo(
+        f"{summary.frames:,} frames of {summary.inputs:,} inputs in {summary.shards:,} shards{there}: "
+        f"{summary.survivors:,} survivors, {summary.empty:,} frames without any"
+    )
+    for failure in summary.failures[:5]:
+        what = failure.shard or failure.input
+        typer.echo(f"posekit: warning: {what} failed: {failure.error}", err=True)
+    if summary.failures:
+        missing = summary.planned - summary.frames
+        typer.echo(
+            f"posekit: warning: {len(summary.failures)} failed, {missing:,} frames are missing; all are named in "
+            f"{output / 'manifest.json'}; run it again to try them again",
+            err=True,
+        )
+    peak = f", at most {summary.peak / 2**20:.0f} MiB a process" if summary.peak else ""
+    typer.echo(f"{summary.seconds:.1f} s{peak}; written: {output}")
+
+
+@contextmanager
+def _shown(asked: bool | None) -> Iterator[Any]:
+    """Show how far a run is: a bar on a terminal, a line now and then elsewhere if that is asked for."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True)
+    if asked is False or (asked is None and not console.is_terminal):
+        yield None
+        return
+    speed = Speed()
+    if not console.is_terminal:
+        yield speed.line
+        return
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("{task.fields[speed]}"),
+        TimeElapsedColumn(),
+    )
+    with Bar(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("opening", total=None, speed="")
+
+        def show(now: Progress) -> None:
+            bar.update(task, description=now.stage, completed=now.done, total=now.total, speed=speed.of(now))
+
+        yield show
+
+
+class Speed:
+    """How fast frames are done, and how long the rest takes."""
+
+    def __init__(self) -> None:
+        self.began: float | None = None
+        self.told = -EVERY
+
+    def of(self, now: Progress) -> str:
+        """Say it in a few words; nothing while inputs are opened."""
+        failed = f", {now.failed} failed" if now.failed else ""
+        if now.stage != "recovering":
+            return failed.removeprefix(", ")
+        if self.began is None:
+            self.began = time.monotonic()
+            self.first = now.done
+            return failed.removeprefix(", ")
+        seconds = time.monotonic() - self.began
+        rate = (now.done - self.first) / seconds if seconds > 0 else 0.0
+        if rate <= 0:
+            return failed.removeprefix(", ")
+        return f"{rate:,.0f} frames/s, {_clock((now.total - now.done) / rate)} left{failed}"
+
+    def line(self, now: Progress) -> None:
+        """Print it as a line, not too often."""
+        words = self.of(now)
+        ended = now.done >= now.total
+        if time.monotonic() - self.told < EVERY and not ended:
+            return
+        self.told = time.monotonic()
+        unit = "frames" if now.stage == "recovering" else "inputs"
+        print(
+            f"{now.stage}: {now.done:,} of {now.total:,} {unit}; {words}".rstrip("; "),
+            file=sys.stderr,
+            flush=True,
+        )
+
+
+def _clock(seconds: float) -> str:
+    """Spell a duration."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return (
+        f"{hours} h {minutes:02d} min" if hours else f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
+    )

@@ -1,0 +1,143 @@
+"""What is known of a view's noise: how far its image points, its necks and the person's lengths may be off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array, Camera
+from posekit.errors import InputError
+from posekit.files import View
+from posekit.pipeline.fit_camera import CameraFit
+from posekit.placement import DETECTED_DEVIATION, Placement
+from posekit.refinement import GIVING, RootPrior
+from posekit.skeleton import RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
+
+JOINT_OFFSET: Final = 0.02
+"""Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
+
+LEAST_CONFIDENCE: Final = 0.25
+"""A confidence below this counts as this."""
+
+LATERAL: Final = 10.0
+"""Deviations of an image point within which a placed neck may lie beside its ray: its image point says the rest."""
+
+LEAST_STEP: Final = 0.01
+"""Metres: the least deviation of a placed neck's depth."""
+
+TRUNK: Final = 6
+"""Joints of torso and hips: the first six."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """How far image points and lengths may be off.
+
+    Parameters
+    ----------
+    deviation : float
+        Standard deviation of each coordinate of an image point that was seen with full confidence, pixels.
+    offset : float
+        How far a detector's joints are from the figure's, standard deviation, metres.
+    lengths : float, optional
+        Relative standard deviation of all lengths; what bodies give (`posekit.refinement.GIVING`) if not given.
+    """
+
+    deviation: float
+    offset: float = 0.0
+    lengths: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.lengths is not None and not (math.isfinite(self.lengths) and 0 <= self.lengths <= 0.3):
+            raise InputError(
+                f"--length-deviation: {self.lengths!r}; expected a fraction of the length, 0 to 0.3"
+            )
+
+    @staticmethod
+    def of(view: View, deviation: float | None, lengths: float | None, *, asked: bool) -> Noise | None:
+        """Say what the noise of a view is; None where nobody does and it was not `asked` for.
+
+        The deviation that is given comes before the view's own, and that before what detectors' points have.
+        """
+        detected = bool(view.derived)
+        known = deviation or view.deviation or (DETECTED_DEVIATION if detected else None)
+        if known is None and not asked:
+            return None
+        return Noise(
+            deviation=known or DETECTED_DEVIATION,
+            offset=JOINT_OFFSET if detected else 0.0,
+            lengths=lengths,
+        )
+
+    @property
+    def by_segment(self) -> Mapping[str, float]:
+        """Relative standard deviations by segment."""
+        return GIVING if self.lengths is None else dict.fromkeys(SEGMENT_NAMES, self.lengths)
+
+    @property
+    def limb(self) -> float:
+        """The largest of the limbs' lengths."""
+        return max(self.by_segment[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= TRUNK)
+
+    @property
+    def rigid(self) -> float:
+        """The largest of the distances inside torso and hips."""
+        return max(self.by_segment[segment_name(pair)] for pair in RIGID_SEGMENTS)
+
+    def of_points(self, view: View, frames: NDArray[np.intp], depth: Array, focal: Array) -> Array:
+        """Return the standard deviations of joints and head points (F, 19), pixels.
+
+        A residual that is weighted with its confidence w (Bogo et al. 2016, eq. 2) has the deviation 1 / sqrt(w).
+
+        Parameters
+        ----------
+        view : View
+        frames : int array (F,)
+        depth : array (F,)
+            Of the neck, metres.
+        focal : array (F,)
+            Focal length, pixels.
+        """
+        confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
+        beside = self.offset * focal / depth
+        return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), beside[:, None]))
+
+
+def neck_priors(
+    fit: CameraFit, chosen: NDArray[np.intp], camera: Camera, beside: float
+) -> tuple[RootPrior, float]:
+    """Return what is known of the neck in some hypotheses, and the largest deviation of a depth, metres.
+
+    A neck that was given is there; one that was placed, within its step along the ray. Each hypothesis keeps its own
+    depth: how far a person is, one picture tells badly, and a single best depth would stand for a whole valley.
+
+    Parameters
+    ----------
+    fit : CameraFit
+    chosen : int array (H,)
+        Hypotheses.
+    camera : Camera
+        Theirs.
+    beside : float
+        Standard deviation of an image point, radians.
+    """
+    root = fit.root[chosen]
+    by_frame = fit.placements or [None] * len(fit.reasons)
+    step = np.array([_step(by_frame[k]) for k in fit.frame[chosen].tolist()])
+    lateral = np.where(step > 0, LATERAL * beside * root[:, 2], 0.0)
+    return RootPrior.along_ray(camera, root, depth=step, lateral=lateral), float(step.max(initial=0.0))
+
+
+def _step(placement: Placement | None) -> float:
+    """Return how far the depth may be from the nearest of the necks that were placed, metres."""
+    if placement is None:
+        return 0.0
+    deviation = (
+        placement.deviation if math.isfinite(placement.deviation) and len(placement.necks) == 1 else 0.0
+    )
+    return max(placement.step, deviation, LEAST_STEP)

@@ -1,0 +1,159 @@
+"""Trunks with the limbs that pull at them, refined together: what many survivors share."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.anatomy import END, MIDDLE
+from posekit.refinement.descent import BLOCK, Descent, descend
+from posekit.refinement.equations import evaluate
+from posekit.refinement.factors import Rows
+from posekit.refinement.laying import Bases, Laid, Settings
+from posekit.refinement.problem import Problem
+from posekit.refinement.state import moved
+from posekit.refinement.together import (
+    LimbTables,
+    TrunkTables,
+    gain_of,
+    joint_step,
+    limb_tables,
+    trunk_tables,
+)
+
+AGREES = 20.0
+"""Times the precision that a further step may gain where a joint step is taken for the last.
+
+The quadratic's error e, of its promise g, leaves about e^2 / g.
+"""
+
+
+FEW = 10
+"""The most steps of a base."""
+
+
+class Tables(NamedTuple):
+    """The quadratics of trunks, and of the limbs that pull at them."""
+
+    trunks: TrunkTables
+    limbs: LimbTables
+
+    @staticmethod
+    def of(problem: Problem, bases: Bases, laid: Laid) -> Tables:
+        """Tabulate trunks alone and their limbs; `problem` is that of all survivors."""
+        pulling = laid.pulling
+        return Tables(
+            trunk_tables(problem.take(bases.leaf), bases.found.state),
+            limb_tables(pulling.problem, bases.found.state.take(pulling.base), pulling.chains),
+        )
+
+    def least(self, bases: Bases, laid: Laid) -> Array:
+        """Return what chi2 of trunk and one limb can come down to, to second order (4, P)."""
+        base = laid.pulling.base
+        out = np.zeros(laid.pulling.chi2.shape)
+        for kind in range(4):
+            rows = np.flatnonzero(laid.pulling.chi2[kind] > 0)
+            gain = gain_of(
+                self.trunks.matrix[base[rows]] + self.limbs.matrix[kind, rows],
+                self.trunks.gradient[base[rows]] + self.limbs.gradient[kind, rows],
+            )
+            out[kind, rows] = bases.found.chi2[base[rows]] + laid.pulling.chi2[kind, rows] - gain
+        return out
+
+
+def assemble(
+    problem: Problem,
+    before: Bases,
+    base: Rows,
+    leaf: Rows,
+    laid: Laid,
+    slots: Rows,
+    settings: Settings,
+    tables: Tables | None,
+) -> Bases:
+    """Put bases together with limbs that pull at them, and refine them.
+
+    Parameters
+    ----------
+    problem : Problem
+        Of all survivors.
+    before : Bases
+    base, leaf : int array (G,)
+        The base that each starts from, and a survivor of each.
+    laid : Laid
+    slots : int array (4, G)
+        Limbs among those that pull, -1 for none.
+    tables : Tables, optional
+        Of trunks and limbs: a joint step is tried first.
+    """
+    held = before.held[:, base] | (slots >= 0)
+    part = _with_limbs(problem.take(leaf), held)
+    found = before.found.take(base)
+    found.settled[...] = False
+    for kind in range(4):
+        rows = np.flatnonzero(slots[kind] >= 0)
+        own = slots[kind, rows]
+        found.state.directions[kind][..., rows] = laid.pulling.chains.directions[kind][..., own]
+        found.state.limbs[kind][..., rows] = laid.pulling.chains.lengths[kind][..., own]
+        found.chi2[rows] += laid.pulling.chi2[kind, own]
+    promised = found.chi2
+    if tables is not None:
+        promised = _step_together(part, tables, before.found.settled[base], base, slots, found, settings)
+    rest = np.flatnonzero(~found.settled & (promised <= settings.hopeless))
+    if rest.size:
+        few = settings._replace(steps=min(settings.steps, FEW))
+        found.put(rest, descend(part.take(rest), found.state.take(rest), **few._asdict()))
+    return Bases(found, leaf, held)
+
+
+def _step_together(
+    part: Problem,
+    tables: Tables,
+    settled: NDArray[np.bool_],
+    base: Rows,
+    slots: Rows,
+    found: Descent,
+    settings: Settings,
+) -> Array:
+    """Take the joint step of trunks and limbs, in place; settled is where chi2 is then what it promised.
+
+    Return the chi2 that it promised (G,); where that is hopeless the step is not taken.
+    """
+    trunks, limbs = tables
+    for kind in range(4):
+        rows = np.flatnonzero(slots[kind] >= 0)
+        found.folds[rows] += limbs.folds[kind, slots[kind, rows]]
+        found.active[rows] += limbs.active[kind, slots[kind, rows]]
+    promised = np.empty(len(base))
+    for at in range(0, len(base), BLOCK):
+        rows = np.arange(at, min(at + BLOCK, len(base)))
+        step, gain, tangents = joint_step(trunks, limbs, base[rows], slots[:, rows])
+        promised[rows] = found.chi2[rows] - gain
+        worth = np.flatnonzero(promised[rows] <= settings.hopeless)
+        if not worth.size:
+            continue
+        rows, step, gain, tangents = rows[worth], step.take(worth), gain[worth], tangents[..., worth]
+        found.steps[rows] += 1
+        trial = moved(found.state.take(rows), step, tangents)
+        chi2 = found.chi2[rows]
+        value, _ = evaluate(part.take(rows), trial)
+        better = value <= chi2
+        off = value - (chi2 - gain)
+        agrees = off * off <= AGREES * settings.precision * np.maximum(gain, settings.precision)
+        found.settled[rows] = better & agrees & settled[rows]
+        good = np.flatnonzero(better)
+        found.state.put(rows[good], trial.take(good))
+        found.chi2[rows[good]] = value[good]
+    return promised
+
+
+def _with_limbs(problem: Problem, held: NDArray[np.bool_]) -> Problem:
+    """Leave those limbs out that are not held (4, N)."""
+    weight = problem.weight.copy()
+    for joints in (MIDDLE, END):
+        weight[list(joints)] *= held
+    return replace(problem, weight=weight, free=~held)

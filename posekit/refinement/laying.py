@@ -1,0 +1,137 @@
+"""Limbs laid on their rays from where a trunk is, and refined there alone."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.refinement.descent import BLOCK, Descent
+from posekit.refinement.equations import chains_of
+from posekit.refinement.factors import Columns, Rows, columns_of
+from posekit.refinement.limb_descent import fit_limbs
+from posekit.refinement.limb_terms import Chains, limb_chi2
+from posekit.refinement.problem import Problem
+from posekit.refinement.start import relift
+
+FEW = 6
+"""The most steps of a limb alone: it goes on together with its trunk."""
+
+
+class Settings(NamedTuple):
+    """See `posekit.refinement.refine`."""
+
+    steps: int
+    precision: float
+    hopeless: float
+
+
+class Bases(NamedTuple):
+    """B trunks with the limbs that pull at them.
+
+    Attributes
+    ----------
+    found : Descent
+    leaf : int array (B,)
+        A survivor of each.
+    held : bool array (4, B)
+        Which limbs they have.
+    """
+
+    found: Descent
+    leaf: Rows
+    held: NDArray[np.bool_]
+
+    def open(self, settings: Settings) -> NDArray[np.bool_]:
+        """Return which are at a minimum, or may yet be explained (B,)."""
+        return np.asarray(self.found.settled | (self.found.chi2 <= settings.hopeless))
+
+
+class Limbs(NamedTuple):
+    """Limbs as they were given.
+
+    Attributes
+    ----------
+    directions : array (4, 2, 3, M)
+    far : bool array (4, 2, M)
+        See `posekit.refinement.start.sides`.
+    """
+
+    directions: Array
+    far: NDArray[np.bool_]
+
+    def gather(self, which: Rows) -> Limbs:
+        """Return limbs (4, K)."""
+        return Limbs(*(np.stack([array[kind][..., which[kind]] for kind in range(4)]) for array in self))
+
+
+class Pulling(NamedTuple):
+    """Limbs that do not meet their image within their limits.
+
+    Attributes
+    ----------
+    base : int array (P,)
+        Of each column.
+    problem : Problem
+    chains : Chains
+    chi2 : array (4, P)
+        Zero where a column has none.
+    """
+
+    base: Rows
+    problem: Problem
+    chains: Chains
+    chi2: Array
+
+
+class Laid(NamedTuple):
+    """Limbs on their bases.
+
+    Attributes
+    ----------
+    chains : Chains
+        Of M columns.
+    chi2 : array (4, M)
+    pulling : Pulling
+    place : int array (4, M)
+        The columns of limbs among those that pull, -1 for the others.
+    """
+
+    chains: Chains
+    chi2: Array
+    pulling: Pulling
+    place: Rows
+
+
+def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings: Settings) -> Laid:
+    """Lay limbs (M columns) on their rays from where their bases are, and fit those that do not meet their image.
+
+    `problem` is that of all survivors.
+    """
+    rows = problem.take(bases.leaf[columns.base])
+    held = chains_of(bases.found.state.take(columns.base)._replace(directions=limbs.directions))
+    chains = relift(rows, held, limbs.far)
+    chi2 = np.zeros((4, len(columns.base)))
+    for at in range(0, chi2.shape[1], BLOCK):
+        part = np.arange(at, min(at + BLOCK, chi2.shape[1]))
+        chi2[:, part] = limb_chi2(rows.take(part), chains.take(part))[0]
+    chi2[~columns.used] = 0.0
+    mine = [np.flatnonzero(chi2[kind] > settings.precision) for kind in range(4)]
+    pulled = columns_of([columns.base[own] for own in mine], len(bases.leaf))
+    place = np.full(chi2.shape, -1)
+    on = chains_of(bases.found.state.take(pulled.base))
+    fit = Pulling(pulled.base, problem.take(bases.leaf[pulled.base]), on, np.zeros((4, len(pulled.base))))
+    for kind, (own, to) in enumerate(zip(mine, pulled.of, strict=True)):
+        place[kind, own] = to
+        on.directions[kind][..., to] = chains.directions[kind][..., own]
+        on.lengths[kind][..., to] = chains.lengths[kind][..., own]
+        fit.chi2[kind, to] = chi2[kind, own]
+    few = settings._replace(steps=min(settings.steps, FEW))
+    fit_limbs(fit.problem, on, fit.chi2, pulled.used, **few._asdict())
+    for kind, (own, to) in enumerate(zip(mine, pulled.of, strict=True)):
+        chains.directions[kind][..., own] = on.directions[kind][..., to]
+        chains.lengths[kind][..., own] = on.lengths[kind][..., to]
+        chi2[kind, own] = fit.chi2[kind, to]
+    return Laid(chains, chi2, fit, place)

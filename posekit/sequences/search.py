@@ -1,0 +1,124 @@
+"""The search for the cheapest path: every end of a path goes to every survivor of the next frame, or passes it over.
+
+Viterbi's algorithm on pairs of survivors: of the paths that end in the same two survivors only the cheapest can be part
+of the best, since what follows depends on no more than these (Forney 1973, "The Viterbi algorithm", Proc. IEEE
+61:268-278). Where a joint is unknown in some frames, its velocity is that of its last two known places, which the
+cheaper path carries on: then the best path may be missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Array
+from posekit.sequences.arrivals import arrivals
+from posekit.sequences.beam import Beam
+from posekit.sequences.channels import Channels, channels_of
+from posekit.sequences.frame import SurvivorFrame
+from posekit.sequences.motion_model import MotionModel
+from posekit.sequences.states import States
+from posekit.sequences.transitions import Target
+
+ABSENT: Final = 5.0
+"""Cost of each joint that a survivor does not know and another of its frame does."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Step:
+    """How the ends of paths after a frame came about.
+
+    Parameters
+    ----------
+    parent : int array (S,)
+        Which end each continues.
+    survivor : int array (S,)
+        The survivor that it went to; -1 where it passed the frame over.
+    dropped : float
+        The cheapest of the ends that were not followed; infinite if all were.
+    """
+
+    parent: NDArray[np.intp]
+    survivor: NDArray[np.intp]
+    dropped: float
+
+
+def advance(
+    states: States,
+    frame: SurvivorFrame,
+    model: MotionModel,
+    beam: Beam,
+    *,
+    fresh: NDArray[np.bool_] | None = None,
+) -> tuple[States, Step]:
+    """Go on by one frame.
+
+    Parameters
+    ----------
+    states : States
+    frame : SurvivorFrame
+    model : MotionModel
+    beam : Beam
+    fresh : bool array (N,), optional
+        Survivors that make a path fresh.
+    """
+    passed = replace(states, cost=states.cost + model.skip)
+    parent, survivor = np.arange(len(states)), np.full(len(states), -1, dtype=np.intp)
+    channels = channels_of(frame.joints, frame.deviation)
+    own = model.ranking * frame.cost + _absence(channels)
+    usable, dropped = beam.cheapest(np.where(channels.known.any(axis=0), own, np.inf))
+    dropped += float(states.cost.min())
+    if len(usable):
+        channels = channels.take(usable)
+        target = Target.of(channels, frame.time)
+        new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
+        came, went, cost, left_out = arrivals(states, target, own[usable], new, model=model, beam=beam)
+        dropped = min(dropped, left_out)
+        moved = _move(states.take(came), channels.take(went), cost, frame.time, new[went])
+        moved = replace(moved, group=states.group.max() + 1 + 2 * went + moved.fresh)
+        states = States.join(moved, passed)
+        parent, survivor = np.concatenate([came, parent]), np.concatenate([usable[went], survivor])
+    else:
+        states = passed
+    least = 0 if np.isfinite(states.interval).any() else len(frame) + 1
+    rows, lost = beam.keep(states.cost, states.fresh, least=least)
+    return states.take(rows), Step(parent=parent[rows], survivor=survivor[rows], dropped=min(dropped, lost))
+
+
+def trace(steps: Sequence[Step], end: int) -> NDArray[np.intp]:
+    """Return the survivors of the path that ends in a state, the first frame's first; -1 for frames passed over."""
+    path = np.empty(len(steps), dtype=np.intp)
+    for k in range(len(steps) - 1, -1, -1):
+        path[k] = steps[k].survivor[end]
+        end = int(steps[k].parent[end])
+    return path
+
+
+def _absence(channels: Channels) -> Array:
+    """Charge survivors (N,) for what others of their frame know."""
+    known = channels.known
+    return np.asarray(ABSENT * (known.any(axis=1, keepdims=True) & ~known).sum(axis=0))
+
+
+def _move(old: States, to: Channels, cost: Array, time: float, new: NDArray[np.bool_]) -> States:
+    """Return the states after steps to survivors: what these do not know is carried on."""
+    since = time - old.time
+    had = np.isfinite(since)
+    velocity = (to.value - old.position) / np.where(had, since, 1.0)[..., None]
+    fresh = old.fresh | new
+    three = to.known[..., None]
+    return States(
+        cost=cost,
+        group=old.group,
+        fresh=fresh,
+        position=np.where(three, to.value, old.position),
+        time=np.where(to.known, time, old.time),
+        variance=np.where(to.known, to.variance, old.variance),
+        velocity=np.where(three, np.where(had[..., None], velocity, 0.0), old.velocity),
+        interval=np.where(to.known, since, old.interval),
+        earlier_variance=np.where(to.known, old.variance, old.earlier_variance),
+    )

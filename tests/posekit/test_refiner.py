@@ -1,0 +1,241 @@
+"""Views whose noise is known: what refinement keeps, how sure it is, and what the result says of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit import files
+from posekit.errors import InputError
+from posekit.figure import load_figure
+from posekit.files import View
+from posekit.pipeline import MEASURED, Recovery, forget_camera, recover, result_of, view_of
+from posekit.pipeline.noise import Noise
+from posekit.refinement import GIVING
+from posekit.skeleton import JOINT, SEGMENTS, segment_name
+from posekit.synthesis import Scene, random_views
+
+FIGURE = load_figure()
+PIXELS = 2.0
+FRAMES = 40
+
+
+def noisy(scene: Scene, pixels: float = PIXELS) -> View:
+    view = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
+    return replace(view, deviation=pixels, root=scene.joints_cam[:, 0])
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return random_views(FIGURE, FRAMES, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def recovery(scene: Scene) -> Recovery:
+    with pytest.warns(UserWarning, match="beside the ray"):
+        return recover(noisy(scene), length_deviation=0.0)
+
+
+def errors(recovery: Recovery, scene: Scene) -> Any:
+    """Return each frame's best mean joint error, metres; infinite without a survivor."""
+    return np.array(
+        [
+            np.linalg.norm(frame.joints - truth, axis=2).mean(axis=1).min(initial=np.inf)
+            for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True)
+        ]
+    )
+
+
+def test_the_truth_is_near_a_survivor(recovery: Recovery, scene: Scene) -> None:
+    found = errors(recovery, scene)
+    assert (found < 0.035).mean() >= 0.95
+    with pytest.warns(UserWarning, match="beside the ray"):
+        plain = recover(noisy(scene), refine=False)
+    assert (errors(plain, scene) < 0.035).mean() < 0.7  # what noise takes where nothing is done about it
+    assert {frame.judged for frame in recovery.frames} == {"refined"}
+    assert {frame.judged for frame in plain.frames} == {"measured"}
+
+
+def test_lengths_that_are_known_are_kept(recovery: Recovery) -> None:
+    lengths = np.array([FIGURE.lengths[segment_name(pair)] for pair in SEGMENTS])
+    a, b = np.array(SEGMENTS).T
+    for frame in recovery.frames:
+        own = np.linalg.norm(frame.joints[:, a] - frame.joints[:, b], axis=2)
+        np.testing.assert_allclose(own, np.broadcast_to(lengths, own.shape), atol=1e-9)
+        assert (frame.length_residual < 1e-9).all()
+
+
+def test_every_leaf_is_accounted_for(recovery: Recovery) -> None:
+    for frame in recovery.frames:
+        assert len(frame) + sum(frame.rejected.values()) == 8192 * max(frame.hypotheses, 1)
+        assert frame.refined is not None
+        merged = frame.rejected.get("noise/merged", 0)
+        assert int(frame.refined.merged.sum()) == merged
+
+
+def test_survivors_are_what_noise_explains_and_their_chi_square_says_so(recovery: Recovery) -> None:
+    view_image = np.concatenate([frame.refined.p for frame in recovery.frames if frame.refined is not None])
+    assert (view_image >= 1e-3).all()
+    for frame in recovery.frames:
+        assert frame.refined is not None
+        assert frame.tolerance is not None
+        assert (
+            frame.refined.chi2 <= (frame.tolerance.angle / 2.0) ** 2
+        ).all()  # limits are known to 2 degrees
+        apart = np.linalg.norm(frame.joints[:, None] - frame.joints[None], axis=3).max(axis=2)
+        assert (apart + np.eye(len(frame)) > 0.005).all()  # what became one is one
+
+
+def test_stated_deviations_are_those_of_the_errors(recovery: Recovery, scene: Scene) -> None:
+    inside = total = 0
+    for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
+        if not len(frame) or frame.refined is None:
+            continue
+        off = frame.joints - truth
+        best = np.linalg.norm(off, axis=2).mean(axis=1).argmin()
+        covariance = frame.refined.covariance[best, 6:] + 1e-10 * np.eye(3)
+        square = np.einsum(
+            "ji,ji->j", off[best, 6:], np.linalg.solve(covariance, off[best, 6:, :, None])[..., 0]
+        )
+        inside += int((square < 7.815).sum())  # the 95 % point of chi-square with three degrees of freedom
+        total += 8
+    assert 0.75 < inside / total <= 1.0
+
+
+def test_probabilities_sum_to_one_and_know_more_than_chance(recovery: Recovery, scene: Scene) -> None:
+    first, middle = [], []
+    for frame, probability, truth in zip(
+        recovery.frames, recovery.probability, scene.joints_cam, strict=True
+    ):
+        assert probability.shape == (len(frame),)
+        if len(frame):
+            assert probability.sum() == pytest.approx(1.0)
+            off = np.linalg.norm(frame.joints - truth, axis=2).mean(axis=1)
+            first.append(off[probability.argmax()])
+            middle.append(off.mean())
+    assert np.mean(first) < np.mean(middle)
+
+
+def test_exact_points_stay_exact_whatever_noise_is_said(scene: Scene) -> None:
+    view = replace(view_of(scene), deviation=PIXELS)
+    told, plain = recover(view), recover(view_of(scene))
+    for a, b in zip(told.frames, plain.frames, strict=True):
+        assert a.judged == b.judged == "exact"
+        np.testing.assert_array_equal(a.joints, b.joints)
+
+
+def test_a_neck_that_is_not_given_is_placed_with_the_noise(scene: Scene) -> None:
+    view = replace(noisy(scene), root=np.full((FRAMES, 3), np.nan))
+    recovery = recover(view, length_deviation=0.0)
+    assert (errors(recovery, scene) < 0.1).mean() >= 0.9
+    assert all(frame.root is not None for frame in recovery.frames)
+
+
+def test_bodies_that_give_need_room_for_it(scene: Scene) -> None:
+    """With a shoulder that is 2 cm off its place, held lengths lose the truth and uncertain ones keep it."""
+    joints = scene.joints_cam.copy()
+    shift = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
+    shift /= np.linalg.norm(shift, axis=1, keepdims=True)
+    for name in ("right_shoulder", "right_elbow", "right_wrist"):
+        joints[:, JOINT[name]] += 0.02 * shift
+    shrugged = replace(scene, joints_cam=joints, image=scene.camera.project(joints))
+    view = noisy(shrugged, 1.0)
+    with pytest.warns(UserWarning, match="beside the ray"):
+        given = errors(recover(view), shrugged)
+        held = errors(recover(view, length_deviation=0.0), shrugged)
+    assert (given < 0.05).mean() >= 0.85
+    assert (held < 0.05).mean() <= 0.6
+
+
+def test_less_confident_points_are_less_certain(scene: Scene) -> None:
+    view = noisy(scene)
+    confidence = np.ones((FRAMES, 19))
+    confidence[:, JOINT["right_wrist"]] = 0.3
+    noise = Noise.of(replace(view, confidence=confidence), None, None, asked=False)
+    assert noise is not None
+    deviation = noise.of_points(
+        replace(view, confidence=confidence), np.arange(FRAMES), np.full(FRAMES, 4.0), np.full(FRAMES, 1500.0)
+    )
+    np.testing.assert_allclose(deviation[:, JOINT["right_wrist"]], PIXELS / np.sqrt(0.3))
+    np.testing.assert_allclose(deviation[:, JOINT["left_wrist"]], PIXELS)
+    assert noise.by_segment == GIVING
+    assert set(replace(noise, lengths=0.03).by_segment.values()) == {0.03}
+
+
+def test_joints_that_are_hidden_stay_unknown_or_are_completed(scene: Scene) -> None:
+    view = noisy(scene)
+    image = view.image[:4].copy()
+    image[:, JOINT["right_wrist"]] = np.nan
+    part = replace(
+        view,
+        image=image,
+        **{name: getattr(view, name)[:4] for name in ("time", "head_image", "confidence", "root", "truth")},
+    )
+    with pytest.warns(UserWarning, match="beside the ray"):
+        without = recover(part, infer=False)
+        completed = recover(part)
+    for frame in without.frames:
+        assert np.isnan(frame.joints[:, JOINT["right_wrist"]]).all()
+        assert frame.refined is not None
+        assert np.isnan(frame.refined.covariance[:, JOINT["right_wrist"]]).all()
+    told = 0
+    for frame in completed.frames:
+        known = np.isfinite(frame.joints[:, JOINT["right_wrist"]]).all(axis=1)
+        assert frame.inferred is not None
+        assert [("right_wrist" in joints) for joints in frame.inferred] == known.tolist()
+        told += int(known.sum())
+    assert told >= 0.9 * sum(len(frame) for frame in completed.frames) > 0
+
+
+@pytest.mark.parametrize("name", ["r.json", "r.npz"])
+@pytest.mark.parametrize("unit", ["m", "cm"])
+def test_a_file_keeps_what_refinement_says(name: str, unit: Any, recovery: Recovery, tmp_path: Path) -> None:
+    some = replace(recovery, frames=recovery.frames[:3])
+    result = result_of(some, unit=unit)
+    files.write_result(tmp_path / name, result)
+    read = files.read_result(tmp_path / name)
+    assert read.settings == result.settings
+    for a, b in zip(read.frames, result.frames, strict=True):
+        assert a.probability is not None
+        assert b.probability is not None
+        assert a.refined is not None
+        assert b.refined is not None
+        np.testing.assert_array_equal(a.probability, b.probability)
+        for field in ("chi2", "dof", "p", "merged"):
+            np.testing.assert_array_equal(getattr(a.refined, field), getattr(b.refined, field))
+        np.testing.assert_allclose(a.refined.covariance, b.refined.covariance, rtol=1e-5, atol=1e-300)
+
+
+def test_what_cannot_be_refined_is_refused(scene: Scene) -> None:
+    view = noisy(scene)
+    with pytest.raises(InputError, match="--refine: only views of a calibrated camera"):
+        recover(forget_camera(view), refine=True)
+    with pytest.raises(InputError, match="--refine: the noise says what is tolerated"):
+        recover(replace(view, root=np.full((FRAMES, 3), np.nan)), refine=True, tolerance=MEASURED)
+    with pytest.raises(InputError, match=r"--length-deviation: 0\.5; expected a fraction"):
+        Noise(deviation=1.0, lengths=0.5)
+
+
+def test_the_command_line_refines(
+    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Callable[..., Any]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert command("synth", "random", "-o", "view.json", "--frames", "3", "--noise", "2").code == 0
+    assert files.read_view("view.json").deviation == 2.0
+    assert command("recover", "view.json", "-o", "r.json").code == 0
+    result = files.read_result("r.json")
+    assert result.settings["noise"] == {"deviation": 2.0, "offset": 0.0, "lengths": None}
+    assert set(result.settings["judged"]) == {"refined"}
+    assert command("recover", "view.json", "-o", "n.json", "--no-refine").code == 0
+    assert files.read_result("n.json").settings["noise"] is None
+    refused = command("recover", "view.json", "-o", "x.json", "--length-deviation", "2")
+    assert refused.code == 2
+    assert "--length-deviation" in refused.err
+    assert not Path("x.json").exists()
+    assert posekit.read_result("r.json").frames[0].probability is not None

@@ -1,0 +1,104 @@
+"""What screens say is clear is what the judges say; on ordinary postures they are hardly ever unsure."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from posekit.figure import load_figure
+from posekit.figure.frames import fit_rotation
+from posekit.tree import PASSED, UNSURE, Check, Screened
+from posekit.tree.compiled import compiled
+from posekit.validators import collision, joint_range, kernels
+
+FIGURE = load_figure()
+N = 150
+
+
+def suite(tolerance: float) -> list[Check]:
+    return [*joint_range(FIGURE, tolerance=tolerance), *collision(FIGURE)]
+
+
+SUITES = {tolerance: suite(tolerance) for tolerance in (0.0, 1e-3, 3.0)}
+NAMES = [f"{check.name} {check.where[0]} {len(check.where)}" for check in SUITES[0.0]]
+
+
+def postures(seed: int, n: int = N) -> np.ndarray:
+    """Draw postures (n, 19, 3) inside and outside all limits, many of them self-penetrating."""
+    rng = np.random.default_rng(seed)
+    q = np.tile(pin.neutral(FIGURE.model), (n, 1))
+    turn = rng.normal(size=(n, 4))
+    q[:, 3:7] = turn / np.linalg.norm(turn, axis=1, keepdims=True)
+    q[:, FIGURE.angle_index] = rng.uniform(-np.pi, np.pi, (n, 22))
+    return FIGURE.forward_kinematics(q)
+
+
+def special(seed: int) -> np.ndarray:
+    """Make postures with straight limbs, right angles, points that coincide, are missing or absurdly far."""
+    rng = np.random.default_rng(seed)
+    q = np.tile(pin.neutral(FIGURE.model), (N, 1))
+    limits = FIGURE.limits
+    values = np.stack([limits.lower, limits.upper, np.zeros(22), np.full(22, np.pi / 2), np.full(22, -np.pi)])
+    q[:, FIGURE.angle_index] = values[rng.integers(0, len(values), (N, 22)), np.arange(22)]
+    points = FIGURE.forward_kinematics(q)
+    points += rng.choice([0.0, 1e-12, 1e-9, 1e-6, 1e-5], (N, 1, 1)) * rng.normal(size=points.shape)
+    for row in range(0, N, 3):
+        points[row, rng.integers(19)] = points[row, rng.integers(19)]
+    for row in range(1, N, 3):
+        points[row, rng.integers(19)] = (np.nan, 1e200, np.inf, 1e9)[rng.integers(4)]
+    return points
+
+
+def places(check: Check, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return what the screen says, and what the judge says."""
+    own = np.ascontiguousarray(points[:, check.points])
+    quick: Screened = check  # type: ignore[assignment]
+    with np.errstate(all="ignore"):
+        violated = check.judge(own).violated
+        screened, presumed = quick.screen(own)
+    if presumed is not None:
+        assert len(presumed) == (screened >= 0).sum()
+        assert not len(presumed) or quick.confirm(presumed)
+    return screened, np.where(violated.any(axis=1), violated.argmax(axis=1), PASSED)
+
+
+@pytest.mark.parametrize("tolerance", SUITES)
+@pytest.mark.parametrize("index", range(len(NAMES)), ids=NAMES)
+def test_a_screen_never_contradicts_the_judge(tolerance: float, index: int) -> None:
+    check = SUITES[tolerance][index]
+    for points in (postures(index), special(index)):
+        screened, judged = places(check, points)
+        clear = screened != UNSURE
+        np.testing.assert_array_equal(screened[clear], judged[clear])
+
+
+@pytest.mark.parametrize("index", range(len(NAMES)), ids=NAMES)
+def test_a_screen_is_hardly_ever_unsure_of_ordinary_postures(index: int) -> None:
+    screened, judged = places(SUITES[1e-3][index], postures(100 + index))
+    assert (screened == UNSURE).mean() < 0.03
+    if SUITES[1e-3][index].name == "joint_range":
+        assert (judged >= 0).any() and (judged == PASSED).any()
+
+
+def test_the_polar_factor_is_the_best_rotation() -> None:
+    rng = np.random.default_rng(0)
+    body = rng.normal(size=(5, 3))
+    loops = kernels
+    for _ in range(20):
+        seen = rng.normal(size=(5, 3))
+        expected = fit_rotation(body, seen[None])[0]
+        X = np.empty((3, 3))
+        if loops.polar(np.einsum("pi,pj->ij", seen, body), X):
+            np.testing.assert_allclose(X, expected, rtol=0, atol=1e-11)
+            np.testing.assert_allclose(X @ X.T, np.eye(3), rtol=0, atol=1e-12)
+
+
+def test_a_mirrored_or_flat_head_is_not_clear() -> None:
+    X = np.empty((3, 3))
+    for C in (np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 0.0]), np.zeros((3, 3)), np.full((3, 3), np.nan)):
+        assert not kernels.polar(C, X)
+
+
+def test_kernels_are_compiled_in_an_order_in_which_each_finds_its_parts() -> None:
+    loops = compiled(kernels)
+    for name, types in kernels.COMPILED.items():
+        assert not types or callable(getattr(loops, name))
