@@ -17,7 +17,7 @@ from posekit.validators.collision import collision
 from posekit.validators.joint_range import TOLERANCE, joint_range
 from posekit.validators.ranges import Ranges
 from posekit.validators.rigid_parts import Mode, RigidTolerance, rigid_parts
-from posekit.validators.walking import DEFAULT_RULES, walking
+from posekit.validators.walking import DEFAULT_RULES, WalkingThresholds, walking
 
 CHECKS = ("rigid-parts", "joint-range", "collision", "walking")
 PHYSICAL = CHECKS[:3]
@@ -42,12 +42,14 @@ def make_checks(
     limbs: bool = False,
     angle_tolerance: float = TOLERANCE,
     rules: Iterable[int] = DEFAULT_RULES,
+    thresholds: WalkingThresholds | None = None,
     contact_margin: float = 0.0,
     exact: bool = False,
 ) -> list[Check]:
     """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance.
 
-    Distances inside torso and hips may be off by `rigid_tolerance` metres: all the same, or each its own.
+    Distances inside torso and hips may be off by `rigid_tolerance` metres: all the same, or each its own. Rules of
+    walking have the paper's `thresholds` unless others are given.
 
     Raises
     ------
@@ -62,7 +64,7 @@ def make_checks(
             raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
     if not math.isfinite(contact_margin):
         raise InputError(f"the contact margin is {contact_margin!r} m; expected a finite length")
-    motion = walking(figure, rules)  # made even where it is not wanted: it refuses unknown rules
+    motion = walking(figure, rules, thresholds)  # made even where it is not wanted: it refuses unknown rules
     checks: list[Check] = []
     for name in check_names(names):
         if name == "rigid-parts":

@@ -26,7 +26,7 @@ from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
 from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, Bodies, Lengths, RobotSettings
 from posekit.validators.suite import PHYSICAL, check_names, judge, make_checks
-from posekit.validators.walking import DEFAULT_RULES
+from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 RIGID_TOLERANCE = 0.03
 """Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
@@ -52,6 +52,8 @@ class Validator:
         ``urdf``, ``table1`` (figures alone) or the path of a TOML table.
     rules : sequence of int
         Rules of walking.
+    walkers : {"paper", "people"}
+        Whose thresholds those have: by the paper's word, or as real walkers keep them.
     rigid_tolerance : float
         Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off.
     angle_tolerance : float
@@ -88,6 +90,7 @@ class Validator:
         checks: Sequence[str] | None = None,
         ranges: str = "urdf",
         rules: Sequence[int] = DEFAULT_RULES,
+        walkers: str = "paper",
         rigid_tolerance: float = RIGID_TOLERANCE,
         angle_tolerance: float = TOLERANCE,
         contact_margin: float = 0.0,
@@ -99,6 +102,7 @@ class Validator:
         untrusted: bool | None = None,
         up: ArrayLike = (0.0, 0.0, 1.0),
     ) -> None:
+        thresholds = thresholds_of(walkers)
         subject = load_subject(
             STICK_FIGURE if urdf is None else urdf,
             srdf=srdf,
@@ -142,6 +146,7 @@ class Validator:
             "rigid_tolerance": rigid_tolerance,
             "angle_tolerance": angle_tolerance,
             "rules": rules,
+            "thresholds": thresholds,
             "contact_margin": contact_margin,
         }
         self._suite = self._make_suite(subject)

@@ -8,9 +8,10 @@ clearly other than zero is no evidence: rules about it are undecided.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from types import MappingProxyType
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -31,7 +32,7 @@ class WalkingThresholds:
     """When a swing is evidence, and what counts as parallel, flexed and vertical.
 
     The paper gives no numbers; these are posekit's. The defaults take the rules by their word, for figures that walk
-    like Lee & Chen's; real walkers keep them as `PEOPLE` says.
+    like Lee & Chen's; real walkers keep them as `PEOPLE` says. Options choose either by its name (`thresholds_of`).
 
     Parameters
     ----------
@@ -60,6 +61,24 @@ PEOPLE = WalkingThresholds(
 )
 """For real walkers (docs, "Rules of walking"): their shoulders lie behind, their hips before the figure's, arms turned
 outward leave the moving plane, and while one leg passes the other both knees are in front, and bent."""
+
+WALKERS: Final[Mapping[str, WalkingThresholds]] = MappingProxyType(
+    {"paper": WalkingThresholds(), "people": PEOPLE}
+)
+"""Thresholds by the name that `--walkers` takes."""
+
+
+def thresholds_of(walkers: str) -> WalkingThresholds:
+    """Return the thresholds for walkers as the paper's, or for people.
+
+    Raises
+    ------
+    InputError
+        Where the name is none of `WALKERS`.
+    """
+    if walkers not in WALKERS:
+        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(WALKERS)}")
+    return WALKERS[walkers]
 
 
 def walking(

@@ -36,6 +36,7 @@ from posekit.cli.options import (
     ContactMargin,
     RangesOption,
     Rules,
+    Walkers,
     examples,
     rule_numbers,
     signed_length,
@@ -117,6 +118,7 @@ def batch(
     checks: Checks = PHYSICAL,
     ranges: RangesOption = "urdf",
     rules: Rules = "1,2",
+    walkers: Walkers = "paper",
     rigid_tolerance: Annotated[
         str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
     ] = "",
@@ -183,6 +185,7 @@ def batch(
         checks=split(checks),
         ranges=ranges,
         rules=rule_numbers(rules),
+        walkers=walkers,
         rigid=parse_length(rigid_tolerance, name="--rigid-tolerance") if rigid_tolerance else None,
         tangent=parse_length(tangent_tolerance, name="--tangent-tolerance") if tangent_tolerance else None,
         angle=angle_tolerance,

@@ -65,7 +65,8 @@ def convert(
         typer.Option(
             "--posture",
             metavar="WHICH",
-            help="Of a result: first (whose lengths fit best), a number from 1, or all (csv, npz, parquet, glb).",
+            help="Of a result: first (the likeliest), path (through all frames, if they were followed), a number "
+            "from 1, or all (csv, npz, parquet, glb).",
         ),
     ] = "first",
     view: Annotated[

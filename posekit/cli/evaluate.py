@@ -16,6 +16,7 @@ from posekit.cli.options import (
     RangesOption,
     Rules,
     Seed,
+    Walkers,
     distinct,
     examples,
     progress,
@@ -122,6 +123,7 @@ def evaluate(
     checks: Checks = PHYSICAL,
     ranges: RangesOption = "urdf",
     rules: Rules = "1,2",
+    walkers: Walkers = "paper",
     rigid_tolerance: Annotated[
         str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
     ] = "",
@@ -176,6 +178,7 @@ def evaluate(
         "checks": split(checks),
         "ranges": ranges,
         "rules": rule_numbers(rules),
+        "walkers": walkers,
         "tolerance": _tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,

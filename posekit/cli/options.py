@@ -26,6 +26,14 @@ Rules = Annotated[
     str,
     typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5."),
 ]
+Walkers = Annotated[
+    str,
+    typer.Option(
+        "--walkers",
+        metavar="paper|people",
+        help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
+    ),
+]
 ContactMargin = Annotated[
     str,
     typer.Option(

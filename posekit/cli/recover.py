@@ -34,6 +34,7 @@ from posekit.cli.options import (
     ContactMargin,
     RangesOption,
     Rules,
+    Walkers,
     about,
     distinct,
     examples,
@@ -74,6 +75,7 @@ def recover(
     checks: Checks = PHYSICAL,
     ranges: RangesOption = "urdf",
     rules: Rules = "1,2",
+    walkers: Walkers = "paper",
     group: Annotated[
         str, typer.Option("--group", metavar="LENGTH", help="Group survivors nearer than this, as 5cm.")
     ] = "",
@@ -162,6 +164,16 @@ def recover(
             help="Then: how far lengths may be off, standard deviation. Default: 0.01, from shoulder to pelvis 0.02.",
         ),
     ] = None,
+    paths: Annotated[
+        int,
+        typer.Option(
+            "--follow",
+            metavar="K",
+            min=0,
+            max=1000,
+            help="Follow the person through the frames: the K likeliest paths from survivor to survivor.",
+        ),
+    ] = 0,
     truth: Annotated[
         Path | None,
         typer.Option(
@@ -207,12 +219,14 @@ def recover(
             ("--checks", checks, PHYSICAL),
             ("--ranges", ranges, "urdf"),
             ("--rules", rules, "1,2"),
+            ("--walkers", walkers, "paper"),
             ("--contact-margin", contact_margin, "0cm"),
             ("--angle-tolerance", angle_tolerance, None),
             ("--proportions", proportions, "figure"),
             ("--no-infer", infer, True),
             ("--refine", refine, None),
             ("--length-deviation", length_deviation, None),
+            ("--follow", paths, 0),
         ):
             if given != default:
                 raise InputError(f"{name} is for persons; leave it out with --linkage")
@@ -244,6 +258,7 @@ def recover(
         checks=split(checks),
         ranges=validators.load_ranges(ranges),
         rules=rule_numbers(rules),
+        walkers=walkers,
         rigid=rigid_tolerance,
         tangent=tangent_tolerance,
         angle=angle_tolerance,
@@ -267,8 +282,13 @@ def recover(
         if write_urdf is not None:
             recovery.figure.write(of_person(write_urdf, one, alone=alone))
         path = of_person(output, one, alone=alone)
-        files.write_result(path, pipeline.result_of(recovery, unit=one.view.unit, explain=explain))
+        with about(view):
+            following = pipeline.follow(recovery, k=paths) if paths else None
+        result = pipeline.result_of(recovery, unit=one.view.unit, explain=explain, following=following)
+        files.write_result(path, result)
         summarize(recovery)
+        if following is not None:
+            typer.echo(pipeline.following_line(following))
         if truth is not None:
             for line in compare(recovery, one.view.truth).lines:
                 typer.echo(line)
@@ -282,6 +302,7 @@ class Asked:
     checks: tuple[str, ...]
     ranges: Ranges
     rules: tuple[int, ...]
+    walkers: str
     rigid: str
     tangent: str
     angle: float | None
@@ -320,6 +341,7 @@ class Asked:
                 checks=self.checks,
                 ranges=self.ranges,
                 rules=self.rules,
+                walkers=self.walkers,
                 tolerance=_tolerance(self.rigid, self.tangent, self.angle, otherwise),
                 contact_margin=self.contact_margin,
                 group=self.group,
@@ -385,9 +407,10 @@ def _tolerance(rigid: str, tangent: str, angle: float | None, otherwise: Toleran
 
 def summarize(recovery: Recovery) -> None:
     """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
+    from posekit.pipeline.advice import advice_lines
     from posekit.pipeline.summary import summary_lines
 
-    for line in summary_lines(recovery):
+    for line in [*summary_lines(recovery), *advice_lines(recovery)]:
         typer.echo(line)
     empty = sum(not len(frame) for frame in recovery.frames)
     if empty:

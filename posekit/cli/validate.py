@@ -12,7 +12,6 @@ import typer
 from posekit.cli.given import schema_of
 from posekit.cli.options import (
     AngleTolerance,
-    ContactMargin,
     Rules,
     about,
     distinct,
@@ -92,6 +91,15 @@ def validate(
         ),
     ] = "urdf",
     rules: Rules = "1,2",
+    walkers: Annotated[
+        str,
+        typer.Option(
+            "--walkers",
+            metavar="paper|people",
+            help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them. Default: paper; a "
+            "result's own.",
+        ),
+    ] = "",
     rigid_tolerance: Annotated[
         str,
         typer.Option(
@@ -101,7 +109,14 @@ def validate(
         ),
     ] = "3cm",
     angle_tolerance: AngleTolerance = None,
-    contact_margin: ContactMargin = "0cm",
+    contact_margin: Annotated[
+        str,
+        typer.Option(
+            "--contact-margin",
+            metavar="LENGTH",
+            help="Clearance that bodies must keep, as 1cm; negative allows penetration. Default: 0cm; a result's own.",
+        ),
+    ] = "",
     lengths: Annotated[
         str,
         typer.Option(
@@ -189,19 +204,24 @@ def validate(
     if not _count(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
-    least = 0.001
+    judged = pipeline.JudgedWith(angle=0.001, contact_margin=0.0, walkers="paper")
     if schema_of(postures).startswith("posekit.result/"):
-        own, least = pipeline.recovered_with(files.read_result(postures))
-        figure = urdf or own
-    angle_tolerance = least if angle_tolerance is None else angle_tolerance
+        with about(postures):
+            result = files.read_result(postures)
+            figure = urdf or pipeline.recovered_with(result)[0]
+            judged = pipeline.judged_with(result)
+    angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
+    walkers = walkers or judged.walkers
+    margin = signed_length(contact_margin, "--contact-margin") if contact_margin else judged.contact_margin
     validator = validators.Validator(
         figure,
         checks=split(checks) if checks else None,
         ranges=ranges,
         rules=rule_numbers(rules),
+        walkers=walkers,
         rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
         angle_tolerance=angle_tolerance,
-        contact_margin=signed_length(contact_margin, "--contact-margin"),
+        contact_margin=margin,
         lengths=lengths or None,  # type: ignore[arg-type]
         joint_map=joint_map or None,
         bodies=bodies,  # type: ignore[arg-type]
@@ -214,9 +234,10 @@ def validate(
         "urdf": urdf or ("stick_figure" if figure == "stick_figure" else "as recovered"),
         "ranges": ranges,
         "rules": rules,
+        "walkers": walkers,
         "rigid_tolerance": rigid_tolerance,
         "angle_tolerance": angle_tolerance,
-        "contact_margin": contact_margin,
+        "contact_margin": contact_margin or f"{100 * margin:g}cm",
     }
     with about(postures):
         report = pipeline.validate(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
 from posekit.files.likelihoods import Likelihoods
+from posekit.files.paths import FollowedPaths
 from posekit.files.root import Root
 from posekit.files.units import Unit
 from posekit.intake.refusal import refusal
@@ -155,6 +156,8 @@ class Result:
         Everything that decided the result, of plain values.
     frames : sequence of ResultFrame
         All with the same margins; all with groups or none, and with probabilities or none.
+    paths : FollowedPaths, optional
+        The person through all frames, where they were followed.
     """
 
     unit: Unit
@@ -162,6 +165,7 @@ class Result:
     configuration_names: Sequence[str]
     settings: Mapping[str, Any]
     frames: Sequence[ResultFrame]
+    paths: FollowedPaths | None = None
 
     def __post_init__(self) -> None:
         for name in ("joint_names", "configuration_names", "frames"):
@@ -170,6 +174,8 @@ class Result:
             raise _refused("frames", "no frame", "at least one")
         if self.joint_names != JOINTS:
             raise _refused("joint_names", ", ".join(self.joint_names)[:60], "the 14 joints in tree order")
+        if self.paths is not None:
+            self.paths.check_against([len(frame.joints) for frame in self.frames])
         first = self.frames[0]
         for index, frame in enumerate(self.frames):
             where = f"frames[{index}]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from posekit.files.family import Family
 from posekit.files.inferred import Inferred
 from posekit.files.likelihoods import Likelihoods
+from posekit.files.paths import FollowedPaths
 from posekit.files.reading import read_json
 from posekit.files.result import Result, ResultFrame
-from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPosture
+from posekit.files.result_schema import SCHEMA, ResultFile, ResultFrameFields, ResultPaths, ResultPosture
 from posekit.files.root import Root
 from posekit.files.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.files.validation import validated
@@ -22,6 +23,8 @@ from posekit.intake.refusal import refusal
 from posekit.intake.writing import json_pieces, write_text
 
 Array = NDArray[np.float64]
+
+_KINDS: Final = {"survivor": int, "interpolated": bool}
 
 
 def read_result_json(path: str | Path) -> Result:
@@ -62,7 +65,21 @@ def result_of(document: object, path: str | Path) -> Result:
             )
             for frame in file.frames
         ],
+        paths=None if file.paths is None else _paths(path, file.paths, file.unit),
     )
+
+
+def _paths(path: str | Path, given: ResultPaths, unit: Unit) -> FollowedPaths:
+    rows = [one.model_dump() for one in given.paths]
+    try:
+        arrays: dict[str, NDArray[Any]] = {
+            name: np.array([row[name] for row in rows], dtype=_KINDS.get(name, float)) for name in rows[0]
+        }
+    except ValueError:
+        raise refusal(
+            path, "paths", "lists of different lengths", "one entry a frame in every path", "follow it again"
+        ) from None
+    return FollowedPaths.of(arrays, given.model_dump(), unit)
 
 
 def write_result_json(path: str | Path, result: Result) -> None:
@@ -74,6 +91,8 @@ def write_result_json(path: str | Path, result: Result) -> None:
         "configuration_names": list(result.configuration_names),
         "settings": dict(result.settings),
     }
+    if result.paths is not None:
+        head["paths"] = result.paths.fields(result.unit)
     write_text(path, json_pieces(head, "frames", _frames(result)))
 
 

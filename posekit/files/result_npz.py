@@ -9,6 +9,8 @@ there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names`
 what is not known are NaN, -1 or an empty text. Uncalibrated: ``scales`` (F, N) and ``families`` (JSON text); with
 joints that were not seen: ``inferred`` (JSON text). ``probability`` (F, N). Refined: ``refined/chi2``,
 ``refined/dof``, ``refined/p``, ``refined/merged`` (F, N), ``refined/covariance`` (F, N, 14, 6) in square units.
+Followed: ``paths/survivor``, ``paths/scale`` (K, F), ``paths/joints``, ``paths/smoothed`` (K, F, 14, 3),
+``paths/interpolated``, ``paths/deviation`` (K, F, 14), ``paths/cost``, ``paths/share`` (K,), ``paths/told`` (text).
 """
 
 from __future__ import annotations
@@ -26,9 +28,10 @@ from posekit.files.family import Family
 from posekit.files.inferred import Inferred
 from posekit.files.likelihoods import NUMBERS, Likelihoods
 from posekit.files.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
+from posekit.files.paths import FollowedPaths
 from posekit.files.reading import parse_json
 from posekit.files.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
-from posekit.files.result_schema import SCHEMA, ResultDetails
+from posekit.files.result_schema import SCHEMA, ResultDetails, ResultPathsTold
 from posekit.files.root import Root
 from posekit.files.units import PER_METRE, UNITS, Unit, from_metres, to_metres
 from posekit.intake.refusal import refusal, shown
@@ -41,6 +44,7 @@ MAX_PADDED: Final = 16_000_000_000
 """Bytes that a result may declare with its padding, which is passed over and never held."""
 _MARGIN = "margins/"
 _REFINED = "refined/"
+_PATHS = "paths/"
 _PADDED = (
     "joints",
     "q",
@@ -113,6 +117,9 @@ def write_result_npz(path: str | Path, result: Result) -> None:
             arrays[_REFINED + name] = Ragged(rows=[getattr(each, name) for each in likelihoods], fill=np.nan)
         packed = [each.packed(unit) for each in likelihoods]
         arrays[_REFINED + "covariance"] = Ragged(rows=packed, fill=np.nan)
+    if result.paths is not None:
+        arrays |= {_PATHS + name: values for name, values in result.paths.in_unit(unit).items()}
+        arrays[_PATHS + "told"] = np.array(json.dumps(result.paths.told(unit), allow_nan=False))
     with replacing(path) as file:
         write_npz(file, arrays)
 
@@ -195,7 +202,33 @@ def result_in(archive: Archive) -> Result:
             )
             for index in range(len(time))
         ],
+        paths=_followed(archive, len(time), unit),
     )
+
+
+def _followed(archive: Archive, frames: int, unit: Unit) -> FollowedPaths | None:
+    """Read the paths, where there are some."""
+    if _PATHS + "survivor" not in archive.names:
+        return None
+    survivor = archive.array(_PATHS + "survivor", "iu", (None, frames))
+    K, joints = len(survivor), len(JOINTS)
+    shapes = {
+        "joints": (K, frames, joints, 3),
+        "smoothed": (K, frames, joints, 3),
+        "deviation": (K, frames, joints),
+        "cost": (K,),
+        "share": (K,),
+        "scale": (K, frames),
+    }
+    arrays: dict[str, Any] = {name: _floats(archive, _PATHS + name, shape) for name, shape in shapes.items()}
+    arrays["interpolated"] = archive.array(_PATHS + "interpolated", "b", (K, frames, joints))
+    try:
+        told = ResultPathsTold.model_validate(_json(archive, _PATHS + "told"))
+    except ValidationError:
+        raise refusal(
+            archive.path, _PATHS + "told", "another text", "what posekit writes", "write the file again"
+        ) from None
+    return FollowedPaths.of({**arrays, "survivor": survivor}, told.model_dump(), unit)
 
 
 def to_metres_rows(

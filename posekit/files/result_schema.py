@@ -205,6 +205,47 @@ class ResultFrameFields(FileModel):
     )
 
 
+PathPoints = Annotated[
+    list[Annotated[list[MaybePoint], Field(min_length=14, max_length=14)]],
+    Field(max_length=1_000_000),
+    FailFast(),
+]
+
+
+class ResultPath(FileModel):
+    """One path through all frames."""
+
+    survivor: Annotated[list[Annotated[int, Field(ge=-1, le=2**53)]], FailFast()] = Field(
+        description="The posture of each frame, from 0; -1 where the path passes the frame over."
+    )
+    joints: PathPoints = Field(description="Its joints, and what bridges them, in `unit`.")
+    smoothed: PathPoints = Field(description="The same with smoothed distances from the camera, in `unit`.")
+    interpolated: list[list[bool]] = Field(
+        description="Joints that are bridged, or completed without being seen."
+    )
+    deviation: list[list[Maybe]] = Field(description="Standard deviation of each joint, in `unit`.")
+    cost: float = Field(description="Minus the logarithm of its likelihood, but for a constant.")
+    share: float = Field(description="Its share of the likelihood of these paths.")
+    scale: list[Maybe] = Field(description="Uncalibrated: pixels a `unit`.")
+
+
+class ResultPaths(FileModel):
+    """One person through all frames: the survivors that a body can have moved along."""
+
+    lead: Maybe = Field(description="How much cheaper the first path is than the next that is different.")
+    exact: bool = Field(description="Whether the first path is certain to be the cheapest.")
+    apart: float = Field(description="By how much some joint is elsewhere in a different path, in `unit`.")
+    paths: Annotated[list[ResultPath], Field(min_length=1, max_length=1000), FailFast()]
+
+
+class ResultPathsTold(FileModel):
+    """What an NPZ says once of all paths, as JSON text."""
+
+    lead: Maybe
+    exact: bool
+    apart: float
+
+
 class ResultDetails(FileModel):
     """What an NPZ keeps as JSON text: families and roots of its frames, and what was inferred in postures."""
 
@@ -224,3 +265,4 @@ class ResultFile(FileModel):
     configuration_names: Names
     settings: dict[str, Any]
     frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]
+    paths: ResultPaths | None = Field(default=None, description="One person through all frames.")

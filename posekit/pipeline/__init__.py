@@ -13,12 +13,15 @@ from posekit.pipeline.result import result_of as result_of
 from posekit.pipeline.rooting import Rooting as Rooting
 from posekit.pipeline.scale import Scale as Scale
 from posekit.pipeline.scale import parse_scale as parse_scale
+from posekit.pipeline.summary import following_line as following_line
 from posekit.pipeline.summary import summary_lines as summary_lines
 from posekit.pipeline.taylor.reproduce import reproduce_taylor as reproduce_taylor
 from posekit.pipeline.tolerance import EXACT as EXACT
 from posekit.pipeline.tolerance import MEASURED as MEASURED
 from posekit.pipeline.tolerance import PHOTOGRAPH as PHOTOGRAPH
 from posekit.pipeline.tolerance import Tolerance as Tolerance
+from posekit.pipeline.validate import JudgedWith as JudgedWith
+from posekit.pipeline.validate import judged_with as judged_with
 from posekit.pipeline.validate import recovered_with as recovered_with
 from posekit.pipeline.validate import validate as validate
 from posekit.pipeline.views import builtin_view as builtin_view

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
 
@@ -16,6 +16,7 @@ from posekit.pipeline.tolerance import Tolerance
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import Ranges, make_checks
+from posekit.validators.walking import WalkingThresholds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +32,15 @@ class Judges:
         Rules of walking.
     contact_margin : float
         Metres that bodies must keep from each other.
+    thresholds : WalkingThresholds
+        Of the rules of walking.
     """
 
     checks: tuple[str, ...]
     ranges: Ranges
     rules: tuple[int, ...]
     contact_margin: float
+    thresholds: WalkingThresholds = field(default_factory=WalkingThresholds)
 
     def suite(self, figure: Figure, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
         """Make the checks of a figure, with every distance measured where `exact`."""
@@ -48,6 +52,7 @@ class Judges:
             rigid_mode="placement" if tolerance.placement else "distances",
             angle_tolerance=tolerance.angle,
             rules=self.rules,
+            thresholds=self.thresholds,
             contact_margin=self.contact_margin,
             exact=exact,
         )

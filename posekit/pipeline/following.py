@@ -58,6 +58,8 @@ class Following:
         Pixels a metre, of the survivors of an uncalibrated view; NaN where a frame is passed over.
     exact : bool
         Whether the first path is certain to be the cheapest of all.
+    apart : float
+        Metres by which some joint is elsewhere in another path.
     """
 
     time: Array
@@ -71,6 +73,7 @@ class Following:
     branches: tuple[tuple[str, ...], ...]
     scale: Array | None
     exact: bool
+    apart: float = APART
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
@@ -189,7 +192,7 @@ def follow_frames(
         model = model or MotionModel(resting=math.inf)
         searched = [_about_neck(frame) for frame in given]
     paths = best_paths(searched, k=k, model=model, beam=beam, apart=apart)
-    return _following(frames, given, paths, k)
+    return _following(frames, given, paths, k, apart)
 
 
 def survivor_frames(
@@ -272,7 +275,7 @@ def _about_neck(frame: SurvivorFrame) -> SurvivorFrame:
 
 
 def _following(
-    frames: Sequence[FrameRecovery], given: Sequence[SurvivorFrame], paths: Paths, k: int
+    frames: Sequence[FrameRecovery], given: Sequence[SurvivorFrame], paths: Paths, k: int, apart: float
 ) -> Following:
     """Put the first K paths together, in the places where the survivors are."""
     joints, interpolated = (
@@ -301,4 +304,5 @@ def _following(
         branches=paths.codes,
         scale=scale,
         exact=paths.exact,
+        apart=apart,
     )

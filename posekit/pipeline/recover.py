@@ -16,6 +16,7 @@ from posekit.figure import Figure, load_figure, stature_from_lengths
 from posekit.files import OpenCVModel, ScaledOrthographicModel, View
 from posekit.pipeline.body import Body, FigureBody, Judges
 from posekit.pipeline.camera_record import camera_records
+from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.fit_scale import fit_scale
 from posekit.pipeline.grower import Grower
@@ -30,7 +31,7 @@ from posekit.pipeline.taylor.body import TaylorBody
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.ranking import Up, load_prior
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
-from posekit.validators.walking import DEFAULT_RULES
+from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 Proportions = Literal["figure", "taylor"]
 
@@ -48,6 +49,7 @@ def recover(
     checks: Sequence[str] = PHYSICAL,
     ranges: str | Ranges = "urdf",
     rules: Sequence[int] = DEFAULT_RULES,
+    walkers: str = "paper",
     tolerance: Tolerance | None = None,
     contact_margin: float = 0.0,
     group: float | None = None,
@@ -73,6 +75,8 @@ def recover(
         ``urdf``, ``table1``, the path of a TOML table, or ranges.
     rules : sequence of int
         Rules of walking, used where ``walking`` is among the checks.
+    walkers : {"paper", "people"}
+        Whose thresholds those have: by the paper's word, or as real walkers keep them.
     tolerance : Tolerance, optional
         By default each frame is judged as exact where distances inside torso or hips show that it is, else as
         measured, or as a photograph where the view is uncalibrated.
@@ -123,7 +127,13 @@ def recover(
         raise InputError(f"--group: {group!r} m; expected zero or a positive length")
     table = load_ranges(ranges) if isinstance(ranges, str) else ranges
     body = body_of(view, figure or load_figure(), proportions)
-    judges = Judges(checks=names, ranges=table, rules=tuple(rules), contact_margin=contact_margin)
+    judges = Judges(
+        checks=names,
+        ranges=table,
+        rules=tuple(rules),
+        contact_margin=contact_margin,
+        thresholds=thresholds_of(walkers),
+    )
     fit = _fit(view, body, scale, tolerance, rooting)
     noise = _noise(view, body, tolerance, rooting, refine, length_deviation)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
@@ -166,6 +176,7 @@ def recover(
         "ranges": table.name,
         "range_limits": {where: list(bounds) for where, bounds in table.limits.items()},
         "rules": list(rules) if "walking" in names else [],
+        "walkers": walkers,
         "tolerance": "exact, else measured" if tolerance is None else asdict(tolerance),
         "exact": asdict(EXACT),
         "measured": asdict(MEASURED),
@@ -176,12 +187,15 @@ def recover(
         "lengths": dict(body.figure.lengths),
         "judged": [frame.judged for frame in frames],
         "noisy": _widest([frame.tolerance for frame in frames if frame.judged == "noisy"]),
-        "refined": _widest([frame.tolerance for frame in frames if frame.judged == "refined"]),
+        "refined": _widest(
+            [frame.tolerance for frame in frames if frame.judged == "refined"],
+            contact=contact_under_noise(contact_margin),
+        ),
         "noise": None if noise is None else asdict(noise),
         "ranking": {"up": Up.level().says, "prior": load_prior().name},
         "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
-    return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings)
+    return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings, grower=grower)
 
 
 def person_of(view: View, figure: Figure) -> Figure:
@@ -289,10 +303,10 @@ def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
             start = end
 
 
-def _widest(tolerances: Sequence[Tolerance | None]) -> dict[str, Any] | None:
-    """Return the widest of some tolerances; None where there is none."""
+def _widest(tolerances: Sequence[Tolerance | None], **also: float) -> dict[str, Any] | None:
+    """Return the widest of some tolerances, and what was `also` allowed; None where there is none."""
     known = [asdict(one) for one in tolerances if one is not None]
-    return {name: max(one[name] for one in known) for name in known[0]} if known else None
+    return {name: max(one[name] for one in known) for name in known[0]} | also if known else None
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ from posekit.ranking import Ranking, deviation_of_tolerance
 from posekit.skeleton import JOINT, JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
+
+if TYPE_CHECKING:
+    from posekit.pipeline.grower import Grower
 
 LEVEL = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""
@@ -422,12 +425,15 @@ class Recovery:
     frames : list of FrameRecovery
     settings : mapping
         Everything that decided the result.
+    grower : Grower, optional
+        What grew the trees: it can tell what would have admitted a posture (`posekit.pipeline.admitting`).
     """
 
     figure: Figure
     fit: CameraFit
     frames: list[FrameRecovery]
     settings: Mapping[str, Any]
+    grower: Grower | None = None
 
     @cached_property
     def ranking(self) -> Ranking:

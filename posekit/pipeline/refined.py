@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.pipeline.contact import Overlaps
 from posekit.refinement import Merged, Refined
 from posekit.refinement.merging import merge
+from posekit.tree import Check
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -63,22 +66,32 @@ class Sifted:
     ----------
     p : array (N,)
         The probability that noise alone gives a chi2 as large.
+    overlaps : Overlaps
+        Which of those that the noise explains have bodies that overlap too far.
     explained, kept : bool array (N,)
-        Those that the noise explains, and the likeliest of those that became one.
+        Those that the noise explains, and of those whose bodies do not overlap the likeliest that became one.
     survivors : RefinedSurvivors
         Those kept, in the leaves' order.
     """
 
     p: Array
+    overlaps: Overlaps
     explained: NDArray[np.bool_]
     kept: NDArray[np.bool_]
     survivors: RefinedSurvivors
 
     @staticmethod
-    def of(refined: Refined, known: NDArray[np.bool_]) -> Sifted:
-        """Reject what noise cannot explain, and merge what became one; joints that are not `known` become NaN."""
+    def of(refined: Refined, known: NDArray[np.bool_], collisions: Sequence[Check]) -> Sifted:
+        """Reject what noise cannot explain, then what `collisions` do, and merge what became one.
+
+        Joints that are not `known` become NaN.
+        """
         explained = refined.explained()
-        merged: Merged = merge(refined, keep=explained)
+        likely = np.flatnonzero(explained)
+        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
+        points = np.concatenate([joints, refined.head[likely]], axis=1)
+        overlaps = Overlaps.of(collisions, points).at(likely, len(refined))
+        merged: Merged = merge(refined, keep=explained & (overlaps.place < 0))
         order = np.argsort(merged.rows)
         rows = merged.rows[order]
         size = np.bincount(merged.group[merged.group >= 0], minlength=len(rows))[order]
@@ -90,6 +103,7 @@ class Sifted:
         kept[rows] = True
         return Sifted(
             p=refined.p,
+            overlaps=overlaps,
             explained=explained,
             kept=kept,
             survivors=RefinedSurvivors(
@@ -115,4 +129,5 @@ class Sifted:
         p, explained, kept = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "explained", "kept")
         )
-        return Sifted(p=p, explained=explained, kept=kept, survivors=survivors)
+        overlaps = Overlaps.joined([part.overlaps for part in parts])
+        return Sifted(p=p, overlaps=overlaps, explained=explained, kept=kept, survivors=survivors)

@@ -7,7 +7,7 @@ Nothing is dropped that the noise can explain, what it cannot explain is rejecte
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array, Camera, PinholeCamera
+from posekit.pipeline.body import Judges
+from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
@@ -30,11 +32,9 @@ from posekit.refinement.refined import LEVEL
 from posekit.refinement.sight import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import InterpretationTree, Leaves
+from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.tree.leaves import Pruned
-
-CONTACT: Final = 0.03
-"""Metres by which bodies may overlap before refinement: depths are off by as much."""
+from posekit.validators import collision
 
 ANGLE: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
@@ -74,7 +74,7 @@ class Refiner:
     def grow(self, frames: NDArray[np.intp]) -> dict[int, Grown]:
         """Grow the trees of some frames of the view, and refine their leaves: hypotheses are trunks, maybe none."""
         fit = self.fit
-        chosen = np.flatnonzero(np.isin(fit.frame, frames))
+        chosen = np.flatnonzero(np.isin(fit.frame, frames) & np.isfinite(fit.root).all(axis=1))
         grown = {
             int(k): Grown(batch=None, index=0, hypotheses=1, fit=fit)
             for k in np.setdiff1d(frames, fit.frame[chosen])
@@ -92,6 +92,35 @@ class Refiner:
             return given
         rooting = replace(self.rooting or Rooting(), trust_head=False)
         return fit_camera(view, self.grower.body.figure, rooting)
+
+    @cached_property
+    def judges(self) -> Judges:
+        """What the checks are asked with: bodies may overlap by as much as depths are off."""
+        asked = self.grower.judges
+        return replace(asked, contact_margin=contact_under_noise(asked.contact_margin))
+
+    def _measuring(self, tolerance: Tolerance) -> Sequence[Check]:
+        """Return the checks that tell every margin: made once for each tolerance."""
+        if tolerance not in self._suites:
+            suite = self.judges.suite(self.grower.body.figure, tolerance, exact=True)
+            self._suites[tolerance] = [check for check in suite if self._can_be_told(check)]
+        return self._suites[tolerance]
+
+    @cached_property
+    def _suites(self) -> dict[Tolerance, Sequence[Check]]:
+        return {}
+
+    @cached_property
+    def _collisions(self) -> Sequence[Check]:
+        if "collision" not in self.judges.checks:
+            return ()
+        made = collision(self.grower.body.figure, contact_margin=self.judges.contact_margin)
+        return [check for check in made if self._can_be_told(check)]
+
+    def _can_be_told(self, check: Check) -> bool:
+        """Whether the noise says enough of its points: not of a detector's head, which no arm can be said to touch."""
+        heads = check.name == "collision" and max(check.points) >= len(JOINTS)
+        return not (heads and self.grower.view.derived)
 
     def _grow(self, chosen: NDArray[np.intp]) -> dict[int, Grown]:
         fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
@@ -131,14 +160,14 @@ class Refiner:
             sight = replace(sight, head_image=head, head_deviation=deviation[:, len(JOINTS) :])
         heads = fit.head[own] + (trunks.root - fit.root[own])[:, None]
         hypothesis = trunks.frame[leaves.frame]
-        sifted = _sift(sight, postures, heads[leaves.frame], hypothesis, frame[hypothesis])
-        leaves = _rejected(leaves, sifted)
+        sifted = _sift(sight, postures, heads[leaves.frame], hypothesis, frame[hypothesis], self._collisions)
+        leaves = _rejected(leaves, sifted, self.judges.contact_margin)
         tolerance = self._tolerance(sifted)
         bounds = np.searchsorted(frame[trunks.frame], np.arange(len(frames) + 1))
         batch = Batch(
             leaves=leaves,
             physical=physical,
-            checks=self.grower.suites_of(tolerance)[1],
+            checks=self._measuring(tolerance),
             body=self.grower.body,
             tolerance=tolerance,
             exact=np.zeros(leaves.n_frames, dtype=np.bool_),
@@ -183,9 +212,6 @@ class Refiner:
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
         rigid = max(DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=ANGLE)
-        judges = replace(
-            self.grower.judges, contact_margin=min(self.grower.judges.contact_margin, 0.0) - CONTACT
-        )
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )
@@ -199,7 +225,7 @@ class Refiner:
                 trunks.image,
                 [
                     check
-                    for check in under_noise(judges.suite(body.figure, tolerance), allowed.bound)
+                    for check in under_noise(self.judges.suite(body.figure, tolerance), allowed.bound)
                     if check.name != "walking"
                 ],
                 given=given,
@@ -218,7 +244,12 @@ def _pinhole(camera: Camera) -> PinholeCamera:
 
 
 def _sift(
-    sight: Sight, postures: Array, head: Array, hypothesis: NDArray[np.intp], frame: NDArray[np.intp]
+    sight: Sight,
+    postures: Array,
+    head: Array,
+    hypothesis: NDArray[np.intp],
+    frame: NDArray[np.intp],
+    collisions: Sequence[Check],
 ) -> Sifted:
     """Refine leaves as their hypotheses were seen; reject and merge frame by frame."""
     parts = []
@@ -226,7 +257,7 @@ def _sift(
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=HOPELESS)
         refined = replace(refined, frame=frame[rows])
-        parts.append(Sifted.of(refined, np.asarray(np.isfinite(start).all(axis=2))))
+        parts.append(Sifted.of(refined, np.asarray(np.isfinite(start).all(axis=2)), collisions))
     return Sifted.joined(parts)
 
 
@@ -241,11 +272,24 @@ def _blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:
             begin = end
 
 
-def _rejected(leaves: Leaves, sifted: Sifted) -> Leaves:
-    """Drop the leaves that noise cannot explain, and those that became another."""
-    gone = ~sifted.kept
-    place = np.where(sifted.explained[gone], 1, 0).astype(np.int8)
-    return _drop(leaves, gone, "noise", ("unlikely", "merged"), place, sifted.p[gone], lower=LEVEL)
+def _rejected(leaves: Leaves, sifted: Sifted, contact: float) -> Leaves:
+    """Drop the leaves that noise cannot explain, those whose bodies overlap, and those that became another."""
+    overlaps = sifted.overlaps
+    through = overlaps.place >= 0
+    leaves = _drop(
+        leaves,
+        through,
+        "collision",
+        overlaps.where,
+        overlaps.place[through],
+        overlaps.distance[through],
+        lower=contact,
+        unit="m",
+    )
+    rest = ~through
+    gone = ~sifted.kept[rest]
+    place = np.where(sifted.explained[rest][gone], 1, 0).astype(np.int8)
+    return _drop(leaves, gone, "noise", ("unlikely", "merged"), place, sifted.p[rest][gone], lower=LEVEL)
 
 
 def _drop(
@@ -256,6 +300,7 @@ def _drop(
     place: NDArray[np.int8],
     value: Array,
     lower: float = -np.inf,
+    unit: str = "",
 ) -> Leaves:
     if not gone.any():
         return leaves
@@ -266,7 +311,7 @@ def _drop(
         code=leaves.code[gone],
         check=check,
         where=where,
-        unit="",
+        unit=unit,
         place=place,
         value=value,
         lower=np.full(count, lower),

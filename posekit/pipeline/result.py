@@ -9,12 +9,16 @@ import numpy as np
 from posekit.cameras import Array
 from posekit.files import Result, ResultFrame
 from posekit.files.likelihoods import Likelihoods
+from posekit.files.paths import FollowedPaths
 from posekit.files.units import Unit
+from posekit.pipeline.following import Following
 from posekit.pipeline.recovery import FrameRecovery, Recovery
 from posekit.pipeline.refined import RefinedSurvivors
 
 
-def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) -> Result:
+def result_of(
+    recovery: Recovery, *, unit: Unit = "m", explain: bool = False, following: Following | None = None
+) -> Result:
     """Gather a recovery for `posekit.write_result`.
 
     Parameters
@@ -24,6 +28,8 @@ def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) ->
         Of lengths in the file.
     explain : bool
         Whether to list every pruned branch with the finding that killed it.
+    following : Following, optional
+        Paths through the frames (`posekit.pipeline.follow`).
     """
     margins = list(dict.fromkeys(name for frame in recovery.frames for name in frame.margins))
     nq = recovery.figure.model.nq
@@ -35,6 +41,27 @@ def result_of(recovery: Recovery, *, unit: Unit = "m", explain: bool = False) ->
             _frame(frame, margins, nq, explain, probability)
             for frame, probability in zip(recovery.frames, recovery.probability, strict=True)
         ],
+        paths=None if following is None else _paths(following),
+    )
+
+
+def _paths(following: Following) -> FollowedPaths:
+    """Gather paths for a file: what is infinite is not known."""
+    unknown = np.full(following.survivor.shape, np.nan)
+    calibrated = following.scale is None
+    smoothed = [following.smoothed(k) for k in range(len(following))] if calibrated else None
+    return FollowedPaths(
+        survivor=following.survivor.astype(np.int64),
+        joints=following.joints,
+        smoothed=np.full(following.joints.shape, np.nan) if smoothed is None else np.stack(smoothed),
+        interpolated=following.interpolated,
+        deviation=np.where(np.isfinite(following.deviation), following.deviation, np.nan),
+        cost=following.cost,
+        share=following.share,
+        scale=unknown if following.scale is None else following.scale,
+        lead=following.lead if np.isfinite(following.lead) else np.nan,
+        exact=following.exact,
+        apart=following.apart,
     )
 
 

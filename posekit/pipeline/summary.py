@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 
+from posekit.pipeline.following import Following
 from posekit.pipeline.recovery import FrameRecovery, Recovery
 
 SHOWN = 4
@@ -57,3 +58,20 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
         return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
+
+
+def following_line(following: Following) -> str:
+    """Describe the paths through a recovery in a line."""
+    lead = following.lead
+    bridged = int(following.bridged[0].sum())
+    sure = (
+        f"{lead:.3g} cheaper than the next that is different"
+        if np.isfinite(lead)
+        else "the only one"
+        if np.isinf(lead)
+        else "how sure is not asked (--follow 2)"
+    )
+    return (
+        f"{len(following)} likeliest paths; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
+        f"{len(following.switches())} changes between near and far"
+    )

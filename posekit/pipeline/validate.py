@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from posekit.files import Postures, Report, Result
 from posekit.files.postures_q import Configurations
 from posekit.files.report import PostureReport
 from posekit.files.report_columns import Columns, Place, joined
+from posekit.intake.refusal import refusal
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH
 from posekit.pipeline.validate_columns import columns_of
 from posekit.pipeline.validate_listing import list_postures
@@ -22,6 +24,7 @@ from posekit.validators import Report as Verdicts
 from posekit.validators import Validator
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
+from posekit.validators.walking import WALKERS
 
 BATCH: Final = 4096
 """Postures that are judged at once."""
@@ -122,6 +125,18 @@ def validate(
     )
 
 
+class JudgedWith(NamedTuple):
+    """What the frames of a result were judged with: of several kinds of frames, what allows most.
+
+    The angle tolerance is in degrees, the contact margin in metres (negative allows penetration); whose thresholds the
+    rules of walking had is a name, as `posekit.validators.walking.WALKERS` has it.
+    """
+
+    angle: float
+    contact_margin: float
+    walkers: str
+
+
 def recovered_with(result: Result) -> tuple[Figure, float]:
     """Return the figure of a result, and the angle tolerance (degrees) that its frames were judged with.
 
@@ -131,9 +146,22 @@ def recovered_with(result: Result) -> tuple[Figure, float]:
     lengths = settings.get("lengths")
     if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
         figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
+    return figure, judged_with(result).angle
+
+
+def judged_with(result: Result) -> JudgedWith:
+    """Return what the frames of a result were judged with, by its settings; exact and by the paper where they are mute.
+
+    Raises
+    ------
+    InputError
+        Where the settings say what is no tolerance, margin or name.
+    """
+    settings = result.settings
     judged = settings.get("judged")
-    kinds = set(judged) if isinstance(judged, list) else set()
-    tolerances = [EXACT.angle]
+    kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
+    asked = _number(settings, "contact_margin", 0.0)
+    tolerances, margins = [EXACT.angle], [asked]
     if "measured" in kinds:
         tolerances.append(MEASURED.angle)
     if "photograph" in kinds:
@@ -141,8 +169,32 @@ def recovered_with(result: Result) -> tuple[Figure, float]:
     for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
         said = settings.get(field)
         if kind in kinds and isinstance(said, dict):
-            tolerances.append(float(said.get("angle", EXACT.angle)))
-    return figure, max(tolerances)
+            tolerances.append(_number(said, "angle", EXACT.angle, within=f"{field}."))
+            margins.append(_number(said, "contact", asked, within=f"{field}."))
+    walkers = settings.get("walkers", "paper")
+    if not (isinstance(walkers, str) and walkers in WALKERS):
+        raise refusal(
+            "result",
+            "settings.walkers",
+            repr(walkers)[:40],
+            " or ".join(WALKERS),
+            "correct what made the result",
+        )
+    return JudgedWith(max(tolerances), min(margins), walkers)
+
+
+def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:
+    """Return a number of a result's settings, or refuse what is none."""
+    value = settings.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise refusal(
+            "result",
+            f"settings.{within}{name}",
+            repr(value)[:40],
+            "a finite number",
+            "correct what made the result",
+        )
+    return float(value)
 
 
 def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdicts]]:

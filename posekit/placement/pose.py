@@ -30,6 +30,9 @@ SIDEWAYS, SPREAD = 1e3, 1e-9
 TINY = 1e-12
 """Added to the squares of a flat part of size 1, and the least scale: points in one line have a start too."""
 
+TILT = 0.35
+"""Radians by which the best pose is tilted to look for another beside it."""
+
 APART = 1e-2
 """Difference between two rotation matrices, and relative one in depth, above which two poses are two minima."""
 
@@ -123,10 +126,15 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     sigma = np.hypot(deviation[number], offset * (K[:, 0, 0] / depth)[:, None])
     weights = np.where(seen, 1.0 / np.maximum(sigma, FLOOR), 0.0)
     starts = _starts(heads.points, plane - weight[:, None] @ plane, first)
-    n = len(starts)
+    fits = [_fit(heads, weights, start) for start in starts]
+    # Seen nearly face on, a flat part has its minima side by side, and all of these may lead to the same one.
+    best = np.argmin([cost for _, cost, _, _ in fits], axis=0)
+    picked = [np.stack([fit[0][k] for fit in fits])[best, np.arange(len(number))] for k in range(4)]
+    fits += [_fit(heads, weights, start) for start in _tilted(Placement(*picked))]
+    n = len(fits)
     every = np.tile(np.arange(len(number)), n)
-    start = Placement(*(np.concatenate(parts) for parts in zip(*starts, strict=True)))
-    end, cost, jacobian, residual = _fit(heads.take(every), weights[every], start)
+    end = Placement(*(np.concatenate(parts) for parts in zip(*(fit[0] for fit in fits), strict=True)))
+    cost, jacobian, residual = (np.concatenate([fit[k] for fit in fits]) for k in (1, 2, 3))
     R, origin, covariance = _origin(end, jacobian, centre[every], size[every])
     rms = np.sqrt((residual**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[every])
 
@@ -194,6 +202,17 @@ def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
         normal = np.cross(plane[..., 0], plane[..., 1])
         R = np.concatenate([plane, normal[..., None]], axis=-1) @ np.swapaxes(v, -1, -2)
         starts.append(Placement(R, first.shift, scale, scale.copy()))
+    return starts
+
+
+def _tilted(placement: Placement) -> list[Placement]:
+    """Tilt bodies by `TILT` to four sides, about axes across the line of sight."""
+    cosine, sine = np.cos(TILT), np.sin(TILT)
+    starts = []
+    for side in (sine, -sine):
+        about_x = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -side], [0.0, side, cosine]])
+        about_y = np.array([[cosine, 0.0, side], [0.0, 1.0, 0.0], [-side, 0.0, cosine]])
+        starts += [placement._replace(R=turn @ placement.R) for turn in (about_x, about_y)]
     return starts
 
 

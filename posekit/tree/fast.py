@@ -139,7 +139,9 @@ def _lifting(
     tolerance: float,
 ) -> Callable[[int, int], None]:
     """Return what lifts the joints of some frames, from one to before another."""
-    rays, unseen = rays_of(camera, image), np.isnan(image).any(axis=-1)
+    rays, unseen = (
+        np.ascontiguousarray(each) for each in (rays_of(camera, image), np.isnan(image).any(axis=-1))
+    )
     above, first = np.array(parents, dtype=np.int64), np.array(candidates.first, dtype=np.int64)
     # By joint and frame, though mostly every frame has the same.
     long = np.empty((len(parents), len(image)))

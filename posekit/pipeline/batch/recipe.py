@@ -21,7 +21,7 @@ from posekit.pipeline.rooting import Rooting
 from posekit.pipeline.scale import parse_scale
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
-from posekit.validators.walking import DEFAULT_RULES
+from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 SHARD_FRAMES: Final = 2000
 """Frames of a shard: about a second's work, and a file of a megabyte."""
@@ -48,6 +48,7 @@ class Recipe:
     ranges : str
         ``urdf``, ``table1``, … or a TOML table.
     rules : sequence of int
+    walkers : {"paper", "people"}
     rigid, tangent, angle : float, optional
         Tolerances: metres, metres, degrees. Those that are not given are as `posekit recover` has them.
     contact_margin : float
@@ -81,6 +82,7 @@ class Recipe:
     checks: Sequence[str] = PHYSICAL
     ranges: str = "urdf"
     rules: Sequence[int] = DEFAULT_RULES
+    walkers: str = "paper"
     rigid: float | None = None
     tangent: float | None = None
     angle: float | None = None
@@ -103,6 +105,7 @@ class Recipe:
         object.__setattr__(self, "checks", check_names(self.checks))
         if self.scale:
             parse_scale(self.scale)
+        thresholds_of(self.walkers)
         _ = self.table, self.rooting, self.tolerance(uncalibrated=False)
 
     @cached_property
@@ -205,6 +208,7 @@ class Recipe:
             checks=self.checks,
             ranges=self.table,
             rules=self.rules,
+            walkers=self.walkers,
             tolerance=self.tolerance(uncalibrated=uncalibrated),
             contact_margin=self.contact_margin,
             scale=parse_scale(self.scale, per_unit=PER_METRE[view.unit]) if self.scale else None,

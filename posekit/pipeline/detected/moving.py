@@ -171,7 +171,7 @@ def moving(
     what : What
         What the file is.
     posture : str
-        Of a result: ``first``, the number of a survivor from 1, or ``all``.
+        Of a result: ``first``, the number of a survivor from 1, ``path``, or ``all``.
     view : View, optional
         What a result was recovered from: its camera's place in the world turns and moves the postures there.
     skeleton : str
@@ -208,6 +208,8 @@ def moving(
 
 def _of_result(result: Result, posture: str, view: View | None, stated: str) -> Moving:
     figure, _ = recovered_with(result)
+    if posture == "path":
+        return _of_path(result, figure, view, stated)
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
     empty = 0
@@ -228,14 +230,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
     says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
-    up = stated or CAMERA_UP
-    if view is not None:
-        points = _in_world(points, view)
-        up = stated or _guessed(points[:, :14], "the camera's world")
-        says.append(f"in the camera's world, where {up} is up")
-    else:
-        level = f"{up} up" if stated else "as if it were held level"
-        says.append(f"in the camera's frame, {level}; with --view, in its world")
+    points, up = _placed(points, view, stated, says)
     names = list(dict.fromkeys(name for frame in result.frames for name in frame.margins))
     values = {
         f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
@@ -257,6 +252,49 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     )
 
 
+def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> Moving:
+    """Take the first path through a result, its depths smoothed where the camera is known."""
+    paths = result.paths
+    if paths is None:
+        raise InputError("--posture path: the result was not followed; recover it with --follow 2")
+    smoothed = paths.smoothed[0]
+    joints = np.where(np.isnan(smoothed), paths.joints[0], smoothed)
+    known = np.flatnonzero(np.isfinite(joints).any(axis=(1, 2)))
+    frames = [result.frames[k] for k in known.tolist()]
+    points = np.concatenate([joints[known], np.full((len(known), 5, 3), np.nan)], axis=1)
+    survivor = paths.survivor[0, known]
+    says = [f"the likeliest path, {int((survivor < 0).sum())} of {len(known)} frames bridged"]
+    points, up = _placed(points, view, stated, says)
+    codes = [
+        frame.branches[row] if row >= 0 else "" for frame, row in zip(frames, survivor.tolist(), strict=True)
+    ]
+    return Moving(
+        points=points,
+        time=np.array([frame.time for frame in frames]),
+        frame=known,
+        survivor=survivor.astype(np.intp),
+        up=up,
+        figure=figure,
+        says=tuple(says),
+        values={"interpolated": paths.interpolated[0, known].sum(axis=1).astype(np.float64)},
+        branches=tuple(codes),
+        gaps=len(result.frames) - len(known),
+    )
+
+
+def _placed(points: Array, view: View | None, stated: str, says: list[str]) -> tuple[Array, str]:
+    """Put points of a result into the view's world, if there is one; say where they are and what is up."""
+    up = stated or CAMERA_UP
+    if view is not None:
+        points = _in_world(points, view)
+        up = stated or _guessed(points[:, :14], "the camera's world")
+        says.append(f"in the camera's world, where {up} is up")
+    else:
+        level = f"{up} up" if stated else "as if it were held level"
+        says.append(f"in the camera's frame, {level}; with --view, in its world")
+    return points, up
+
+
 def _guessed(joints: Array, source: str) -> str:
     """Guess which axis points up, or name the option that says it."""
     try:
@@ -268,7 +306,7 @@ def _guessed(joints: Array, source: str) -> str:
 def _number(posture: str, count: int, frame: int) -> int:
     if not posture.isdigit() or not 1 <= int(posture) <= count:
         raise InputError(
-            f"--posture: {posture!r}; expected first, all, or a number from 1 to {count}, as frame {frame + 1} has"
+            f"--posture: {posture!r}; expected first, path, all, or 1 to {count}, as many as frame {frame + 1} has"
         )
     return int(posture) - 1
 

@@ -22,7 +22,7 @@ from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.rooting import Rooting
 from posekit.pipeline.tolerance import Tolerance
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, walking
-from posekit.validators.walking import DEFAULT_RULES
+from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 RootFrom = Literal["given", "auto"]
 
@@ -45,6 +45,7 @@ class Method:
     checks : tuple of str
     ranges : Ranges or str
     rules : tuple of int
+    walkers : {"paper", "people"}
         As `posekit.recover` takes them.
     tolerance : Tolerance, optional
         Likewise.
@@ -66,6 +67,7 @@ class Method:
     checks: Sequence[str] = PHYSICAL
     ranges: Ranges | str = "urdf"
     rules: Sequence[int] = DEFAULT_RULES
+    walkers: str = "paper"
     tolerance: Tolerance | None = None
     seed: int = 0
     rank: Ranker = by_probability
@@ -73,7 +75,7 @@ class Method:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "checks", check_names(self.checks))
-        walking(load_figure(), self.rules)  # refuses rules that there are not
+        walking(load_figure(), self.rules, thresholds_of(self.walkers))  # refuses rules that there are not
         if isinstance(self.ranges, str):
             object.__setattr__(self, "ranges", load_ranges(self.ranges))
         if self.root is not None and self.root not in get_args(RootFrom):
@@ -116,6 +118,7 @@ class Method:
             "checks": list(self.checks),
             "ranges": self.table.name,
             "rules": list(self.rules) if "walking" in self.checks else [],
+            "walkers": self.walkers,
             "tolerance": "exact, else measured" if self.tolerance is None else vars(self.tolerance),
             "seed": self.seed,
             "ranking": _name(self.rank),
@@ -131,6 +134,7 @@ class Method:
                 checks=self.checks,
                 ranges=self.table,
                 rules=self.rules,
+                walkers=self.walkers,
                 tolerance=self.tolerance,
                 rooting=Rooting() if self.root == "auto" else None,
             ).frames
