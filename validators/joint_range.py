@@ -35,7 +35,9 @@ TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
-def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE) -> list[Check]:
+def joint_range(
+    figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE, directions: bool = False
+) -> list[Check]:
     """Make the checks of the joint ranges.
 
     With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
@@ -51,6 +53,8 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
     ranges : Ranges
     tolerance : float
         Degrees by which the direction of a segment may be off; see `Limb` for what follows for axial rotations.
+    directions : bool
+        Whether the same follows for the first angles of shoulder and hip: see `Limb`.
     """
     if ranges.kind == "projected":
         return projected_angles(figure, ranges, tolerance=tolerance)
@@ -69,7 +73,7 @@ def joint_range(figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: floa
             joints = tuple(f"{side}_{joint}" for joint in limb)
             for part in (joints[:2], joints):
                 if ranges.anatomy is None:
-                    checks.append(Limb(figure=figure, limb=part, tolerance=tolerance))
+                    checks.append(Limb(figure=figure, limb=part, tolerance=tolerance, directions=directions))
                 else:
                     checks.append(
                         AnatomicalLimb(figure=figure, anatomy=ranges.anatomy, limb=part, tolerance=tolerance)
@@ -172,11 +176,15 @@ class Limb:
     ----------
     limb : tuple of str
         ``("right_shoulder", "right_elbow", "right_wrist")``, or the first two.
+    directions : bool
+        Whether the first angle of an upper segment near the second one's pole is treated likewise, and both as
+        refinement measures them (`posekit.refinement.limits`): what it leaves within the tolerance is then valid.
     """
 
     figure: Figure
     limb: tuple[str, ...]
     tolerance: float
+    directions: bool = False
     name: str = "joint_range"
     unit: str = "deg"
 
@@ -208,7 +216,18 @@ class Limb:
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
             angles[tolerance[:, 2] > UNSEEN, 2] = np.nan
+        if self.directions:
+            level = np.abs(np.cos(angles[:, 1]))
+            tolerance[:, 0] = self._turn(np.where(np.isnan(level), 1.0, level))
+            if end is not None:
+                tolerance[:, 2] = self._turn(np.where(np.isnan(bend), 1.0, bend))
+            angles[tolerance > UNSEEN] = np.nan
         return _findings(self.figure.ik, self.where, angles, tolerance)
+
+    def _turn(self, sine: Array) -> Array:
+        """Return by how many degrees a direction may turn about an axis to which it has an angle of that sine (N,)."""
+        share = np.radians(self.tolerance) / np.maximum(sine, np.finfo(np.float64).tiny)
+        return np.asarray(np.degrees(np.tan(np.arcsin(np.minimum(share, 1.0)))))
 
     def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
         """Tell what is clear; see `posekit.tree.Screened`."""

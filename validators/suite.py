@@ -41,6 +41,7 @@ def make_checks(
     rigid_mode: Mode = "placement",
     limbs: bool = False,
     angle_tolerance: float = TOLERANCE,
+    directions: bool = False,
     rules: Iterable[int] = DEFAULT_RULES,
     thresholds: WalkingThresholds | None = None,
     contact_margin: float = 0.0,
@@ -49,7 +50,7 @@ def make_checks(
     """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance.
 
     Distances inside torso and hips may be off by `rigid_tolerance` metres: all the same, or each its own. Rules of
-    walking have the paper's `thresholds` unless others are given.
+    walking have the paper's `thresholds` unless others are given. Of `directions` see `joint_range`.
 
     Raises
     ------
@@ -70,7 +71,7 @@ def make_checks(
         if name == "rigid-parts":
             checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode, limbs=limbs)
         elif name == "joint-range":
-            checks += joint_range(figure, ranges, tolerance=angle_tolerance)
+            checks += joint_range(figure, ranges, tolerance=angle_tolerance, directions=directions)
         elif name == "collision":
             checks += collision(figure, contact_margin=contact_margin, exact=exact)
         else:

@@ -264,7 +264,13 @@ class Validator:
 
     def _make_suite(self, figure: Figure) -> list[Check]:
         return make_checks(
-            figure, self.checks, rigid_mode="distances", limbs=True, exact=True, **self._options
+            figure,
+            self.checks,
+            rigid_mode="distances",
+            limbs=True,
+            exact=True,
+            directions=True,
+            **self._options,
         )
 
 

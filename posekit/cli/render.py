@@ -21,7 +21,7 @@ EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
     "posekit render postures.json --view walk.json -o first.png --frame 1 --posture 1 --supersample 3",
     "posekit render postures.json -o all.png --layout superposed --background grey",
-    "posekit render postures.json -o walk.gif --posture 1 --fps 5",
+    "posekit render postures.json -o walk.gif --posture likeliest --fps 5",
     "posekit render postures.json -o turn.gif --frame 2 --posture 1 --turntable 36 --size 640x480",
     "posekit render explained.json --view walk.json -o rejected.png --rejected",
 )
@@ -64,7 +64,9 @@ def render(
     posture: Annotated[
         str,
         typer.Option(
-            "--posture", metavar="LIST", help="From 1, as 1,5; all; or groups, the first of each group."
+            "--posture",
+            metavar="LIST",
+            help="From 1, as 1,5; all; likeliest; or groups, the first of each group.",
         ),
     ] = "all",
     rejected: Annotated[
@@ -214,9 +216,13 @@ def _shown(
 
 
 def _chosen(shown: Shown, text: str, frame: int) -> Shown:
-    """Choose postures of a frame by a list of numbers from 1, ``all`` or ``groups``."""
+    """Choose postures of a frame by a list of numbers from 1, ``all``, ``likeliest`` or ``groups``."""
     if text == "all" or len(shown) == 0:
         return shown
+    if text == "likeliest":
+        if shown.probability is None:
+            raise InputError("--posture likeliest: nothing says how likely the postures are; expected a result")
+        return shown.chosen([int(shown.probability.argmax())])
     if text == "groups":
         if shown.groups is None:
             raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
@@ -224,7 +230,7 @@ def _chosen(shown: Shown, text: str, frame: int) -> Shown:
         return shown.chosen([groups.index(group) for group in sorted(set(groups))])
     rows = [_number(word, len(shown), f"--posture: frame {frame + 1}: {word!r}") for word in split(text)]
     if not rows:
-        raise InputError(f"--posture: {text!r}; expected numbers from 1 with commas, all, or groups")
+        raise InputError(f"--posture: {text!r}; expected numbers from 1 with commas, all, likeliest or groups")
     return shown.chosen(rows)
 
 

@@ -114,6 +114,8 @@ def _frame_with(frame: ResultFrame, joints: Array, scales: Array, **changes: obj
             "fk_distance": np.zeros(count),
             "length_residual": np.zeros(count),
             "scales": scales,
+            "probability": np.full(count, 1 / count),
+            "refined": None,
             **changes,
         },  # type: ignore[arg-type]
     )

@@ -206,7 +206,7 @@ def test_unknown_joints_and_empty_frames_are_left_out(opened):
     joints[:, JOINTS.index("left_wrist")] = np.nan
     empty = {"joints": np.empty((0, 14, 3)), "q": frames[1].q[:0], "branches": [], "groups": np.empty(0, int)}
     empty |= {"margins": {name: np.empty(0) for name in frames[1].margins}}
-    empty |= {"fk_distance": np.empty(0), "length_residual": np.empty(0)}
+    empty |= {"fk_distance": np.empty(0), "length_residual": np.empty(0), "probability": np.empty(0)}
     frames[0] = dataclasses.replace(frames[0], joints=joints)
     frames[1] = dataclasses.replace(frames[1], **empty)
     tab, _, errors = opened(dataclasses.replace(walking_result(), frames=frames))
@@ -269,6 +269,7 @@ def test_a_hundred_frames_of_fifty_survivors_stay_below_ten_megabytes():
         margins={name: values[pick] for name, values in frame.margins.items()},
         fk_distance=frame.fk_distance[pick],
         length_residual=frame.length_residual[pick],
+        probability=np.full(50, 1 / 50),
     )
     page = page_html(dataclasses.replace(walking_result(), frames=[many] * 100))
     assert len(page.encode()) < 10e6

@@ -376,7 +376,8 @@ def test_frames_without_survivors_have_no_family(opened, flat):
     frames = list(flat.frames)
     frame = frames[1]
     empty = {
-        name: getattr(frame, name)[:0] for name in ("joints", "q", "fk_distance", "length_residual", "scales")
+        name: getattr(frame, name)[:0]
+        for name in ("joints", "q", "fk_distance", "length_residual", "scales", "probability")
     }
     margins = {name: values[:0] for name, values in frame.margins.items()}
     frames[1] = dataclasses.replace(frame, branches=[], groups=np.empty(0, int), margins=margins, **empty)

@@ -127,6 +127,7 @@ def _frame(frame: ResultFrame) -> Json:
         "levels": {name: list(frame.levels[name]) for name in ("joint", "physical", "motion")},
         "branches": list(frame.branches),
         "groups": None if frame.groups is None else frame.groups.tolist(),
+        "probability": None if frame.probability is None else _numbers(frame.probability),
         "margins": {name: _numbers(values) for name, values in frame.margins.items()},
         "rejected": [[*reason.partition("/")[::2], leaves] for reason, leaves in reasons],
     }

@@ -31,6 +31,11 @@ const page = (() => {
     return scaled.toFixed(size !== 0 && size < 0.1 ? 3 : size < 100 ? 1 : 0);
   }
 
+  function percent(share) {
+    if (share > 0 && share < 0.0005) return "< 0.1 %";
+    return `${(100 * share).toFixed(1)} %`;
+  }
+
   // Chooses a frame; the survivor with the same near-far choices stays chosen where it is there too.
   function chooseFrame(index) {
     const code = frame().branches?.[state.survivor];
@@ -92,6 +97,7 @@ const page = (() => {
     const found = [{ key: "number", title: "posture" }];
     if (frame().family?.scales.length > 1) found.push({ key: "scale", title: "s (px/m)" });
     if (frame().groups) found.push({ key: "group", title: "group" });
+    if (frame().probability) found.push({ key: "probability", title: "probability" });
     for (const margin of DATA.margins) {
       found.push({ key: margin.name, title: words(margin.name) + (margin.unit ? ` (${margin.unit})` : ""), margin });
     }
@@ -101,7 +107,7 @@ const page = (() => {
   function sorted() {
     const { key, down } = state.sort, here = frame();
     const value = (index) =>
-      key === "number" ? index : key === "scale" ? lift.scaleOf(here.family, index) : key === "group" ? here.groups[index] : here.margins[key][index] ?? -Infinity;
+      key === "number" ? index : key === "scale" ? lift.scaleOf(here.family, index) : key === "group" ? here.groups[index] : key === "probability" ? here.probability[index] : here.margins[key][index] ?? -Infinity;
     const order = here.points.map((_, index) => index);
     return order.sort((a, b) => (value(a) - value(b) || 0) * (down ? -1 : 1) || a - b);
   }
@@ -130,7 +136,8 @@ const page = (() => {
         const mark = state.sort.key === column.key ? (state.sort.down ? "\u00a0▾" : "\u00a0▴") : "";
         const made = element("th", column.title + mark, "sort");
         made.onclick = () => {
-          state.sort = { key: column.key, down: state.sort.key === column.key && !state.sort.down };
+          const again = state.sort.key === column.key;
+          state.sort = { key: column.key, down: again ? !state.sort.down : column.key === "probability" };
           showSurvivors();
         };
         return made;
@@ -146,6 +153,7 @@ const page = (() => {
           made.append(chip, here.groups[index] + 1);
           return made;
         }
+        if (column.key === "probability") return element("td", percent(here.probability[index]));
         const value = here.margins[column.margin.name][index];
         return element("td", shown(value, column.margin.scale), value < 0 ? "low" : "");
       });

@@ -46,6 +46,8 @@ class Shown:
         The scale of each posture behind an uncalibrated view, pixels a metre.
     inferred : sequence of N mappings
         By joint that was not seen, where it can be; empty where all were seen.
+    probability : array (N,), optional
+        That each is the one nearest to the truth.
     time : float
         Seconds.
     """
@@ -57,6 +59,7 @@ class Shown:
     sight: Sight | None = None
     scales: Array | None = None
     inferred: Sequence[Mapping[str, Inferred]] = ()
+    probability: Array | None = None
     time: float = 0.0
 
     def __len__(self) -> int:
@@ -95,6 +98,7 @@ class Shown:
             sight=sight,
             scales=scales,
             inferred=[self.inferred[row] for row in rows] if self.inferred else (),
+            probability=None if self.probability is None else self.probability[index],
         )
 
 
@@ -179,6 +183,7 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
         sight=sight_of(frame, view, index),
         scales=frame.scales,
         inferred=frame.inferred or (),
+        probability=frame.probability,
         time=frame.time,
     )
 
