@@ -221,7 +221,9 @@ def _chosen(shown: Shown, text: str, frame: int) -> Shown:
         return shown
     if text == "likeliest":
         if shown.probability is None:
-            raise InputError("--posture likeliest: nothing says how likely the postures are; expected a result")
+            raise InputError(
+                "--posture likeliest: nothing says how likely the postures are; expected a result"
+            )
         return shown.chosen([int(shown.probability.argmax())])
     if text == "groups":
         if shown.groups is None:
@@ -230,7 +232,9 @@ def _chosen(shown: Shown, text: str, frame: int) -> Shown:
         return shown.chosen([groups.index(group) for group in sorted(set(groups))])
     rows = [_number(word, len(shown), f"--posture: frame {frame + 1}: {word!r}") for word in split(text)]
     if not rows:
-        raise InputError(f"--posture: {text!r}; expected numbers from 1 with commas, all, likeliest or groups")
+        raise InputError(
+            f"--posture: {text!r}; expected numbers from 1 with commas, all, likeliest or groups"
+        )
     return shown.chosen(rows)
 
 

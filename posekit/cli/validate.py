@@ -212,7 +212,9 @@ def validate(
             judged = pipeline.judged_with(result)
     angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
     walkers = walkers or judged.walkers
-    margin = signed_length(contact_margin, "--contact-margin") if contact_margin else judged.contact_margin
+    # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
+    own_margin = judged.contact_margin if urdf in ("", "stick_figure") else 0.0
+    margin = signed_length(contact_margin, "--contact-margin") if contact_margin else own_margin
     validator = validators.Validator(
         figure,
         checks=split(checks) if checks else None,

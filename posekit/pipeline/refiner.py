@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array, Camera, PinholeCamera
+from posekit.figure.angles import Limits
 from posekit.pipeline.body import Judges
 from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
@@ -111,6 +112,15 @@ class Refiner:
         return {}
 
     @cached_property
+    def _limits(self) -> Limits:
+        """The limits that refinement keeps to: those of the ranges where they are of the figure's own angles."""
+        ranges, figure = self.grower.judges.ranges, self.grower.body.figure
+        if ranges.kind != "configuration" or not ranges.limits:
+            return figure.limits
+        radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}
+        return figure.with_limits(radians).limits
+
+    @cached_property
     def _collisions(self) -> Sequence[Check]:
         if "collision" not in self.judges.checks:
             return ()
@@ -138,6 +148,7 @@ class Refiner:
             deviation=deviation[:, : len(JOINTS)],
             root=necks,
             length_deviation=self.noise.by_segment if self.noise.rigid else 0.0,
+            limits=self._limits,
         )
         trunks = find_trunks(sight)
         seen = np.isfinite(sight.points()).all(axis=2)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import View
 from posekit.pipeline import MEASURED, Recovery, forget_camera, recover, result_of, view_of
+from posekit.pipeline.contact import Overlaps, contact_under_noise
 from posekit.pipeline.noise import Noise
 from posekit.refinement import GIVING
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
+from posekit.validators import Validator
 
 FIGURE = load_figure()
 PIXELS = 2.0
@@ -120,6 +123,39 @@ def test_probabilities_sum_to_one_and_know_more_than_chance(recovery: Recovery, 
             first.append(off[probability.argmax()])
             middle.append(off.mean())
     assert np.mean(first) < np.mean(middle)
+
+
+def test_bodies_overlap_no_farther_than_is_allowed() -> None:
+    """Without a check after refinement some would; what it rejects is counted, and the truth stays."""
+    scene = random_views(FIGURE, 20, np.random.default_rng(0))
+    view = noisy(scene, 10.0)
+
+    def overlapping(recovery: Recovery) -> int:
+        deepest = Validator(checks=("collision",), contact_margin=contact_under_noise(0.0))
+        joints = np.concatenate([frame.joints for frame in recovery.frames])
+        return deepest.check(joints).verdicts.count("invalid")
+
+    with pytest.warns(UserWarning, match="beside the ray"):
+        recovery = recover(view)
+        with mock.patch.object(Overlaps, "of", lambda _, points: Overlaps.none(len(points))):
+            unchecked = recover(view)
+    assert recovery.settings["refined"]["contact"] == -0.03
+    assert overlapping(unchecked) > 0
+    assert overlapping(recovery) == 0
+    assert all((frame.margins["collision"] >= -1e-9).all() for frame in recovery.frames)
+    for frame, other in zip(recovery.frames, unchecked.frames, strict=True):
+        for each in (frame, other):
+            assert len(each) + sum(each.rejected.values()) == 8192 * each.hypotheses
+        assert len(frame) <= len(other)
+    late = [
+        branch
+        for frame in recovery.frames
+        for branch in frame.pruned()
+        if branch.reason.startswith("collision/") and len(branch.branch) == 13 and branch.lower == -0.03
+    ]
+    assert late
+    assert all(branch.value < -0.03 and branch.unit == "m" for branch in late)
+    np.testing.assert_allclose(errors(recovery, scene), errors(unchecked, scene), atol=0.02)
 
 
 def test_exact_points_stay_exact_whatever_noise_is_said(scene: Scene) -> None:

@@ -156,6 +156,28 @@ def test_the_tables_say_what_the_result_says(opened):
     order = [int(text) - 1 for text in tab.locator("#survivors-body td:first-child").all_inner_texts()]
     margins = frame.margins["joint_range"]
     np.testing.assert_allclose(margins[order], np.sort(margins), atol=1e-5)
+    # Sorting by probability puts the likeliest first.
+    heading = tab.locator("#survivors-head th", has_text="probability")
+    heading.click()
+    order = [int(text) - 1 for text in tab.locator("#survivors-body td:first-child").all_inner_texts()]
+    np.testing.assert_allclose(frame.probability[order], np.sort(frame.probability)[::-1], atol=1e-6)
+    column = 1 + tab.locator("#survivors-head th").all_inner_texts().index("probability\u00a0▾")
+    first = tab.inner_text(f"#survivors-body tr:first-child td:nth-child({column})")
+    assert first == f"{100 * frame.probability.max():.1f} %"
+    heading.click()
+    again = [int(text) - 1 for text in tab.locator("#survivors-body td:first-child").all_inner_texts()]
+    np.testing.assert_allclose(frame.probability[again], np.sort(frame.probability), atol=1e-6)
+    assert errors == []
+
+
+def test_results_without_probabilities_have_no_such_column(opened):
+    result = dataclasses.replace(
+        walking_result(),
+        frames=[dataclasses.replace(one, probability=None) for one in walking_result().frames],
+    )
+    tab, _, errors = opened(result)
+    assert tab.locator("#survivors-head th", has_text="probability").count() == 0
+    assert tab.locator("#survivors-body tr").count() == len(result.frames[0].joints)
     assert errors == []
 
 

@@ -14,6 +14,7 @@ from PIL import Image
 
 import posekit
 from posekit.cli.main import main
+from posekit.cli.render import _chosen
 from posekit.errors import InputError, ViewerError
 from posekit.files import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
@@ -165,6 +166,7 @@ def test_render_draws_chosen_postures(
     small = ("--size", "160x120", "--supersample", 1)
     assert render(monkeypatch, result, "-o", film, "--frame", "2-4", "--posture", 1, *small) == 0
     assert capsys.readouterr().out == f"written: {film} (3 pictures)\n"
+    assert render(monkeypatch, result, "-o", film, "--posture", "likeliest", *small) == 0
     assert render(monkeypatch, result, "-o", picture, "--rejected", *small) == 0
     assert render(monkeypatch, view, "-o", tmp_path / "page.html") == 0
     assert render(monkeypatch, result, "-o", tmp_path / "scene.html", "--layout", "superposed") == 0
@@ -183,6 +185,20 @@ def test_render_draws_what_is_known_of_postures(
     text = refused(monkeypatch, capsys, tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", 2, *small)
     assert "all are NaN" in text
     assert not (tmp_path / "b.png").exists()
+    words = (tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", "likeliest")
+    assert "nothing says how likely the postures are" in refused(monkeypatch, capsys, *words)
+
+
+def test_the_likeliest_posture_is_chosen(subject: Subject, walked: Result) -> None:
+    for shown, frame in zip(subject.frames, walked.frames, strict=True):
+        assert frame.probability is not None
+        chosen = _chosen(shown, "likeliest", 0)
+        likeliest = int(np.argmax(frame.probability))
+        np.testing.assert_array_equal(chosen.points, shown.points[likeliest][None])
+        assert chosen.probability == pytest.approx([frame.probability.max()])
+        assert len(_chosen(shown.chosen([]), "likeliest", 0)) == 0
+    firsts = [int(np.argmax(np.asarray(frame.probability))) for frame in walked.frames]
+    assert any(firsts)  # not always the first
 
 
 def test_render_refuses(

@@ -26,7 +26,8 @@ class Choice:
     survivor : int array (F,)
         The index of a survivor of each frame, -1 where none is chosen.
     joints : array (F, 14, 3), optional
-        What stands for the frames of which none is: camera frame, metres; NaN where nothing does.
+        Where the person is then, camera frame, metres: smoothed, or bridged where none is chosen. NaN for the chosen
+        survivor's own.
     """
 
     survivor: NDArray[np.intp]
@@ -42,7 +43,10 @@ class Chooser(Protocol):
 
 
 def by_path(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Choice:
-    """Choose the cheapest path (`posekit.pipeline.follow`); probabilities count where the ranking states them."""
+    """Choose the cheapest path (`posekit.pipeline.follow`), smoothed where the camera is known.
+
+    Probabilities count where the ranking states them.
+    """
     if not any(map(len, frames)):
         return Choice(survivor=np.full(len(frames), -1, dtype=np.intp))
     stated = [one.probability for one in rankings]
@@ -51,13 +55,14 @@ def by_path(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Cho
         with np.errstate(divide="ignore"):
             log_probability = [np.log(np.asarray(each, dtype=np.float64)) for each in stated]
     found = follow_frames(frames, log_probability=log_probability, k=1)
-    return Choice(survivor=found.survivor[0], joints=found.joints[0])
+    joints = found.joints[0] if found.scale is not None else found.smoothed()
+    return Choice(survivor=found.survivor[0], joints=joints)
 
 
 def chosen_by(
     chooser: Chooser, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]
 ) -> tuple[NDArray[np.intp], Array]:
-    """Return what a chooser chooses, checked: survivors (F,), and the joints (F, 14, 3) of frames without; else NaN.
+    """Return what a chooser chooses, checked: survivors (F,), and joints (F, 14, 3) of its own, NaN without.
 
     Raises
     ------
@@ -79,11 +84,10 @@ def chosen_by(
         raise InputError(
             f"frame {k} of the sequence: survivor {chosen[k]} was chosen; expected -1 to {counts[k] - 1}"
         )
-    bridged = np.full((len(counts), len(JOINTS), 3), np.nan)
-    if choice.joints is not None:
-        if np.shape(choice.joints) != bridged.shape:
-            raise InputError(
-                f"the joints chosen through the sequence have shape {np.shape(choice.joints)}; expected {bridged.shape}"
-            )
-        bridged[chosen < 0] = np.asarray(choice.joints)[chosen < 0]
-    return chosen.astype(np.intp), bridged
+    shape = (len(counts), len(JOINTS), 3)
+    joints = np.full(shape, np.nan) if choice.joints is None else np.asarray(choice.joints, dtype=np.float64)
+    if joints.shape != shape:
+        raise InputError(
+            f"the joints chosen through the sequence have shape {joints.shape}; expected {shape}"
+        )
+    return chosen.astype(np.intp), joints

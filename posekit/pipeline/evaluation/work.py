@@ -126,10 +126,10 @@ def measure(work: Work, method: Method) -> Measured:
     errors = survivor_errors(joints, work.view.truth[which])
     rankings = method.rank(frames, figure)
     first, probability = first_ranked(rankings, counts)
-    path, bridges = _followed(work, method, frames, rankings)
-    bridging = survivor_errors(bridges, work.view.truth)
+    path, along = _followed(work, method, frames, rankings)
+    followed = survivor_errors(along, work.view.truth)
     if isinstance(work.view.camera, ScaledOrthographicModel):
-        for found in (errors, bridging):
+        for found in (errors, followed):
             found[:, [0, 3]] = found[:, [1, 4]]  # it tells no place in space
     chosen = {
         "best": best_rows(errors[:, 0], offsets),
@@ -140,8 +140,8 @@ def measure(work: Work, method: Method) -> Measured:
     true, retained, killer = _true_codes(frames, work.view.truth)
     codes = np.array([int(code, 2) for frame in frames for code in frame.branches], dtype=np.int32)
     of_frame = {role: np.where(rows >= 0, _taken(codes, offsets, rows), -1) for role, rows in chosen.items()}
-    if np.isfinite(bridges).any():
-        of_frame["path"] = np.where(path >= 0, of_frame["path"], _true_codes(frames, bridges)[0])
+    if (np.isfinite(along).all(axis=(1, 2)) & (path < 0)).any():
+        of_frame["path"] = np.where(path >= 0, of_frame["path"], _true_codes(frames, along)[0])
     known = np.isfinite(retained)
     certified, excess = _certified(frames, figure, method)
     first_branch = np.where(known, (of_frame["first"] == true) & (true >= 0) & (first >= 0), np.nan)
@@ -150,7 +150,7 @@ def measure(work: Work, method: Method) -> Measured:
         errors={
             **{role: of_chosen(errors, offsets, rows) for role, rows in chosen.items()},
             "best": best_of_frames(errors, offsets),
-            "path": np.where(path[:, None] >= 0, of_chosen(errors, offsets, path), bridging),
+            "path": np.where(np.isnan(followed), of_chosen(errors, offsets, path), followed),
         },
         branch=retained,
         limbs={
@@ -185,17 +185,17 @@ def _drawn(counts: NDArray[np.intp], rng: np.random.Generator) -> NDArray[np.int
 def _followed(
     work: Work, method: Method, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]
 ) -> tuple[NDArray[np.intp], Array]:
-    """Let each camera's frames be followed in order: survivors (F,), and joints (F, 14, 3) where there is none."""
+    """Let each camera's frames be followed in order: survivors (F,), and where the person is then (F, 14, 3)."""
     chosen = np.full(len(frames), -1, dtype=np.intp)
-    bridges = np.full((len(frames), len(JOINTS), 3), np.nan)
+    along = np.full((len(frames), len(JOINTS), 3), np.nan)
     if method.choose is not None:
         for camera in np.unique(work.camera):
             rows = np.flatnonzero(work.camera == camera)
             own = rows.tolist()
-            chosen[rows], bridges[rows] = chosen_by(
+            chosen[rows], along[rows] = chosen_by(
                 method.choose, [frames[k] for k in own], [rankings[k] for k in own]
             )
-    return chosen, bridges
+    return chosen, along
 
 
 def _batches(frames: Sequence[FrameRecovery]) -> Iterator[tuple[Batch, NDArray[np.intp]]]:
