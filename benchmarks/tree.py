@@ -5,8 +5,10 @@
 Brute force lifts all 8192 leaves of a view, in one NumPy batch, and asks every check about every leaf that has a
 solution; collisions are asked of Pinocchio's pool over whole configurations. The tree's collisions are coal's too.
 Survivors must be identical. With `--mocap` views of real motion are taken as well, as they are judged by default: each
-frame of the capture seen by some cameras, one tree a clip, whose person has lengths of their own. Rates are best of
-five, on all cores that the process has; ratios are of one run on one machine.
+frame of the capture seen by some cameras, one tree a clip, whose person has lengths of their own. All of them then go
+through `posekit.recover`: of random ones the head tells the neck, of real motion the neck is given; each clip seen by a
+camera is a view. Rates are best of five, on one thread, on two, and in two processes with a thread each; ratios are of
+one run on one machine.
 """
 
 from __future__ import annotations
@@ -16,6 +18,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from multiprocessing import Queue, get_context
+from multiprocessing.synchronize import Barrier
 from pathlib import Path
 from typing import Any
 
@@ -23,9 +27,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+import posekit
 from posekit.cameras import Array, Camera
 from posekit.figure import Figure, load_figure
+from posekit.files import View
 from posekit.pipeline import EXACT, MEASURED, Tolerance
+from posekit.pipeline.views import view_of
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree, Leaves, compiled, enumerate_leaves
@@ -33,6 +40,8 @@ from posekit.validators import judge, load_ranges, make_checks
 
 CHUNK = 2000
 """Frames a call."""
+
+PROCESSES = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -199,6 +208,66 @@ def rates(name: str, jobs: Sequence[Job]) -> None:
     compiled.use_threads(None)
 
 
+def recover_all(views: Sequence[View]) -> int:
+    """Recover views and count their survivors."""
+    return sum(len(frame) for view in views for frame in posekit.recover(view).frames)
+
+
+def recover_rates(name: str, views: Sequence[View]) -> None:
+    """Print the rates of `posekit.recover`, compiled code loaded and persons known."""
+    frames = sum(len(view) for view in views)
+    start = time.process_time()
+    with compiled.path("fast"):
+        survivors = recover_all(views)
+    first = time.process_time() - start
+    print(f"posekit.recover, {name}: {frames} frames in {len(views)} views, {survivors} survivors")
+    for threads in (1, 2):
+        compiled.use_threads(threads)
+        wall, busy = [], []
+        with compiled.path("fast"):
+            for _ in range(5):
+                before = time.process_time()
+                wall.append(timed(lambda: recover_all(views))[1])
+                busy.append(time.process_time() - before)
+        print(
+            f"  {threads} thread(s):  {frames / min(wall):8.0f} views/s, "
+            f"{min(busy) / frames * 1e6:6.1f} us of processor time a view"
+        )
+    compiled.use_threads(None)
+    persons = max(first - min(busy), 0.0) / len(views)
+    print(
+        f"  the first time: {persons * 1e3:.1f} ms a view more, for persons that are new and code that is loaded"
+    )
+    context = get_context("spawn")
+    begin, results = context.Barrier(PROCESSES), context.Queue()
+    workers = [context.Process(target=_worker, args=(views, begin, results)) for _ in range(PROCESSES)]
+    for worker in workers:
+        worker.start()
+    turns = list(zip(*(results.get() for _ in workers), strict=True))
+    for worker in workers:
+        worker.join()
+    seconds = min(max(wall for wall, _ in turn) for turn in turns)
+    cost = min(sum(busy for _, busy in turn) for turn in turns) / (PROCESSES * frames)
+    print(
+        f"  {PROCESSES} processes:  {PROCESSES * frames / seconds:8.0f} views/s, "
+        f"{cost * 1e6:6.1f} us of processor time a view: {PROCESSES / cost:.0f} views/s of {PROCESSES} idle cores"
+    )
+
+
+def _worker(views: Sequence[View], begin: Barrier, results: Queue[list[tuple[float, float]]]) -> None:
+    """Recover the same views as the other workers, at the same times; return clock's and processor's time of each."""
+    compiled.use_threads(1)
+    spans = []
+    with compiled.path("fast"):
+        recover_all(views)
+        for _ in range(5):
+            begin.wait()
+            before = time.process_time()
+            wall = timed(lambda: recover_all(views))[1]
+            spans.append((wall, time.process_time() - before))
+    results.put(spans)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--views", type=int, default=200)
@@ -210,11 +279,15 @@ def main() -> None:
     random = Job.of([scene], EXACT)
     against_brute_force(random, given.views)
     rates("random legal views, exact", [random])
+    recover_rates("random legal views", [view_of(scene)])
     if given.mocap is not None:
         capture = read_capture(given.mocap)
         frames = sum(len(capture.frames_of(k, complete=True)) for k in range(len(capture.names)))
         seen = [mocap_scenes(capture, frames, np.random.default_rng(seed)) for seed in range(given.cameras)]
         rates("real motion, as measured", [Job.of(scenes, MEASURED) for scenes in zip(*seen, strict=True)])
+        recover_rates(
+            "real motion", [view_of(scene) for scenes in zip(*seen, strict=True) for scene in scenes]
+        )
 
 
 if __name__ == "__main__":

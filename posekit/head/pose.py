@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.cameras import Array, PinholeCamera
 from posekit.cameras.lee_chen import pinhole
 from posekit.errors import HeadError
+from posekit.head.blocks import estimate_blocks
 from posekit.head.dlt import require
-from posekit.head.estimate import estimate
 from posekit.head.misfit import beyond_chance
 from posekit.head.points import HeadPoints, head_points_cam
 from posekit.head.sighting import Sighting, sight
@@ -86,7 +86,9 @@ class HeadPose:
         return self
 
 
-def calibrate(head: HeadPoints, image: ArrayLike, f: ArrayLike | None = None) -> HeadPose:
+def calibrate(
+    head: HeadPoints, image: ArrayLike, f: ArrayLike | None = None, *, threads: int = 1
+) -> HeadPose:
     r"""Find the head's pose and f in the image plane of a camera with square pixels.
 
     The squared reprojection error is minimised over rotations, translations and, where it is not given, f.
@@ -103,6 +105,8 @@ def calibrate(head: HeadPoints, image: ArrayLike, f: ArrayLike | None = None) ->
         Those of the paper's camera are turned over by `posekit.cameras.lee_chen.image_from_paper`.
     f : float or array (F,), optional
         The focal length, where it is known.
+    threads : int
+        How many may be used, where there are thousands of frames.
 
     Returns
     -------
@@ -124,10 +128,11 @@ def calibrate(head: HeadPoints, image: ArrayLike, f: ArrayLike | None = None) ->
     >>> calibrate(TABLE_A2, image).f.round(9)
     array([0.05])
     """
-    return _place(head, image, None if f is None else pinhole(np.asarray(f, dtype=np.float64)))
+    camera = None if f is None else pinhole(np.asarray(f, dtype=np.float64))
+    return _place(head, image, camera, threads)
 
 
-def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera) -> HeadPose:
+def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera, *, threads: int = 1) -> HeadPose:
     """Find the head's pose in the pixels of a known camera (perspective-n-point).
 
     As `calibrate`, with the reprojection error measured in distorted pixels.
@@ -141,6 +146,8 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera) -> Hea
     camera : PinholeCamera
         Its K one for all frames or one a frame. A pixel that no ray reaches through its distortion counts
         as not seen.
+    threads : int
+        As `calibrate`.
 
     Returns
     -------
@@ -152,10 +159,10 @@ def solve_pose(head: HeadPoints, image: ArrayLike, camera: PinholeCamera) -> Hea
     HeadError
         As `calibrate`, and where K is one a frame but not of these frames.
     """
-    return _place(head, image, camera)
+    return _place(head, image, camera, threads)
 
 
-def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None) -> HeadPose:
+def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None, threads: int) -> HeadPose:
     """Place the head, refuse a single frame that gives no pose, and warn of misfits."""
     sighting = sight(head, image)
     known = None
@@ -164,7 +171,7 @@ def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None) -> 
         known = (camera, normalized)
     # Exact image points divide 0 by 0 where chances are compared; absurd ones overflow, and have no fit.
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        estimated = estimate(head, sighting, known)
+        estimated = estimate_blocks(head, sighting, known, threads)
     seen = sighting.seen.sum(axis=-1)
     pose = HeadPose(
         head=head,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,15 +12,22 @@ from posekit.files import LeeChenModel, OpenCVModel, View
 from posekit.pipeline.fit_camera import CameraFit
 
 
-def camera_records(view: View, fit: CameraFit) -> list[dict[str, Any]]:
-    """Describe the camera of each frame: f, rotation, position, residual; lengths in metres.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CameraRecords:
+    """The camera of each frame, described when it is asked for: f, rotation, position, residual; lengths in metres.
 
     For a `lee-chen` camera these are the paper's (Table 2): [R] and the image plane's origin in the head's
     frame. For an `opencv` camera with extrinsics they are the camera's in the world, without extrinsics the
     head's R_cam_head and the optical centre in the head's frame. The residual is the root mean square
     reprojection error of the head, in image units. None where it is not known.
     """
-    return [_record(view, fit, k) for k in range(len(view.time))]
+
+    view: View
+    fit: CameraFit
+
+    def __getitem__(self, frame: int) -> dict[str, Any]:
+        """Describe the camera of one frame."""
+        return _record(self.view, self.fit, frame)
 
 
 def _record(view: View, fit: CameraFit, k: int) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from posekit.pipeline.rooting import Rooting, place_roots
 from posekit.pipeline.tolerance import Tolerance
 from posekit.placement import Placement
 from posekit.skeleton import HEAD, HEAD_POINTS
+from posekit.tree.compiled import n_threads
 
 ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 """Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
@@ -109,11 +110,13 @@ def fit_camera(
     pose: HeadPose | None = None
     model = view.camera
     if isinstance(model, LeeChenModel):
-        pose = calibrate(head_points, image, f=model.f) if seen.any() or model.f is None else None
+        pose = None
+        if seen.any() or model.f is None:
+            pose = calibrate(head_points, image, f=model.f, threads=n_threads())
         camera = lee_chen.pinhole(_recovered_f(pose) if model.f is None else model.f)
     elif isinstance(model, OpenCVModel):
         camera = PinholeCamera(K=model.K, distortion=model.distortion)
-        pose = solve_pose(head_points, image, camera) if seen.any() else None
+        pose = solve_pose(head_points, image, camera, threads=n_threads()) if seen.any() else None
     else:
         raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
     root = view.root.copy()
@@ -135,6 +138,8 @@ def fit_camera(
         for k in np.flatnonzero(seen & np.isnan(root).any(axis=1)).tolist():
             reasons[k] = f"frames[{k}]: {pose.reasons[k] if pose is not None else ''}"
         placements = _placed(view, camera, figure, root, rooting, tolerance, reasons)
+    if not any(placements):
+        return CameraFit(camera=camera, frame=np.arange(n), root=root, head=head, pose=pose, reasons=reasons)
     necks = [root[k : k + 1] if one is None or reasons[k] else one.necks for k, one in enumerate(placements)]
     frame = np.repeat(np.arange(n), [len(each) for each in necks])
     return CameraFit(
@@ -144,7 +149,7 @@ def fit_camera(
         head=head[frame],
         pose=pose,
         reasons=reasons,
-        placements=placements if any(placements) else None,
+        placements=placements,
     )
 
 

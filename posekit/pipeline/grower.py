@@ -19,10 +19,13 @@ from posekit.pipeline.nearer import Nearer
 from posekit.pipeline.recovery import Batch
 from posekit.pipeline.tolerance import EXACT, Tolerance
 from posekit.skeleton import JOINT, TORSO
-from posekit.tree import Check, Leaves
+from posekit.tree import Check, InterpretationTree, Leaves
 
 MOST_HIDDEN = 1000
 """Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
+
+WORTH_ASKING = 64
+"""Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
 
 TRUNK = tuple(JOINT[name] for name in TORSO[1:])
 
@@ -66,14 +69,14 @@ class Grower:
                 given=self.fit.head[chosen],
                 tolerance=tolerance.tangent,
             )
-        exact = is_exact(leaves, self.body, fitted=self.fit.closed)
+        exact = np.zeros(leaves.n_frames, dtype=np.bool_)
+        if tolerance == EXACT:
+            exact = is_exact(leaves, self.body, fitted=self.fit.closed)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
-        physical = leaves.counts()
+        physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
         leaves = tree.prune(leaves, motion)
         leaves, completion = self.complete(leaves, camera, image, suite, tolerance, self.fit.frame[chosen])
-        if not motion:  # a joint without a position is no matter of motion
-            physical = leaves.counts()
         return Batch(
             leaves=leaves,
             physical=physical,
@@ -83,6 +86,37 @@ class Grower:
             exact=exact,
             completion=completion,
         )
+
+    def closing(self, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return those of some hypotheses that may be exact: of frames whose torso closes to rounding, or may.
+
+        A torso that does not close in any branch, as those of measured points do not, is evidence enough: nothing is
+        left then of which `is_exact` could be true, and the tree need not be grown to see it. Many frames are only
+        asked where some are found not to close.
+        """
+        if not self.body.evidence:
+            return chosen[:0]
+        if not isinstance(self.body, FigureBody) or len(chosen) < WORTH_ASKING:
+            return chosen
+        if self._closed(chosen[:: len(chosen) // (WORTH_ASKING // 2)]).all():
+            return chosen
+        frame = self.fit.frame[chosen]
+        return chosen[np.isin(frame, frame[self._closed(chosen)])]
+
+    def _closed(self, chosen: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Say of which hypotheses (H,) some branch closes the torso exactly, or does not show it."""
+        tree, n = self.body.tree, JOINT["left_hip"]
+        stem = InterpretationTree(joints=tree.joints[:n], parents=tree.parents[:n], lengths=tree.lengths[:n])
+        suite, _ = self.suites_of(EXACT)
+        with np.errstate(over="ignore"):
+            leaves = stem.grow(
+                self.fit.cameras(chosen),
+                self.fit.root[chosen],
+                self.body.image(self.view.image[self.fit.frame[chosen]])[:, :n],
+                [check for check in suite if check.name == "rigid_parts" and max(check.points) < n],
+                tolerance=EXACT.tangent,
+            )
+        return np.bincount(leaves.frame, minlength=len(chosen)) > 0
 
     def complete(
         self,
@@ -145,9 +179,14 @@ def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.
     """
     if not body.evidence:
         return np.zeros(leaves.n_frames, dtype=bool)
-    fits = np.ones(len(leaves.code), dtype=bool)
-    seen = np.zeros(len(leaves.code), dtype=np.int8)
-    nodes = np.arange(len(leaves.code))
+    # Many leaves share a trunk, and stand together: one of them tells.
+    depth = max(max(segment) for segment, _ in body.evidence)
+    trunk = leaves.code >> (leaves.level - depth)
+    first = np.ones(len(trunk), dtype=bool)
+    first[1:] = (trunk[1:] != trunk[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
+    nodes = np.flatnonzero(first)
+    fits = np.ones(len(nodes), dtype=bool)
+    seen = np.zeros(len(nodes), dtype=np.int8)
     for segment, length in body.evidence:
         ends = leaves.positions(segment, nodes)
         known_length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
@@ -155,7 +194,7 @@ def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.
         fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
         seen += known
     exact = np.zeros(leaves.n_frames, dtype=bool)
-    exact[leaves.frame[fits & (seen > int(fitted))]] = True
+    exact[leaves.frame[nodes[fits & (seen > int(fitted))]]] = True
     empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
     for group in leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import cache, lru_cache
 from importlib.metadata import version
 from typing import Any, Literal, get_args
 
@@ -15,7 +16,7 @@ from posekit.errors import InputError
 from posekit.figure import Figure, load_figure, stature_from_lengths
 from posekit.files import OpenCVModel, ScaledOrthographicModel, View
 from posekit.pipeline.body import Body, FigureBody, Judges
-from posekit.pipeline.camera_record import camera_records
+from posekit.pipeline.camera_record import CameraRecords
 from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.fit_scale import fit_scale
@@ -37,6 +38,9 @@ Proportions = Literal["figure", "taylor"]
 
 FRAMES_AT_ONCE = 2000
 """Frames grown together: enough to spread NumPy's overhead and to keep all cores busy."""
+
+PERSONS = 32
+"""Figures of persons that are kept: clips and shards of the same person follow each other."""
 
 VAGUE_AT_ONCE = 250
 """Hypotheses grown together where depth or scale is open: each may have thousands of leaves."""
@@ -141,11 +145,13 @@ def recover(
     refiner = None if noise is None else Refiner(grower=grower, noise=noise, rooting=rooting)
     grown: dict[int, Grown] = {}
     for part in _parts(fit):
-        batch = grower.grow(part, tolerance or EXACT)
-        grown |= grown_of(batch, fit, part)
+        rows = part if tolerance is not None else grower.closing(part)
+        inexact = part
+        if len(rows):
+            batch = grower.grow(rows, tolerance or EXACT)
+            grown |= grown_of(batch, fit, rows)
+            inexact = part[~np.isin(fit.frame[part], fit.frame[rows[batch.exact]])]
         if tolerance is None:
-            exact = set(fit.frame[part[batch.exact]].tolist())
-            inexact = part[[k not in exact for k in fit.frame[part].tolist()]]
             if refiner is not None:
                 grown |= refiner.grow(np.unique(fit.frame[inexact]))
             else:
@@ -154,7 +160,7 @@ def recover(
         if progress is not None:
             progress(len(np.unique(fit.frame[part])))
     frames = []
-    records = camera_records(view, fit)
+    cameras = CameraRecords(view=view, fit=fit)
     for k, time in enumerate(view.time.tolist()):
         one = grown.get(k) or Grown(batch=None, index=0, hypotheses=1, fit=fit)
         frames.append(
@@ -167,7 +173,8 @@ def recover(
                 placement=None if one.fit.placements is None else one.fit.placements[k],
                 reason=one.fit.reasons[k],
                 group_within=group,
-                camera=records[k],
+                number=k,
+                cameras=cameras,
             )
         )
     _refuse_impossible(frames)
@@ -193,17 +200,38 @@ def recover(
         ),
         "noise": None if noise is None else asdict(noise),
         "ranking": {"up": Up.level().says, "prior": load_prior().name},
-        "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
+        "versions": {name: _version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=settings, grower=grower)
 
 
+@cache
+def _version(name: str) -> str:
+    """Return the version of an installed package: reading it takes a millisecond."""
+    return version(name)
+
+
 def person_of(view: View, figure: Figure) -> Figure:
     """Apply a view's own stature, lengths and head points to a figure."""
-    if view.stature is not None:
-        figure = figure.from_stature(view.stature)
-    if view.lengths or view.head_points:
-        figure = figure.scaled(view.lengths, view.head_points)
+    head = {
+        name: tuple(np.asarray(at, dtype=np.float64).tolist())
+        for name, at in (view.head_points or {}).items()
+    }
+    return _person(figure, view.stature, tuple(view.lengths.items()), tuple(head.items()))
+
+
+@lru_cache(maxsize=PERSONS)
+def _person(
+    figure: Figure,
+    stature: float | None,
+    lengths: tuple[tuple[str, float], ...],
+    head_points: tuple[tuple[str, tuple[float, ...]], ...],
+) -> Figure:
+    """Make the figure of a person: building one takes as long as recovering some hundred frames."""
+    if stature is not None:
+        figure = figure.from_stature(stature)
+    if lengths or head_points:
+        figure = figure.scaled(dict(lengths), dict(head_points))
     return figure
 
 
@@ -264,8 +292,7 @@ def _grown(grower: Grower, rows: NDArray[np.intp], allowed: Tolerance) -> dict[i
     batch = grower.grow(rows, allowed)
     found = grown_of(batch, grower.fit, rows)
     frame = grower.fit.frame[rows]
-    left = set(frame[batch.leaves.frame].tolist())
-    lost = rows[[k not in left for k in frame.tolist()]]
+    lost = rows[~np.isin(frame, frame[batch.leaves.frame])]
     if allowed.hips < 1 and len(lost):
         wide = replace(allowed, hips=1.0)
         found |= grown_of(grower.grow(lost, wide), grower.fit, lost)
@@ -274,30 +301,30 @@ def _grown(grower: Grower, rows: NDArray[np.intp], allowed: Tolerance) -> dict[i
 
 def _by_tolerance(fit: CameraFit, rows: NDArray[np.intp]) -> Iterator[tuple[NDArray[np.intp], Tolerance]]:
     """Yield hypotheses of frames that are not exact with what they are judged with."""
-    if fit.families is not None:
-        allowed = [PHOTOGRAPH] * len(rows)
-    else:
-        placements = fit.placements or [None] * len(fit.reasons)
-        by_frame = [
-            MEASURED if one is None or not len(one.necks) else tolerance_of(one) for one in placements
-        ]
-        allowed = [by_frame[k] for k in fit.frame[rows].tolist()]
+    if fit.families is not None or fit.placements is None:
+        if len(rows):
+            yield rows, MEASURED if fit.families is None else PHOTOGRAPH
+        return
+    by_frame = [
+        MEASURED if one is None or not len(one.necks) else tolerance_of(one) for one in fit.placements
+    ]
+    allowed = [by_frame[k] for k in fit.frame[rows].tolist()]
     for one in dict.fromkeys(allowed):
         yield rows[[each == one for each in allowed]], one
 
 
 def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
     """Yield hypotheses that are grown together: whole frames, whose root is known."""
-    usable = np.flatnonzero([not fit.reasons[k] for k in fit.frame])
+    usable = np.flatnonzero(np.array([not reason for reason in fit.reasons], dtype=np.bool_)[fit.frame])
     if not len(usable):
         return
     frames = fit.frame[usable]
-    first = np.flatnonzero(np.diff(frames, prepend=-1))
+    first = np.flatnonzero(np.diff(frames, prepend=-1)).tolist()
     most = FRAMES_AT_ONCE if fit.families is None and fit.placements is None else VAGUE_AT_ONCE
     start = 0
     for k in range(1, len(first) + 1):
-        end = int(first[k]) if k < len(first) else len(usable)
-        following = int(first[k + 1]) if k + 1 < len(first) else len(usable)
+        end = first[k] if k < len(first) else len(usable)
+        following = first[k + 1] if k + 1 < len(first) else len(usable)
         if k == len(first) or following - start > most:
             yield usable[start:end]
             start = end

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,6 +17,7 @@ from posekit.files import Family, Inferred, Root
 from posekit.grouping import group_postures
 from posekit.occlusion import Completion
 from posekit.pipeline.body import Body
+from posekit.pipeline.camera_record import CameraRecords
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.mirror import mirrored
 from posekit.pipeline.ranked import ranked
@@ -53,15 +54,15 @@ class Batch:
     ----------
     leaves : Leaves
         What survived all checks.
-    physical : int array (F, 14)
-        Survivors by level before the motion model.
+    physical : int array (F, 14), optional
+        Survivors by level before the motion model, where one was asked.
     checks : sequence of Check
         The checks that judged them, every distance measured, for margins.
     body : Body
         What the trees are of.
     tolerance : Tolerance
     exact : bool array (F,)
-        Where there is evidence that the image points are exact.
+        Where there is evidence that the image points are exact, of frames that were judged so.
     completion : Completion, optional
         The survivors' joints that were not seen; of the leaves before the motion model.
     refined : RefinedSurvivors, optional
@@ -71,7 +72,7 @@ class Batch:
     """
 
     leaves: Leaves
-    physical: NDArray[np.int64]
+    physical: NDArray[np.int64] | None
     checks: Sequence[Check]
     body: Body
     tolerance: Tolerance
@@ -209,6 +210,10 @@ class FrameRecovery:
         Why nothing was grown.
     group_within : float or None
         Metres within which survivors are grouped.
+    number : int
+        Which frame of the view it is.
+    cameras : CameraRecords, optional
+        Of all frames of the view.
     """
 
     time: float
@@ -219,7 +224,8 @@ class FrameRecovery:
     placement: Placement | None = None
     reason: str = ""
     group_within: float | None = None
-    camera: Mapping[str, Any] = field(default_factory=dict)
+    number: int = 0
+    cameras: CameraRecords | None = None
 
     @property
     def _rows(self) -> slice:
@@ -339,10 +345,9 @@ class FrameRecovery:
         if self.batch is None:
             return {name: np.zeros(14, dtype=np.int64) for name in ("physical", "motion")}
         part = slice(self.index, self.index + self.hypotheses)
-        return {
-            "physical": self.batch.physical[part].sum(axis=0),
-            "motion": self.batch.motion[part].sum(axis=0),
-        }
+        motion = self.batch.motion
+        physical = motion if self.batch.physical is None else self.batch.physical
+        return {"physical": physical[part].sum(axis=0), "motion": motion[part].sum(axis=0)}
 
     @property
     def rejected(self) -> dict[str, int]:
@@ -373,6 +378,11 @@ class FrameRecovery:
         placement = self.placement
         noisy = placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement)
         return "noisy" if noisy and self.batch.refined is None else self.batch.judged
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """What is known of the camera: f, rotation, position, residual (`posekit.pipeline.camera_record`)."""
+        return {} if self.cameras is None else self.cameras[self.number]
 
     @property
     def root(self) -> Root | None:

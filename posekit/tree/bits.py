@@ -25,6 +25,13 @@ def path_of(joint: int, parents: Sequence[int]) -> tuple[int, ...]:
     return path
 
 
+@lru_cache(maxsize=1024)
+def support_of(points: tuple[int, ...], parents: tuple[int, ...]) -> tuple[int, ...]:
+    """Return the joints on whose branches the positions of some points depend, in tree order."""
+    joints = {joint for point in points if point < len(parents) for joint in path_of(point, parents)}
+    return tuple(sorted(joints))
+
+
 @lru_cache(maxsize=512)
 def select(level: int, joints: tuple[int, ...]) -> Codes:
     """Return a table of all codes at a level to the bits of some joints, the first joint's the highest.

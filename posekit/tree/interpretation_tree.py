@@ -72,8 +72,9 @@ class InterpretationTree:
         """
         by_level: list[list[Check]] = [[] for _ in self.joints]
         for check in checks:
-            if self._level(check) < len(by_level):
-                by_level[self._level(check)].append(check)
+            level = self._level(check)
+            if level < len(by_level):
+                by_level[level].append(check)
         start = partial(Leaves.start, self.joints, self.parents, given=given, root=root)
         settings: Any = {
             "lengths": self.lengths,

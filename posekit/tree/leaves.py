@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.tree.bits import Codes, path_of, select
+from posekit.tree.bits import Codes, path_of, select, support_of
 from posekit.tree.candidates import Candidates
 
 
@@ -180,10 +180,7 @@ class Leaves:
 
     def support(self, points: Sequence[int]) -> tuple[int, ...]:
         """Return the joints on whose branches the positions of some points depend, in tree order."""
-        on_paths = {
-            joint for point in points if point < len(self.joints) for joint in path_of(point, self.parents)
-        }
-        return tuple(sorted(on_paths))
+        return support_of(tuple(points), self.parents)
 
     def positions(self, points: Sequence[int], nodes: NDArray[np.intp] | NDArray[np.int32]) -> Array:
         """Place some points in some nodes: (len(nodes), len(points), 3), camera frame, metres."""
