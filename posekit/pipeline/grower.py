@@ -16,8 +16,8 @@ from posekit.occlusion import Completion, complete, reject
 from posekit.pipeline.body import Body, FigureBody, Judges
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.pipeline.nearer import Nearer
-from posekit.pipeline.recovery import Batch
 from posekit.pipeline.tolerance import EXACT, Tolerance
+from posekit.pipeline.trees import Batch
 from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, InterpretationTree, Leaves
 

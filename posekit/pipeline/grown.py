@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.pipeline.fit_camera import CameraFit
-from posekit.pipeline.recovery import Batch
+from posekit.pipeline.trees import Batch
 
 
 @dataclass(frozen=True, kw_only=True)

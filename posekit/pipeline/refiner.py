@@ -23,10 +23,10 @@ from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
 from posekit.pipeline.noise import Noise, neck_priors
-from posekit.pipeline.recovery import Batch
 from posekit.pipeline.refined import Sifted
 from posekit.pipeline.rooting import Rooting
 from posekit.pipeline.tolerance import Tolerance
+from posekit.pipeline.trees import Batch
 from posekit.ranking import deviation_of_noise
 from posekit.refinement import Sight, Trunks, find_trunks, refine, tolerance_of, under_noise
 from posekit.refinement.refined import LEVEL

@@ -17,7 +17,8 @@ from posekit.intake import extra
 from posekit.motion.survivors import COORDINATES
 from posekit.pipeline.batch.image_rows import IMAGE, ImageRows
 from posekit.pipeline.batch.recipe import Recipe
-from posekit.pipeline.recovery import Batch, FrameRecovery, Recovery
+from posekit.pipeline.recovery import FrameRecovery, Recovery
+from posekit.pipeline.trees import Batch
 from posekit.skeleton import JOINTS
 
 TEXTS: Final = ("input", "judged", "reason", "inferred", "rejected")

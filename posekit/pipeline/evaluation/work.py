@@ -19,8 +19,9 @@ from posekit.pipeline.evaluation.method import Method, figure_of
 from posekit.pipeline.evaluation.ranking import Ranking, first_ranked
 from posekit.pipeline.evaluation.sequences import chosen_by
 from posekit.pipeline.evaluation.true_branch import killers, limbs_right, true_branch
-from posekit.pipeline.recovery import Batch, FrameRecovery
+from posekit.pipeline.recovery import FrameRecovery
 from posekit.pipeline.tolerance import Tolerance
+from posekit.pipeline.trees import Batch
 from posekit.skeleton import JOINTS
 
 ROLES: Final = ("best", "first", "random", "path")
