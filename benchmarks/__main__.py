@@ -54,6 +54,8 @@ def main(arguments: list[str] | None = None) -> int:
     unknown = [name for name in names if name not in SECTIONS]
     if unknown:
         parser.error(f"--only: {unknown[0]!r}; expected some of {', '.join(SECTIONS)}")
+    if not 0 <= given.tolerance <= 1:
+        parser.error(f"--tolerance: {given.tolerance!r}; expected a share, 0 to 1")
     baseline = gate.read_baseline(given.baseline) if given.gate else {}
     sizes = TINY if given.tiny else QUICK if given.quick else Sizes()
     about = machine()

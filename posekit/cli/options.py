@@ -20,7 +20,10 @@ Checks = Annotated[
     ),
 ]
 RangesOption = Annotated[
-    str, typer.Option("--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, table1, or a TOML file.")
+    str,
+    typer.Option(
+        "--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, anatomical, table1, or a TOML file."
+    ),
 ]
 Rules = Annotated[
     str,

@@ -85,7 +85,7 @@ def recover(
             "--rigid-tolerance",
             metavar="LENGTH",
             help="How far distances inside torso and hips may be off. Default: exact where some torso fits "
-            "exactly, else 3cm, or 10cm in an uncalibrated view.",
+            "exactly, else 3cm, or 10cm in an uncalibrated view. A tolerance that is given turns refinement off.",
         ),
     ] = "",
     tangent_tolerance: Annotated[
@@ -416,7 +416,7 @@ def summarize(recovery: Recovery) -> None:
     if empty:
         typer.echo(
             f"posekit: warning: {empty} of {len(recovery.frames)} frames have no posture; the table says what rejected "
-            "most; noisy points need more tolerance (--rigid-tolerance, --angle-tolerance, --tangent-tolerance), and "
-            "a noisy head a given root",
+            "most; noisy points need their noise said (--deviation PX), or more tolerance (--rigid-tolerance, "
+            "--angle-tolerance, --tangent-tolerance), and a noisy head a given root",
             err=True,
         )

@@ -191,7 +191,7 @@ def validate(
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
     ] = False,
 ) -> None:
-    """Judge postures: exit 0 if all are valid, 1 if some are not, 2 on bad input."""
+    """Judge postures: exit 0 if all are valid, 1 if some are not or are undecided, 2 on bad input."""
     from posekit import files, pipeline, validators
     from posekit.files.report import columns_of
     from posekit.files.report_table import summary_table

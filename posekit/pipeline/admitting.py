@@ -46,7 +46,7 @@ class Excess:
     def __str__(self) -> str:
         """Say it in words: ``rigid_parts/right_hip-left_hip 1.2 cm``."""
         if self.unit == "m":
-            return f"{self.reason} {self.beyond * 100:.2g} cm"
+            return f"{self.reason} {self.beyond * 100:.3g} cm"
         return f"{self.reason} {self.beyond:.2g} {self.unit}"
 
 

@@ -15,7 +15,7 @@ from posekit.pipeline.noise import Noise, neck_priors
 from posekit.pipeline.recovery import Recovery
 from posekit.pipeline.tolerance import MEASURED
 from posekit.refinement import Sight, diagnose
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINTS, SEGMENT_NAMES
 
 NAMED: Final = 3
 """Empty frames of which the least violation is told."""
@@ -25,6 +25,9 @@ DOUBTED_WITH: Final = 12
 
 TOLD: Final = 3
 """Lengths that are doubted aloud."""
+
+ALIKE: Final = 1.2
+"""Factors that differ by no more than this are one."""
 
 PIXELS: Final = 2.0
 """Standard deviation of image points of which nobody says it."""
@@ -43,10 +46,16 @@ def advice_lines(recovery: Recovery) -> list[str]:
     lines = []
     for k in empty[:NAMED]:
         frame = recovery.frames[k]
-        allowed = frame.tolerance if frame.judged in ("given", "noisy") else MEASURED
+        allowed = MEASURED if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, k, allowed)
         if found is not None and found.excesses:
             lines.append(f"frame {k + 1}: the least that would admit a posture: {found}")
+        elif found is not None and frame.refined is not None:
+            lines.append(
+                f"frame {k + 1}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"
+            )
+    if len(empty) > NAMED and lines:
+        lines.append(f"and {len(empty) - NAMED} more frames without a posture")
     if len(empty) > len(recovery.frames) / 2:
         lines += _doubts(recovery, grower, empty)
     return lines
@@ -63,7 +72,12 @@ def _doubts(recovery: Recovery, grower: Grower, empty: list[int]) -> list[str]:
     camera = fit.cameras(rows)
     if not len(rows) or not isinstance(camera, PinholeCamera):
         return []
-    noise = Noise.of(view, None, None, asked=False) or Noise(deviation=PIXELS)
+    said = recovery.settings.get("noise")
+    noise = (
+        Noise(deviation=PIXELS)
+        if said is None
+        else Noise(deviation=said["deviation"], offset=said["offset"], lengths=said["lengths"])
+    )
     focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(rows))
     deviation = noise.of_points(view, fit.frame[rows], fit.root[rows, 2], focal)
     necks, _ = neck_priors(fit, rows, camera, float((deviation[:, 0] / focal).max()))
@@ -76,6 +90,13 @@ def _doubts(recovery: Recovery, grower: Grower, empty: list[int]) -> list[str]:
         length_deviation=noise.by_segment,
     )
     try:
-        return [str(doubt) for doubt in diagnose(sight)[:TOLD]]
+        doubts = diagnose(sight)
     except PosekitError:
         return []
+    factors = [doubt.needed / doubt.stated for doubt in doubts]
+    if len(doubts) > len(SEGMENT_NAMES) / 2 and max(factors) < ALIKE * min(factors):
+        return [
+            f"all lengths look stated at {1 / float(np.median(factors)):.2f} of what the pictures need: check unit, "
+            "stature and root"
+        ]
+    return [str(doubt) for doubt in doubts[:TOLD]]

@@ -212,7 +212,10 @@ def _check_root(root: Array, view: View, camera: PinholeCamera) -> None:
             "expected the neck, in the view's unit, OpenCV camera frame; correct it, or leave it out where a head "
             "is seen"
         )
-    if beside[k] > ROOT_WARNED:
+    noise = (
+        0.0 if view.deviation is None else 3 * view.deviation * root[k, 2] / float(camera.K[..., 0, 0].min())
+    )
+    if beside[k] > max(ROOT_WARNED, noise):
         warnings.warn(
             f"frames[{k}].root is {beside[k] * 100:.2g} cm beside the ray on which the neck is seen; "
             "the postures start from it as it is given",

@@ -24,6 +24,9 @@ JOINT_OFFSET: Final = 0.02
 LEAST_CONFIDENCE: Final = 0.25
 """A confidence below this counts as this."""
 
+LEAST_LENGTHS: Final = 1e-4
+"""Relative deviations of lengths below this count as none."""
+
 LATERAL: Final = 10.0
 """Deviations of an image point within which a placed neck may lie beside its ray: its image point says the rest."""
 
@@ -77,7 +80,9 @@ class Noise:
     @property
     def by_segment(self) -> Mapping[str, float]:
         """Relative standard deviations by segment."""
-        return GIVING if self.lengths is None else dict.fromkeys(SEGMENT_NAMES, self.lengths)
+        if self.lengths is None:
+            return GIVING
+        return dict.fromkeys(SEGMENT_NAMES, self.lengths if self.lengths >= LEAST_LENGTHS else 0.0)
 
     @property
     def limb(self) -> float:

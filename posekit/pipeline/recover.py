@@ -198,7 +198,7 @@ def recover(
             [frame.tolerance for frame in frames if frame.judged == "refined"],
             contact=contact_under_noise(contact_margin),
         ),
-        "noise": None if noise is None else asdict(noise),
+        "noise": None if noise is None else {**asdict(noise), "by_segment": dict(noise.by_segment)},
         "ranking": {"up": Up.level().says, "prior": load_prior().name},
         "versions": {name: _version(name) for name in ("posekit", "pin", "coal", "numpy")},
     }
@@ -282,6 +282,8 @@ def _noise(
     if refine and tolerance is not None:
         raise InputError("--refine: the noise says what is tolerated; leave out the tolerances, or --refine")
     if refine is False or not able or tolerance is not None:
+        if lengths is not None:
+            raise InputError("--length-deviation: nothing is refined here; leave it out")
         return None
     deviation = None if rooting is None else rooting.deviation
     return Noise.of(view, deviation, lengths, asked=bool(refine))

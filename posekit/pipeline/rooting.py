@@ -19,6 +19,9 @@ from posekit.placement import DETECTED_DEVIATION, DETECTED_OFFSET, Method, Place
 DEVIATION: Final = 2.0
 """Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
 
+MOST: Final = 1000.0
+"""Pixels: the largest deviation that is taken for one."""
+
 RELATIVE: Final = 1e-3
 """The same on the image plane of a `lee-chen` camera, as a fraction of f: some 2 pixels of most cameras."""
 
@@ -49,8 +52,10 @@ class Rooting:
     def __post_init__(self) -> None:
         if self.method not in get_args(Method):
             raise InputError(f"--root: {self.method!r}; expected {', '.join(get_args(Method))}")
-        if self.deviation is not None and not (math.isfinite(self.deviation) and self.deviation > 0):
-            raise InputError(f"--deviation: {self.deviation!r}; expected a positive number of pixels")
+        if self.deviation is not None and not 0 < self.deviation <= MOST:
+            raise InputError(
+                f"--deviation: {self.deviation!r}; expected a positive number of pixels, at most {MOST:g}"
+            )
 
 
 def place_roots(

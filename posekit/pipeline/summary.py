@@ -17,7 +17,7 @@ def summary_lines(recovery: Recovery) -> list[str]:
     """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
     frames = list(enumerate(recovery.frames))
     lines = [
-        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected most by (of 8192)"
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected by (leaves, 8192 a tree)"
     ]
     cut = len(frames) - 2 * SHOWN
     for k, frame in frames:
@@ -56,7 +56,10 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
     judged = frame.judged or "-"
     if frame.reason:
         return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
-    most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
+    lost = Counter(frame.rejected).most_common()
+    if not len(frame):  # what the last ones died of comes first
+        lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
+    most = ", ".join(f"{reason} {count}" for reason, count in lost[:SHOWN])
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
 
 
@@ -67,11 +70,12 @@ def following_line(following: Following) -> str:
     sure = (
         f"{lead:.3g} cheaper than the next that is different"
         if np.isfinite(lead)
-        else "the only one"
+        else "without another that differs by a limb"
         if np.isinf(lead)
         else "how sure is not asked (--follow 2)"
     )
+    count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
     return (
-        f"{len(following)} likeliest paths; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
+        f"{count}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
         f"{len(following.switches())} changes between near and far"
     )

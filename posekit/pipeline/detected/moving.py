@@ -21,8 +21,15 @@ from posekit.motion.motion_axes import up_rotation
 from posekit.pipeline.detected.kinds import Kind, What
 from posekit.pipeline.ranked import probabilities
 from posekit.pipeline.validate import recovered_with
-from posekit.skeleton import POINTS
+from posekit.sequences import bridge
+from posekit.skeleton import JOINTS, POINTS
 from posekit.skeleton_map import SkeletonMap, load_skeleton_map
+
+EVEN: Final = 0.25
+"""Share of a step by which the time of a picture may be off its place."""
+
+MOST_GAPS: Final = 4
+"""Times as many frames as there are that gaps may make."""
 
 RATE: Final = 30.0
 """Frames a second of postures without times."""
@@ -260,26 +267,44 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     smoothed = paths.smoothed[0]
     joints = np.where(np.isnan(smoothed), paths.joints[0], smoothed)
     known = np.flatnonzero(np.isfinite(joints).any(axis=(1, 2)))
-    frames = [result.frames[k] for k in known.tolist()]
-    points = np.concatenate([joints[known], np.full((len(known), 5, 3), np.nan)], axis=1)
-    survivor = paths.survivor[0, known]
-    says = [f"the likeliest path, {int((survivor < 0).sum())} of {len(known)} frames bridged"]
+    time, place = _evenly(np.array([result.frames[k].time for k in known.tolist()]))
+    filled = np.full((len(time), len(JOINTS), 3), np.nan)
+    filled[place] = joints[known]
+    points = np.concatenate([bridge(time, filled), np.full((len(time), 5, 3), np.nan)], axis=1)
+    survivor = np.full(len(time), -1, dtype=np.intp)
+    survivor[place] = paths.survivor[0, known]
+    interpolated = np.full(len(time), float(len(JOINTS)))
+    interpolated[place] = paths.interpolated[0, known].sum(axis=1)
+    says = [f"the likeliest path, {int((survivor < 0).sum())} of {len(time)} frames bridged"]
     points, up = _placed(points, view, stated, says)
-    codes = [
-        frame.branches[row] if row >= 0 else "" for frame, row in zip(frames, survivor.tolist(), strict=True)
-    ]
+    codes = [""] * len(time)
+    for row, k in zip(place.tolist(), known.tolist(), strict=True):
+        codes[row] = result.frames[k].branches[survivor[row]] if survivor[row] >= 0 else ""
     return Moving(
         points=points,
-        time=np.array([frame.time for frame in frames]),
-        frame=known,
-        survivor=survivor.astype(np.intp),
+        time=time,
+        frame=np.arange(len(time)),
+        survivor=survivor,
         up=up,
         figure=figure,
         says=tuple(says),
-        values={"interpolated": paths.interpolated[0, known].sum(axis=1).astype(np.float64)},
+        values={"interpolated": interpolated},
         branches=tuple(codes),
         gaps=len(result.frames) - len(known),
     )
+
+
+def _evenly(time: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Put in times of pictures that were left out, where the others are whole steps apart; say where these are."""
+    steps = np.diff(time)
+    step = float(np.median(steps)) if len(steps) else 1.0
+    places = np.concatenate([[0.0], np.cumsum(np.round(steps / step))])
+    whole = np.abs(time - time[:1] - places * step) <= EVEN * step
+    if not whole.all() or places[-1] > MOST_GAPS * len(time):
+        return time, np.arange(len(time))
+    place = places.astype(np.intp)
+    every = np.arange(place[-1] + 1)
+    return np.interp(every, place, time), place
 
 
 def _placed(points: Array, view: View | None, stated: str, says: list[str]) -> tuple[Array, str]:
@@ -306,7 +331,8 @@ def _guessed(joints: Array, source: str) -> str:
 def _number(posture: str, count: int, frame: int) -> int:
     if not posture.isdigit() or not 1 <= int(posture) <= count:
         raise InputError(
-            f"--posture: {posture!r}; expected first, path, all, or 1 to {count}, as many as frame {frame + 1} has"
+            f"--posture: {posture!r}; expected first, path, all, or a number from 1 to {count}, "
+            f"as frame {frame + 1} has"
         )
     return int(posture) - 1
 
