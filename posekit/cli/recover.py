@@ -61,6 +61,10 @@ EXAMPLES = examples(
 )
 
 
+MOST = 1024
+"""Survivors of a frame that paths may go through: the likeliest."""
+
+
 def recover(
     view: Annotated[
         Path,
@@ -171,7 +175,8 @@ def recover(
             metavar="K",
             min=0,
             max=1000,
-            help="Follow the person through the frames: the K likeliest paths from survivor to survivor.",
+            help="Follow the person through the frames: the K likeliest paths through the 1024 likeliest survivors of "
+            "each; minutes where there are so many.",
         ),
     ] = 0,
     truth: Annotated[
@@ -204,6 +209,7 @@ def recover(
     from posekit.pipeline.detected.compare import compare
     from posekit.pipeline.detected.conversion import of_person
     from posekit.pipeline.detected.given_views import given_views
+    from posekit.sequences import Beam
 
     for read in (view, nearer, truth, calibrate, lengths):
         distinct(output, write_urdf, read)
@@ -283,7 +289,7 @@ def recover(
             recovery.figure.write(of_person(write_urdf, one, alone=alone))
         path = of_person(output, one, alone=alone)
         with about(view):
-            following = pipeline.follow(recovery, k=paths) if paths else None
+            following = pipeline.follow(recovery, k=paths, beam=Beam(survivors=MOST)) if paths else None
         result = pipeline.result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         files.write_result(path, result)
         summarize(recovery)

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from posekit.files import Postures
     from posekit.files.postures_q import Configurations
 
+LOOSE = 0.1
+"""Degrees of tolerance from which it is said."""
+
 SOME_INVALID = 1
 DETAIL: Final[Mapping[str, Literal["findings", "margins"]]] = {".json": "findings", ".csv": "margins"}
 """What a report of each kind shows of every posture; others show what is behind those that are not valid."""
@@ -256,6 +259,10 @@ def validate(
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)
+    if angle_tolerance >= LOOSE or margin < 0:
+        typer.echo(
+            f"judged with {angle_tolerance:g} degrees of tolerance, and {100 * margin:g} cm between bodies"
+        )
     if output is not None:
         typer.echo(f"written: {output}")
     not_valid = len(columns) - columns.summary["valid"]

@@ -139,8 +139,7 @@ def test_a_result_says_what_its_frames_were_judged_with() -> None:
     assert tuple(judged_with(exact)) == (pytest.approx(1e-3), 0.01, "paper")
     noisy = view_of(scene.with_noise(2.0, np.random.default_rng(1)))
     noisy = replace(noisy, deviation=2.0, root=scene.joints_cam[:, 0])
-    with pytest.warns(UserWarning, match="beside the ray"):
-        refined = result_of(recover(noisy, contact_margin=-0.01))
+    refined = result_of(recover(noisy, contact_margin=-0.01))
     assert refined.settings["refined"]["contact"] == pytest.approx(-0.04)
     told = judged_with(refined)
     assert told.contact_margin == pytest.approx(-0.04)
