@@ -154,10 +154,12 @@ class Refiner:
         seen = np.isfinite(sight.points()).all(axis=2)
         worst = float(np.max(angular[:, : len(JOINTS)], where=seen, initial=0.0))
         leaves, tolerance = self._leaves(trunks, chosen, camera, worst, step)
+        own = chosen[trunks.frame]
+        if self.grower.nearer is not None:
+            leaves = self.grower.nearer.prune(leaves, fit.frame[own])
         physical = leaves.counts()
         suite, _ = self.grower.suites_of(tolerance)
         leaves = self.grower.body.tree.prune(leaves, [check for check in suite if check.name == "walking"])
-        own = chosen[trunks.frame]
         leaves, completion = self.grower.complete(
             leaves, fit.cameras(own), trunks.image, suite, tolerance, fit.frame[own]
         )
