@@ -188,12 +188,13 @@ def test_bodies_that_give_need_room_for_it(scene: Scene) -> None:
 def test_flips_that_are_given_by_hand_hold(scene: Scene, recovery: Recovery) -> None:
     segment = "right_elbow-right_wrist"
     given = recover(noisy(scene), length_deviation=0.0, nearer=[{segment: "right_wrist"}])
-    place = JOINT["right_wrist"] - 1
-    some = 0
+    wrist, elbow = JOINT["right_wrist"], JOINT["right_elbow"]
+    beyond = 0
     for free, held in zip(recovery.frames, given.frames, strict=True):
-        assert {code[place] for code in held.branches} <= {"0"}
-        some += "0" in {code[place] for code in free.branches}
-    assert some > FRAMES / 2
+        # Lifted, the wrist was nearer; what refinement does afterwards is a few centimetres.
+        assert (held.joints[:, wrist, 2] < held.joints[:, elbow, 2] + 0.06).all()
+        beyond += bool((free.joints[:, wrist, 2] > free.joints[:, elbow, 2] + 0.06).any())
+    assert beyond > FRAMES / 3
 
 
 def test_less_confident_points_are_less_certain(scene: Scene) -> None:
