@@ -223,6 +223,10 @@ def command_of(pid: int) -> bytes:
         return b""
 
 
+LEAST = 20_000
+"""Views below which one worker and two are not compared."""
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -237,6 +241,8 @@ def main() -> None:
     parser.add_argument("--cluster", default="")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    if given.two < LEAST:
+        parser.error(f"--two: {given.two}; expected {LEAST} or more: fewer are done before they can be timed")
     given.views = given.views or (200_000 if given.study == "scale" else 20_000)
     place = Path(tempfile.mkdtemp(prefix="batch-"))
     try:
