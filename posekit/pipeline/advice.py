@@ -11,11 +11,11 @@ from posekit.errors import PosekitError
 from posekit.files import OpenCVModel
 from posekit.pipeline.admitting import least_violation
 from posekit.pipeline.grower import Grower
-from posekit.pipeline.noise import Noise, neck_priors
+from posekit.pipeline.noise import Noise, Seen
 from posekit.pipeline.recovery import Recovery
 from posekit.pipeline.tolerance import MEASURED
-from posekit.refinement import Sight, diagnose
-from posekit.skeleton import JOINTS, SEGMENT_NAMES
+from posekit.refinement import diagnose
+from posekit.skeleton import SEGMENT_NAMES
 
 NAMED: Final = 3
 """Empty frames of which the least violation is told."""
@@ -78,19 +78,8 @@ def _doubts(recovery: Recovery, grower: Grower, empty: list[int]) -> list[str]:
         if said is None
         else Noise(deviation=said["deviation"], offset=said["offset"], lengths=said["lengths"])
     )
-    focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(rows))
-    deviation = noise.of_points(view, fit.frame[rows], fit.root[rows, 2], focal)
-    necks, _ = neck_priors(fit, rows, camera, float((deviation[:, 0] / focal).max()))
-    sight = Sight(
-        figure=recovery.figure,
-        camera=camera,
-        image=view.image[fit.frame[rows]],
-        deviation=deviation[:, : len(JOINTS)],
-        root=necks,
-        length_deviation=noise.by_segment,
-    )
     try:
-        doubts = diagnose(sight)
+        doubts = diagnose(Seen.of(view, fit, rows, camera, recovery.figure, noise).sight)
     except PosekitError:
         return []
     factors = [doubt.needed / doubt.stated for doubt in doubts]

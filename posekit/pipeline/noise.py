@@ -10,13 +10,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, Camera
+from posekit.cameras import Array, Camera, PinholeCamera
 from posekit.errors import InputError
+from posekit.figure import Figure
+from posekit.figure.angles import Limits
 from posekit.files import View
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.placement import DETECTED_DEVIATION, Placement
-from posekit.refinement import GIVING, RootPrior
-from posekit.skeleton import RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
+from posekit.refinement import GIVING, RootPrior, Sight
+from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
 
 JOINT_OFFSET: Final = 0.02
 """Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
@@ -111,6 +113,54 @@ class Noise:
         confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
         beside = self.offset * focal / depth
         return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), beside[:, None]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seen:
+    """What H hypotheses of a view saw, and how well.
+
+    Parameters
+    ----------
+    sight : Sight
+        Without their heads.
+    deviation : array (H, 19)
+        Of joints and head points, pixels.
+    focal : array (H,)
+        Pixels.
+    step : float
+        The largest deviation of a neck's depth, metres.
+    """
+
+    sight: Sight
+    deviation: Array
+    focal: Array
+    step: float
+
+    @staticmethod
+    def of(
+        view: View,
+        fit: CameraFit,
+        chosen: NDArray[np.intp],
+        camera: PinholeCamera,
+        figure: Figure,
+        noise: Noise,
+        limits: Limits | None = None,
+    ) -> Seen:
+        """Gather what some hypotheses saw with their `camera`; `limits` are the figure's if not given."""
+        frames = fit.frame[chosen]
+        focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(chosen))
+        deviation = noise.of_points(view, frames, fit.root[chosen, 2], focal)
+        necks, step = neck_priors(fit, chosen, camera, float((deviation[:, 0] / focal).max()))
+        sight = Sight(
+            figure=figure,
+            camera=camera,
+            image=view.image[frames],
+            deviation=deviation[:, : len(JOINTS)],
+            root=necks,
+            length_deviation=noise.by_segment,
+            limits=limits,
+        )
+        return Seen(sight=sight, deviation=deviation, focal=focal, step=step)
 
 
 def neck_priors(

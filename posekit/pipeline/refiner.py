@@ -22,7 +22,7 @@ from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
-from posekit.pipeline.noise import Noise, neck_priors
+from posekit.pipeline.noise import Noise, Seen
 from posekit.pipeline.refined import Sifted
 from posekit.pipeline.rooting import Rooting
 from posekit.pipeline.tolerance import Tolerance
@@ -136,24 +136,13 @@ class Refiner:
         fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
         frames, frame = np.unique(fit.frame[chosen], return_inverse=True)
         camera = _pinhole(fit.cameras(chosen))
-        focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(chosen))
-        depth = fit.root[chosen, 2]
-        deviation = self.noise.of_points(view, fit.frame[chosen], depth, focal)
-        angular = deviation / focal[:, None]
-        necks, step = neck_priors(fit, chosen, camera, float(angular[:, 0].max()))
-        sight = Sight(
-            figure=figure,
-            camera=camera,
-            image=view.image[fit.frame[chosen]],
-            deviation=deviation[:, : len(JOINTS)],
-            root=necks,
-            length_deviation=self.noise.by_segment if self.noise.rigid else 0.0,
-            limits=self._limits,
-        )
+        what = Seen.of(view, fit, chosen, camera, figure, self.noise, self._limits)
+        sight, deviation = what.sight, what.deviation
         trunks = find_trunks(sight)
         seen = np.isfinite(sight.points()).all(axis=2)
-        worst = float(np.max(angular[:, : len(JOINTS)], where=seen, initial=0.0))
-        leaves, tolerance = self._leaves(trunks, chosen, camera, worst, step)
+        angular = deviation[:, : len(JOINTS)] / what.focal[:, None]
+        worst = float(np.max(angular, where=seen, initial=0.0))
+        leaves, tolerance = self._leaves(trunks, chosen, camera, worst, what.step)
         own = chosen[trunks.frame]
         if self.grower.nearer is not None:
             leaves = self.grower.nearer.prune(leaves, fit.frame[own])
@@ -186,7 +175,9 @@ class Refiner:
             exact=np.zeros(leaves.n_frames, dtype=np.bool_),
             completion=None if completion is None else completion.take(sifted.kept),
             refined=sifted.survivors,
-            spread=float(deviation_of_noise(self.noise.deviation, np.median(depth / focal))),
+            spread=float(
+                deviation_of_noise(self.noise.deviation, np.median(fit.root[chosen, 2] / what.focal))
+            ),
         )
         return {
             frame: Grown(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
