@@ -274,6 +274,17 @@ def test_pictures_of_nobody_are_frames_too(detections: Path, folder: Path) -> No
     assert (rows[rows.survivor >= 0].inferred == "").all()
 
 
+def test_warnings_number_frames_as_the_recording_does(tmp_path: Path, folder: Path) -> None:
+    view = seen(9)
+    head = view.head_image.copy()
+    head[7, 0] += 60.0
+    write_view_table(tmp_path / "views.parquet", replace(view, head_image=head))
+    one, two, three = shards(tmp_path / "views.parquet", folder, Recipe(shard_frames=3))
+    assert not (run_shard(one).warnings or run_shard(two).warnings)
+    (line,) = run_shard(three).warnings
+    assert "in 1 of 3 frames, most in frames[7]:" in line
+
+
 def test_image_points_without_a_camera_are_key_points(tmp_path: Path, folder: Path) -> None:
     """The same points as arrays and as a detector's file are the same view."""
     view = seen(5, 4)

@@ -384,7 +384,7 @@ def test_a_wrong_point_is_named(offset, rng):
     image = view(PIXELS, R, t) + 0.2 * rng.normal(size=(300, 6, 2))
     wrong, angle = rng.integers(0, 6, 300), rng.uniform(0, 2 * np.pi, 300)
     image[np.arange(300), wrong] += offset * np.column_stack([np.cos(angle), np.sin(angle)])
-    with pytest.warns(HeadWarning, match=r"in \d+ of 300 frames, most in frame \d+") as caught:
+    with pytest.warns(HeadWarning, match=r"in \d+ of 300 frames, most in frames\[\d+\]") as caught:
         pose = solve_pose(TABLE_A2, image, PIXELS)
     assert len(caught) == 6  # one a point, not one a frame
     named = np.array([TABLE_A2.index(name) if name else -1 for name in pose.misfit])

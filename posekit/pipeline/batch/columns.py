@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Final
 
 import numpy as np
@@ -27,6 +28,8 @@ NO_SURVIVOR: Final = -1
 UNKNOWN: Final = "root/not_known"
 LEAVES: Final = 8192
 
+Letters = NDArray[np.uint8]
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frames:
@@ -41,7 +44,8 @@ class Frames:
     judged, reason, inferred, rejected : tuple of str (F,)
         With which tolerances it was judged; why nothing was grown; which joints were not seen and put in by commas;
         how many leaves were lost to what, as JSON.
-    branches : tuple of str (N,)
+    branches : byte array (N, B)
+        Survivors' branches: a letter a joint from the second, 0 or 1.
     joints : array (N, 14, 3)
     values : mapping of str to array (N,)
         Every other number of a survivor, by the name of its column.
@@ -54,7 +58,7 @@ class Frames:
     reason: tuple[str, ...]
     inferred: tuple[str, ...]
     rejected: tuple[str, ...]
-    branches: tuple[str, ...] = ()
+    branches: Letters = field(default_factory=lambda: np.empty((0, len(JOINTS) - 1), dtype=np.uint8))
     joints: Array = field(default_factory=lambda: np.empty((0, len(JOINTS), 3)))
     values: dict[str, Array] = field(default_factory=dict)
 
@@ -84,7 +88,7 @@ class Frames:
             reason=self.reason + other.reason,
             inferred=self.inferred + other.inferred,
             rejected=self.rejected + other.rejected,
-            branches=self.branches + other.branches,
+            branches=np.concatenate([self.branches, other.branches]),
             joints=np.concatenate([self.joints, other.joints]),
             values={
                 name: np.concatenate(
@@ -132,7 +136,7 @@ def frames_of(rows: ImageRows, recovery: Recovery, recipe: Recipe) -> Frames:
         judged=tuple(frame.judged or "" for frame in frames),
         reason=tuple(re.sub(r"^frames\[\d+\]: ", "", frame.reason) for frame in frames),
         inferred=tuple(inferred),
-        rejected=tuple(json.dumps(frame.rejected) for frame in frames),
+        rejected=tuple(map(_spelled, frames)),
         branches=branches,
         joints=joints,
         values=values,
@@ -175,8 +179,6 @@ def table_of(frames: Frames, input: str, person: int, schema: Any) -> Any:
     starts = np.cumsum(repeated) - repeated
     survivor = np.where(filled, np.arange(len(of_row)) - starts[of_row], NO_SURVIVOR)
     flat = frames.joints.reshape(-1, len(COORDINATES))
-    names = np.full(len(of_row), "", dtype=object)
-    names[filled] = frames.branches
     columns: dict[str, Any] = {
         "input": _dictionary(pa, (input,), np.zeros(len(of_row), dtype=np.int32)),
         "person": np.full(len(of_row), person, dtype=np.int32),
@@ -184,7 +186,7 @@ def table_of(frames: Frames, input: str, person: int, schema: Any) -> Any:
         "time": frames.time[of_row],
         "survivors": frames.count[of_row].astype(np.int32),
         "survivor": survivor.astype(np.int32),
-        "branches": pa.array(names.tolist(), pa.string()),
+        "branches": _strings(pa, frames.branches, filled),
         **{name: _scattered(flat[:, k], filled) for k, name in enumerate(COORDINATES)},
         **{name: _dictionary(pa, getattr(frames, name), of_row) for name in TEXTS if name != "input"},
     }
@@ -209,6 +211,13 @@ def _scattered(values: Array, filled: NDArray[np.bool_]) -> Array:
     return column
 
 
+def _strings(pa: Any, letters: Letters, filled: NDArray[np.bool_]) -> Any:
+    """Make a column of the survivors' branches from their bytes; of a frame without any it is empty."""
+    ends = np.concatenate([[0], np.cumsum(filled * letters.shape[1])]).astype(np.int32)
+    content = pa.py_buffer(np.ascontiguousarray(letters))
+    return pa.StringArray.from_buffers(len(filled), pa.py_buffer(ends), content)
+
+
 def _dictionary(pa: Any, texts: Sequence[str], of_row: NDArray[Any]) -> Any:
     """Make a column of texts that are repeated."""
     words = {text: k for k, text in enumerate(dict.fromkeys(texts))}
@@ -216,16 +225,24 @@ def _dictionary(pa: Any, texts: Sequence[str], of_row: NDArray[Any]) -> Any:
     return pa.DictionaryArray.from_arrays(pa.array(codes[of_row]), pa.array(list(words), pa.string()))
 
 
-def _survivors(
-    frames: Sequence[FrameRecovery], recipe: Recipe
-) -> tuple[Array, tuple[str, ...], dict[str, Array]]:
+def _spelled(frame: FrameRecovery) -> str:
+    """Write how many leaves were lost to what as JSON."""
+    return "{" + ", ".join(f"{_quoted(reason)}: {count}" for reason, count in frame.rejected.items()) + "}"
+
+
+@lru_cache(maxsize=4096)
+def _quoted(text: str) -> str:
+    return json.dumps(text)
+
+
+def _survivors(frames: Sequence[FrameRecovery], recipe: Recipe) -> tuple[Array, Letters, dict[str, Array]]:
     """Gather all survivors, in the order of the frames, batch by batch: frames of one batch are grown together."""
     grown: dict[int, tuple[Batch, list[int]]] = {}
     for k, frame in enumerate(frames):
         if frame.batch is not None and len(frame):
             grown.setdefault(id(frame.batch), (frame.batch, []))[1].append(k)
     if not grown:
-        return np.empty((0, len(JOINTS), 3)), (), {}
+        return np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS) - 1), dtype=np.uint8), {}
     owner, joints, branches = [], [], []
     values: dict[str, list[Array]] = {}
     for batch, members in grown.values():
@@ -235,10 +252,12 @@ def _survivors(
         branches.append(_codes(batch, rows))
         for name, column in _values(batch, [frames[k] for k in members], rows, recipe).items():
             values.setdefault(name, []).append(column)
+    if len(grown) == 1:
+        return joints[0], branches[0], {name: columns[0] for name, columns in values.items()}
     order = np.argsort(np.concatenate(owner), kind="stable")
     return (
         np.concatenate(joints)[order],
-        tuple(np.concatenate(branches)[order].tolist()),
+        np.concatenate(branches)[order],
         {name: np.concatenate(columns)[order] for name, columns in values.items()},
     )
 
@@ -252,11 +271,10 @@ def _rows(batch: Batch, members: Sequence[FrameRecovery]) -> tuple[NDArray[np.in
     return (first[of_frame] + within).astype(np.intp), of_frame
 
 
-def _codes(batch: Batch, rows: NDArray[np.intp]) -> NDArray[np.str_]:
-    """Spell branch codes as 0 and 1, a letter a joint from the second."""
+def _codes(batch: Batch, rows: NDArray[np.intp]) -> Letters:
+    """Spell branch codes as the letters 0 and 1, one a joint from the second."""
     levels = np.arange(batch.leaves.level)[::-1]
-    letters = ((batch.leaves.code[rows, None] >> levels) & 1).astype(np.uint32) + ord("0")
-    return np.ascontiguousarray(letters).view(f"<U{len(levels)}").ravel()
+    return (((batch.leaves.code[rows, None] >> levels) & 1) + ord("0")).astype(np.uint8)
 
 
 def _values(

@@ -22,6 +22,9 @@ T = TypeVar("T")
 R = TypeVar("R")
 THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """What libraries read when they are loaded: a process is one thread, and processes are as many as cores."""
+MEMORY: Final = {"MALLOC_MMAP_THRESHOLD_": "33554432", "MALLOC_TRIM_THRESHOLD_": "67108864"}
+"""What glibc's malloc reads (mallopt(3)), bytes: arrays that come and go with every piece of a shard stay the process's
+own, instead of being given back and asked of the system, page by page, again; at most so much is kept."""
 STARTS: Final = 5
 """Processes in a row that end before they are ready, after which none is started any more."""
 READY: Final = b"ready"
@@ -178,7 +181,8 @@ def _start() -> _Worker:
     context = get_context("spawn")  # a fork after OpenMP was used hangs the child
     ours, theirs = context.Pipe()
     process = context.Process(target=serve, args=(theirs,), daemon=True)
-    kept = {name: os.environ.get(name) for name in THREADS}
+    kept = {name: os.environ.get(name) for name in (*THREADS, *MEMORY)}
+    os.environ.update({**MEMORY, **{name: value for name, value in kept.items() if value is not None}})
     os.environ.update(dict.fromkeys(THREADS, "1"))
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:

@@ -7,6 +7,8 @@ deaths of workers and nodes; an error that a task raises is raised where its res
 from __future__ import annotations
 
 import os
+import re
+import socket
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
@@ -23,6 +25,8 @@ LOCAL: Final = "local"
 """Instead of an address: a cluster of this machine alone, started and ended with the run."""
 AHEAD: Final = 2
 """Tasks in flight for each core of the cluster: one that runs and one that waits."""
+ANSWERS_WITHIN: Final = 10.0
+"""Seconds for a cluster to answer at all: Ray itself waits for minutes, and complains meanwhile."""
 LEAST: Final = (2, 55)
 """The oldest version whose retries are relied on."""
 
@@ -59,6 +63,7 @@ class RayPool:
             raise InputError(
                 f"--cluster: ray is {self.ray.__version__}; expected {LEAST[0]}.{LEAST[1]} or later; update it"
             )
+        self._call()
         common: dict[str, Any] = {"log_to_driver": False, "logging_level": "error", "configure_logging": True}
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told of the run
         try:
@@ -67,11 +72,24 @@ class RayPool:
             else:
                 self.ray.init(address=self.address, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
-            raise InputError(
-                f"--cluster: {self.address}: {short(str(error))}; expected the address of a running cluster, or local; "
-                "start one with: ray start --head"
-            ) from None
+            raise self._refusal(short(str(error))) from None
         return self
+
+    def _call(self) -> None:
+        """Refuse an address where nothing listens."""
+        found = re.fullmatch(r"(?:ray://)?\[?([^/\[\]]+?)\]?:(\d{1,5})", self.address)
+        if found is None:
+            return  # local, auto, or what Ray refuses at once
+        try:
+            socket.create_connection((found[1], int(found[2])), ANSWERS_WITHIN).close()
+        except (OSError, OverflowError, UnicodeError) as error:
+            raise self._refusal(f"nothing answers there ({short(str(error))})") from None
+
+    def _refusal(self, why: str) -> InputError:
+        return InputError(
+            f"--cluster: {self.address}: {why}; expected the address of a running cluster, or local; "
+            "start one with: ray start --head"
+        )
 
     def __exit__(
         self,

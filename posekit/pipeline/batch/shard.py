@@ -6,6 +6,7 @@ import json
 import re
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -187,9 +188,7 @@ def finished(shard: Shard) -> Finished | None:
 def _pieces(shard: Shard, head: View) -> Iterator[Frames]:
     """Recover the frames of a shard piece by piece."""
     noisy = bool(head.derived or head.deviation or shard.recipe.source.deviation)
-    for start in range(shard.start, shard.stop, FRAMES_AT_ONCE):
-        stop = min(start + FRAMES_AT_ONCE, shard.stop)
-        rows = _joined(list(read_rows(Path(shard.table.path), start, stop)))
+    for rows in read_rows(Path(shard.table.path), shard.start, shard.stop):
         for piece in portions(rows, noisy=noisy):
             part = rows.part(piece)
             usable = np.flatnonzero(part.usable(head))
@@ -219,7 +218,8 @@ def portions(rows: ImageRows, *, noisy: bool) -> Iterator[slice]:
 def _recovered(rows: ImageRows, head: View, shard: Shard) -> Frames:
     """Recover frames; where none of several can be, each by itself, so that each has its own reason."""
     try:
-        return frames_of(rows, shard.recipe.recover(rows.view(head)), shard.recipe)
+        with _numbered(rows):
+            return frames_of(rows, shard.recipe.recover(rows.view(head)), shard.recipe)
     except PosekitError as error:
         if len(rows) == 1:
             return unrecovered(rows, re.sub(r"^frames\[0\]: ", "", str(error)))
@@ -229,13 +229,14 @@ def _recovered(rows: ImageRows, head: View, shard: Shard) -> Frames:
     )
 
 
-def _joined(pieces: list[ImageRows]) -> ImageRows:
-    """Lay pieces of rows behind each other."""
-    if len(pieces) == 1:
-        return pieces[0]
-    return ImageRows(
-        **{
-            name: np.concatenate([getattr(piece, name) for piece in pieces])
-            for name in ("frame", "time", "points", "confidence", "root")
-        }
-    )
+@contextmanager
+def _numbered(rows: ImageRows) -> Iterator[None]:
+    """Let warnings name frames by their numbers in the recording, not in these rows."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for one in caught:
+        text = re.sub(
+            r"\bframes\[(\d+)\]", lambda found: f"frames[{rows.frame[int(found[1])]}]", str(one.message)
+        )
+        warnings.warn(text, one.category, stacklevel=3)

@@ -103,7 +103,8 @@ def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> I
         Where the file is damaged, has fewer rows, or a number is infinite.
     """
     with _opened(path) as file:
-        wanted = [name for name in (*UV, *SURE, *ROOT, "frame", "time") if name in file.schema_arrow.names]
+        there = set(file.schema_arrow.names)
+        wanted = [name for name in (*UV, *SURE, *ROOT, "frame", "time") if name in there]
         found = start
         for columns, first in _pieces(path, file, wanted, start, stop):
             rows = _rows(columns, first, rate)
