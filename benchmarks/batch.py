@@ -5,7 +5,9 @@
 
 ``scale`` recovers a table of synthetic views (random legal postures from random cameras; `--distinct` of them over and
 over), and prints the memory of driver and workers by tenths of the run. Then it recovers the first `--two` of them with
-one worker and with two: by the clock, which says little where others use the cores, and by processor time.
+one worker, with two, and in two runs of one worker each that know nothing of each other: by the clock, which says
+little where others use the cores, and by processor time. What two such runs do is what two cores of the machine are
+worth; what two workers of one run do less is the driver's doing.
 ``kills`` kills a run with SIGKILL at random moments, a worker or the driver, starts it again whenever the driver
 is gone, lets it end, and compares every byte with a run that was left alone.
 """
@@ -24,6 +26,8 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -155,7 +159,11 @@ def scale(given: argparse.Namespace, place: Path) -> None:
         for jobs in (1, 2):
             _, steady = timed(small, place / f"small{turn}{jobs}", recipe, jobs)
             clock, cpu = steady.rates
-            rows.append([str(jobs), f"{clock:,.0f}", f"{cpu:,.0f}"])
+            rows.append([f"{jobs} of one run", f"{clock:,.0f}", f"{cpu:,.0f}"])
+        with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+            runs = [pool.submit(alone, small, place / f"apart{turn}{k}", recipe) for k in range(2)]
+            clocks, cpus = zip(*(run.result() for run in runs), strict=True)
+        rows.append(["1 of each of two runs", f"{sum(clocks):,.0f}", f"{sum(cpus) / 2:,.0f}"])
     print("\n".join(table_lines(["workers", "views/s by the clock", "views/s of processor time"], rows)))
 
 
@@ -223,6 +231,11 @@ def command_of(pid: int) -> bytes:
         return b""
 
 
+def alone(table: Path, out: Path, recipe: Recipe) -> tuple[float, float]:
+    """Return the rates of a run of one worker."""
+    return timed(table, out, recipe, 1)[1].rates
+
+
 LEAST = 20_000
 """Views below which one worker and two are not compared."""
 
@@ -241,8 +254,8 @@ def main() -> None:
     parser.add_argument("--cluster", default="")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    if given.two < LEAST:
-        parser.error(f"--two: {given.two}; expected {LEAST} or more: fewer are done before they can be timed")
+    if given.two < LEAST or (given.study == "scale" and given.views is not None and given.views < LEAST):
+        parser.error(f"--views, --two: expected {LEAST:,} or more: fewer are done before they can be timed")
     given.views = given.views or (200_000 if given.study == "scale" else 20_000)
     place = Path(tempfile.mkdtemp(prefix="batch-"))
     try:
