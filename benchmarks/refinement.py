@@ -5,7 +5,8 @@
 Random legal postures seen from 2.5 to 6 m with f = 1500 px. The neck is given, exactly or with a deviation of 10 cm
 along its ray. Three ways to grow the tree: with the fixed tolerances for measured points, with tolerances derived from
 the noise, and on trunks found first. Its leaves are refined, those that the noise cannot explain rejected at 1e-3, and
-those that became one merged. With a capture the same is asked of real motion, whose lengths are uncertain.
+those that became one merged; with exact necks by `Refiner` itself, whose survivors have also passed the checks.
+Those are counted for all ranges. With a capture the same is asked of real motion, whose lengths are uncertain.
 Prints Markdown tables.
 """
 
@@ -23,8 +24,10 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from posekit.figure import Figure, load_figure
-from posekit.pipeline import MEASURED, Tolerance
+from posekit.pipeline import MEASURED, Tolerance, recover, recovered_with, result_of, view_of
 from posekit.pipeline.markdown import table_lines
+from posekit.pipeline.noise import Noise
+from posekit.pipeline.refiner import Refiner
 from posekit.refinement import (
     GIVING,
     RootPrior,
@@ -36,10 +39,10 @@ from posekit.refinement import (
     tolerance_of,
     under_noise,
 )
-from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
-from posekit.validators import PHYSICAL, load_ranges, make_checks
+from posekit.validators import PHYSICAL, Validator, load_ranges, make_checks
 
 NEAR = 0.035
 """Metres of mean joint error within which a survivor counts as near the truth."""
@@ -48,11 +51,8 @@ PIXELS = (0.5, 1.0, 2.0, 5.0)
 ROOT_DEPTH = 0.1
 HOPELESS = 60.0
 MOST_LEAVES = 350_000
-LIMB_LENGTHS = 0.01
-"""Relative deviation of limbs' lengths for real bodies."""
-
-TORSO = 0.02
-"""Metres that distances inside a found trunk may be off where its lengths are varied."""
+OF = {"urdf": 1, "table1": 60, "anatomical": 10}
+"""Ranges, and of how many random views about one or more are inside them."""
 
 CONTACT = -0.03
 """Metres: what bodies may overlap under noise."""
@@ -111,20 +111,17 @@ def derived(sight: Sight, pixels: float) -> Leaves:
 
 
 def on_trunks(sight: Sight, pixels: float, trunks: Trunks | None = None) -> Leaves:
-    """Grow trees on trunks that were found first, every angle with its own allowance."""
+    """Grow trees on trunks that were found first, as `Refiner` does, where the neck is known as it cannot say."""
     trunks = find_trunks(sight) if trunks is None else trunks
-    varied = bool(sight.length_deviation)
     allowed = tolerance_of(
         pixels,
         sight.camera,
         sight.figure,
         depth_of(sight),
-        length_deviation=LIMB_LENGTHS if varied else 0.0,
         root_depth_deviation=root_deviation(sight),
         trunks=True,
     )
-    rigid = TORSO if varied else allowed.rigid
-    tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=1.0)
+    tolerance = Tolerance(rigid=allowed.rigid, tangent=allowed.tangent, placement=False, angle=1.0)
     tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=trunks.tree_lengths(sight.figure))
     leaves = tree.grow(
         sight.camera,
@@ -208,6 +205,86 @@ def outcome(sight: Sight, leaves: Leaves, truth: np.ndarray) -> Outcome:
     )
 
 
+def by_refiner(scene: Scene, image: np.ndarray, pixels: float, lengths: float | None) -> Outcome:
+    """Do what `posekit.recover` does with exact necks, and look at each stage; survivors have passed all checks."""
+    view = replace(
+        view_of(replace(scene, image=image)),
+        deviation=pixels,
+        root=scene.joints_cam[:, 0],
+        head_image=np.full((len(scene), len(HEAD_POINTS), 2), np.nan),
+    )
+    grower = recover(view, figure=scene.figure, length_deviation=lengths).grower
+    assert grower is not None
+    refiner = Refiner(grower=grower, noise=Noise(deviation=pixels, lengths=lengths))
+    lifted = refiner.lift(np.arange(len(view)))
+    frame, postures, truth = lifted.frame[lifted.hypothesis], lifted.postures(), scene.joints_cam
+    refined = refine(lifted.seen.sight, postures, frame=lifted.hypothesis, hopeless=HOPELESS)
+    sifted = refiner.sift(lifted)
+    kept = frame[sifted.kept], sifted.survivors.joints
+    n, near = len(view), best(*kept, truth)
+    return Outcome(
+        leaves=float(np.median(np.bincount(frame, minlength=n))),
+        leaves_near=float((best(frame, postures, truth) < NEAR).mean()),
+        empty=float((np.bincount(kept[0], minlength=n) == 0).mean()),
+        refined_near=float((best(frame, refined.joints, truth) < NEAR).mean()),
+        explained=float(np.median(np.bincount(frame[sifted.explained], minlength=n))),
+        merged=float(np.median(np.bincount(kept[0], minlength=n))),
+        kept_near=float((near < NEAR).mean()),
+        median_error=float(np.median(near[np.isfinite(near)])),
+    )
+
+
+def legal(ranges: str, views: int) -> Scene:
+    """Return random views whose true postures are inside some ranges, heads too."""
+    scene = random_views(load_figure(), views * OF[ranges], np.random.default_rng(0))
+    validator = Validator(ranges=ranges, checks=("joint-range",))
+    verdicts = np.array(validator.check(scene.joints_cam, scene.head_cam).verdicts)
+    return scene.select(np.flatnonzero(verdicts == "valid")[:views])
+
+
+def certificates(views: int) -> None:
+    print("\nCertificates: what `validate` says of `recover`'s survivors, exact necks and lengths\n")
+    rows = []
+    for ranges in OF:
+        scene = legal(ranges, views)
+        for pixels in PIXELS:
+            view = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
+            view = replace(view, deviation=pixels, root=scene.joints_cam[:, 0])
+            start = time.process_time()
+            recovery = recover(view, ranges=ranges, length_deviation=0.0)
+            spent = time.process_time() - start
+            judged = recovered_with(result_of(recovery)).judged
+            validator = Validator(
+                ranges=ranges, angle_tolerance=judged.angle, contact_margin=judged.contact_margin
+            )
+            counts = [len(frame) for frame in recovery.frames]
+            joints = np.concatenate([frame.joints for frame in recovery.frames])
+            near = best(np.repeat(np.arange(len(scene)), counts), joints, scene.joints_cam)
+            rows.append(
+                [
+                    ranges,
+                    f"{pixels:g}",
+                    f"{len(scene)}",
+                    f"{(near < NEAR).mean():.1%}",
+                    f"{(np.array(counts) == 0).mean():.1%}",
+                    f"{len(joints)}",
+                    f"{validator.check(joints).verdicts.count('invalid')}",
+                    f"{spent / len(scene) * 1000:.1f}",
+                ]
+            )
+    head = (
+        "ranges",
+        "noise, px",
+        "views",
+        "within 3.5 cm",
+        "frames without a posture",
+        "survivors",
+        "invalid by `validate`",
+        "CPU, ms a frame",
+    )
+    print("\n".join(table_lines(head, rows)))
+
+
 def root_prior(scene: Scene, depth: float, rng: np.random.Generator) -> RootPrior:
     neck = scene.joints_cam[:, 0]
     ray = neck / np.linalg.norm(neck, axis=1, keepdims=True)
@@ -225,6 +302,10 @@ def retention(views: int) -> None:
             root = root_prior(scene, depth, np.random.default_rng(2))
             sight = Sight(figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root)
             for label, way in (("fixed", fixed), ("derived", derived), ("on trunks", on_trunks)):
+                if way is on_trunks and not depth:
+                    row = by_refiner(scene, image, pixels, 0.0).row()
+                    rows.append([f"{pixels:g}", name, label, *row])
+                    continue
                 leaves = way(sight, pixels)
                 if len(leaves[0]) > MOST_LEAVES:
                     near = (best(*leaves, scene.joints_cam) < NEAR).mean()
@@ -347,17 +428,18 @@ def real(capture: Path, frames: int) -> None:
             total = []
             for k, scene in enumerate(scenes):
                 image = scene.with_noise(pixels, np.random.default_rng(10 + k)).image
-                root = root_prior(scene, 0.0, np.random.default_rng(2))
+                if label == "on trunks":
+                    total.append((len(scene), by_refiner(scene, image, pixels, None)))
+                    continue
                 sight = Sight(
                     figure=scene.figure,
                     camera=scene.camera,
                     image=image,
                     deviation=pixels,
-                    root=root,
+                    root=root_prior(scene, 0.0, np.random.default_rng(2)),
                     length_deviation=GIVING,
                 )
-                leaves = (fixed if label == "fixed" else on_trunks)(sight, pixels)
-                total.append((len(scene), outcome(sight, leaves, scene.joints_cam)))
+                total.append((len(scene), outcome(sight, fixed(sight, pixels), scene.joints_cam)))
             weight = np.array([count for count, _ in total]) / sum(count for count, _ in total)
             fields = [[*vars(result).values()] for _, result in total]
             rows.append([f"{pixels:g}", label, *Outcome(*(weight @ np.array(fields)).tolist()).row()])
@@ -373,6 +455,7 @@ def main() -> None:
     given = parser.parse_args()
     warnings.simplefilter("ignore")
     retention(given.views)
+    certificates(given.views)
     calibration(given.truths)
     cost(given.views)
     if given.capture is not None:

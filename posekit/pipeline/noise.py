@@ -18,6 +18,7 @@ from posekit.files import View
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.placement import DETECTED_DEVIATION, Placement
 from posekit.refinement import GIVING, RootPrior, Sight
+from posekit.refinement.walls import Walls
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
 
 JOINT_OFFSET: Final = 0.02
@@ -136,6 +137,13 @@ class Seen:
     focal: Array
     step: float
 
+    @property
+    def worst(self) -> float:
+        """The largest deviation of a joint that was seen, radians."""
+        seen = np.isfinite(self.sight.points()).all(axis=2)
+        angular = self.deviation[:, : len(JOINTS)] / self.focal[:, None]
+        return float(np.max(angular, where=seen, initial=0.0))
+
     @staticmethod
     def of(
         view: View,
@@ -145,8 +153,12 @@ class Seen:
         figure: Figure,
         noise: Noise,
         limits: Limits | None = None,
+        walls: Walls | None = None,
     ) -> Seen:
-        """Gather what some hypotheses saw with their `camera`; `limits` are the figure's if not given."""
+        """Gather what some hypotheses saw with their `camera`; `limits` are the figure's if not given.
+
+        Those of limbs may be `walls` instead.
+        """
         frames = fit.frame[chosen]
         focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(chosen))
         deviation = noise.of_points(view, frames, fit.root[chosen, 2], focal)
@@ -159,6 +171,7 @@ class Seen:
             root=necks,
             length_deviation=noise.by_segment,
             limits=limits,
+            walls=walls,
         )
         return Seen(sight=sight, deviation=deviation, focal=focal, step=step)
 

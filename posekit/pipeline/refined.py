@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.pipeline.contact import Overlaps
-from posekit.refinement import Merged, Refined
-from posekit.refinement.merging import merge
-from posekit.tree import Check
+from posekit.refinement import Merged
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,81 +50,36 @@ class RefinedSurvivors:
         """Count the survivors."""
         return len(self.joints)
 
-    def part(self, rows: slice) -> RefinedSurvivors:
-        """Return some of them."""
-        return RefinedSurvivors(**{item.name: getattr(self, item.name)[rows] for item in fields(self)})
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sifted:
-    """What became of N leaves: their probabilities, which of them stand for themselves, and those.
-
-    Parameters
-    ----------
-    p : array (N,)
-        The probability that noise alone gives a chi2 as large.
-    overlaps : Overlaps
-        Which of those that the noise explains have bodies that overlap too far.
-    explained, kept : bool array (N,)
-        Those that the noise explains, and of those whose bodies do not overlap the likeliest that became one.
-    survivors : RefinedSurvivors
-        Those kept, in the leaves' order.
-    """
-
-    p: Array
-    overlaps: Overlaps
-    explained: NDArray[np.bool_]
-    kept: NDArray[np.bool_]
-    survivors: RefinedSurvivors
-
     @staticmethod
-    def of(refined: Refined, known: NDArray[np.bool_], collisions: Sequence[Check]) -> Sifted:
-        """Reject what noise cannot explain, then what `collisions` do, and merge what became one.
-
-        Joints that are not `known` become NaN.
-        """
-        explained = refined.explained()
-        likely = np.flatnonzero(explained)
-        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
-        points = np.concatenate([joints, refined.head[likely]], axis=1)
-        overlaps = Overlaps.of(collisions, points).at(likely, len(refined))
-        merged: Merged = merge(refined, keep=explained & (overlaps.place < 0))
+    def of(merged: Merged, known: NDArray[np.bool_]) -> RefinedSurvivors:
+        """Take what was merged; joints that are not `known` (of all leaves) become NaN."""
         order = np.argsort(merged.rows)
-        rows = merged.rows[order]
-        size = np.bincount(merged.group[merged.group >= 0], minlength=len(rows))[order]
+        unknown = ~known[merged.rows[order]]
         chosen = merged.refined.select(order)
         joints, covariance = chosen.joints.copy(), chosen.covariance.copy()
-        joints[~known[rows]] = np.nan
-        covariance[~known[rows]] = np.nan
-        kept = np.zeros(len(refined), dtype=np.bool_)
-        kept[rows] = True
-        return Sifted(
-            p=refined.p,
-            overlaps=overlaps,
-            explained=explained,
-            kept=kept,
-            survivors=RefinedSurvivors(
-                joints=joints,
-                head=chosen.head.copy(),
-                chi2=chosen.chi2.copy(),
-                dof=chosen.dof.copy(),
-                p=chosen.p.copy(),
-                covariance=covariance,
-                merged=size - 1,
-            ),
+        joints[unknown] = np.nan
+        covariance[unknown] = np.nan
+        size = np.bincount(merged.group[merged.group >= 0], minlength=len(order))[order]
+        return RefinedSurvivors(
+            joints=joints,
+            head=chosen.head.copy(),
+            chi2=chosen.chi2.copy(),
+            dof=chosen.dof.copy(),
+            p=chosen.p.copy(),
+            covariance=covariance,
+            merged=size - 1,
         )
 
     @staticmethod
-    def joined(parts: list[Sifted]) -> Sifted:
-        """Put the leaves of one part behind those of the last."""
-        survivors = RefinedSurvivors(
+    def joined(parts: Sequence[RefinedSurvivors]) -> RefinedSurvivors:
+        """Put those of one part behind those of the last."""
+        return RefinedSurvivors(
             **{
-                item.name: np.concatenate([getattr(part.survivors, item.name) for part in parts])
+                item.name: np.concatenate([getattr(part, item.name) for part in parts])
                 for item in fields(RefinedSurvivors)
             }
         )
-        p, explained, kept = (
-            np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "explained", "kept")
-        )
-        overlaps = Overlaps.joined([part.overlaps for part in parts])
-        return Sifted(p=p, overlaps=overlaps, explained=explained, kept=kept, survivors=survivors)
+
+    def part(self, rows: slice) -> RefinedSurvivors:
+        """Return some of them."""
+        return RefinedSurvivors(**{item.name: getattr(self, item.name)[rows] for item in fields(self)})

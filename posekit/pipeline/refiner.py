@@ -1,13 +1,13 @@
 """Trees under noise: trunks first, limbs on them, then the likeliest posture of every leaf.
 
-Nothing is dropped that the noise can explain, what it cannot explain is rejected, and what became one is merged: see
-`posekit.refinement`.
+Nothing is dropped that the noise can explain, what it cannot explain is rejected, what became one is merged, and every
+survivor passes the checks: see `posekit.refinement` and `posekit.pipeline.certified`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -17,43 +17,80 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array, Camera, PinholeCamera
 from posekit.figure.angles import Limits
+from posekit.occlusion import Completion
 from posekit.pipeline.body import Judges
+from posekit.pipeline.certified import Contradiction, certified_within, certifying_checks
 from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
+from posekit.pipeline.limb_walls import LimbWalls
 from posekit.pipeline.noise import Noise, Seen
-from posekit.pipeline.refined import Sifted
 from posekit.pipeline.rooting import Rooting
+from posekit.pipeline.sifting import Sifted, blocks, drop, sift
 from posekit.pipeline.tolerance import Tolerance
 from posekit.pipeline.trees import Batch
 from posekit.ranking import deviation_of_noise
-from posekit.refinement import Sight, Trunks, find_trunks, refine, tolerance_of, under_noise
-from posekit.refinement.refined import LEVEL
-from posekit.refinement.sight import LIMIT_DEVIATION
+from posekit.refinement import Sight, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import DEVIATIONS
-from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
-from posekit.tree.leaves import Pruned
-from posekit.validators import collision
 
 ANGLE: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
 
-HOPELESS: Final = 60.0
-"""A chi2 beyond which a leaf is given up unless the next step promises to halve it."""
-
-LEAST: Final = 1e-6
-"""Metres by which held lengths may be off: rounding."""
-
-SIX: Final = 6.0
-"""The root of the largest chi2 that is explained with up to 13 degrees of freedom."""
-
 HYPOTHESES_AT_ONCE: Final = 250
 """Hypotheses whose trees are grown together: each may have thousands of leaves."""
 
-LEAVES_AT_ONCE: Final = 60_000
-"""Leaves that are refined together: each takes some kilobytes on the way."""
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lifted:
+    """Leaves of trees on trunks, before they are refined.
+
+    Parameters
+    ----------
+    chosen : int array (H,)
+        The hypotheses of the camera fit.
+    frame : int array (H,)
+        Whose frame each is, counted from 0.
+    frames : int array (F,)
+        The view's frames.
+    seen : Seen
+    trunks : Trunks
+        Of those hypotheses.
+    leaves : Leaves
+        On them.
+    physical : int array
+        Survivors by level, before the motion model.
+    completion : Completion or None
+        The joints that were not seen.
+    """
+
+    chosen: NDArray[np.intp]
+    frame: NDArray[np.intp]
+    frames: NDArray[np.intp]
+    seen: Seen
+    trunks: Trunks
+    leaves: Leaves
+    physical: NDArray[np.int64]
+    completion: Completion | None
+
+    @property
+    def own(self) -> NDArray[np.intp]:
+        """The hypothesis of the camera fit that each trunk was found for."""
+        return self.chosen[self.trunks.frame]
+
+    @property
+    def hypothesis(self) -> NDArray[np.intp]:
+        """The hypothesis of each leaf, counted from 0."""
+        return self.trunks.frame[self.leaves.frame]
+
+    def postures(self) -> Array:
+        """Place the leaves (N, 14, 3), completed where that was possible."""
+        postures = self.leaves.postures()
+        if self.completion is None:
+            return postures
+        return np.where(np.isnan(postures), self.completion.postures, postures)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,9 +117,9 @@ class Refiner:
             int(k): Grown(batch=None, index=0, hypotheses=1, fit=fit)
             for k in np.setdiff1d(frames, fit.frame[chosen])
         }
-        for rows in _blocks(fit.frame[chosen], HYPOTHESES_AT_ONCE):
+        for rows in blocks(fit.frame[chosen], HYPOTHESES_AT_ONCE):
             if rows.stop > rows.start:
-                grown |= self._grow(chosen[rows])
+                grown |= self._refine(self.lift(chosen[rows]))
         return grown
 
     @cached_property
@@ -100,16 +137,22 @@ class Refiner:
         asked = self.grower.judges
         return replace(asked, contact_margin=contact_under_noise(asked.contact_margin))
 
-    def _measuring(self, tolerance: Tolerance) -> Sequence[Check]:
-        """Return the checks that tell every margin: made once for each tolerance."""
-        if tolerance not in self._suites:
-            suite = self.judges.suite(self.grower.body.figure, tolerance, exact=True)
-            self._suites[tolerance] = [check for check in suite if self._can_be_told(check)]
-        return self._suites[tolerance]
+    @cached_property
+    def tolerance(self) -> Tolerance:
+        """By how much survivors may be off."""
+        return certified_within(self.noise)
 
     @cached_property
-    def _suites(self) -> dict[Tolerance, Sequence[Check]]:
-        return {}
+    def certifying(self) -> Sequence[Check]:
+        """The checks that every survivor passes."""
+        made = certifying_checks(self.grower.body.figure, self.grower.judges, self.tolerance)
+        return [check for check in made if self._can_be_told(check)]
+
+    @cached_property
+    def _measuring(self) -> Sequence[Check]:
+        """The checks that tell every margin."""
+        suite = self.judges.suite(self.grower.body.figure, self.tolerance, exact=True)
+        return [check for check in suite if self._can_be_told(check)]
 
     @cached_property
     def _limits(self) -> Limits:
@@ -121,28 +164,25 @@ class Refiner:
         return figure.with_limits(radians).limits
 
     @cached_property
-    def _collisions(self) -> Sequence[Check]:
-        if "collision" not in self.judges.checks:
-            return ()
-        made = collision(self.grower.body.figure, contact_margin=self.judges.contact_margin)
-        return [check for check in made if self._can_be_told(check)]
+    def _walls(self) -> LimbWalls | None:
+        """The limits of limbs that no box of angles can say."""
+        figure, judges = self.grower.body.figure, self.grower.judges
+        suite = judges.suite(figure, replace(self.tolerance, angle=ANGLE))
+        return LimbWalls.of(figure, judges.ranges, suite, ANGLE)
 
     def _can_be_told(self, check: Check) -> bool:
         """Whether the noise says enough of its points: not of a detector's head, which no arm can be said to touch."""
         heads = check.name == "collision" and max(check.points) >= len(JOINTS)
         return not (heads and self.grower.view.derived)
 
-    def _grow(self, chosen: NDArray[np.intp]) -> dict[int, Grown]:
+    def lift(self, chosen: NDArray[np.intp]) -> Lifted:
+        """Find the trunks of some hypotheses of the fit, and put limbs on them."""
         fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
         frames, frame = np.unique(fit.frame[chosen], return_inverse=True)
         camera = _pinhole(fit.cameras(chosen))
-        what = Seen.of(view, fit, chosen, camera, figure, self.noise, self._limits)
-        sight, deviation = what.sight, what.deviation
-        trunks = find_trunks(sight)
-        seen = np.isfinite(sight.points()).all(axis=2)
-        angular = deviation[:, : len(JOINTS)] / what.focal[:, None]
-        worst = float(np.max(angular, where=seen, initial=0.0))
-        leaves, tolerance = self._leaves(trunks, chosen, camera, worst, what.step)
+        seen = Seen.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
+        trunks = find_trunks(seen.sight)
+        leaves, tolerance = self._leaves(trunks, chosen, camera, seen)
         own = chosen[trunks.frame]
         if self.grower.nearer is not None:
             leaves = self.grower.nearer.prune(leaves, fit.frame[own])
@@ -152,93 +192,98 @@ class Refiner:
         leaves, completion = self.grower.complete(
             leaves, fit.cameras(own), trunks.image, suite, tolerance, fit.frame[own]
         )
-        postures = leaves.postures()
-        if completion is not None:
-            postures = np.where(np.isnan(postures), completion.postures, postures)
-        head = view.head_image[fit.frame[chosen]]
-        if np.isfinite(head).any() and not view.derived:
-            # Only now: the head's turn, unknown at first, would lead trunks astray. A detector's ears and eyes are no
-            # points of the figure's head: in one frame of six some ear is ten deviations off.
-            sight = replace(sight, head_image=head, head_deviation=deviation[:, len(JOINTS) :])
-        heads = fit.head[own] + (trunks.root - fit.root[own])[:, None]
-        hypothesis = trunks.frame[leaves.frame]
-        sifted = _sift(sight, postures, heads[leaves.frame], hypothesis, frame[hypothesis], self._collisions)
-        leaves = _rejected(leaves, sifted, self.judges.contact_margin)
-        tolerance = self._tolerance(sifted)
-        bounds = np.searchsorted(frame[trunks.frame], np.arange(len(frames) + 1))
-        batch = Batch(
+        return Lifted(
+            chosen=chosen,
+            frame=frame.reshape(-1),
+            frames=frames,
+            seen=seen,
+            trunks=trunks,
             leaves=leaves,
             physical=physical,
-            checks=self._measuring(tolerance),
-            body=self.grower.body,
-            tolerance=tolerance,
-            exact=np.zeros(leaves.n_frames, dtype=np.bool_),
-            completion=None if completion is None else completion.take(sifted.kept),
-            refined=sifted.survivors,
-            spread=float(
-                deviation_of_noise(self.noise.deviation, np.median(fit.root[chosen, 2] / what.focal))
-            ),
+            completion=completion,
         )
+
+    def sift(self, lifted: Lifted) -> Sifted:
+        """Refine leaves, reject and merge."""
+        heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
+        return sift(
+            self._with_heads(lifted),
+            lifted.postures(),
+            heads[lifted.leaves.frame],
+            lifted.hypothesis,
+            lifted.frame[lifted.hypothesis],
+            self.certifying,
+        )
+
+    def _with_heads(self, lifted: Lifted) -> Sight:
+        """Return what was seen, with the head.
+
+        Only now: the head's turn, unknown at first, would lead trunks astray. A detector's ears and eyes are no points
+        of the figure's head: in one frame of six some ear is ten deviations off.
+        """
+        view, seen = self.grower.view, lifted.seen
+        head = view.head_image[self.fit.frame[lifted.chosen]]
+        if not np.isfinite(head).any() or view.derived:
+            return seen.sight
+        return replace(seen.sight, head_image=head, head_deviation=seen.deviation[:, len(JOINTS) :])
+
+    def _refine(self, lifted: Lifted) -> dict[int, Grown]:
+        """Refine leaves, and gather what is left of each frame."""
+        sifted = self.sift(lifted)
+        leaves, fit = sifted.prune(lifted.leaves), self.fit
+        depth = np.median(fit.root[lifted.chosen, 2] / lifted.seen.focal)
+        batch = Batch(
+            leaves=leaves,
+            physical=lifted.physical,
+            checks=self._measuring,
+            body=self.grower.body,
+            tolerance=self.tolerance,
+            exact=np.zeros(leaves.n_frames, dtype=np.bool_),
+            completion=None if lifted.completion is None else lifted.completion.take(sifted.kept),
+            refined=sifted.survivors,
+            spread=float(deviation_of_noise(self.noise.deviation, depth)),
+        )
+        bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
         return {
             frame: Grown(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
-            for frame, start, end in zip(frames.tolist(), bounds[:-1], bounds[1:], strict=True)
+            for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
         }
 
-    def _tolerance(self, sifted: Sifted) -> Tolerance:
-        """Return by how much survivors may be off: one residual of a chi-square is no larger than its root."""
-        figure = self.grower.body.figure
-        worst = max(float(math.ceil(math.sqrt(sifted.survivors.chi2.max(initial=0.0)))), SIX)
-        off = {name: worst * share * figure.lengths[name] for name, share in self.noise.by_segment.items()}
-        return Tolerance(
-            rigid=max([LEAST, *(off[segment_name(pair)] for pair in RIGID_SEGMENTS)]),
-            tangent=max([LEAST, *(off[segment_name(pair)] for pair in TREE_SEGMENTS)]),
-            placement=False,
-            angle=worst * LIMIT_DEVIATION,
-        )
-
     def _leaves(
-        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, worst: float, step: float
+        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: Seen
     ) -> tuple[Leaves, Tolerance]:
         """Grow limbs on trunks, with every angle's own allowance."""
         fit, body = self.fit, self.grower.body
-        depth = float(fit.root[chosen, 2].max())
         focal = float(np.min(camera.K[..., [0, 1], [0, 1]]))
         allowed = tolerance_of(
-            worst * focal,
+            seen.worst * focal,
             camera,
             body.figure,
-            depth,
+            float(fit.root[chosen, 2].max()),
             length_deviation=self.noise.limb,
-            root_depth_deviation=step,
+            root_depth_deviation=seen.step,
             trunks=True,
         )
         # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
         rigid = max(DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=ANGLE)
+        suite = under_noise(self.judges.suite(body.figure, tolerance), allowed.bound)
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )
-        own = chosen[trunks.frame]
         # Six noisy points tell a head's turn to some ten degrees: refinement weighs them, the tree does not ask.
         given = np.full((len(trunks), len(HEAD), 3), np.nan)
         with np.errstate(over="ignore"):
             leaves = tree.grow(
-                fit.cameras(own),
+                fit.cameras(chosen[trunks.frame]),
                 trunks.root,
                 trunks.image,
-                [
-                    check
-                    for check in under_noise(self.judges.suite(body.figure, tolerance), allowed.bound)
-                    if check.name != "walking"
-                ],
+                [check for check in suite if check.name != "walking"],
                 given=given,
                 tolerance=tolerance.tangent,
             )
-        twin = ~trunks.carries(leaves.frame, leaves.postures())
-        nothing = np.full(int(twin.sum()), np.nan)
-        leaves = _drop(leaves, twin, "trunk", ("twin",), np.zeros(len(nothing), dtype=np.int8), nothing)
-        return leaves, tolerance
+        return _without_twins(leaves, trunks), tolerance
 
 
 def _pinhole(camera: Camera) -> PinholeCamera:
@@ -247,78 +292,19 @@ def _pinhole(camera: Camera) -> PinholeCamera:
     return camera
 
 
-def _sift(
-    sight: Sight,
-    postures: Array,
-    head: Array,
-    hypothesis: NDArray[np.intp],
-    frame: NDArray[np.intp],
-    collisions: Sequence[Check],
-) -> Sifted:
-    """Refine leaves as their hypotheses were seen; reject and merge frame by frame."""
-    parts = []
-    for rows in _blocks(frame, LEAVES_AT_ONCE):
-        start = postures[rows]
-        refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=HOPELESS)
-        refined = replace(refined, frame=frame[rows])
-        parts.append(Sifted.of(refined, np.asarray(np.isfinite(start).all(axis=2)), collisions))
-    return Sifted.joined(parts)
-
-
-def _blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:
-    """Yield runs of whole frames with no more rows than are treated together, or one frame; at least one."""
-    starts = np.flatnonzero(np.diff(frame, prepend=-1))
-    ends = [*starts[1:].tolist(), len(frame)]
-    begin = 0
-    for k, end in enumerate(ends):
-        if k + 1 == len(ends) or ends[k + 1] - begin > most:
-            yield slice(begin, end)
-            begin = end
-
-
-def _rejected(leaves: Leaves, sifted: Sifted, contact: float) -> Leaves:
-    """Drop the leaves that noise cannot explain, those whose bodies overlap, and those that became another."""
-    overlaps = sifted.overlaps
-    through = overlaps.place >= 0
-    leaves = _drop(
-        leaves,
-        through,
-        "collision",
-        overlaps.where,
-        overlaps.place[through],
-        overlaps.distance[through],
-        lower=contact,
-        unit="m",
+def _without_twins(leaves: Leaves, trunks: Trunks) -> Leaves:
+    """Drop the leaves whose trunk is another than the one that was found: its twin in the same image."""
+    twin = ~trunks.carries(leaves.frame, leaves.postures())
+    row = np.flatnonzero(twin)
+    nothing = np.full(len(row), np.nan)
+    why = Contradiction(
+        check="trunk",
+        where=("twin",),
+        unit=("",),
+        row=row,
+        place=np.zeros(len(row), dtype=np.int8),
+        value=nothing,
+        lower=np.full(len(row), -np.inf),
+        upper=np.full(len(row), np.inf),
     )
-    rest = ~through
-    gone = ~sifted.kept[rest]
-    place = np.where(sifted.explained[rest][gone], 1, 0).astype(np.int8)
-    return _drop(leaves, gone, "noise", ("unlikely", "merged"), place, sifted.p[rest][gone], lower=LEVEL)
-
-
-def _drop(
-    leaves: Leaves,
-    gone: NDArray[np.bool_],
-    check: str,
-    where: tuple[str, ...],
-    place: NDArray[np.int8],
-    value: Array,
-    lower: float = -np.inf,
-    unit: str = "",
-) -> Leaves:
-    if not gone.any():
-        return leaves
-    count = int(gone.sum())
-    pruned = Pruned(
-        level=leaves.level,
-        frame=leaves.frame[gone],
-        code=leaves.code[gone],
-        check=check,
-        where=where,
-        unit=unit,
-        place=place,
-        value=value,
-        lower=np.full(count, lower),
-        upper=np.full(count, np.inf),
-    )
-    return leaves.keep(~gone, leaves.frame, leaves.code, leaves.level, (*leaves.pruned, pruned))
+    return drop(leaves, twin, why)

@@ -7,7 +7,7 @@ unknowns are solved last.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,10 +17,11 @@ from posekit.refinement.anatomy import START
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
+from posekit.refinement.loops import arrow_of, loops
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import backward, cholesky, forward
 from posekit.refinement.state import State, Step, parents, trunk_offsets
-from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms, turn_of
+from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
 
 FLOOR = 1e-6
 """Added to diagonals, one over rad^2 or m^2: what nothing determines does not move."""
@@ -76,10 +77,11 @@ class Equations(NamedTuple):
         return np.zeros(n, dtype=np.intp) if self.limbs is None else self.limbs.folds.sum(axis=(0, 1))
 
 
-def chains_of(state: State, offsets: Array | None = None) -> Chains:
+def chains_of(problem: Problem, state: State, offsets: Array | None = None) -> Chains:
     """Return the limbs of postures, whose trunks' offsets may be known already."""
     offsets = trunk_offsets(state) if offsets is None else offsets
-    return Chains(state.root + offsets[list(START)], parents(state), state.directions, state.limbs)
+    parent = parents(state, on_torso=problem.legs_on_torso)
+    return Chains(state.root + offsets[list(START)], parent, state.directions, state.limbs)
 
 
 def linearise(problem: Problem, state: State, watch: Watch | None = None) -> Equations:
@@ -87,7 +89,7 @@ def linearise(problem: Problem, state: State, watch: Watch | None = None) -> Equ
     trunk = trunk_terms(problem, state, watch and watch.hips)
     limbs = None
     if not problem.trunk_only:
-        limbs = limb_terms(problem, chains_of(state, trunk.offsets), watch and watch.limbs)
+        limbs = limb_terms(problem, chains_of(problem, state, trunk.offsets), watch and watch.limbs)
     head = None if problem.head_image is None else head_terms(problem, state, watch and watch.head)
     return Equations(trunk, limbs, head)
 
@@ -99,7 +101,7 @@ def evaluate(problem: Problem, state: State) -> tuple[Array, Watch]:
     chi2, hips = trunk_chi2(problem, state, offsets)
     passed.hips[...] = hips
     if not problem.trunk_only:
-        by_limb, limbs = limb_chi2(problem, chains_of(state, offsets))
+        by_limb, limbs = limb_chi2(problem, chains_of(problem, state, offsets))
         chi2 += by_limb.sum(axis=0)
         passed.limbs[...] = limbs
     if problem.head_image is not None:
@@ -194,7 +196,7 @@ def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> A
             turns = start, push
     matrix, gradient = spread(here.trunk, P, g)
     if turns is not None and starts is not None:
-        _add_turns(*turns, starts, matrix, gradient)
+        _add_turns(*turns, starts, here.trunk.turns, matrix, gradient)
     if here.head is not None:
         head = eliminate(here.head.matrix, here.head.coupling, here.head.gradient, damping, floor)
         more, push = left_over(head, here.head.trunk, here.head.trunk_gradient)
@@ -203,10 +205,11 @@ def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> A
     return Arrow(matrix, gradient, limbs, head, starts)
 
 
-def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient: Array) -> None:
+def _add_turns(
+    start: Array, push: Array, starts: Array, turns: tuple[slice, ...], matrix: Array, gradient: Array
+) -> None:
     """Add how the limits of limbs depend on the rotation of the part on which they hang, in place."""
-    for limb in range(4):
-        turn = turn_of(limb)
+    for limb, turn in enumerate(turns):
         gradient[turn] += push[3:, limb]
         matrix[turn, turn] += start[3:, 3:, limb]
         cross = np.einsum("jin,icn->jcn", start[3:, :3, limb], starts[limb, :3])
@@ -216,6 +219,9 @@ def _add_turns(start: Array, push: Array, starts: Array, matrix: Array, gradient
 
 def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
     """Solve for the step, and the decrease of chi2 that it promises (N,), watched limits left out."""
+    compiled = loops()
+    if compiled is not None:
+        return _solve_compiled(compiled, here, damping)
     arrow = assemble(here, damping)
     last = eliminate(arrow.matrix, arrow.matrix[:, :0], arrow.gradient, damping, FLOOR)
     own = last.right[:, 0]
@@ -229,6 +235,16 @@ def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
         head = follow(arrow.head, trunk[:6])
         gain += _gain(arrow.head, head)
     return Step(trunk, limbs, head), gain - here.slack
+
+
+def _solve_compiled(compiled: Any, here: Equations, damping: Array | float) -> tuple[Step, Array]:
+    width, n = here.trunk.gradient.shape
+    reach = 0 if here.limbs is None else len(here.limbs.matrix)
+    trunk, limbs, head, gain = np.empty((width, n)), np.empty((reach, 4, n)), np.empty((3, n)), np.empty(n)
+    damped = np.full(n, damping)
+    compiled.steps(*arrow_of(here), damped, FLOOR, trunk, limbs, head, gain)
+    step = Step(trunk, None if here.limbs is None else limbs, None if here.head is None else head)
+    return step, gain - here.slack
 
 
 def follow(block: Reduced, shift: Array) -> Array:

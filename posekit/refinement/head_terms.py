@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from posekit.cameras import Array
-from posekit.refinement.limits import Signs, ball_limits
+from posekit.refinement.joints import neck_limits
+from posekit.refinement.limits import Signs
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import cross, dot
 from posekit.refinement.state import State, head_points
@@ -49,7 +50,7 @@ def head_terms(problem: Problem, state: State, watch: Signs | None = None) -> He
     coupling[:, :3], trunk[:3, :3], trunk_gradient[:3] = normal[:3, 3:], normal[3:, 3:], push[3:]
     crossed, slack = np.zeros((3, n), dtype=np.int8), np.zeros(n)
     if problem.limited:
-        ball = ball_limits(state.torso, state.head, problem.anatomy.neck_bounds, watch)
+        ball = neck_limits(problem, state, watch)
         squared = problem.limit_deviation**-2
         cost = ball.cost()
         chi2 += cost * squared

@@ -111,7 +111,7 @@ def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings
     `problem` is that of all survivors.
     """
     rows = problem.take(bases.leaf[columns.base])
-    held = chains_of(bases.found.state.take(columns.base)._replace(directions=limbs.directions))
+    held = chains_of(rows, bases.found.state.take(columns.base)._replace(directions=limbs.directions))
     chains = relift(rows, held, limbs.far)
     chi2 = np.zeros((4, len(columns.base)))
     for at in range(0, chi2.shape[1], BLOCK):
@@ -121,7 +121,7 @@ def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings
     mine = [np.flatnonzero(chi2[kind] > settings.precision) for kind in range(4)]
     pulled = columns_of([columns.base[own] for own in mine], len(bases.leaf))
     place = np.full(chi2.shape, -1)
-    on = chains_of(bases.found.state.take(pulled.base))
+    on = chains_of(problem, bases.found.state.take(pulled.base))
     fit = Pulling(pulled.base, problem.take(bases.leaf[pulled.base]), on, np.zeros((4, len(pulled.base))))
     for kind, (own, to) in enumerate(zip(mine, pulled.of, strict=True)):
         place[kind, own] = to

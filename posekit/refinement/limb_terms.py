@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.refinement.anatomy import END, MIDDLE
-from posekit.refinement.limits import Limbs, Signs, limb_angles, limb_limits, limb_rows, tangents_of
+from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import dot
 from posekit.refinement.state import place_limbs
+from posekit.refinement.walls import Beyond, beyond_walls, wall_rows
 
 
 class Chains(NamedTuple):
@@ -127,20 +128,25 @@ def limb_terms(problem: Problem, chains: Chains, watch: Signs | None = None) -> 
     terms = LimbTerms(
         chi2, matrix, coupling, start, gradient, start_gradient, tangents, folds, crossed, slack
     )
-    if problem.limited:
-        _add_limits(problem, found, watch, terms)
+    if problem.limited and problem.walls is not None:
+        out = beyond_walls(problem.walls, chains.directions, chains.parent, watch, problem.free)
+        if out is not None:
+            J = wall_rows(problem.walls, out, chains.parent, chains.directions, tangents)
+            _add_limits(problem, out, out.over, J, terms)
+    elif problem.limited:
+        boxed = limb_limits(found, problem.anatomy.limb_bounds, watch, problem.free)
+        if boxed is not None:
+            k, m = boxed.limb, boxed.row
+            J = limb_rows(found, boxed, tangents[k, 1, 0, :, m], tangents[k, 1, 1, :, m])
+            _add_limits(problem, boxed, boxed.residual(), J, terms)
     return terms
 
 
-def _add_limits(problem: Problem, found: Limbs, watch: Signs | None, terms: LimbTerms) -> None:
-    """Add the limits that are passed or watched, in place."""
-    out = limb_limits(found, problem.anatomy.limb_bounds, watch, problem.free)
-    if out is None:
-        return
+def _add_limits(problem: Problem, out: Outside | Beyond, residual: Array, J: Array, terms: LimbTerms) -> None:
+    """Add the limits that are passed or watched, in place: radians, and how they change."""
     k, m = out.limb, out.row
     scale = 1.0 / problem.limit_deviation
-    judged = out.residual() * scale
-    J = limb_rows(found, out, terms.tangents[k, 1, 0, :, m], terms.tangents[k, 1, 1, :, m]) * scale
+    judged, J = residual * scale, J * scale
     normal, push = np.einsum("aim,ajm->ijm", J, J), np.einsum("aim,am->im", J, judged)
     terms.matrix[:4, :4, k, m] += normal[:4, :4]
     terms.coupling[:4, 3:, k, m] += normal[:4, 4:]
@@ -166,8 +172,12 @@ def limb_chi2(problem: Problem, chains: Chains) -> tuple[Array, Signs]:
         chi2 += np.einsum("lsn,lsn->ln", stretch, stretch)
     crossed = np.zeros((4, 4, n), dtype=np.int8)
     if problem.limited:
-        found = limb_angles(chains.directions, chains.parent)
-        out = limb_limits(found, problem.anatomy.limb_bounds, free=problem.free)
+        out: Outside | Beyond | None
+        if problem.walls is not None:
+            out = beyond_walls(problem.walls, chains.directions, chains.parent, free=problem.free)
+        else:
+            found = limb_angles(chains.directions, chains.parent)
+            out = limb_limits(found, problem.anatomy.limb_bounds, free=problem.free)
         if out is not None:
             chi2[out.limb, out.row] += out.cost() / problem.limit_deviation**2
             crossed[:, out.limb, out.row] = out.crossed

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.refinement.anatomy import Anatomy
 from posekit.refinement.optics import Optics
+from posekit.refinement.walls import Walls
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,6 +34,8 @@ class Problem:
         lengths are varied.
     free : bool array (4, N), optional
         Limbs without limits.
+    walls : Walls, optional
+        Limits of the limbs in place of the anatomy's.
     trunk_only : bool
         Leave the limbs as they are, and unseen.
     """
@@ -49,6 +52,7 @@ class Problem:
     shape_weight: Array | None = None
     limb_weight: Array | None = None
     free: NDArray[np.bool_] | None = None
+    walls: Walls | None = None
     trunk_only: bool = False
 
     def take(self, rows: NDArray[np.intp] | slice) -> Problem:
@@ -86,6 +90,11 @@ class Problem:
     def limited(self) -> bool:
         """Whether there are limits."""
         return bool(np.isfinite(self.limit_deviation))
+
+    @property
+    def legs_on_torso(self) -> bool:
+        """Whether legs, too, are judged in the torso's frame."""
+        return self.walls is not None and self.walls.on_torso
 
     @property
     def trunk_width(self) -> int:

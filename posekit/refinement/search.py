@@ -58,7 +58,7 @@ def search(
     origin = np.stack([columns.of[kind][factors.limb_of[kind]] for kind in range(4)])
     on_columns = begin.take(columns.base)
     rows = problem.take(one[columns.base])
-    given = chains_of(on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
+    given = chains_of(rows, on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
     first = _first(alone, rows, begin, given, factors.trunk_of, origin)
     limbs = Limbs(given.directions, sides(rows.optics, given))
     trunks = descend(alone, begin, steps=steps, precision=precision)

@@ -17,6 +17,7 @@ from posekit.refinement.inputs import batch_last, length_weights, numbers, root_
 from posekit.refinement.optics import optics_of
 from posekit.refinement.prior import RootPrior
 from posekit.refinement.problem import Problem
+from posekit.refinement.walls import Walls
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 LIMIT_DEVIATION = 2.0
@@ -53,6 +54,8 @@ class Sight:
         The figure's unless told otherwise.
     limit_deviation : float
         Degrees; infinite for no limits.
+    walls : Walls, optional
+        Limits of the limbs in place of those in `limits`: what couples angles, or is no angle of the figure's.
 
     Raises
     ------
@@ -70,6 +73,7 @@ class Sight:
     length_deviation: Mapping[str, float] | float = 0.0
     limits: Limits | None = None
     limit_deviation: float = LIMIT_DEVIATION
+    walls: Walls | None = None
 
     def points(self) -> Array:
         """Return the key points (F, 14, 2)."""
@@ -111,4 +115,5 @@ class Sight:
             head_weight=batch_last(head_weight[frames]) if seen and head_weight is not None else None,
             shape_weight=shape_weight,
             limb_weight=limb_weight,
+            walls=self.walls,
         )

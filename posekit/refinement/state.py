@@ -141,10 +141,10 @@ def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array)
     return unit(along), lengths
 
 
-def parents(state: State) -> Array:
-    """Return the rotation of the part on which each limb hangs (4, 3, 3, N)."""
+def parents(state: State, *, on_torso: bool = False) -> Array:
+    """Return the rotation of the part by which each limb is judged (4, 3, 3, N): it hangs on it, unless `on_torso`."""
     out = np.empty((4, 3, 3, state.root.shape[1]))
-    out[ARMS], out[LEGS] = state.torso, state.hips
+    out[ARMS], out[LEGS] = state.torso, state.torso if on_torso else state.hips
     return out
 
 

@@ -20,7 +20,7 @@ from posekit.refinement.limb_terms import Chains, limb_terms
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import backward
 from posekit.refinement.state import State, Step
-from posekit.refinement.trunk_terms import start_ways, trunk_terms, turn_of
+from posekit.refinement.trunk_terms import start_ways, trunk_terms
 
 
 class TrunkTables(NamedTuple):
@@ -129,15 +129,16 @@ def limb_tables(problem: Problem, trunks: State, chains: Chains) -> LimbTables:
         terms = limb_terms(part, chains.take(rows))
         block = eliminate(terms.matrix, terms.coupling, terms.gradient, 0.0, FLOOR)
         start, push = left_over(block, terms.start, terms.start_gradient)
-        ways = start_ways(trunk_terms(part, trunks.take(rows)))
+        trunk = trunk_terms(part, trunks.take(rows))
+        ways = start_ways(trunk)
         carried = np.einsum("ijln,ljcn->licn", start[:, :3], ways[:, :3])
         for limb in range(4):
-            carried[limb, :, turn_of(limb)] += start[:, 3:, limb]
+            carried[limb, :, trunk.turns[limb]] += start[:, 3:, limb]
         matrix = np.einsum("licn,lidn->lcdn", ways[:, :3], carried[:, :3])
         gradient = np.einsum("licn,iln->lcn", ways[:, :3], push[:3])
         for limb in range(4):
-            matrix[limb, turn_of(limb)] += carried[limb, 3:]
-            gradient[limb, turn_of(limb)] += push[3:, limb]
+            matrix[limb, trunk.turns[limb]] += carried[limb, 3:]
+            gradient[limb, trunk.turns[limb]] += push[3:, limb]
         slope = -backward(block.factor, block.right.copy())
         parts.append(
             LimbTables(

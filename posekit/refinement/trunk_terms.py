@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.refinement.anatomy import LEGS, START, TRUNK_SEGMENTS
-from posekit.refinement.limits import Ball, Signs, ball_limits
+from posekit.refinement.joints import pelvis_limits
+from posekit.refinement.limits import Ball, Signs
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import dot, turned
 from posekit.refinement.state import State, trunk_offsets
@@ -32,6 +33,8 @@ class TrunkTerms(NamedTuple):
     crossed : int array (3, N)
         Limits of the hips that are passed.
     slack : array (N,)
+    turns : tuple of 4 slices
+        Which unknowns turn the part by which each limb is judged.
     """
 
     chi2: Array
@@ -43,6 +46,7 @@ class TrunkTerms(NamedTuple):
     offsets: Array
     crossed: Signs
     slack: Array
+    turns: tuple[slice, ...]
 
 
 def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> TrunkTerms:
@@ -57,7 +61,7 @@ def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> T
     chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
     crossed, slack = np.zeros((3, n), dtype=np.int8), np.zeros(n)
     if problem.limited:
-        ball = ball_limits(state.torso, state.hips, problem.anatomy.pelvis_bounds, watch)
+        ball = pelvis_limits(problem, state, watch)
         squared = problem.limit_deviation**-2
         _add_ball(ball, squared, matrix, gradient)
         cost = ball.cost()
@@ -79,6 +83,7 @@ def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> T
         offsets=offsets,
         crossed=crossed,
         slack=slack,
+        turns=turns_of(problem),
     )
 
 
@@ -88,7 +93,7 @@ def trunk_chi2(problem: Problem, state: State, offsets: Array) -> tuple[Array, S
     chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
     crossed = np.zeros((3, len(chi2)), dtype=np.int8)
     if problem.limited:
-        ball = ball_limits(state.torso, state.hips, problem.anatomy.pelvis_bounds)
+        ball = pelvis_limits(problem, state)
         chi2 += ball.cost() / problem.limit_deviation**2
         crossed = ball.crossed
     if problem.shape_weight is not None:
@@ -127,14 +132,15 @@ def start_ways(terms: TrunkTerms) -> Array:
     out = np.zeros((4, 6, width, n))
     out[:, :3] = terms.ways[list(START)]
     for limb in range(4):
-        for i, column in enumerate(range(9)[turn_of(limb)]):
+        for i, column in enumerate(range(9)[terms.turns[limb]]):
             out[limb, 3 + i, column] = 1.0
     return out
 
 
-def turn_of(limb: int) -> slice:
-    """Return which unknowns turn the part on which a limb hangs: torso or hips."""
-    return slice(6, 9) if limb >= LEGS.start else slice(3, 6)
+def turns_of(problem: Problem) -> tuple[slice, ...]:
+    """Return which unknowns turn the part by which each limb is judged: torso or hips."""
+    torso, hips = slice(3, 6), slice(6, 9)
+    return tuple(hips if limb >= LEGS.start and not problem.legs_on_torso else torso for limb in range(4))
 
 
 def _root(problem: Problem, state: State) -> Array:

@@ -16,8 +16,18 @@ from posekit import files
 from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import View
-from posekit.pipeline import MEASURED, Recovery, forget_camera, recover, result_of, view_of
-from posekit.pipeline.contact import Overlaps, contact_under_noise
+from posekit.pipeline import (
+    MEASURED,
+    Recovery,
+    forget_camera,
+    recover,
+    recovered_with,
+    result_of,
+    sifting,
+    view_of,
+)
+from posekit.pipeline.certified import certified_within
+from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.noise import Noise
 from posekit.refinement import GIVING
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
@@ -86,9 +96,7 @@ def test_survivors_are_what_noise_explains_and_their_chi_square_says_so(recovery
     for frame in recovery.frames:
         assert frame.refined is not None
         assert frame.tolerance is not None
-        assert (
-            frame.refined.chi2 <= (frame.tolerance.angle / 2.0) ** 2
-        ).all()  # limits are known to 2 degrees
+        assert frame.tolerance.angle == 6.0  # three deviations of the limits
         apart = np.linalg.norm(frame.joints[:, None] - frame.joints[None], axis=3).max(axis=2)
         assert (apart + np.eye(len(frame)) > 0.005).all()  # what became one is one
 
@@ -134,7 +142,7 @@ def test_bodies_overlap_no_farther_than_is_allowed() -> None:
         return deepest.check(joints).verdicts.count("invalid")
 
     recovery = recover(view)
-    with mock.patch.object(Overlaps, "of", lambda _, points: Overlaps.none(len(points))):
+    with mock.patch.object(sifting, "contradictions", lambda *_: []):
         unchecked = recover(view)
     assert recovery.settings["refined"]["contact"] == -0.03
     assert overlapping(unchecked) > 0
@@ -153,6 +161,52 @@ def test_bodies_overlap_no_farther_than_is_allowed() -> None:
     assert late
     assert all(branch.value < -0.03 and branch.unit == "m" for branch in late)
     np.testing.assert_allclose(errors(recovery, scene), errors(unchecked, scene), atol=0.02)
+
+
+@pytest.mark.parametrize("pixels", [0.5, 5.0])
+@pytest.mark.parametrize("ranges", ["urdf", "table1", "anatomical"])
+def test_every_survivor_is_valid_by_the_result_itself(ranges: str, pixels: float, scene: Scene) -> None:
+    """What `validate` asks of the result, with its settings, finds nothing."""
+    view = noisy(scene.select(np.arange(16)), pixels)
+    recovery = recover(view, ranges=ranges)
+
+    def verdicts(recovery: Recovery, *, heads: bool) -> list[str]:
+        judged = recovered_with(result_of(recovery)).judged
+        validator = Validator(
+            ranges=ranges, angle_tolerance=judged.angle, contact_margin=judged.contact_margin
+        )
+        points = np.concatenate(
+            [frame.batch.points[frame._rows] for frame in recovery.frames if frame.batch is not None]
+        )
+        return validator.check(points[:, :14], points[:, 14:] if heads else None).verdicts
+
+    assert recovered_with(result_of(recovery)).judged.angle == 6.0
+    for heads in (False, True):
+        assert "invalid" not in verdicts(recovery, heads=heads)
+    named = {reason for frame in recovery.frames for reason in frame.rejected}
+    assert any(reason.startswith("joint_range/") for reason in named)
+    for frame in recovery.frames:
+        assert len(frame) + sum(frame.rejected.values()) == 8192 * max(frame.hypotheses, 1)
+
+
+def test_a_rejection_after_refinement_says_what_and_by_how_much(recovery: Recovery) -> None:
+    late = [
+        branch
+        for frame in recovery.frames
+        for branch in frame.pruned()
+        if branch.reason.startswith("joint_range/") and len(branch.branch) == 13
+    ]
+    assert late
+    assert all(branch.unit == "deg" for branch in late)
+    assert all(not branch.lower <= branch.value <= branch.upper for branch in late)
+
+
+@pytest.mark.parametrize("lengths", [0.0, 0.02, 0.06])
+def test_lengths_are_allowed_what_bodies_are_or_what_is_said(lengths: float) -> None:
+    allowed = certified_within(Noise(deviation=2.0, lengths=lengths))
+    assert allowed.angle == 6.0
+    assert allowed.rigid == pytest.approx(0.03 * max(1.0, lengths / 0.02))
+    assert certified_within(Noise(deviation=2.0)).rigid == 0.03
 
 
 def test_exact_points_stay_exact_whatever_noise_is_said(scene: Scene) -> None:

@@ -1,0 +1,128 @@
+"""Checks as soft limits: they say what the checks say, and their derivatives are those of differences."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from posekit.figure import Figure, load_figure
+from posekit.figure.frames import hips_frame, torso_frame, unit
+from posekit.pipeline.limb_walls import LimbWalls
+from posekit.refinement import Sight
+from posekit.refinement.anatomy import LIMBS
+from posekit.refinement.equations import evaluate, linearise
+from posekit.refinement.start import limb_directions, state_of
+from posekit.refinement.state import Step, moved
+from posekit.refinement.trunk_terms import start_ways
+from posekit.skeleton import HIPS, JOINT, TORSO
+from posekit.synthesis import Scene, random_views
+from posekit.validators import judge, load_ranges
+from posekit.validators.joint_range import joint_range
+
+N = 80
+RANGES = ("table1", "anatomical")
+
+
+@cache
+def figure() -> Figure:
+    return load_figure()
+
+
+@cache
+def scene() -> Scene:
+    return random_views(figure(), N, np.random.default_rng(3))
+
+
+def walls_of(name: str) -> LimbWalls:
+    ranges = load_ranges(name)
+    walls = LimbWalls.of(figure(), ranges, joint_range(figure(), ranges, tolerance=1.0), 1.0)
+    assert walls is not None
+    return walls
+
+
+def test_boxes_of_the_figures_own_angles_need_none() -> None:
+    ranges = load_ranges("urdf")
+    assert LimbWalls.of(figure(), ranges, joint_range(figure(), ranges), 1.0) is None
+    assert LimbWalls.of(figure(), load_ranges("table1"), [], 1.0) is None
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_they_are_beyond_where_the_checks_say_so(name: str) -> None:
+    walls, joints = walls_of(name), scene().joints_cam
+    torso = torso_frame(*(joints[:, JOINT[each]] for each in TORSO))
+    hips = hips_frame(*(joints[:, JOINT[each]] for each in HIPS))
+    outside = np.zeros((N, 4), dtype=bool)
+    for limb, (start, middle, end) in enumerate(LIMBS):
+        part = torso if limb < 2 or walls.on_torso else hips
+        upper, lower = (
+            np.einsum("nij,ni->nj", part, unit(joints[:, b] - joints[:, a]))
+            for a, b in ((start, middle), (middle, end))
+        )
+        above, below = walls.beyond(limb, upper, lower)
+        outside[:, limb] = (np.maximum(above, below) > 1e-9).any(axis=0)
+    points = np.concatenate([joints, scene().head_cam], axis=1)
+    (found,) = judge(joint_range(figure(), load_ranges(name), tolerance=1.0), points)
+    for limb in range(4):
+        names = tuple(
+            f"{side}_{joint}."
+            for side in [("right", "left")[limb % 2]]
+            for joint in (("shoulder", "elbow") if limb < 2 else ("hip", "knee"))
+        )
+        own = [k for k, where in enumerate(found.where) if where.startswith(names)]
+        np.testing.assert_array_equal(outside[:, limb], (found.margin[:, own] < -1e-7).any(axis=1))
+    assert 0.05 < outside.mean() < 0.95
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Generator) -> None:
+    view = scene()
+    # Nothing but walls counts: image points are all but unknown.
+    sight = Sight(
+        figure=figure(),
+        camera=view.camera,
+        image=view.image,
+        deviation=1e5,
+        walls=walls_of(name),
+        head_image=view.head_image,
+        head_deviation=1e5,
+    )
+    problem = sight.problem(np.arange(N), view.joints_cam[:, 0])
+    state = state_of(problem.anatomy, view.joints_cam, view.head_cam)
+    rows = np.tile(np.arange(N), (4, 1))
+    state = state._replace(directions=limb_directions(view.joints_cam, rows, state))
+    here = linearise(problem, state)
+    assert here.limbs is not None
+    assert here.head is not None
+    tangents = here.limbs.tangents
+    step = Step(rng.normal(size=(9, N)), rng.normal(size=(4, 4, N)), rng.normal(size=(3, N)))
+    assert step.limbs is not None
+    assert step.head is not None
+    trunk, limbs, head = here.trunk, here.limbs, here.head
+    slope = np.einsum("cn,cn->n", trunk.gradient, step.trunk)
+    slope += np.einsum("jin,jicn,cn->n", trunk.pull, trunk.ways, step.trunk)
+    slope += np.einsum("uln,uln->n", limbs.gradient, step.limbs)
+    slope += np.einsum("iln,licn,cn->n", limbs.start_gradient, start_ways(trunk), step.trunk)
+    slope += np.einsum("in,in->n", head.gradient, step.head)
+    slope += np.einsum("in,in->n", head.trunk_gradient, step.trunk[:6])
+
+    def chi2(h: float) -> np.ndarray:
+        part = Step(*(h * array for array in step if array is not None))
+        return np.asarray(evaluate(problem, moved(state, part, tangents))[0])
+
+    difference = (chi2(1e-6) - chi2(-1e-6)) / 4e-6
+    off = np.abs(slope - difference) > 1e-3 * (1.0 + np.abs(slope))
+    # A few stand at an edge, where another wall or another way to write the limb takes over.
+    assert off.mean() <= 0.05
+    assert (np.abs(slope) > 1.0).mean() > 0.3
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_what_is_not_known_is_beyond_nothing(name: str) -> None:
+    walls = walls_of(name)
+    nothing = np.full((2, 3), np.nan)
+    for limb in range(4):
+        above, below = walls.beyond(limb, nothing, nothing)
+        assert (above == -np.inf).all()
+        assert (below == -np.inf).all()
