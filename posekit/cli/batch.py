@@ -11,37 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from posekit.cli.detector_options import (
-    Calibrate,
-    CameraFile,
-    Deviation,
-    FieldOfView,
-    Focal35,
-    Format,
-    LengthsFile,
-    MinConfidence,
-    Person,
-    Proportions,
-    Rate,
-    Size,
-    Skeleton,
-    Stature,
-    SwapSides,
-)
+from posekit.cli.detector_options import Proportions, Reading, Who
 from posekit.cli.detector_source import source_of
-from posekit.cli.options import (
-    PHYSICAL,
-    AngleTolerance,
-    Checks,
-    ContactMargin,
-    RangesOption,
-    Rules,
-    Walkers,
-    examples,
-    rule_numbers,
-    signed_length,
-    split,
-)
+from posekit.cli.groups import with_groups
+from posekit.cli.judging_options import Judging, TolerancesAsRecover
+from posekit.cli.noise_options import UncertainAsRecover
+from posekit.cli.options import ContactMargin, examples, signed_length
 
 if TYPE_CHECKING:
     from posekit.pipeline.batch import Progress, Summary
@@ -57,7 +32,9 @@ EVERY = 10.0
 """Seconds between two lines of progress where there is no terminal."""
 
 
+@with_groups
 def batch(
+    *,
     inputs: Annotated[
         list[Path],
         typer.Argument(
@@ -115,87 +92,36 @@ def batch(
             "--progress/--no-progress", help="Show rate and time left. Default: where stderr is a terminal."
         ),
     ] = None,
-    checks: Checks = PHYSICAL,
-    ranges: RangesOption = "urdf",
-    rules: Rules = "1,2",
-    walkers: Walkers = "paper",
-    rigid_tolerance: Annotated[
-        str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
-    ] = "",
-    tangent_tolerance: Annotated[
-        str, typer.Option("--tangent-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
-    ] = "",
-    angle_tolerance: AngleTolerance = None,
+    judging: Judging,
+    tolerances: TolerancesAsRecover,
     contact_margin: ContactMargin = "0cm",
     scale: Annotated[
         str, typer.Option("--scale", metavar="HOW", help="Uncalibrated views: as `posekit recover` has it.")
     ] = "",
     proportions: Proportions = "figure",
-    infer: Annotated[
-        bool, typer.Option("--infer/--no-infer", help="Complete joints that were not seen.")
-    ] = True,
-    root: Annotated[
-        str,
-        typer.Option("--root", metavar="HOW", help="As `posekit recover` has it: auto, head, torso, search."),
-    ] = "auto",
-    deviation: Deviation = None,
-    refine: Annotated[
-        bool | None, typer.Option("--refine/--no-refine", help="As `posekit recover` has it.")
-    ] = None,
-    length_deviation: Annotated[
-        float | None,
-        typer.Option("--length-deviation", metavar="FRACTION", help="As `posekit recover` has it."),
-    ] = None,
-    format: Format = "",
-    skeleton: Skeleton = "",
-    person: Person = "",
-    swap_sides: SwapSides = False,
-    camera: CameraFile = "",
-    fov: FieldOfView = None,
-    focal35: Focal35 = None,
-    size: Size = "",
-    fps: Rate = None,
-    min_confidence: MinConfidence = 0.0,
-    stature: Stature = "",
-    lengths: LengthsFile = None,
-    calibrate: Calibrate = None,
+    uncertain: UncertainAsRecover,
+    reading: Reading,
+    who: Who,
 ) -> None:
     """Recover an archive: every frame once, whatever dies on the way; exit 1 where some shards failed."""
-    from posekit.files import parse_length
     from posekit.pipeline.batch import Recipe, run_batch
 
     recipe = Recipe(
-        source=source_of(
-            format=format,
-            skeleton=skeleton,
-            person=person,
-            swap_sides=swap_sides,
-            camera=camera,
-            fov=fov,
-            focal35=focal35,
-            size=size,
-            fps=fps,
-            min_confidence=min_confidence,
-            deviation=deviation,
-            stature=stature,
-            lengths=lengths,
-            calibrate=calibrate,
-            proportions=proportions,
-        ),
-        checks=split(checks),
-        ranges=ranges,
-        rules=rule_numbers(rules),
-        walkers=walkers,
-        rigid=parse_length(rigid_tolerance, name="--rigid-tolerance") if rigid_tolerance else None,
-        tangent=parse_length(tangent_tolerance, name="--tangent-tolerance") if tangent_tolerance else None,
-        angle=angle_tolerance,
+        source=source_of(reading, who, proportions=proportions, deviation=uncertain.deviation),
+        checks=judging.names,
+        ranges=judging.ranges,
+        rules=judging.numbers,
+        walkers=judging.walkers,
+        rigid=tolerances.rigid,
+        tangent=tolerances.tangent,
+        angle=tolerances.angle_tolerance,
         contact_margin=signed_length(contact_margin, "--contact-margin"),
         scale=scale,
         proportions=proportions,
-        infer=infer,
-        root=root,
-        refine=refine,
-        length_deviation=length_deviation,
+        infer=uncertain.infer,
+        root=uncertain.root,
+        refine=uncertain.refine,
+        length_deviation=uncertain.length_deviation,
         rank=rank,
         q=q,
         margins=margins,

@@ -9,25 +9,9 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.detector_options import (
-    Calibrate,
-    CameraFile,
-    Deviation,
-    FieldOfView,
-    Focal35,
-    Format,
-    LengthsFile,
-    MinConfidence,
-    Person,
-    Proportions,
-    Rate,
-    Size,
-    Skeleton,
-    Stature,
-    SwapSides,
-    Unit,
-)
+from posekit.cli.detector_options import Deviation, Proportions, Reading, Unit, Who
 from posekit.cli.detector_source import source_of
+from posekit.cli.groups import with_groups
 from posekit.cli.options import distinct, examples
 from posekit.errors import PosekitError
 
@@ -41,7 +25,9 @@ EXAMPLES = examples(
 )
 
 
+@with_groups
 def convert(
+    *,
     given: Annotated[Path, typer.Argument(metavar="IN", help="A file or folder of any format that is read.")],
     output: Annotated[
         Path,
@@ -94,20 +80,9 @@ def convert(
         str, typer.Option("--clip", metavar="NAME", help="Of motion capture with several clips: which.")
     ] = "",
     unit: Unit = "",
-    format: Format = "",
-    skeleton: Skeleton = "",
-    person: Person = "",
-    swap_sides: SwapSides = False,
-    camera: CameraFile = "",
-    fov: FieldOfView = None,
-    focal35: Focal35 = None,
-    size: Size = "",
-    fps: Rate = None,
-    min_confidence: MinConfidence = 0.0,
+    reading: Reading,
     deviation: Deviation = None,
-    stature: Stature = "",
-    lengths: LengthsFile = None,
-    calibrate: Calibrate = None,
+    who: Who,
     proportions: Proportions = "figure",
 ) -> None:
     """Convert a file: key points to views, results and motion capture to what other programs open."""
@@ -116,8 +91,8 @@ def convert(
     from posekit.pipeline.detected.conversion import Conversion
     from posekit.pipeline.detected.conversion import convert as run
 
-    calibration = split_camera(camera)[0] if camera else None
-    for read in (given, view, lengths, calibrate, calibration):
+    calibration = split_camera(reading.camera)[0] if reading.camera else None
+    for read in (given, view, who.lengths, who.calibrate, calibration):
         distinct(read, output)
     job = Conversion(
         given=given,
@@ -129,23 +104,7 @@ def convert(
         input_up=input_up,
         clip=clip,
         unit=unit,
-        source=source_of(
-            format=format,
-            skeleton=skeleton,
-            person=person,
-            swap_sides=swap_sides,
-            camera=camera,
-            fov=fov,
-            focal35=focal35,
-            size=size,
-            fps=fps,
-            min_confidence=min_confidence,
-            deviation=deviation,
-            stature=stature,
-            lengths=lengths,
-            calibrate=calibrate,
-            proportions=proportions,
-        ),
+        source=source_of(reading, who, proportions=proportions, deviation=deviation),
     )
     with _naming(given, output):
         lines = run(job)

@@ -1,7 +1,8 @@
-"""Options that say how a detector's file is to be read: shared by `recover`, `convert` and `inspect`."""
+"""Options that say how a detector's file is to be read, and whose body it shows."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -23,54 +24,13 @@ Skeleton = Annotated[
         help="What the points are: a built-in skeleton map, as body_25b, or a posekit.skeleton_map/1 TOML.",
     ),
 ]
-Person = Annotated[
-    str,
-    typer.Option(
-        "--person",
-        metavar="WHO",
-        help="largest, surest, first, a track's number from `posekit inspect`, or all. Default: the only one, else "
-        "largest.",
-    ),
-]
 SwapSides = Annotated[
     bool, typer.Option("--swap-sides", help="Exchange left and right: the file has them the wrong way round.")
-]
-CameraFile = Annotated[
-    str,
-    typer.Option(
-        "--camera",
-        metavar="FILE[:NAME]",
-        help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP, NPZ; or the photograph, whose EXIF "
-        "gives a guess. NAME where it has several cameras. Without any camera the view is scaled orthographic.",
-    ),
-]
-FieldOfView = Annotated[
-    float | None,
-    typer.Option(
-        "--fov", metavar="DEGREES", help="A guess instead of a calibration: the horizontal field of view."
-    ),
-]
-Focal35 = Annotated[
-    float | None,
-    typer.Option("--focal35", metavar="MM", help="A guess: the focal length in 35 mm equivalents."),
 ]
 Size = Annotated[
     str,
     typer.Option(
         "--size", metavar="WxH", help="The picture's width and height, where the file does not say."
-    ),
-]
-Rate = Annotated[
-    float | None,
-    typer.Option("--fps", metavar="RATE", help="Frames a second, where the file does not say. Default: 30."),
-]
-MinConfidence = Annotated[
-    float,
-    typer.Option(
-        "--min-confidence",
-        metavar="VALUE",
-        min=0.0,
-        help="Points that are less sure than this count as not seen.",
     ),
 ]
 Deviation = Annotated[
@@ -99,19 +59,79 @@ Unit = Annotated[
         help="Of motion capture: m, cm, mm or in, where the file's is wrong or not said.",
     ),
 ]
-Stature = Annotated[
-    str, typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths.")
-]
-LengthsFile = Annotated[
-    Path | None,
-    typer.Option("--lengths", metavar="FILE", help="The person's segment lengths: posekit.lengths/1."),
-]
-Calibrate = Annotated[
-    Path | None,
-    typer.Option(
-        "--calibrate",
-        metavar="FILE",
-        help="A recording of the same person, from which lengths are estimated: motion capture, or key points of "
-        "the same camera (with --stature).",
-    ),
-]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading:
+    """How a detector's file is to be read: who, with which camera."""
+
+    format: Format = ""
+    skeleton: Skeleton = ""
+    person: Annotated[
+        str,
+        typer.Option(
+            "--person",
+            metavar="WHO",
+            help="largest, surest, first, a track's number from `posekit inspect`, or all. Default: the only one, else "
+            "largest.",
+        ),
+    ] = ""
+    swap_sides: SwapSides = False
+    camera: Annotated[
+        str,
+        typer.Option(
+            "--camera",
+            metavar="FILE[:NAME]",
+            help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP, NPZ; or the photograph, whose EXIF "
+            "gives a guess. NAME where it has several cameras. Without any camera the view is scaled orthographic.",
+        ),
+    ] = ""
+    fov: Annotated[
+        float | None,
+        typer.Option(
+            "--fov", metavar="DEGREES", help="A guess instead of a calibration: the horizontal field of view."
+        ),
+    ] = None
+    focal35: Annotated[
+        float | None,
+        typer.Option("--focal35", metavar="MM", help="A guess: the focal length in 35 mm equivalents."),
+    ] = None
+    size: Size = ""
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--fps", metavar="RATE", help="Frames a second, where the file does not say. Default: 30."
+        ),
+    ] = None
+    minimum_confidence: Annotated[
+        float,
+        typer.Option(
+            "--min-confidence",
+            metavar="VALUE",
+            min=0.0,
+            help="Points that are less sure than this count as not seen.",
+        ),
+    ] = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Who:
+    """Whose body it shows: what gives the lengths."""
+
+    stature: Annotated[
+        str,
+        typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths."),
+    ] = ""
+    lengths: Annotated[
+        Path | None,
+        typer.Option("--lengths", metavar="FILE", help="The person's segment lengths: posekit.lengths/1."),
+    ] = None
+    calibrate: Annotated[
+        Path | None,
+        typer.Option(
+            "--calibrate",
+            metavar="FILE",
+            help="A recording of the same person, from which lengths are estimated: motion capture, or key points of "
+            "the same camera (with --stature).",
+        ),
+    ] = None

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from posekit.cli.detector_options import Reading, Who
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -12,42 +13,20 @@ if TYPE_CHECKING:
 
 
 def source_of(
-    *,
-    format: str = "",
-    skeleton: str = "",
-    person: str = "",
-    swap_sides: bool = False,
-    camera: str = "",
-    fov: float | None = None,
-    focal35: float | None = None,
-    size: str = "",
-    fps: float | None = None,
-    min_confidence: float = 0.0,
-    deviation: float | None = None,
-    stature: str = "",
-    lengths: Path | None = None,
-    calibrate: Path | None = None,
-    proportions: str = "figure",
+    reading: Reading, who: Who, *, proportions: str = "figure", deviation: float | None = None
 ) -> Source:
     """Read the texts of the options."""
     from posekit.files import parse_length
     from posekit.pipeline.detected.source import Source
 
+    said = asdict(reading) | asdict(who)
     return Source(
-        format=format,
-        skeleton=skeleton,
-        person=person,
-        swap_sides=swap_sides,
-        camera=camera,
-        fov=fov,
-        focal35=focal35,
-        size=pixels(size) if size else None,
-        rate=fps,
-        minimum_confidence=min_confidence,
+        **said
+        | {
+            "size": pixels(reading.size) if reading.size else None,
+            "stature": parse_length(who.stature, name="--stature") if who.stature else None,
+        },
         deviation=deviation,
-        stature=parse_length(stature, name="--stature") if stature else None,
-        lengths=lengths,
-        calibrate=calibrate,
         proportions=proportions,
     )
 

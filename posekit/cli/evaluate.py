@@ -9,25 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from posekit.cli.detector_options import Format, Skeleton, Unit
-from posekit.cli.options import (
-    PHYSICAL,
-    AngleTolerance,
-    Checks,
-    RangesOption,
-    Rules,
-    Seed,
-    Walkers,
-    distinct,
-    examples,
-    progress,
-    rule_numbers,
-    split,
-)
+from posekit.cli.detector_source import pixels
+from posekit.cli.groups import with_groups
+from posekit.cli.judging_options import Judging, TolerancesAsRecover
+from posekit.cli.options import Seed, distinct, examples, options_given, progress, split
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.files import View
-    from posekit.pipeline import Tolerance
     from posekit.synthesis import Capture
 
 EXAMPLES = examples(
@@ -42,7 +31,9 @@ SWEPT = ("--yaw-step", "--heights", "--distance", "--f", "--size")
 SAMPLED = ("--frames-per-clip", "--clips", "--actions", "--consecutive", "--skeleton", "--unit", "--up")
 
 
+@with_groups
 def evaluate(
+    *,
     ctx: typer.Context,
     file: Annotated[
         Path,
@@ -120,17 +111,8 @@ def evaluate(
             "they are.",
         ),
     ] = "",
-    checks: Checks = PHYSICAL,
-    ranges: RangesOption = "urdf",
-    rules: Rules = "1,2",
-    walkers: Walkers = "paper",
-    rigid_tolerance: Annotated[
-        str, typer.Option("--rigid-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
-    ] = "",
-    tangent_tolerance: Annotated[
-        str, typer.Option("--tangent-tolerance", metavar="LENGTH", help="As `posekit recover` has it.")
-    ] = "",
-    angle_tolerance: AngleTolerance = None,
+    judging: Judging,
+    tolerances: TolerancesAsRecover,
     format: Format = "",
     skeleton: Skeleton = "",
     unit: Unit = "",
@@ -148,7 +130,7 @@ def evaluate(
 ) -> None:
     """Recover views whose truth is known, and say how good the survivors are: retained, how many, how far off."""
     from posekit.files import View
-    from posekit.pipeline import evaluation
+    from posekit.pipeline import MEASURED, evaluation
     from posekit.pipeline.evaluation.draw import plot_paths, write_plots
     from posekit.pipeline.evaluation.report import check_evaluation_path, summary
     from posekit.viewer.plots.figure import drawing
@@ -165,7 +147,7 @@ def evaluate(
         heights=_heights(heights),
         distance=_length(distance, "--distance"),
         f=f,
-        size=_size(size),
+        size=pixels(size),
     )
     sampling = evaluation.Sampling(
         frames_per_clip=(60 if sequences else 10) if frames_per_clip is None else frames_per_clip,
@@ -175,11 +157,11 @@ def evaluate(
     )
     options: dict[str, Any] = {
         "root": root or None,
-        "checks": split(checks),
-        "ranges": ranges,
-        "rules": rule_numbers(rules),
-        "walkers": walkers,
-        "tolerance": _tolerance(rigid_tolerance, tangent_tolerance, angle_tolerance),
+        "checks": judging.names,
+        "ranges": judging.ranges,
+        "rules": judging.numbers,
+        "walkers": judging.walkers,
+        "tolerance": tolerances.filled(MEASURED),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,
     }
@@ -188,7 +170,11 @@ def evaluate(
     method = evaluation.Method(**options)
     given = _read(file, format=format, skeleton=skeleton, unit=unit, up=up)
     if isinstance(given, View):
-        _refuse_given(ctx, (*SWEPT, *SAMPLED))
+        for name in options_given(ctx):
+            if name in (*SWEPT, *SAMPLED):
+                raise InputError(
+                    f"{name}: a view is evaluated as it is; expected motion; leave the option out"
+                )
         if not noise:
             method = evaluation.Method(**{**options, "noise": (0.0,)})
     found = evaluation.evaluate(
@@ -231,15 +217,6 @@ def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capt
     )
 
 
-def _refuse_given(ctx: typer.Context, names: tuple[str, ...]) -> None:
-    """Refuse options of virtual cameras where a view is evaluated as it is."""
-    for name in names:
-        key = name.removeprefix("--").replace("-", "_")
-        source = ctx.get_parameter_source(key)
-        if source is not None and source.name == "COMMANDLINE":
-            raise InputError(f"{name}: a view is evaluated as it is; expected motion; leave the option out")
-
-
 def _yaws(step: float) -> tuple[float, ...]:
     if not 1 <= step <= 180:
         raise InputError(f"--yaw-step: {step:g} degrees; expected 1 to 180")
@@ -261,26 +238,3 @@ def _noise(text: str) -> tuple[float, ...]:
         return tuple(float(word) for word in split(text))
     except ValueError as error:
         raise InputError(f"--noise: {text!r}; expected pixels by commas, as 0,1,2") from error
-
-
-def _size(text: str) -> tuple[int, int]:
-    parts = text.lower().split("x")
-    if len(parts) != 2 or not all(part.isascii() and part.isdigit() and len(part) <= 6 for part in parts):
-        raise InputError(f"--size: {text!r}; expected width and height in pixels, as 1920x1080")
-    return int(parts[0]), int(parts[1])
-
-
-def _tolerance(rigid: str, tangent: str, angle: float | None) -> Tolerance | None:
-    """Make the tolerance of what was given, the rest as measured points have it."""
-    from posekit.pipeline import EXACT, MEASURED
-    from posekit.pipeline import Tolerance as Made
-
-    if not rigid and not tangent and angle is None:
-        return None
-    metres = _length(rigid, "--rigid-tolerance") if rigid else MEASURED.rigid
-    return Made(
-        rigid=metres,
-        tangent=_length(tangent, "--tangent-tolerance") if tangent else MEASURED.tangent,
-        placement=metres <= EXACT.rigid,
-        angle=MEASURED.angle if angle is None else angle,
-    )

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.detector_options import Format, Size, Skeleton, SwapSides, Unit
+from posekit.cli.detector_options import Format, Reading, Size, Skeleton, SwapSides, Unit, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.options import examples
 
@@ -16,6 +16,7 @@ EXAMPLES = examples(
     "posekit inspect predictions.json --skeleton coco_17 --size 1920x1080",
     "posekit inspect trial.trc",
     "posekit inspect postures.json",
+    "posekit inspect results",
 )
 
 
@@ -29,9 +30,9 @@ def inspect(
     swap_sides: SwapSides = False,
     unit: Unit = "",
 ) -> None:
-    """Say what is in a file: its format, who is in it, which joints are missing, and how sure they are."""
-    from posekit.pipeline.detected.inspection import inspect as describe
+    """Say what is in a file: its format, who is in it, which joints are missing; of results what survived, and how."""
+    from posekit.pipeline.contents import describe
 
-    source = source_of(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides)
+    source = source_of(Reading(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides), Who())
     for line in describe(file, source, unit=unit):
         typer.echo(line)

@@ -13,29 +13,9 @@ from posekit.errors import InputError, PosekitError
 
 PHYSICAL = "rigid-parts,joint-range,collision"
 
-Checks = Annotated[
-    str,
-    typer.Option(
-        "--checks", metavar="LIST", help="Some of rigid-parts, joint-range, collision, walking, by commas."
-    ),
-]
-RangesOption = Annotated[
-    str,
-    typer.Option(
-        "--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, anatomical, table1, or a TOML file."
-    ),
-]
 Rules = Annotated[
     str,
     typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5."),
-]
-Walkers = Annotated[
-    str,
-    typer.Option(
-        "--walkers",
-        metavar="paper|people",
-        help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
-    ),
 ]
 ContactMargin = Annotated[
     str,
@@ -59,6 +39,11 @@ Noise = Annotated[
     float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")
 ]
 OutputView = Annotated[Path, typer.Option("-o", "--output", metavar="VIEW", help="The view file to write.")]
+
+
+def as_recover(name: str, metavar: str | None = None, more: str = ".") -> Any:
+    """Return an option that `posekit recover` explains."""
+    return typer.Option(name, metavar=metavar, help=f"As `posekit recover` has it{more}")
 
 
 def examples(*lines: str) -> str:
@@ -112,6 +97,17 @@ def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     return values
 
 
+def options_given(ctx: typer.Context) -> list[str]:
+    """List the options that the command line gives, as help spells them; a switch that is turned off by its `--no-`."""
+    given = []
+    for parameter in ctx.command.params:
+        source = ctx.get_parameter_source(str(parameter.name))
+        if parameter.param_type_name == "option" and source is not None and source.name == "COMMANDLINE":
+            off = parameter.secondary_opts and ctx.params.get(str(parameter.name)) is False
+            given.append((parameter.secondary_opts if off else parameter.opts)[-1])
+    return given
+
+
 def signed_length(text: str, option: str) -> float:
     """Read a length that may be negative, metres."""
     from posekit.files import parse_length
@@ -122,12 +118,24 @@ def signed_length(text: str, option: str) -> float:
 
 @contextmanager
 def progress(label: str, total: int) -> Iterator[Any]:
-    """Show a progress bar on a terminal's stderr; yield the function to call with the number done."""
+    """Show a progress bar on a terminal's stderr; yield the function to call with the number done since then."""
+    with _bar(label, total) as (bar, task):
+        yield lambda done: bar.advance(task, done)
+
+
+@contextmanager
+def progress_so_far(label: str) -> Iterator[Any]:
+    """Show the same; yield the function to call with the number done so far, and of how many."""
+    with _bar(label, None) as (bar, task):
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _bar(label: str, total: int | None) -> Iterator[tuple[Any, Any]]:
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda done: bar.advance(task, done)
+        yield bar, bar.add_task(label, total=total)

@@ -211,8 +211,8 @@ def validate(
     if schema_of(postures).startswith("posekit.result/"):
         with about(postures):
             result = files.read_result(postures)
-            figure = urdf or pipeline.recovered_with(result)[0]
-            judged = pipeline.judged_with(result)
+            own, judged = pipeline.recovered_with(result)
+            figure = urdf or own
     angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
     walkers = walkers or judged.walkers
     # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.

@@ -21,7 +21,7 @@ from posekit.pipeline.tolerance import MEASURED as MEASURED
 from posekit.pipeline.tolerance import PHOTOGRAPH as PHOTOGRAPH
 from posekit.pipeline.tolerance import Tolerance as Tolerance
 from posekit.pipeline.validate import JudgedWith as JudgedWith
-from posekit.pipeline.validate import judged_with as judged_with
+from posekit.pipeline.validate import RecoveredWith as RecoveredWith
 from posekit.pipeline.validate import recovered_with as recovered_with
 from posekit.pipeline.validate import validate as validate
 from posekit.pipeline.views import builtin_view as builtin_view

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -89,10 +90,12 @@ class FrameRecovery:
         How the neck of a calibrated frame was placed, where it was not given.
     reason : str
         Why nothing was grown.
+    lost_to : str
+        The same in two words, ``what/why``, as leaves are lost to it.
     group_within : float or None
         Metres within which survivors are grouped.
     number : int
-        Which frame of the view it is.
+        Which frame of the view that was recovered it is.
     cameras : CameraRecords, optional
         Of all frames of the view.
     """
@@ -104,6 +107,7 @@ class FrameRecovery:
     family: Family | None = None
     placement: Placement | None = None
     reason: str = ""
+    lost_to: str = "root/not_known"
     group_within: float | None = None
     number: int = 0
     cameras: CameraRecords | None = None
@@ -234,7 +238,7 @@ class FrameRecovery:
     def rejected(self) -> dict[str, int]:
         """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
         if self.batch is None:
-            return {"root/not_known": 8192}
+            return {self.lost_to: 8192}
         if not self.hypotheses:
             return {"noise/no_trunk": 8192}
         lost: Counter[str] = Counter()
@@ -325,6 +329,15 @@ class Recovery:
     frames: list[FrameRecovery]
     settings: Mapping[str, Any]
     grower: Grower | None = None
+
+    @property
+    def unrecovered(self) -> dict[str, list[int]]:
+        """Frames in which nothing was grown, counted from zero, by the reason."""
+        found: dict[str, list[int]] = {}
+        for k, frame in enumerate(self.frames):
+            if frame.reason:
+                found.setdefault(re.sub(r"^frames\[\d+\]: ", "", frame.reason), []).append(k)
+        return found
 
     @cached_property
     def ranking(self) -> Ranking:

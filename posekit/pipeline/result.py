@@ -33,10 +33,11 @@ def result_of(
     """
     margins = list(dict.fromkeys(name for frame in recovery.frames for name in frame.margins))
     nq = recovery.figure.model.nq
+    unrecovered = recovery.unrecovered
     return Result(
         unit=unit,
         configuration_names=recovery.figure.configuration_names,
-        settings=recovery.settings,
+        settings={**recovery.settings, **({"unrecovered": unrecovered} if unrecovered else {})},
         frames=[
             _frame(frame, margins, nq, explain, probability)
             for frame, probability in zip(recovery.frames, recovery.probability, strict=True)

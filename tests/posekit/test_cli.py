@@ -1,19 +1,23 @@
 """The command line: what each command does, and one clear line for whatever is wrong."""
 
 import importlib
+import inspect
 import json
 import os
 import subprocess
 import sys
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
+import typer
 
-from posekit.cli.options import examples, numbers, rule_numbers, signed_length, split
+from posekit.cli.groups import with_groups
+from posekit.cli.options import examples, numbers, options_given, rule_numbers, signed_length, split
 from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import (
@@ -29,7 +33,7 @@ from posekit.files import (
 )
 from posekit.head import HeadPoints
 from posekit.pipeline.objects import load_object
-from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, POINTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 
 FIGURE = load_figure()
@@ -330,6 +334,172 @@ def test_a_frame_without_a_neck_is_told_and_the_rest_recovered(run: Run, walk: d
     assert [len(frame.joints) > 0 for frame in read_result("r.json").frames] == [False, True]
 
 
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_frames_that_cannot_be_recovered_say_why_and_the_others_are_the_same(run: Run, suffix: str) -> None:
+    assert run("synth", "walker", "-o", "view.json", "--frames", "4").code == 0
+    whole = json.loads(Path("view.json").read_text(encoding="utf-8"))
+    holes = copy(whole)
+    del holes["frames"][1]["image"]["neck"]
+    seen = holes["frames"][2]["image"]
+    holes["frames"][2]["image"] = {name: seen[name] for name in ("neck", "left_ankle", "right_ankle")}
+    outcome = run("recover", write(holes, "holes.json"), "-o", f"some.{suffix}", "--follow", "1")
+    assert outcome.code == 0
+    assert "frames[1]: the neck, from which the tree grows, is not seen" in outcome.out
+    assert (
+        "1 of 4 frames not recovered: the neck, from which the tree grows, is not seen (frame 2)"
+        in outcome.err
+    )
+    assert run("recover", "view.json", "-o", f"all.{suffix}").code == 0
+    one, other = read_result(f"some.{suffix}"), read_result(f"all.{suffix}")
+    assert [len(frame.joints) > 0 for frame in one.frames] == [True, False, False, True]
+    assert [frame.time for frame in one.frames] == [frame.time for frame in other.frames]
+    for k in (0, 3):
+        np.testing.assert_array_equal(one.frames[k].joints, other.frames[k].joints)
+        np.testing.assert_array_equal(one.frames[k].q, other.frames[k].q)
+        assert one.frames[k].rejected == other.frames[k].rejected
+        np.testing.assert_array_equal(one.frames[k].camera["position"], other.frames[k].camera["position"])
+    assert [one.frames[k].rejected for k in (1, 2)] == [{"neck/not_seen": 8192}, {"trunk/not_seen": 8192}]
+    assert one.settings["judged"] == ["exact", None, None, "exact"]
+    assert sorted(one.settings["unrecovered"].values()) == [[1], [2]]
+    assert one.paths is not None
+    assert (one.paths.survivor[0] >= 0).tolist() == [True, False, False, True]
+
+
+def test_following_shows_how_far_it_is_on_a_terminal_alone(
+    run: Run, walk: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ("recover", write(walk), "-o", "r.json", "--follow", "2")
+    assert run(*command).err == ""
+    monkeypatch.setattr("rich.console.Console.is_terminal", property(lambda _: True))
+    shown = run(*command)
+    assert shown.code == 0
+    assert "following" in shown.err
+    assert "/4" in shown.err  # two searches through two frames
+    assert "following" not in shown.out
+
+
+def test_what_is_said_of_single_frames_stays_with_them_where_others_are_left_out(
+    run: Run, walk: dict[str, Any]
+) -> None:
+    document = copy(walk)
+    document["frames"] = [walk["frames"][0], *walk["frames"]]
+    document["frames"][0] = {**walk["frames"][0], "image": {"left_elbow": [0.0, 0.0]}}
+    for k in (1, 2):
+        document["frames"][k] = {**document["frames"][k], "time": float(k)}
+    assert run("recover", write(document), "-o", "free.json", "--checks", "rigid-parts").code == 0
+    given: list[dict[str, str]] = [{}]
+    for frame in read_result("free.json").frames[1:]:
+        rising = frame.joints[:, list(range(6, 14)), 2] - frame.joints[:, [1, 2, 6, 7, 4, 5, 10, 11], 2]
+        both = np.flatnonzero((rising > 0).any(axis=0) & (rising < 0).any(axis=0))
+        child = 6 + int(both[len(given) - 1])  # of each frame another segment that may point both ways
+        given.append({segment_name((PARENTS[child], child)): JOINTS[child]})
+    assert given[1].keys() != given[2].keys()
+    flips = write({"schema": "posekit.nearer/1", "frames": given}, "flips.json")
+    assert run("recover", "view.json", "-o", "r.json", "--checks", "rigid-parts", "--nearer", flips).code == 0
+    for k, frame in enumerate(read_result("r.json").frames[1:], 1):
+        ((segment, end),) = given[k].items()
+        ends = frame.joints[:, [JOINTS.index(name) for name in segment.split("-")], 2]
+        assert len(ends)
+        assert (np.ptp(ends, axis=1) > 0).all()
+        assert (ends.argmin(axis=1) == segment.split("-").index(end)).all()
+    # A warning about the last frame names it by its number in the file.
+    document["camera"] = {"model": "lee-chen", "f": 5.0}
+    neck = document["frames"][2]["truth"]["neck"]
+    document["frames"][2]["root"] = [neck[0] + 2.0, neck[1], neck[2]]
+    assert "frames[2].root is 2" in run("recover", write(document), "-o", "r.json").err
+
+
+@pytest.mark.parametrize("camera", ["lee-chen", "scaled-orthographic"])
+def test_a_deviation_that_has_no_effect_is_refused_or_told(run: Run, camera: str) -> None:
+    made = ("walker",) if camera == "lee-chen" else ("random", "--uncalibrated")
+    assert run("synth", *made, "-o", "view.json", "--frames", "1").code == 0
+    assert_refused(
+        run("recover", "view.json", "-o", "r.json", "--deviation", "2"),
+        f"--deviation: the view's camera is {camera}",
+    )
+    document = {**json.loads(Path("view.json").read_text(encoding="utf-8")), "deviation": 2.0}
+    outcome = run("recover", write(document, "says.json"), "-o", "r.json")
+    assert outcome.code == 0
+    assert f"the view's deviation of 2 px has no effect: its camera is {camera}" in outcome.err
+    assert "noise" in read_result("r.json").settings
+    assert read_result("r.json").settings["noise"] is None
+
+
+@pytest.mark.parametrize(
+    "option",
+    [
+        ("--root", "search"),
+        ("--deviation", "2"),
+        ("--no-infer",),
+        ("--person", "1"),
+        ("--checks", "collision"),
+    ],
+)
+def test_options_of_persons_are_refused_with_a_linkage(run: Run, option: tuple[str, ...]) -> None:
+    refused = run("recover", "view.json", "-o", "r.json", "--linkage", "panda", *option)
+    assert_refused(refused, f"{option[0]} is for persons; leave it out with --linkage")
+
+
+def test_groups_of_options_stand_where_they_are_taken() -> None:
+    """A command with groups has the very options, defaults and order of one that lists them."""
+
+    @dataclass(frozen=True, kw_only=True)
+    class Pair:
+        left: Annotated[int, typer.Option("--left")] = 1
+        right: Annotated[str, typer.Option("--right")] = "r"
+
+    got: list[Any] = []
+
+    def command(
+        ctx: typer.Context, *, name: str, pair: Pair, last: Annotated[bool, typer.Option("--last")] = False
+    ) -> None:
+        got.append((name, pair, last, options_given(ctx)))
+
+    command.__annotations__ = {
+        "ctx": typer.Context,
+        "name": str,
+        "pair": Pair,
+        "last": Annotated[bool, typer.Option("--last")],
+    }
+    app = typer.Typer(add_completion=False)
+    made = with_groups(command)
+    app.command()(made)
+    assert list(inspect.signature(made).parameters) == ["ctx", "name", "left", "right", "last"]
+    app(["n", "--right", "x", "--last"], standalone_mode=False)
+    app(["n"], standalone_mode=False)
+    assert got == [
+        ("n", Pair(left=1, right="x"), True, ["--right", "--last"]),
+        ("n", Pair(left=1, right="r"), False, []),
+    ]
+
+
+def test_commands_share_their_options(run: Run) -> None:
+    """What is in a group is in every command that takes it, with the same default."""
+    options = {}
+    for name in ("recover", "batch", "evaluate", "convert"):
+        told = run(name, "--help").out
+        options[name] = {word.strip(",") for word in told.split() if word.startswith("--")}
+    judging = {"--checks", "--ranges", "--rules", "--walkers", "--rigid-tolerance", "--angle-tolerance"}
+    reading = {
+        "--format",
+        "--skeleton",
+        "--person",
+        "--camera",
+        "--fps",
+        "--min-confidence",
+        "--stature",
+        "--calibrate",
+    }
+    noise = {"--root", "--deviation", "--refine", "--length-deviation", "--infer"}
+    for name, groups in {
+        "recover": judging | reading | noise,
+        "batch": judging | reading | noise,
+        "evaluate": judging,
+        "convert": reading,
+    }.items():
+        assert groups <= options[name], name
+
+
 def test_joints_that_are_not_seen_are_unknown_in_the_result(run: Run, walk: dict[str, Any]) -> None:
     document = copy(walk)
     for frame in document["frames"]:
@@ -517,13 +687,46 @@ BAD_VIEWS: dict[str, tuple[Callable[[dict[str, Any]], Any], tuple[str, ...]]] = 
         lambda d: edited(d, "frames", 0, "truth", "pelvis", 2, value=float("-inf")),
         ("view.json: frames[0].truth.pelvis[2]: got -Infinity", "finite number"),
     ),
-    "missing neck": (
-        lambda d: edited(
-            d,
-            *("frames", 1, "image"),
-            value={name: point for name, point in d["frames"][1]["image"].items() if name != "neck"},
-        ),
-        ("view.json: frames[1].image.neck: got nothing", "the tree grows from it"),
+    "no neck in any frame": (
+        lambda d: {
+            **copy(d),
+            "frames": [
+                {**frame, "image": {name: at for name, at in frame["image"].items() if name != "neck"}}
+                for frame in d["frames"]
+            ],
+        },
+        ("view.json: frames[0].image.neck: got nothing", "the tree grows from it"),
+    ),
+    "a neck is missing, and a joint is unknown elsewhere": (
+        lambda d: {
+            **copy(d),
+            "frames": [
+                {**d["frames"][0], "image": {"left_elbow": d["frames"][0]["image"]["left_elbow"]}},
+                {**d["frames"][1], "image": {**d["frames"][1]["image"], "left_elbo": [0, 0]}},
+            ],
+        },
+        ("view.json: frames[1].image.left_elbo", "did you mean left_elbow"),
+    ),
+    "a neck is missing, and a root is wrong elsewhere": (
+        lambda d: {
+            **copy(d),
+            "camera": {"model": "lee-chen", "f": 5.0},
+            "frames": [
+                {"time": 0.0, "image": {"left_elbow": d["frames"][0]["image"]["left_elbow"]}},
+                {**d["frames"][1], "root": [0.0, 0.0, -500.0]},
+            ],
+        },
+        ("view.json: frames[1].root: [0.0, 0.0, -5.0] m is behind the camera",),
+    ),
+    "nothing hangs on the neck": (
+        lambda d: {
+            **copy(d),
+            "frames": [
+                {**frame, "image": {name: frame["image"][name] for name in ("neck", "left_wrist")}}
+                for frame in d["frames"]
+            ],
+        },
+        ("view.json: frames[0]: none of right_shoulder, left_shoulder, pelvis is seen",),
     ),
     "unknown joint": (
         lambda d: edited(d, "frames", 0, "image", "left_elbo", value=[0, 0]),

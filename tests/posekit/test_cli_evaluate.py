@@ -185,7 +185,7 @@ def test_frames_in_a_row_and_placed_necks(run: Run) -> None:
         (("--f", "nan"), ("focal length",)),
         (("--f", "90000"), ("leaves every picture",)),
         (("--size", "9"), ("--size", "1920x1080")),
-        (("--size", "0x9"), ("0 x 9",)),
+        (("--size", "0x9"), ("--size: '0x9'", "1920x1080")),
         (("--frames-per-clip", "0"), ("--frames-per-clip",)),
         (("--clips", "swim"), ("--clips", "walk")),
         (("--actions", "swimming"), ("--actions", "walking")),

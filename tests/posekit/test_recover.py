@@ -417,13 +417,33 @@ def test_what_hangs_on_an_unseen_torso_joint_has_no_q() -> None:
     assert np.isnan(shoulderless.fk_distance).all()
 
 
-def test_only_the_neck_is_one_posture() -> None:
+@pytest.mark.parametrize("infer", [True, False])
+@pytest.mark.parametrize("beside", [(), ("right_wrist",), ("right_hip", "left_hip", "right_knee")])
+def test_a_frame_without_a_trunk_has_no_posture_and_says_why(beside: tuple[str, ...], infer: bool) -> None:
+    """Only the neck would be known of it: that is no posture."""
+    bare = SEQ1.image[1].copy()
+    bare[[k for k, name in enumerate(JOINTS) if name not in ("neck", *beside)]] = np.nan
+    image = SEQ1.image.copy()
+    image[1] = bare
+    recovery, whole = recover(change(SEQ1, image=image), infer=infer), recover(SEQ1)
+    assert [len(frame) > 0 for frame in recovery.frames] == [True, False, True, True, True]
+    frame = recovery.frames[1]
+    assert frame.reason.startswith("frames[1]: none of right_shoulder, left_shoulder, pelvis is seen")
+    assert total(frame) == LEAVES
+    assert set(frame.rejected) == {"trunk/not_seen"}
+    assert list(recovery.unrecovered.values()) == [[1]]
+    for k in (0, 2, 3, 4):
+        np.testing.assert_array_equal(recovery.frames[k].joints, whole.frames[k].joints)
+    result = result_of(recovery)
+    assert list(result.settings["unrecovered"].values()) == [[1]]
+    assert "unrecovered" not in result_of(whole).settings
+
+
+@pytest.mark.parametrize("joint", ["right_shoulder", "left_shoulder", "pelvis"])
+def test_one_joint_of_the_trunk_makes_a_posture(joint: str) -> None:
     image = np.full_like(SEQ1.image, np.nan)
-    image[:, 0] = SEQ1.image[:, 0]
-    recovery = recover(change(SEQ1, image=image), infer=False)
-    assert counts(recovery) == [1] * 5
-    assert {total(frame) for frame in recovery.frames} == {LEAVES}
-    assert all(np.isnan(value).all() for value in recovery.frames[0].margins.values())
+    image[:, [0, JOINT[joint]]] = SEQ1.image[:, [0, JOINT[joint]]]
+    assert counts(recover(change(SEQ1, image=image))) == [2] * 5
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from posekit import files
 from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import View
-from posekit.pipeline import judged_with, recover, result_of, view_of
+from posekit.pipeline import recover, recovered_with, result_of, view_of
 from posekit.pipeline.batch import Recipe
 from posekit.pipeline.evaluation import Method
 from posekit.skeleton import DOFS
@@ -136,16 +136,16 @@ def test_the_command_line_takes_them(
 def test_a_result_says_what_its_frames_were_judged_with() -> None:
     scene = random_views(FIGURE, 3, np.random.default_rng(0))
     exact = result_of(recover(view_of(scene), contact_margin=0.01))
-    assert tuple(judged_with(exact)) == (pytest.approx(1e-3), 0.01, "paper")
+    assert tuple(recovered_with(exact).judged) == (pytest.approx(1e-3), 0.01, "paper")
     noisy = view_of(scene.with_noise(2.0, np.random.default_rng(1)))
     noisy = replace(noisy, deviation=2.0, root=scene.joints_cam[:, 0])
     refined = result_of(recover(noisy, contact_margin=-0.01))
     assert refined.settings["refined"]["contact"] == pytest.approx(-0.04)
-    told = judged_with(refined)
+    told = recovered_with(refined).judged
     assert told.contact_margin == pytest.approx(-0.04)
     assert told.angle == refined.settings["refined"]["angle"]
     older = replace(refined, settings={**refined.settings, "refined": {"angle": 14.0}})
-    assert judged_with(older).contact_margin == -0.01
+    assert recovered_with(older).judged.contact_margin == -0.01
 
 
 @pytest.mark.parametrize(
@@ -162,7 +162,7 @@ def test_a_result_says_what_its_frames_were_judged_with() -> None:
 def test_settings_that_say_no_number_are_refused(view: View, changed: dict[str, Any], said: str) -> None:
     result = result_of(recover(view))
     with pytest.raises(InputError, match=said):
-        judged_with(replace(result, settings={**result.settings, **changed}))
+        recovered_with(replace(result, settings={**result.settings, **changed}))
 
 
 def test_an_arm_may_be_turned_as_far_as_its_direction_may() -> None:

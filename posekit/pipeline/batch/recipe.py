@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from posekit.errors import InputError
 from posekit.figure import load_figure
-from posekit.files import PER_METRE, ScaledOrthographicModel, View
+from posekit.files import PER_METRE, OpenCVModel, ScaledOrthographicModel, View
 from posekit.pipeline.batch import digests
 from posekit.pipeline.detected.camera import split_camera
 from posekit.pipeline.detected.source import Source
@@ -186,8 +186,14 @@ class Recipe:
         Raises
         ------
         InputError
-            Where a calibrated view is given a scale or Taylor's proportions, or an uncalibrated one a root.
+            Where a calibrated view is given a scale or Taylor's proportions, an uncalibrated one a root, or one whose
+            camera is not an `opencv` one a deviation.
         """
+        if self.source.deviation is not None and not isinstance(view.camera, OpenCVModel):
+            raise InputError(
+                f"--deviation: the view's camera is {view.camera.type}: a deviation has no effect there; expected an "
+                "opencv camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
+            )
         if isinstance(view.camera, ScaledOrthographicModel):
             if self.root != "auto":
                 raise InputError(

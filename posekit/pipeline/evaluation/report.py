@@ -100,13 +100,13 @@ def summary(evaluation: Evaluation) -> list[str]:
     lines += [f"left out: {line}" for line in material.left_out]
     if material.out_of_picture:
         lines.append(f"left out: {material.out_of_picture} views in which the person leaves the picture")
-    lines += ["", "By noise (errors: means over frames with survivors, mm)", ""]
+    lines += ["", "By added noise (errors: means over frames with survivors, mm)", ""]
     by_noise = [
         (f"{key['noise']:g} px", numbers(frames, rows)) for key, rows in frames.conditions(("noise",))
     ]
-    lines += _table("noise", by_noise)
+    lines += _table("added noise", by_noise)
     least = min(frames.keys["noise"])
-    lines += [f"By action, at {least:g} px", ""]
+    lines += [f"By action, at {least:g} px of added noise", ""]
     lines += _table(
         "action",
         [
@@ -118,7 +118,7 @@ def summary(evaluation: Evaluation) -> list[str]:
     lost = next(lost_to(frames, rows) for key, rows in frames.conditions(("noise",)) if key["noise"] == least)
     if lost:
         told = ", ".join(f"{name} {count}" for name, count in list(lost.items())[:8])
-        lines.append(f"what pruned the true branch, at {least:g} px: {told}")
+        lines.append(f"what pruned the true branch, at {least:g} px of added noise: {told}")
     broken = every["violations"]
     lines.append(
         f"{broken['certified']} survivors certified: {broken['lengths']} break lengths, {broken['ranges']} ranges"

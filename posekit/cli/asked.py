@@ -1,0 +1,132 @@
+"""What the options of `posekit recover` ask of every view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from posekit.cli.judging_options import Tolerances
+from posekit.cli.options import about, progress
+from posekit.errors import InputError, PosekitError
+
+if TYPE_CHECKING:
+    from posekit.files import View
+    from posekit.pipeline import Recovery, Rooting
+    from posekit.pipeline.detected import Opened
+    from posekit.pipeline.left_out import LeftOut
+    from posekit.validators import Ranges
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What is asked of every view, as `posekit.recover` takes it where nothing else is said.
+
+    Parameters
+    ----------
+    tolerances : Tolerances
+        What is not given is as it is for such a view.
+    scale : str
+        As the option has it: its unit is the view's.
+    """
+
+    checks: tuple[str, ...]
+    ranges: Ranges
+    rules: tuple[int, ...]
+    walkers: str
+    tolerances: Tolerances
+    contact_margin: float
+    group: float | None
+    scale: str
+    proportions: str
+    nearer: Sequence[Mapping[str, str]] | None
+    infer: bool
+    rooting: Rooting
+    refine: bool | None
+    length_deviation: float | None
+
+    def recover_all(
+        self, people: Sequence[Opened], path: Path, left_out: LeftOut | None
+    ) -> list[tuple[Opened, Recovery]]:
+        """Recover everybody before anything is written; of several people, warn of those who cannot be."""
+        self.check_noise(people[0].view)  # one camera sees them all
+        recovered = []
+        for one in people:
+            try:
+                recovered.append((one, self.recover_seen(one.view, path, left_out)))
+            except PosekitError as error:
+                if len(people) == 1 or (one is people[-1] and not recovered):
+                    raise
+                typer.echo(f"posekit: warning: person {one.person} is left out: {error}", err=True)
+        return recovered
+
+    def recover_seen(self, seen: View, path: Path, left_out: LeftOut | None) -> Recovery:
+        """Recover a view that comes from `path`, and say of the frames that were left out of it why they were."""
+        if left_out is None:
+            return _some(self.recover(seen, path), path)
+        asked = self if self.nearer is None else replace(self, nearer=left_out.of_kept(self.nearer))
+        with left_out.naming():
+            recovery = asked.recover(seen, path)
+        return _some(left_out.put_back(recovery), path)
+
+    def recover(self, seen: View, path: Path) -> Recovery:
+        """Recover a view that comes from `path`."""
+        from posekit import files, pipeline
+
+        uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
+        per_unit = files.PER_METRE[seen.unit]
+        with progress("recovering", len(seen.time)) as done, about(path):
+            return pipeline.recover(
+                seen,
+                checks=self.checks,
+                ranges=self.ranges,
+                rules=self.rules,
+                walkers=self.walkers,
+                tolerance=self.tolerances.filled(pipeline.PHOTOGRAPH if uncalibrated else pipeline.MEASURED),
+                contact_margin=self.contact_margin,
+                group=self.group,
+                scale=pipeline.parse_scale(self.scale, per_unit=per_unit) if self.scale else None,
+                proportions=self.proportions,
+                infer=self.infer,
+                nearer=self.nearer,
+                rooting=self.rooting,
+                refine=self.refine,
+                length_deviation=self.length_deviation,
+                progress=done,
+            )
+
+    def check_noise(self, seen: View) -> None:
+        """Refuse a deviation where it has no effect; of one that the view itself says, say so.
+
+        Raises
+        ------
+        InputError
+            Where the option is given for another camera than an `opencv` one.
+        """
+        from posekit import files
+
+        if isinstance(seen.camera, files.OpenCVModel):
+            return
+        uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
+        camera = "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
+        if self.rooting.deviation is not None:
+            raise InputError(
+                f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
+                "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
+            )
+        if seen.deviation is not None:
+            typer.echo(
+                f"posekit: warning: the view's deviation of {seen.deviation:g} px has no effect: its camera is "
+                f"{camera}, and noise is allowed for where it is opencv",
+                err=True,
+            )
+
+
+def _some(recovery: Recovery, path: Path) -> Recovery:
+    """Refuse a view in none of whose frames anything could be grown."""
+    if all(frame.reason for frame in recovery.frames):
+        raise InputError(f"{path}: {recovery.frames[0].reason}")
+    return recovery

@@ -1,0 +1,116 @@
+"""Options that say what postures are judged by, and with which tolerances."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from posekit.cli.options import PHYSICAL, AngleTolerance, Rules, as_recover, rule_numbers, split
+
+if TYPE_CHECKING:
+    from posekit.pipeline import Tolerance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judging:
+    """By what postures are judged: `recover`, `batch` and `evaluate` have it."""
+
+    checks: Annotated[
+        str,
+        typer.Option(
+            "--checks",
+            metavar="LIST",
+            help="Some of rigid-parts, joint-range, collision, walking, by commas.",
+        ),
+    ] = PHYSICAL
+    ranges: Annotated[
+        str,
+        typer.Option(
+            "--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, anatomical, table1, or a TOML file."
+        ),
+    ] = "urdf"
+    rules: Rules = "1,2"
+    walkers: Annotated[
+        str,
+        typer.Option(
+            "--walkers",
+            metavar="paper|people",
+            help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
+        ),
+    ] = "paper"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The checks."""
+        return split(self.checks)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The rules of walking."""
+        return rule_numbers(self.rules)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """What may be off: `recover` explains it."""
+
+    rigid_tolerance: Annotated[
+        str,
+        typer.Option(
+            "--rigid-tolerance",
+            metavar="LENGTH",
+            help="How far distances inside torso and hips may be off. Default: exact where some torso fits "
+            "exactly, else 3cm, or 10cm in an uncalibrated view. A tolerance that is given turns refinement off.",
+        ),
+    ] = ""
+    tangent_tolerance: Annotated[
+        str,
+        typer.Option(
+            "--tangent-tolerance",
+            metavar="LENGTH",
+            help="How much too short for its image a segment may be. Default: as above, 1cm or 5cm.",
+        ),
+    ] = ""
+    angle_tolerance: AngleTolerance = None
+
+    @property
+    def rigid(self) -> float | None:
+        """Metres, where it is given."""
+        return _length(self.rigid_tolerance, "--rigid-tolerance")
+
+    @property
+    def tangent(self) -> float | None:
+        """Metres, where it is given."""
+        return _length(self.tangent_tolerance, "--tangent-tolerance")
+
+    def filled(self, otherwise: Tolerance) -> Tolerance | None:
+        """Make the tolerance of what is given, the rest as it is `otherwise`; None where nothing is given."""
+        from posekit.pipeline import EXACT
+        from posekit.pipeline import Tolerance as Made
+
+        rigid, tangent, angle = self.rigid, self.tangent, self.angle_tolerance
+        if rigid is None and tangent is None and angle is None:
+            return None
+        metres = otherwise.rigid if rigid is None else rigid
+        return Made(
+            rigid=metres,
+            tangent=otherwise.tangent if tangent is None else tangent,
+            placement=metres <= EXACT.rigid,
+            angle=otherwise.angle if angle is None else angle,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class TolerancesAsRecover(Tolerances):
+    """The same, told more shortly."""
+
+    rigid_tolerance: Annotated[str, as_recover("--rigid-tolerance", "LENGTH")] = ""
+    tangent_tolerance: Annotated[str, as_recover("--tangent-tolerance", "LENGTH")] = ""
+
+
+def _length(text: str, option: str) -> float | None:
+    from posekit.files import parse_length
+
+    return parse_length(text, name=option) if text else None

@@ -1,0 +1,61 @@
+"""Options that say what is not seen, or not exactly: hidden joints, the depth of the neck, and noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import typer
+
+from posekit.cli.detector_options import Deviation
+from posekit.cli.options import as_recover
+
+
+@dataclass(frozen=True, kw_only=True)
+class Uncertain:
+    """Hidden joints, the depth of the neck, and noise: `recover` explains it."""
+
+    infer: Annotated[
+        bool,
+        typer.Option(
+            "--infer/--no-infer",
+            help="Complete joints that were not seen, each with the set of its positions.",
+        ),
+    ] = True
+    root: Annotated[
+        str,
+        typer.Option(
+            "--root",
+            metavar="HOW",
+            help="Calibrated views without a root: find the neck's depth by auto, head, torso or search.",
+        ),
+    ] = "auto"
+    deviation: Deviation = None
+    refine: Annotated[
+        bool | None,
+        typer.Option(
+            "--refine/--no-refine",
+            help="Turn survivors into the likeliest postures near them, and reject what the noise cannot explain. "
+            "Default: where the view, a detector or --deviation says how noisy its points are.",
+        ),
+    ] = None
+    length_deviation: Annotated[
+        float | None,
+        typer.Option(
+            "--length-deviation",
+            metavar="FRACTION",
+            help="Then: how far lengths may be off, standard deviation. Default: 0.01, from shoulder to pelvis 0.02.",
+        ),
+    ] = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class UncertainAsRecover(Uncertain):
+    """The same, told more shortly."""
+
+    infer: Annotated[bool, typer.Option("--infer/--no-infer", help="Complete joints that were not seen.")] = (
+        True
+    )
+    root: Annotated[str, as_recover("--root", "HOW", ": auto, head, torso, search.")] = "auto"
+    refine: Annotated[bool | None, as_recover("--refine/--no-refine")] = None
+    length_deviation: Annotated[float | None, as_recover("--length-deviation", "FRACTION")] = None
