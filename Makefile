@@ -144,7 +144,7 @@ layers: $(VENV)/dev.stamp ## import-linter: who may import whom
 
 .PHONY: docs
 docs: $(VENV)/dev.stamp ## build the documentation, warnings are errors
-	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/sphinx-build -j $(WORKERS) -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
 .PHONY: check

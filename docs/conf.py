@@ -1,4 +1,8 @@
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # the two extensions of our own
 
 project = "posekit"
 author = "posekit developers"
@@ -9,10 +13,12 @@ version = ".".join(release.split(".")[:2])
 # No intersphinx: the documentation builds without a network.
 extensions = [
     "myst_parser",
+    "quick_build",
     "sphinx.ext.autodoc",
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "warned_again",
 ]
 exclude_patterns = ["_build"]
 
@@ -29,6 +35,9 @@ napoleon_use_rtype = False
 
 # Short names in docstrings (`Figure`, `q`) have more than one target: posekit.Figure is figure.figure.Figure.
 suppress_warnings = ["ref.python"]
+
+# Every page's sidebar is made of all entries of all pages: with each class and its fields among them that took minutes.
+toc_object_entries = False
 
 html_theme = "furo"
 html_title = f"posekit {release}"

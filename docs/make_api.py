@@ -1,64 +1,126 @@
-"""Write docs/api.md: every module, lowest layer first.
+"""Write docs/api.md and docs/api/: every module, lowest layer first, a page a package.
 
-python docs/make_api.py
+    python docs/make_api.py
+
+A page a package: several processes share the work, and what has changed is all that is read and written again.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Final
 
 ROOT = Path(__file__).parents[1]
-SECTIONS = (
-    ("From Python", "posekit", False),
-    ("Errors", "posekit.errors", False),
-    ("Intake", "posekit.intake", True),
-    ("Skeleton", "posekit.skeleton", False),
-    ("Cameras", "posekit.cameras", True),
-    ("Measures", "posekit.measures", True),
-    ("Head", "posekit.head", True),
-    ("Interpretation tree", "posekit.tree", True),
-    ("Linkages", "posekit.linkage", True),
-    ("Robots", "posekit.robot", True),
-    ("Figure", "posekit.figure", True),
-    ("Grouping", "posekit.grouping", False),
-    ("Synthetic views", "posekit.synthesis", True),
-    ("Files", "posekit.files", True),
-    ("Joints that are not seen", "posekit.occlusion", True),
-    ("Validators", "posekit.validators", True),
-    ("Viewer", "posekit.viewer", True),
-    ("Whole jobs", "posekit.pipeline", True),
-    ("Command line", "posekit.cli", True),
+SECTIONS: Final = (
+    ("From Python", "posekit"),
+    ("Errors", "posekit.errors"),
+    ("Intake", "posekit.intake"),
+    ("Skeleton", "posekit.skeleton"),
+    ("Cameras", "posekit.cameras"),
+    ("Measures", "posekit.measures"),
+    ("Skeleton maps", "posekit.skeleton_map"),
+    ("Head", "posekit.head"),
+    ("Interpretation tree", "posekit.tree"),
+    ("Key points", "posekit.keypoints"),
+    ("Calibration", "posekit.calibration"),
+    ("Linkages", "posekit.linkage"),
+    ("Robots", "posekit.robot"),
+    ("Figure", "posekit.figure"),
+    ("Motion", "posekit.motion"),
+    ("Anthropometry", "posekit.anthropometry"),
+    ("Placement", "posekit.placement"),
+    ("Grouping", "posekit.grouping"),
+    ("Synthetic views", "posekit.synthesis"),
+    ("Files", "posekit.files"),
+    ("Joints that are not seen", "posekit.occlusion"),
+    ("Ranking", "posekit.ranking"),
+    ("Refinement", "posekit.refinement"),
+    ("Sequences", "posekit.sequences"),
+    ("Validators", "posekit.validators"),
+    ("Viewer", "posekit.viewer"),
+    ("Whole jobs", "posekit.pipeline"),
+    ("Command line", "posekit.cli"),
 )
-"""Title, module, and whether its submodules are listed too."""
+"""Title, and the package or module; those of a package's folders that are packages have pages of their own."""
 
-HEAD = """# Python API
+HEAD: Final = """# Python API
 
 From the lowest layer up; `make layers` holds that none imports one above it.
+
+```{toctree}
+:maxdepth: 1
+
 """
 
 
-def modules(package: str) -> list[str]:
-    """List a package and its submodules by name."""
-    folder = ROOT / package.replace(".", "/")
-    found = [package]
-    for file in folder.rglob("*.py"):
-        parts = file.relative_to(folder).with_suffix("").parts
-        parts = parts[:-1] if parts[-1] == "__init__" else parts
-        if parts:
-            found.append(".".join([package, *parts]))
-    return sorted(found)
+def pages() -> dict[str, str]:
+    """Return the text of every page by its path under docs.
+
+    Raises
+    ------
+    ValueError
+        Where a module of posekit would be on no page.
+    """
+    text: dict[str, str] = {}
+    order: list[str] = []
+    for title, name in SECTIONS:
+        for package, modules in _packages(name).items():
+            inside = package.removeprefix(name).lstrip(".").replace(".", ", ")
+            path = f"api/{package.removeprefix('posekit.')}.rst"
+            order.append(path.removesuffix(".rst"))
+            text[path] = _page(f"{title}: {inside}" if inside else title, modules)
+    missing = sorted(_top() - {name for _, name in SECTIONS})
+    if missing:
+        raise ValueError(
+            f"{', '.join(missing)}: on no page; expected in SECTIONS of docs/make_api.py; add it"
+        )
+    return {"api.md": HEAD + "".join(f"{path}\n" for path in order) + "```\n", **text}
 
 
 def text() -> str:
-    """Return the whole page."""
-    sections = [
-        f"\n## {title}\n\n```{{eval-rst}}\n"
-        + "".join(f".. automodule:: {name}\n" for name in (modules(module) if deep else [module]))
-        + "```\n"
-        for title, module, deep in SECTIONS
-    ]
-    return HEAD + "".join(sections)
+    """Return the first page, which names the others."""
+    return pages()["api.md"]
+
+
+def write() -> None:
+    """Write the pages anew, and remove those of packages that are no more."""
+    made = pages()
+    docs = ROOT / "docs"
+    (docs / "api").mkdir(exist_ok=True)
+    for path in (docs / "api").iterdir():
+        if f"api/{path.name}" not in made:
+            path.unlink()
+    for name, text in made.items():
+        (docs / name).write_text(text, encoding="utf-8")
+
+
+def _page(title: str, modules: list[str]) -> str:
+    parts = [f"{title}\n{'=' * len(title)}\n"]
+    parts += [f"{name}\n{'-' * len(name)}\n\n.. automodule:: {name}\n" for name in modules]
+    return "\n".join(parts)
+
+
+def _packages(name: str) -> dict[str, list[str]]:
+    """Return the modules of a package by the package that they are in, itself first; a module is by itself."""
+    folder = ROOT / name.replace(".", "/")
+    if not folder.is_dir() or name == "posekit":
+        return {name: [name]}
+    found: dict[str, list[str]] = {}
+    for file in sorted(folder.rglob("*.py")):
+        parts = (name, *file.relative_to(folder).with_suffix("").parts)
+        package = ".".join(parts[:-1])
+        found.setdefault(package, [])
+        found[package].append(package if parts[-1] == "__init__" else ".".join(parts))
+    return {package: sorted(found[package]) for package in sorted(found)}
+
+
+def _top() -> set[str]:
+    """List the modules and packages right inside posekit, but the data's."""
+    files = (ROOT / "posekit").glob("*.py")
+    folders = (file.parent for file in (ROOT / "posekit").glob("*/__init__.py"))
+    names = {file.stem for file in files} | {folder.name for folder in folders}
+    return {f"posekit.{name}" for name in names - {"__init__", "urdf"}} | {"posekit"}
 
 
 if __name__ == "__main__":
-    (ROOT / "docs" / "api.md").write_text(text(), encoding="utf-8")
+    write()

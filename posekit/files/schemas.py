@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from typing import Any, Final
 
-from posekit.files import nearer as nearer_schema
 from posekit.files import (
+    batch_schema,
+    evaluation_schema,
     object_result_schema,
     postures_q_schema,
     postures_schema,
@@ -14,6 +15,7 @@ from posekit.files import (
     result_schema,
     view_schema,
 )
+from posekit.files import nearer as nearer_schema
 from posekit.files.validation import FileModel
 from posekit.intake.refusal import nearest, refusal, shown
 
@@ -25,6 +27,9 @@ _MODELS: Final[dict[str, type[FileModel]]] = {
     nearer_schema.SCHEMA: nearer_schema.NearerFile,
     object_result_schema.SCHEMA: object_result_schema.ObjectFile,
     postures_q_schema.SCHEMA: postures_q_schema.ConfigurationsFile,
+    evaluation_schema.SCHEMA: evaluation_schema.EvaluationFile,
+    batch_schema.SCHEMA: batch_schema.BatchFile,
+    batch_schema.MANIFEST_SCHEMA: batch_schema.ManifestFile,
 }
 SCHEMAS: Final = tuple(_MODELS)
 """The names of the schemas, each with its version: ``posekit.view/1``."""

@@ -137,27 +137,32 @@ class JudgedWith(NamedTuple):
     walkers: str
 
 
-def recovered_with(result: Result) -> tuple[Figure, float]:
-    """Return the figure of a result, and the angle tolerance (degrees) that its frames were judged with.
+class RecoveredWith(NamedTuple):
+    """Whose postures a result holds, and what they were judged with."""
 
-    Both are in its settings; a result without them is taken as the built-in figure's, and exact.
-    """
-    figure, settings = load_figure(), result.settings
-    lengths = settings.get("lengths")
-    if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
-        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
-    return figure, judged_with(result).angle
+    figure: Figure
+    judged: JudgedWith
 
 
-def judged_with(result: Result) -> JudgedWith:
-    """Return what the frames of a result were judged with, by its settings; exact and by the paper where they are mute.
+def recovered_with(result: Result) -> RecoveredWith:
+    """Return what a result was recovered with, by its settings.
+
+    Where they are mute, it is taken as the built-in figure's, exact, and by the paper.
 
     Raises
     ------
     InputError
         Where the settings say what is no tolerance, margin or name.
     """
-    settings = result.settings
+    figure, settings = load_figure(), result.settings
+    lengths = settings.get("lengths")
+    if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
+        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
+    return RecoveredWith(figure, _judged(settings))
+
+
+def _judged(settings: Mapping[str, Any]) -> JudgedWith:
+    """Return what frames were judged with."""
     judged = settings.get("judged")
     kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
     asked = _number(settings, "contact_margin", 0.0)

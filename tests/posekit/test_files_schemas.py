@@ -1,12 +1,15 @@
 """The published schemas say what the readers accept."""
 
 import json
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from posekit.errors import InputError
+from posekit.figure import load_figure
 from posekit.files import (
     SCHEMAS,
     Family,
@@ -29,7 +32,96 @@ from posekit.files import (
     write_result,
     write_view,
 )
+from posekit.files.batch_schema import ManifestFile, SettingsFields, SourceFields
+from posekit.pipeline.batch.digests import of_values
+from posekit.pipeline.batch.recipe import Recipe
+from posekit.pipeline.batch.run_folder import Asked, Failure, run_folder
+from posekit.pipeline.detected.source import Source
+from posekit.pipeline.evaluation import (
+    Evaluation,
+    Method,
+    Sampling,
+    Sweep,
+    by_path,
+    evaluate,
+    write_evaluation,
+)
+from posekit.pipeline.tolerance import MEASURED
 from posekit.skeleton import JOINTS, SEGMENT_NAMES
+from posekit.synthesis import Capture
+
+TOTALS = ("inputs", "shards", "done", "planned", "frames", "survivors", "empty")
+KINDS = (
+    "view",
+    "result",
+    "postures",
+    "report",
+    "nearer",
+    "object",
+    "configurations",
+    "evaluation",
+    "batch",
+    "batch_manifest",
+)
+
+
+@cache
+def evaluation(**options: Any) -> Evaluation:
+    """Evaluate two frames, seen through two cameras."""
+    sampling = Sampling(frames_per_clip=2, consecutive="choose" in options)
+    sweep = Sweep(yaws=(0.0, 90.0), heights=(1.5,))
+    return evaluate(
+        some_capture(), sampling=sampling, sweep=sweep, method=Method(noise=(0.0, 2.0), **options)
+    )
+
+
+def some_capture() -> Capture:
+    """Return a person who stands still."""
+    return Capture(
+        points=np.tile(load_figure().neutral_points, (4, 1, 1)),
+        clip=np.zeros(4, dtype=np.intp),
+        names=("clip",),
+        actions=("standing",),
+        fps=np.array([25.0]),
+        up=np.array([0.0, 0.0, 1.0]),
+        source="capture",
+    )
+
+
+def write_batch(folder: Path) -> None:
+    """Write what a run says of itself, with failures, beside the settings of another."""
+    table, layout, camera = (folder.parent / name for name in ("ranges.toml", "layout.toml", "camera.toml"))
+    table.write_text('schema = "posekit.ranges/1"\nkind = "configuration"\n')
+    layout.write_text("x")
+    camera.write_text("x")
+    for name, recipe in (
+        ("plain", Recipe()),
+        (
+            "rich",
+            Recipe(
+                source=Source(
+                    skeleton=str(layout), camera=str(camera), size=(640, 480), rate=25.0, lengths=table
+                ),
+                ranges=str(table),
+                rigid=0.01,
+                refine=True,
+                length_deviation=0.03,
+            ),
+        ),
+        ("named", Recipe(source=Source(camera="nowhere.toml:left", calibrate=table))),
+    ):
+        settings = recipe.document()
+        with run_folder(folder / name) as run:
+            run.write_asked(
+                Asked(hash=of_values(settings), settings=settings, inputs={"a": "0" * 64}, root=folder)
+            )
+            failures = [
+                Failure(
+                    shard=shard, input="a", person=of, start=of, stop=of, error="it", attempts=1, died=False
+                )
+                for shard, of in (("", None), ("a.parquet", 0))
+            ]
+            run.write_manifest(dict.fromkeys(TOTALS, 1), failures)
 
 
 def write_all(folder, rng) -> dict[str, list]:
@@ -95,18 +187,18 @@ def write_all(folder, rng) -> dict[str, list]:
     near = {"schema": "posekit.nearer/1", "frames": [{"neck-pelvis": "neck"}]}
     (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
     assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]
+    write_evaluation(folder / "evaluation.json", evaluation())
+    write_evaluation(folder / "followed.json", evaluation(choose=by_path, tolerance=MEASURED))
+    write_batch(folder / "batch")
     documents: dict[str, list] = {name: [] for name in SCHEMAS}
-    for path in folder.iterdir():
+    for path in folder.rglob("*.json"):
         document = json.loads(path.read_text())
         documents[document["schema"]].append(document)
     return documents
 
 
 def test_each_is_versioned_and_closed():
-    assert SCHEMAS == tuple(
-        f"posekit.{kind}/1"
-        for kind in ("view", "result", "postures", "report", "nearer", "object", "configurations")
-    )
+    assert SCHEMAS == tuple(f"posekit.{kind}/1" for kind in KINDS)
     for name in SCHEMAS:
         found = schema(name)
         assert found["title"] == name
@@ -152,3 +244,42 @@ def test_what_is_refused_is_invalid_for_another_validator(tmp_path, rng):
 def test_an_unknown_schema_is_refused():
     with pytest.raises(InputError, match=r'schema: got "views"; .*did you mean view'):
         schema("views")
+
+
+def test_all_that_decides_a_batch_is_in_its_schema():
+    settings = Recipe().document()
+    assert list(settings) == list(SettingsFields.model_fields)
+    assert list(settings["source"]) == list(SourceFields.model_fields)
+    assert set(TOTALS) | {"schema_", "failed"} == set(ManifestFile.model_fields)
+
+
+def test_numbers_that_an_evaluation_cannot_have_are_refused(tmp_path):
+    jsonschema = pytest.importorskip("jsonschema")
+    write_evaluation(tmp_path / "evaluation.json", evaluation())
+    document = json.loads((tmp_path / "evaluation.json").read_text())
+    validator = jsonschema.Draft202012Validator(schema("evaluation"))
+    validator.validate(document)
+    assert {"action", "yaw", "height", "noise"} <= set(document["conditions"][0])
+    everything = document["all"]
+    for wrong in (
+        {"retained_branch": 1.1},
+        {"frames": 0},
+        {"survivors": {"mean": 1.0}},
+        {"limbs_right": {"worst": 1.0}},
+        {"noise": 0.0},
+    ):
+        assert not validator.is_valid(document | {"all": everything | wrong}), wrong
+    without = {name: value for name, value in document["by_yaw"][0].items() if name != "yaw"}
+    assert not validator.is_valid(document | {"by_yaw": [without]})
+
+
+def test_a_batch_note_names_contents_by_their_hash(tmp_path):
+    jsonschema = pytest.importorskip("jsonschema")
+    write_batch(tmp_path / "batch")
+    validator = jsonschema.Draft202012Validator(schema("batch"))
+    document = json.loads((tmp_path / "batch" / "rich" / "batch.json").read_text())
+    validator.validate(document)
+    assert not validator.is_valid(document | {"inputs": {"a": "0" * 63}})
+    assert not validator.is_valid(document | {"settings": document["settings"] | {"ranges": []}})
+    source = document["settings"]["source"] | {"camera": ["only one"]}
+    assert not validator.is_valid(document | {"settings": document["settings"] | {"source": source}})

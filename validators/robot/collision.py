@@ -15,6 +15,7 @@ from posekit.errors import InputError
 from posekit.figure.pool import collides, make_pool
 from posekit.validators.collision import CONTACT_TOLERANCE
 from posekit.validators.robot.contacts import Contacts, find_contacts
+from posekit.validators.robot.near_pairs import NearPairs
 from posekit.validators.robot.subject import Subject
 from posekit.validators.suite import Judgement
 
@@ -59,11 +60,21 @@ class SelfCollision:
 
     @cached_property
     def _with_mesh(self) -> NDArray[np.bool_]:
+        """Which pairs have a mesh (P,)."""
+        return np.asarray(self._meshes.any(axis=1))
+
+    @cached_property
+    def _meshes(self) -> NDArray[np.bool_]:
+        """Which bodies of each pair are meshes (P, 2)."""
         geometry = self._bodies
         meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in geometry.geometryObjects]
-        return np.array(
-            [meshes[pair.first] or meshes[pair.second] for pair in geometry.collisionPairs], dtype=np.bool_
-        )
+        both = [(meshes[pair.first], meshes[pair.second]) for pair in geometry.collisionPairs]
+        return np.array(both, dtype=np.bool_).reshape(-1, 2)
+
+    @cached_property
+    def _near(self) -> NearPairs | None:
+        """What spares asking pairs that are far apart, where asking is dear."""
+        return NearPairs(self.subject.model, self._bodies, self.margins) if self.has_meshes else None
 
     @cached_property
     def margins(self) -> Array:
@@ -123,6 +134,8 @@ class SelfCollision:
             margins=self.margins,
             names=subject.pair_names,
             nearest=nearest,
+            meshes=np.asarray(self._meshes.all(axis=1)),
+            near=self._near,
         )
 
     @cached_property
