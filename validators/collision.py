@@ -19,9 +19,9 @@ from posekit.figure import Figure
 from posekit.figure.capsules import Capsule
 from posekit.figure.frames import cross
 from posekit.figure.pool import collides, make_pool
-from posekit.tree import Check, Findings
-from posekit.tree.compiled import compiled
+from posekit.tree import Check, Findings, Rule
 from posekit.validators import kernels
+from posekit.validators.screening import screened
 
 CONTACT_TOLERANCE = 1e-9
 """Metres of penetration below which the verdict would be rounding noise: not a collision."""
@@ -99,22 +99,28 @@ class PairCollision:
             rejects=rejects[:, None],
         )
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array]:
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
         """Tell which pairs are clear of contact, and which seem to penetrate; see `posekit.tree.Screened`."""
-        places, placed = compiled(kernels).capsules(points, *self._shapes)
-        return places, placed
+        return screened(self.rule, points)
 
     def confirm(self, presumed: Array) -> bool:
         """Ask coal whether pairs that seem to penetrate do; see `posekit.tree.Screened`."""
         return bool(collides(self._pool, presumed.T).all())
 
     @cached_property
-    def _shapes(self) -> tuple[NDArray[np.int64], Array, float]:
-        """How the kernel takes the two capsules."""
+    def rule(self) -> Rule:
+        """The screen as numbers: shapes, reach, and how many points start and end each capsule."""
         a, b = self.a, self.b
-        sizes = np.array([len(a.start), len(a.end), len(b.start), len(b.end)], dtype=np.int64)
-        shape = np.array([a.center, a.half_length, b.center, b.half_length])
-        return sizes, shape, a.radius + b.radius + self.contact_margin
+        reach = a.radius + b.radius + self.contact_margin
+        sizes = len(a.start), len(a.end), len(b.start), len(b.end)
+        return Rule(
+            kernels=kernels,
+            kind=kernels.CAPSULES,
+            numbers=np.array(
+                [a.center, a.half_length, b.center, b.half_length, reach, *sizes], dtype=np.float64
+            ),
+            presumed=kernels.PLACED,
+        )
 
     def _coal(self, middle_a: Array, axis_a: Array, middle_b: Array, axis_b: Array) -> NDArray[np.bool_]:
         q = np.empty((14, len(middle_a)))

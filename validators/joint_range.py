@@ -5,7 +5,7 @@ Two kinds: the URDF's own angles (this file), or the paper's projected angles (`
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,12 +18,12 @@ from posekit.figure.angles import Limits
 from posekit.figure.closed_form import ClosedForm
 from posekit.figure.frames import hips_frame, torso_frame
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
-from posekit.tree import Check, Findings
-from posekit.tree.compiled import compiled
+from posekit.tree import Check, Findings, Rule
 from posekit.validators import kernels
 from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges
+from posekit.validators.screening import screened
 
 TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
@@ -86,11 +86,12 @@ def _limited(ik: ClosedForm, limits: Mapping[str, Range]) -> ClosedForm:
     return replace(ik, limits=Limits(sign=ik.limits.sign, lower=lower, upper=upper))
 
 
-def _limits(ik: ClosedForm, where: tuple[str, ...]) -> Array:
-    """Return signs and limits of some angles (3, K), as the kernels take them."""
+def _rule(ik: ClosedForm, where: tuple[str, ...], kind: int, more: Sequence[float]) -> Rule:
+    """Write a screen as numbers: signs and limits of some angles, radians, then tolerances and what else there is."""
     rows = [DOFS.index(dof) for dof in where]
     limits = ik.limits
-    return np.ascontiguousarray(np.stack([limits.sign[rows], limits.lower[rows], limits.upper[rows]]))
+    numbers = np.concatenate([limits.sign[rows], limits.lower[rows], limits.upper[rows], more])
+    return Rule(kernels=kernels, kind=kind, numbers=numbers)
 
 
 def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
@@ -120,20 +121,16 @@ class Neck:
         angles = self.ik.neck(R_torso, points[:, 0], points[:, 4:])
         return _findings(self.ik, self.where, angles, self.tolerance)
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
         """Tell what is clear; see `posekit.tree.Screened`."""
-        places: NDArray[np.int8] = compiled(kernels).neck(
-            points, self._offsets, self._limits, np.radians(self.tolerance)
+        return screened(self.rule, points)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: limits, tolerance, and where the head's points are."""
+        return _rule(
+            self.ik, self.where, kernels.NECK, [np.radians(self.tolerance), *np.ravel(self.ik.head_offsets)]
         )
-        return places, None
-
-    @cached_property
-    def _offsets(self) -> Array:
-        return np.array(self.ik.head_offsets, order="C")
-
-    @cached_property
-    def _limits(self) -> Array:
-        return _limits(self.ik, self.where)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,14 +151,14 @@ class Pelvis:
         angles = self.ik.pelvis(R_torso, R_hips)
         return _findings(self.ik, self.where, angles, self.tolerance)
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
         """Tell what is clear; see `posekit.tree.Screened`."""
-        places: NDArray[np.int8] = compiled(kernels).pelvis(points, self._limits, np.radians(self.tolerance))
-        return places, None
+        return screened(self.rule, points)
 
     @cached_property
-    def _limits(self) -> Array:
-        return _limits(self.ik, self.where)
+    def rule(self) -> Rule:
+        """The screen as numbers: limits and tolerance."""
+        return _rule(self.ik, self.where, kernels.PELVIS, [np.radians(self.tolerance)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -229,14 +226,15 @@ class Limb:
         share = np.radians(self.tolerance) / np.maximum(sine, np.finfo(np.float64).tiny)
         return np.asarray(np.degrees(np.tan(np.arcsin(np.minimum(share, 1.0)))))
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
         """Tell what is clear; see `posekit.tree.Screened`."""
-        places: NDArray[np.int8] = compiled(kernels).limb(
-            points, len(self._parent), self._limits, np.radians(self.tolerance), np.radians(UNSEEN)
-        )
-        return places, None
+        return screened(self.rule, points)
 
     @cached_property
-    def _limits(self) -> Array:
+    def rule(self) -> Rule:
+        """The screen as numbers: what the limb hangs on, whether it is whole, limits and tolerances."""
         first = DOFS.index(f"{self.limb[0]}.flexion")
-        return _limits(self.figure.ik, DOFS[first : first + 4])
+        sizes = len(self._parent), len(self.limb) == 3
+        kind = kernels.JUDGED if self.directions else kernels.LIMB
+        more = [np.radians(self.tolerance), np.radians(UNSEEN), *sizes]
+        return _rule(self.figure.ik, DOFS[first : first + 4], kind, more)

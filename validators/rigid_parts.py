@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.figure.frames import torso_frame
 from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Rule
+from posekit.validators import kernels
+from posekit.validators.screening import screened
 
 Mode = Literal["distances", "placement"]
 
@@ -126,6 +130,16 @@ class Distance:
             upper=np.array([self.length + self.tolerance]),
         )
 
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
+        """Tell what is clear; see `posekit.tree.Screened`."""
+        return screened(self.rule, points)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: the bounds."""
+        bounds = np.array([self.length - self.tolerance, self.length + self.tolerance])
+        return Rule(kernels=kernels, kind=kernels.DISTANCE, numbers=bounds)
+
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 
@@ -147,3 +161,13 @@ class Placement:
         placed = points[:, :1] + np.einsum("nij,pj->npi", R, self.torso)
         value = np.linalg.norm(placed - points, axis=-1).max(axis=1)[:, None]
         return Findings(value=value, lower=np.array([-np.inf]), upper=np.array([self.tolerance]))
+
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
+        """Tell what is clear; see `posekit.tree.Screened`."""
+        return screened(self.rule, points)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: the tolerance, and the figure's torso."""
+        numbers = np.concatenate([[self.tolerance], np.ravel(self.torso)])
+        return Rule(kernels=kernels, kind=kernels.PLACEMENT, numbers=numbers)

@@ -5,6 +5,8 @@ from posekit.tree.check import PASSED as PASSED
 from posekit.tree.check import UNSURE as UNSURE
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
+from posekit.tree.check import Rule as Rule
+from posekit.tree.check import Ruled as Ruled
 from posekit.tree.check import Screened as Screened
 from posekit.tree.enumeration import enumerate_leaves as enumerate_leaves
 from posekit.tree.interpretation_tree import InterpretationTree as InterpretationTree

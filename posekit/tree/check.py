@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Protocol
 
 import numpy as np
@@ -108,4 +109,35 @@ class Screened(Check, Protocol):
 
     def confirm(self, presumed: Array) -> bool:
         """Ask whoever has the last word whether all that was presumed (M, …) is so."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rule:
+    """A screen as numbers, for loops that grow whole trees and ask all checks on the way.
+
+    Parameters
+    ----------
+    kernels : module
+        Where a function ``screen`` tells what is clear in one posture (see `posekit.tree.frame_kernels.screen`). All
+        rules that a tree is grown with have the same.
+    kind : int
+        What it takes the numbers for.
+    numbers : array (N,)
+    presumed : int
+        How many numbers it gives for `Screened.confirm` with every place violated; 0 where none need be confirmed.
+    """
+
+    kernels: ModuleType
+    kind: int
+    numbers: Array
+    presumed: int = 0
+
+
+class Ruled(Screened, Protocol):
+    """A check whose screen is a rule."""
+
+    @property
+    def rule(self) -> Rule:
+        """The screen; it says what `screen` says."""
         ...

@@ -1,8 +1,8 @@
 """Loops that Numba compiles where it is installed (the extra ``fast``), once it pays.
 
 A module of kernels is plain Python on plain arrays, with the functions to compile listed in `COMPILED`, each with the
-types it takes (none: it is compiled into those that call it). They are compiled as copies that know each other; the
-module itself needs no Numba. Machine code is kept on disk in Numba's own
+types it takes (none: it is compiled into those that call it), and those of other modules in `PARTS`. They are compiled
+as copies that know each other; the module itself needs no Numba. Machine code is kept on disk in Numba's own
 cache, under names that carry a hash of the source and its constants: old code is never run for new sources.
 
 What runs compiled gives what runs uncompiled, so it may be switched at any moment. Importing Numba and loading the code
@@ -14,9 +14,10 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import sys
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -30,7 +31,7 @@ PAYS_FROM = 5000
 """Frames that were grown in this process from which Numba is loaded: until then it costs more than it brings."""
 
 _LOCK = threading.Lock()
-_LOADED: dict[str, Any] = {}
+_LOADED: dict[tuple[str, str], Any] = {}
 
 
 class _State:
@@ -79,42 +80,72 @@ def path(chosen: Path_) -> Iterator[None]:
         _State.chosen = before
 
 
-def compiled(module: ModuleType) -> Any:
-    """Return a module's kernels, compiled if Numba is there: an object with a function for each of `COMPILED`."""
-    loaded = _LOADED.get(module.__name__)
+def compiled(module: ModuleType, parts: ModuleType | None = None) -> Any:
+    """Return a module's kernels, compiled if Numba is there: an object with a function for each of `COMPILED`.
+
+    Functions of `parts` take the place of those of the same name: a module may leave some to be filled in.
+    """
+    key = (module.__name__, "" if parts is None else parts.__name__)
+    loaded = _LOADED.get(key)
     if loaded is None:
         with _LOCK:
-            loaded = _LOADED.setdefault(module.__name__, _load(module))
+            loaded = _LOADED.get(key)
+            if loaded is None:
+                loaded = _LOADED[key] = _load(module, parts)
     return loaded
 
 
-def _load(module: ModuleType) -> Any:
+def _load(module: ModuleType, parts: ModuleType | None) -> Any:
     numba = _numba()
     if numba is None:
-        return module
+        return module if parts is None else _linked(module, parts, lambda copy, types: copy)
     try:
-        return _compiled(module, numba, on_disk=True)
+        return _compiled(module, parts, numba, on_disk=True)
     except (RuntimeError, OSError, EOFError, pickle.UnpicklingError):
         # No folder that can be written, or a damaged cache: compile for this process alone.
-        return _compiled(module, numba, on_disk=False)
+        return _compiled(module, parts, numba, on_disk=False)
 
 
-def _compiled(module: ModuleType, numba: ModuleType, *, on_disk: bool) -> SimpleNamespace:
+def _compiled(
+    module: ModuleType, parts: ModuleType | None, numba: ModuleType, *, on_disk: bool
+) -> SimpleNamespace:
     """Compile copies of a module's functions, which call each other's compiled copies."""
-    names = dict(vars(module))
-    constants = sorted((name, value) for name, value in names.items() if isinstance(value, int | float))
-    source = Path(str(module.__file__)).read_bytes()
-    digest = hashlib.sha256(source + repr(constants).encode()).hexdigest()[:12]
-    for name, types in module.COMPILED.items():
-        function = names[name]
-        copy = FunctionType(function.__code__, names, name, function.__defaults__)
-        copy.__qualname__ = f"{name}_{digest}"
-        copy.__module__ = module.__name__
+
+    def compiling(copy: FunctionType, types: str) -> Any:
         if types:
-            names[name] = numba.njit(types, nogil=True, cache=on_disk, error_model="numpy")(copy)
-        else:
-            names[name] = numba.njit(nogil=True, error_model="numpy")(copy)
-    return SimpleNamespace(**{name: names[name] for name, types in module.COMPILED.items() if types})
+            return numba.njit(types, nogil=True, cache=on_disk, error_model="numpy")(copy)
+        return numba.njit(nogil=True, error_model="numpy", forceinline=parts is not None)(copy)
+
+    return _linked(module, parts, compiling)
+
+
+def _linked(
+    module: ModuleType, parts: ModuleType | None, make: Callable[[FunctionType, str], Any]
+) -> SimpleNamespace:
+    """Make copies of functions that know those before them, each with the other names of the file it is from."""
+    filled = {} if parts is None else _of(parts)
+    wanted = filled | {name: pair for name, pair in _of(module).items() if name not in filled}
+    homes = dict.fromkeys(function.__module__ for function, _ in wanted.values())
+    spaces = {home: dict(vars(sys.modules[home])) for home in homes}
+    digest = hashlib.sha256()
+    for names in spaces.values():
+        constants = sorted((name, value) for name, value in names.items() if isinstance(value, int | float))
+        digest.update(Path(str(names["__file__"])).read_bytes() + repr(constants).encode())
+    made: dict[str, Any] = {}
+    for name, (function, types) in wanted.items():
+        copy = FunctionType(function.__code__, spaces[function.__module__], name, function.__defaults__)
+        copy.__qualname__ = f"{name}_{digest.hexdigest()[:12]}"
+        copy.__module__ = function.__module__
+        made[name] = make(copy, types)
+        for names in spaces.values():
+            names[name] = made[name]
+    return SimpleNamespace(**{name: made[name] for name, types in module.COMPILED.items() if types})
+
+
+def _of(module: ModuleType) -> dict[str, tuple[FunctionType, str]]:
+    """Return the functions to compile, with the types they take: those of the modules in `PARTS` first."""
+    wanted = {name: each for part in getattr(module, "PARTS", ()) for name, each in _of(part).items()}
+    return wanted | {name: (vars(module)[name], types) for name, types in module.COMPILED.items()}
 
 
 @cache

@@ -21,6 +21,9 @@ FRAME, CODE, PATHS = range(3)
 WHY = 2
 """Column of a lost node, after frame and code: its state, or the place of the check that rejected it."""
 
+GROUP, OF_FRAME, LOST, PLACE = range(4)
+"""Columns of a lost node in the end: who rejected it, frame, code and place."""
+
 Ints = NDArray[np.int32]
 Bytes = NDArray[np.int8]
 
@@ -210,6 +213,30 @@ def part(nodes: Ints, row: Ints, places: Bytes) -> tuple[Ints, Ints]:
     return kept, lost[:dead]
 
 
+def sort(lost: Ints, groups: int) -> tuple[Ints, Ints, Bytes, NDArray[np.int64]]:
+    """Sort lost nodes (M, 4) by who rejected them, else left in order.
+
+    Returns
+    -------
+    frame, code, place : int array (M,)
+    start : int array (groups + 1,)
+        Where each group's start and the last ends.
+    """
+    start = np.zeros(groups + 1, np.int64)
+    for i in range(len(lost)):
+        start[lost[i, GROUP] + 1] += 1
+    for g in range(groups):
+        start[g + 1] += start[g]
+    at = start.copy()
+    frame, code = np.empty(len(lost), np.int32), np.empty(len(lost), np.int32)
+    place = np.empty(len(lost), np.int8)
+    for i in range(len(lost)):
+        k = at[lost[i, GROUP]]
+        at[lost[i, GROUP]] += 1
+        frame[k], code[k], place[k] = lost[i, OF_FRAME], lost[i, LOST], lost[i, PLACE]
+    return frame, code, place, start
+
+
 COMPILED = {
     "lift": (
         "(i8, i8, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, "
@@ -218,5 +245,6 @@ COMPILED = {
     "branch": "(i4[:, ::1], i8, i8, i1[:, ::1], i8)",
     "pose": "(i4[:, ::1], i4[::1], i4[::1], i4[::1], i4[::1], f8[:, :, ::1])",
     "part": "(i4[:, ::1], i4[::1], i1[::1])",
+    "sort": "(i4[:, ::1], i8)",
 }
 """The kernels, in the order in which they need each other, with the types they take."""

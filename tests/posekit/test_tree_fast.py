@@ -5,8 +5,9 @@ Where Numba is not installed the same loops run as Python does, over fewer views
 
 import importlib.util
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from types import SimpleNamespace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -14,11 +15,15 @@ import pytest
 
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.figure import load_figure
-from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree, Leaves, compiled, fast, kernels
+from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+from posekit.tree import Check, InterpretationTree, Leaves, compiled, fast, kernels, whole
+from posekit.tree.blocks import Block
 from posekit.tree.candidates import Candidates, lift_all, rays_of
+from posekit.tree.layout import places_of, programme_of
+from posekit.tree.steps import grow_steps
 from posekit.validators import load_ranges, make_checks
 from posekit.validators.collision import PairCollision
+from posekit.validators.rigid_parts import RigidTolerance
 
 FIGURE = load_figure()
 LENGTHS = np.array([0.0] + [FIGURE.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])
@@ -165,6 +170,36 @@ def uncalibrated() -> tuple[Leaves, Leaves]:
     return both(checks(), points[:, 0], camera.project(points)[:, :N], points[:, N:], camera=camera)
 
 
+def measured() -> tuple[Leaves, Leaves]:
+    """Torsos that give and pixels that are off, judged as measured points are; every third arm is all but straight."""
+    points = postures(22, VIEWS // 2, beyond=0.1)
+    elbow, wrist, shoulder = (JOINT[f"right_{name}"] for name in ("elbow", "wrist", "shoulder"))
+    upper = points[::3, elbow] - points[::3, shoulder]
+    points[::3, wrist] = points[::3, elbow] + 0.9 * upper
+    points[:, JOINT["left_shoulder"]] += np.random.default_rng(23).normal(0.0, 0.01, (len(points), 3))
+    image = hide_some(seen(points, noise=1.0), 24)
+    image[: VIEWS // 4] = seen(points, noise=1.0)[: VIEWS // 4]
+    rigid = RigidTolerance(shoulders=0.03, sides=0.03, hips=0.0075)
+    suite = make_checks(
+        FIGURE,
+        ("rigid-parts", "joint-range", "collision"),
+        ranges=load_ranges("urdf"),
+        rigid_tolerance=rigid,
+        rigid_mode="distances",
+        angle_tolerance=2.0,
+    )
+    return both(suite, points[:, 0], image, points[:, N:], tolerance=0.01)
+
+
+def empty_frames() -> tuple[Leaves, Leaves]:
+    """Frames without a root, without a joint that is seen, and without any branch, among others."""
+    points = postures(25, 24)
+    root, image = points[:, 0].copy(), seen(points)
+    root[::4], image[1::4] = np.nan, np.nan
+    image[2::4, 1:] += 5000.0
+    return both(checks(), root, image, points[:, N:])
+
+
 def one_view() -> tuple[Leaves, Leaves]:
     points = postures(12, 1)
     return both(checks(), points[:, 0], seen(points), points[:, N:])
@@ -198,6 +233,8 @@ CASES = (
     projected_ranges,
     several_hypotheses,
     at_the_limits,
+    measured,
+    empty_frames,
     tangent_and_behind,
     uncalibrated,
     one_view,
@@ -234,17 +271,90 @@ def test_the_cases_lose_branches_for_every_reason() -> None:
     assert reasons >= lifts | {"rigid_parts", "joint_range"}  # and collisions: see below
 
 
-@pytest.mark.parametrize("threads", [1, 3])
-def test_blocks_and_threads_change_nothing(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
-    points = postures(15, VIEWS // 4 + 2)
-    whole = both(checks(), points[:, 0], seen(points), points[:, N:])[1]
-    monkeypatch.setattr(fast, "BLOCK", 2)
+def at_a_pole(frames: int) -> np.ndarray:
+    """Draw postures of which every fifth has an arm along its abduction axis: no screen is sure of it."""
+    rng = np.random.default_rng(15)
+    q = np.tile(pin.neutral(FIGURE.model), (frames, 1))
+    q[:, :3] = [0.0, 0.0, 4.0]
+    q[:, FIGURE.angle_index] = rng.uniform(FIGURE.limits.lower, FIGURE.limits.upper, (frames, 22))
+    q[::5, FIGURE.angle_index[DOFS.index("right_shoulder.abduction")]] = np.pi / 2
+    return FIGURE.forward_kinematics(q)
+
+
+@pytest.mark.parametrize("size", [1, 4, 1000])
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("frames", [1, 2, 23])
+def test_blocks_and_threads_change_nothing(
+    monkeypatch: pytest.MonkeyPatch, frames: int, threads: int, size: int
+) -> None:
+    points = at_a_pole(frames if NUMBA else min(frames, 6))
+    suite = checks()
+    whole = both(suite, points[:, 0], seen(points), points[:, N:])[0]
+    for name in ("LEAST", "MOST", "BLOCK"):
+        monkeypatch.setattr(fast, name, size)
     compiled.use_threads(threads)
     try:
-        split = both(checks(), points[:, 0], seen(points), points[:, N:])[1]
+        with compiled.path("fast"):
+            split = TREE.grow(CAMERA, points[:, 0], seen(points), suite, given=points[:, N:], tolerance=1e-9)
     finally:
         compiled.use_threads(None)
     assert_same(whole, split)
+
+
+def test_frames_are_shared_out_evenly() -> None:
+    for threads, frames in ((1, 1000), (2, 1015), (3, 100), (2, 9), (2, 30_001)):
+        compiled.use_threads(threads)
+        try:
+            blocks = fast._blocks(frames)
+        finally:
+            compiled.use_threads(None)
+        assert [b for _, b in blocks[:-1]] == [a for a, _ in blocks[1:]]
+        assert (blocks[0][0], blocks[-1][1]) == (0, frames)
+        sizes = {b - a for a, b in blocks[:-1]}
+        assert len(sizes) <= 1
+        assert max(b - a for a, b in blocks) <= fast.MOST
+        if frames > threads * fast.LEAST:
+            assert len(blocks) >= threads
+
+
+def test_only_frames_of_which_a_rule_is_unsure_are_grown_step_by_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points = at_a_pole(20 if NUMBA else 6)
+    stepped: list[int] = []
+
+    def spy(*args: Any) -> Block:
+        stepped.extend(args[-1].tolist())
+        return grow_steps(*args)
+
+    monkeypatch.setattr(fast, "grow_steps", spy)
+    plain, quick = both(checks(), points[:, 0], seen(points), points[:, N:])
+    assert_same(plain, quick)
+    assert stepped == list(range(0, len(points), 5))
+
+
+def test_rows_that_are_too_few_are_made_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    points = postures(26, 40 if NUMBA else 3, beyond=0.0)
+    for name in ("NODES", "LEAVES", "LOSSES", "QUESTIONS"):
+        monkeypatch.setattr(whole, name, 1)
+    compiled.use_threads(1)
+    try:
+        assert_same(*both(checks(0.05, 3.0), points[:, 0], seen(points), points[:, N:], tolerance=0.05))
+    finally:
+        compiled.use_threads(None)
+
+
+def test_checks_that_a_loop_does_not_know_are_asked_step_by_step() -> None:
+    suite: list[Any] = list(checks())
+    nothing: list[list[Any]] = [[] for _ in range(N - 1)]
+    places = [places_of(check.points, PARENTS, tuple(range(N + 1)), N + 1) for check in suite]
+    assert programme_of([*nothing, suite], [*nothing, places]) is not None
+    assert programme_of([*nothing, []], [*nothing, []]) is None
+    ruleless = SimpleNamespace(points=suite[0].points)
+    stranger = SimpleNamespace(points=suite[0].points, rule=replace(suite[0].rule, kernels=kernels))
+    for other in (ruleless, stranger):
+        layout: list[list[Any]] = [*nothing, [*suite, other]]
+        assert programme_of(layout, [*nothing, [*places, places[0]]]) is None
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["one length", "a length a frame"])

@@ -6,16 +6,19 @@ import pytest
 
 from posekit.figure import load_figure
 from posekit.figure.frames import fit_rotation
+from posekit.skeleton import DOFS
 from posekit.tree import PASSED, UNSURE, Check, Screened
-from posekit.tree.compiled import compiled
-from posekit.validators import collision, joint_range, kernels
+from posekit.tree.frame_kernels import NUMBERS
+from posekit.validators import angle_kernels, collision, joint_range, rigid_parts
+from posekit.validators.angle_kernels import TURN
 
 FIGURE = load_figure()
 N = 150
 
 
 def suite(tolerance: float) -> list[Check]:
-    return [*joint_range(FIGURE, tolerance=tolerance), *collision(FIGURE)]
+    rigid = rigid_parts(FIGURE, tolerance=tolerance / 100)
+    return [*rigid, *joint_range(FIGURE, tolerance=tolerance), *collision(FIGURE)]
 
 
 SUITES = {tolerance: suite(tolerance) for tolerance in (0.0, 1e-3, 3.0)}
@@ -82,23 +85,54 @@ def test_a_screen_is_hardly_ever_unsure_of_ordinary_postures(index: int) -> None
 def test_the_polar_factor_is_the_best_rotation() -> None:
     rng = np.random.default_rng(0)
     body = rng.normal(size=(5, 3))
-    loops = kernels
     for _ in range(20):
         seen = rng.normal(size=(5, 3))
         expected = fit_rotation(body, seen[None])[0]
-        X = np.empty((3, 3))
-        if loops.polar(np.einsum("pi,pj->ij", seen, body), X):
+        w = np.empty(NUMBERS)
+        w[TURN : TURN + 9] = np.einsum("pi,pj->ij", seen, body).ravel()
+        if angle_kernels.polar(w):
+            X = w[TURN : TURN + 9].reshape(3, 3)
             np.testing.assert_allclose(X, expected, rtol=0, atol=1e-11)
             np.testing.assert_allclose(X @ X.T, np.eye(3), rtol=0, atol=1e-12)
 
 
 def test_a_mirrored_or_flat_head_is_not_clear() -> None:
-    X = np.empty((3, 3))
+    w = np.empty(NUMBERS)
     for C in (np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 0.0]), np.zeros((3, 3)), np.full((3, 3), np.nan)):
-        assert not kernels.polar(C, X)
+        w[TURN : TURN + 9] = C.ravel()
+        assert not angle_kernels.polar(w)
 
 
-def test_kernels_are_compiled_in_an_order_in_which_each_finds_its_parts() -> None:
-    loops = compiled(kernels)
-    for name, types in kernels.COMPILED.items():
-        assert not types or callable(getattr(loops, name))
+@pytest.mark.parametrize("off", [-1e-3, -1e-9, -1e-13, 0.0, 1e-13, 1e-9, 1e-3])
+def test_a_distance_at_its_bound_is_left_to_the_judge(off: float) -> None:
+    rng = np.random.default_rng(7)
+    for check in rigid_parts(FIGURE, tolerance=0.01, mode="distances"):
+        a, b = check.points
+        points = postures(8, 20) + rng.normal(size=(20, 1, 3))
+        along = points[:, b] - points[:, a]
+        length = np.linalg.norm(along, axis=1, keepdims=True)
+        points[:, b] = points[:, a] + along / length * (length + 0.01 + off)
+        screened, judged = places(check, points)
+        clear = screened != UNSURE
+        assert clear.all() == (abs(off) > 1e-12)
+        np.testing.assert_array_equal(screened[clear], judged[clear])
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-7, 3e-6])
+@pytest.mark.parametrize("tolerance", [1e-3, 3.0])
+def test_straight_limbs_are_clear_where_their_rotation_is_not_judged(bend: float, tolerance: float) -> None:
+    """Elbows and knees of real motion are often straight to rounding."""
+    rng = np.random.default_rng(9)
+    q = np.tile(pin.neutral(FIGURE.model), (N, 1))
+    q[:, FIGURE.angle_index] = rng.uniform(FIGURE.limits.lower, FIGURE.limits.upper, (N, 22))
+    hinges = [
+        DOFS.index(f"{side}_{hinge}.flexion") for side in ("right", "left") for hinge in ("elbow", "knee")
+    ]
+    q[:, FIGURE.angle_index[hinges]] = bend
+    points = FIGURE.forward_kinematics(q)
+    for check in SUITES[tolerance]:
+        if len(check.where) == 4:
+            screened, judged = places(check, points)
+            clear = screened != UNSURE
+            np.testing.assert_array_equal(screened[clear], judged[clear])
+            assert clear.mean() > (0.95 if 7 * bend < np.radians(tolerance) else -1)
