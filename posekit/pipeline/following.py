@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -118,6 +118,7 @@ def follow(
     model: MotionModel | None = None,
     beam: Beam | None = None,
     apart: float = APART,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Following:
     """Follow the person through the frames of a recovery, whose survivors cost what they are ranked.
 
@@ -134,6 +135,8 @@ def follow(
         Which paths are followed while searching.
     apart : float
         Metres by which some joint has to be elsewhere in some frame for a path to be another one.
+    progress : callable, optional
+        Told after every frame how many were searched, and how many will be at most: K times the frames.
 
     Returns
     -------
@@ -156,7 +159,13 @@ def follow(
         with np.errstate(divide="ignore"):
             log_probability = [np.log(each) for each in recovery.probability]
     return follow_frames(
-        recovery.frames, log_probability=log_probability, k=k, model=model, beam=beam, apart=apart
+        recovery.frames,
+        log_probability=log_probability,
+        k=k,
+        model=model,
+        beam=beam,
+        apart=apart,
+        progress=progress,
     )
 
 
@@ -168,6 +177,7 @@ def follow_frames(
     model: MotionModel | None = None,
     beam: Beam | None = None,
     apart: float = APART,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Following:
     """Follow the person through recovered frames, whose survivors cost nothing unless their probabilities are given.
 
@@ -191,7 +201,7 @@ def follow_frames(
     if any(frame.family is not None for frame in frames):
         model = model or MotionModel(resting=math.inf)
         searched = [_about_neck(frame) for frame in given]
-    paths = best_paths(searched, k=k, model=model, beam=beam, apart=apart)
+    paths = best_paths(searched, k=k, model=model, beam=beam, apart=apart, progress=progress)
     return _following(frames, given, paths, k, apart)
 
 

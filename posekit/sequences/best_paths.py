@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ def best_paths(
     model: MotionModel | None = None,
     beam: Beam | None = None,
     apart: float = APART,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Paths:
     """Find the cheapest paths through the survivors of a sequence.
 
@@ -49,6 +50,9 @@ def best_paths(
         Which paths are followed while searching.
     apart : float
         Metres.
+    progress : callable, optional
+        Told after every frame of every search how many there were so far, and how many there will be at most: each path
+        takes a search.
 
     Returns
     -------
@@ -79,7 +83,7 @@ def best_paths(
     exact = False
     for number in range(k):
         new = None if number == 0 else [_new(frame, at, along, apart) for at, frame in enumerate(frames)]
-        found = _cheapest(frames, model, beam, new)
+        found = _cheapest(frames, model, beam, new, _after(progress, number * len(frames), k * len(frames)))
         if found is None:
             break
         cost, path, dropped = found
@@ -100,14 +104,24 @@ def best_paths(
     )
 
 
+def _after(progress: Callable[[int, int], None] | None, before: int, total: int) -> Callable[[int], None]:
+    """Tell progress how many frames of a search are done."""
+    return lambda done: None if progress is None else progress(before + done, total)
+
+
 def _cheapest(
-    frames: Sequence[SurvivorFrame], model: MotionModel, beam: Beam, new: list[NDArray[np.bool_]] | None
+    frames: Sequence[SurvivorFrame],
+    model: MotionModel,
+    beam: Beam,
+    new: list[NDArray[np.bool_]] | None,
+    tell: Callable[[int], None],
 ) -> tuple[float, NDArray[np.intp], float] | None:
     """Find the cheapest path, of fresh ones where it is said what is new: cost, survivors, cheapest end dropped."""
     states, steps = States.start(), list[Step]()
     for k, frame in enumerate(frames):
         states, step = advance(states, frame, model, beam, fresh=None if new is None else new[k])
         steps.append(step)
+        tell(k + 1)
     ends = np.arange(len(states)) if new is None else np.flatnonzero(states.fresh)
     if not len(ends):
         return None

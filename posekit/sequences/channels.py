@@ -35,9 +35,18 @@ class Channels:
     variance: Array
     known: NDArray[np.bool_]
 
+    @property
+    def centre(self) -> Array:
+        """The mean (27, 3) of each channel where it is known."""
+        return np.asarray(self.value.sum(axis=1) / np.maximum(self.known.sum(axis=1), 1)[:, None])
+
     def take(self, rows: NDArray[np.intp]) -> Channels:
         """Return some postures, by index."""
-        return Channels(value=self.value[:, rows], variance=self.variance[:, rows], known=self.known[:, rows])
+        return Channels(
+            value=self.value.take(rows, axis=1),
+            variance=self.variance.take(rows, axis=1),
+            known=self.known.take(rows, axis=1),
+        )
 
 
 def directions(joints: Array) -> tuple[Array, Array]:

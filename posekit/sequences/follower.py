@@ -17,7 +17,7 @@ from posekit.sequences.motion_model import MotionModel
 from posekit.sequences.search import Step, advance
 from posekit.sequences.states import States
 
-LIVE = Beam(width=256, survivors=1024)
+LIVE = Beam(width=128, survivors=1024)
 """Which paths are followed live, unless told otherwise."""
 
 

@@ -127,7 +127,9 @@ class MotionModel:
         """Scales of the velocities of channels that rest."""
         return np.concatenate([np.asarray(self.resting), np.full(N_SEGMENTS, np.inf)])
 
-    @cached_property
-    def sudden(self) -> Array:
-        """Scales of the accelerations of all channels; infinite for the directions of segments."""
-        return np.concatenate([np.asarray(self.acceleration), np.full(N_SEGMENTS, np.inf)])
+    def reach(self, since: Array) -> Array:
+        """Return the walls (27, S) after some time (27, S): metres, chords of angles; infinite where there is none."""
+        far = np.asarray(self.max_speed)[:, None] * since[:N_JOINTS]
+        angle = np.asarray(self.max_swing)[:, None] * since[N_JOINTS:]
+        chord = np.where(angle < np.pi, 2 * np.sin(np.minimum(angle, np.pi) / 2), np.inf)
+        return np.concatenate([far, chord])

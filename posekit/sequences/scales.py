@@ -46,14 +46,24 @@ class ScaleChoice:
     @property
     def between(self) -> float:
         """The minimum of the parabola through the cheapest scale and its neighbours; at the ends the scale itself."""
+        return self._minimum()[0]
+
+    @property
+    def deviation(self) -> float:
+        """Standard deviation of that, as costs tell it: far too small where frames are not independent."""
+        return self._minimum()[1]
+
+    def _minimum(self) -> tuple[float, float]:
         at = self.best
         if not 0 < at < len(self.scales) - 1:
-            return self.scale
+            gap = np.abs(np.delete(self.scales, at) - self.scale).min(initial=np.inf)
+            return self.scale, float(gap)
         x, y = self.scales[at - 1 : at + 2] - self.scales[at], self.cost[at - 1 : at + 2]
         curvature, slope, _ = np.polyfit(x, y, 2)
         if not curvature > 0:
-            return self.scale
-        return float(np.clip(-slope / (2 * curvature), x[0], x[2]) + self.scales[at])
+            return self.scale, float(np.abs(x).max())
+        found = float(np.clip(-slope / (2 * curvature), x[0], x[2]) + self.scales[at])
+        return found, float(1 / math.sqrt(2 * curvature))
 
 
 def choose_scale(

@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from posekit.cameras import Array
 from posekit.sequences.arrivals import arrivals
 from posekit.sequences.beam import Beam
-from posekit.sequences.channels import Channels, channels_of
+from posekit.sequences.channels import N_JOINTS, Channels, channels_of
 from posekit.sequences.frame import SurvivorFrame
 from posekit.sequences.motion_model import MotionModel
 from posekit.sequences.states import States
-from posekit.sequences.transitions import Target
 
 ABSENT: Final = 5.0
 """Cost of each joint that a survivor does not know and another of its frame does."""
@@ -66,27 +65,41 @@ def advance(
     fresh : bool array (N,), optional
         Survivors that make a path fresh.
     """
-    passed = replace(states, cost=states.cost + model.skip)
-    parent, survivor = np.arange(len(states)), np.full(len(states), -1, dtype=np.intp)
+    skipped = states.cost + model.skip
     channels = channels_of(frame.joints, frame.deviation)
     own = model.ranking * frame.cost + _absence(channels)
     usable, dropped = beam.cheapest(np.where(channels.known.any(axis=0), own, np.inf))
     dropped += float(states.cost.min())
-    if len(usable):
+    if not len(usable):
+        least = 0 if np.isfinite(states.interval).any() else len(frame) + 1
+        rows, lost = beam.keep(skipped, states.fresh, least=least)
+        passed = replace(states, cost=skipped).take(rows)
+        return passed, Step(parent=rows, survivor=np.full(len(rows), -1), dropped=min(dropped, lost))
+    if len(usable) < len(frame):
         channels = channels.take(usable)
-        target = Target.of(channels, frame.time)
-        new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
-        came, went, cost, left_out = arrivals(states, target, own[usable], new, model=model, beam=beam)
-        dropped = min(dropped, left_out)
-        moved = _move(states.take(came), channels.take(went), cost, frame.time, new[went])
-        moved = replace(moved, group=states.group.max() + 1 + 2 * went + moved.fresh)
-        states = States.join(moved, passed)
-        parent, survivor = np.concatenate([came, parent]), np.concatenate([usable[went], survivor])
-    else:
-        states = passed
-    least = 0 if np.isfinite(states.interval).any() else len(frame) + 1
-    rows, lost = beam.keep(states.cost, states.fresh, least=least)
-    return states.take(rows), Step(parent=parent[rows], survivor=survivor[rows], dropped=min(dropped, lost))
+    new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
+    came, went, cost, left_out = arrivals(
+        states, channels, frame.time, own[usable], new, model=model, beam=beam
+    )
+    # Once a path has a velocity, the beam is no wider than it is said to be.
+    seen = np.isfinite(states.time[:N_JOINTS]).any(axis=1) & channels.known[:N_JOINTS].any(axis=1)
+    still = not (np.isfinite(states.interval).any() or (len(came) and seen.any()))
+    rows, lost = beam.keep(
+        np.concatenate([cost, skipped]),
+        np.concatenate([states.fresh[came] | new[went], states.fresh]),
+        least=len(frame) + 1 if still else 0,
+    )
+    moved, stayed = rows[rows < len(cost)], rows[rows >= len(cost)] - len(cost)
+    came, went = came[moved], went[moved]
+    after = _move(states.take(came), channels.take(went), cost[moved], frame.time, new[went])
+    after = replace(after, group=states.group.max() + 1 + 2 * went + after.fresh)
+    if len(stayed):
+        after = States.join(after, replace(states, cost=skipped).take(stayed))
+    return after, Step(
+        parent=np.concatenate([came, stayed]),
+        survivor=np.concatenate([usable[went], np.full(len(stayed), -1)]),
+        dropped=min(dropped, left_out, lost),
+    )
 
 
 def trace(steps: Sequence[Step], end: int) -> NDArray[np.intp]:
@@ -106,19 +119,31 @@ def _absence(channels: Channels) -> Array:
 
 def _move(old: States, to: Channels, cost: Array, time: float, new: NDArray[np.bool_]) -> States:
     """Return the states after steps to survivors: what these do not know is carried on."""
-    since = time - old.time
+    joints = slice(N_JOINTS)
+    since = time - old.time[joints]
     had = np.isfinite(since)
-    velocity = (to.value - old.position) / np.where(had, since, 1.0)[..., None]
-    fresh = old.fresh | new
-    three = to.known[..., None]
+    velocity = np.where(had, 1.0 / np.where(had, since, 1.0), 0.0)[..., None] * (
+        to.value[joints] - old.position[joints]
+    )
+    if to.known.all():
+        position, at, variance = to.value, np.full(to.known.shape, time), to.variance
+        interval, earlier = since, old.variance[joints]
+    else:
+        three, known = to.known[..., None], to.known[joints]
+        position = np.where(three, to.value, old.position)
+        at = np.where(to.known, time, old.time)
+        variance = np.where(to.known, to.variance, old.variance)
+        velocity = np.where(three[joints], velocity, old.velocity)
+        interval = np.where(known, since, old.interval)
+        earlier = np.where(known, old.variance[joints], old.earlier_variance)
     return States(
         cost=cost,
         group=old.group,
-        fresh=fresh,
-        position=np.where(three, to.value, old.position),
-        time=np.where(to.known, time, old.time),
-        variance=np.where(to.known, to.variance, old.variance),
-        velocity=np.where(three, np.where(had[..., None], velocity, 0.0), old.velocity),
-        interval=np.where(to.known, since, old.interval),
-        earlier_variance=np.where(to.known, old.variance, old.earlier_variance),
+        fresh=old.fresh | new,
+        position=position,
+        time=at,
+        variance=variance,
+        velocity=velocity,
+        interval=interval,
+        earlier_variance=earlier,
     )

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
-from posekit.sequences.channels import N_JOINTS, Channels
+from posekit.sequences.channels import Channels
 from posekit.sequences.motion_model import MotionModel
 from posekit.sequences.states import States
 from posekit.sequences.student import columns, rows, unlikelihood
@@ -40,9 +40,8 @@ class Target:
     @staticmethod
     def of(channels: Channels, time: float) -> Target:
         """Lay out the survivors of a frame."""
-        known = channels.known[..., None]
-        centre = channels.value.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
-        value = np.where(known, channels.value - centre[:, None], 0.0)
+        centre = channels.centre
+        value = np.where(channels.known[..., None], channels.value - centre[:, None], 0.0)
         return Target(
             channels=channels,
             time=time,
@@ -78,28 +77,19 @@ def step_costs(states: States, target: Target, model: MotionModel) -> Array:
 
 def turn_costs(states: States, target: Target, model: MotionModel) -> Array:
     """Return what each change of velocity costs (S, N), from that of arrival to that of departure."""
-    pick = np.flatnonzero(np.isfinite(model.sudden))
+    scale = np.asarray(model.acceleration)
+    pick = np.flatnonzero(np.isfinite(scale))
     if not len(pick):
         return np.zeros((len(states), target.columns.shape[2]))
-    before = states.interval[pick]
-    known = np.isfinite(before)
-    before = np.where(known, before, 1.0)
-    after = np.where(known, target.time - states.time[pick], 1.0)
-    weight = (2 / (after * (before + after)) / model.sudden[pick, None]) ** 2
-    ratio = after / before
-    variance, earlier = states.variance[pick], states.earlier_variance[pick]
-    place = states.position[pick] + states.velocity[pick] * after[..., None] - target.centre[pick][:, None]
+    heading = states.heading(target.time)
+    known, variance = heading.known[pick], heading.variance[pick]
+    weight = heading.weight[pick] / scale[pick, None] ** 2
+    place = heading.place[pick] - target.centre[pick][:, None]
     return unlikelihood(
-        rows(
-            place,
-            weight / model.nu,
-            weight * ((1 + ratio) ** 2 * variance + ratio**2 * earlier),
-            weight,
-            known,
-        ),
+        rows(place, weight / model.nu, weight * variance, weight, known),
         target.columns[pick],
         model.nu,
-        noisy=bool(target.channels.variance.any() or variance.any() or earlier.any()),
+        noisy=bool(target.channels.variance.any() or variance.any()),
     )
 
 
@@ -114,16 +104,8 @@ def _possible(
     noisy: bool,
 ) -> NDArray[np.bool_]:
     """Tell which steps (S, N) are within the walls."""
-    reach = np.concatenate(
-        [
-            np.asarray(model.max_speed)[:, None] * since[:N_JOINTS],
-            2 * np.sin(np.minimum(np.asarray(model.max_swing)[:, None] * since[N_JOINTS:], np.pi) / 2),
-        ]
-    )  # metres, and the chord of the angle
-    reach[~known] = np.inf
-    # Directions that may turn by any angle, and joints that may be anywhere, need not be looked at.
-    bound = np.where(np.arange(len(reach)) < N_JOINTS, np.inf, 2.0)
-    pick = np.flatnonzero((reach < bound[:, None]).any(axis=1))
+    reach = model.reach(np.where(known, since, np.inf))
+    pick = np.flatnonzero((reach < np.inf).any(axis=1))
     squared = _squared(place[pick], target.columns[pick])
     limit = reach[pick][:, :, None]
     if noisy:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,8 +11,13 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.sequences import Beam, MotionModel, SurvivorFrame, best_paths, bridge
-from posekit.sequences.channels import N_JOINTS, N_SEGMENTS
+from posekit.sequences.channels import N_JOINTS, N_SEGMENTS, channels_of
+from posekit.sequences.floors import Floors
+from posekit.sequences.search import advance
+from posekit.sequences.states import States
+from posekit.sequences.transitions import Target, step_costs, turn_costs
 from posekit.skeleton import TREE_SEGMENTS
+from posekit.tree.compiled import path as loops
 
 ALL = Beam(width=10**6, slack=1e9)
 STANDING = np.array(
@@ -243,7 +249,7 @@ def test_a_path_that_a_beam_claims_to_be_exact_is():
 def test_blocks_of_memory_do_not_show(monkeypatch):
     frames = sequence(1, (12, 15, 9, 14), noise=0.01)
     whole = best_paths(frames, k=2)
-    monkeypatch.setattr("posekit.sequences.arrivals.BLOCK", 27 * 20)
+    monkeypatch.setattr("posekit.sequences.plain.BLOCK", 27 * 20)
     parts = best_paths(frames, k=2)
     np.testing.assert_allclose(whole.cost, parts.cost, atol=1e-9)
     assert whole.survivor.tolist() == parts.survivor.tolist()
@@ -260,7 +266,7 @@ def test_a_dear_detour_is_charged_its_turns_in_any_block(monkeypatch, detour):
             joints = np.concatenate([joints, joints[:1] + np.array([0, 0, detour])])
         frames.append(SurvivorFrame(time=k / 30, joints=joints))
     whole = best_paths(frames, k=2, apart=detour - 0.02)
-    monkeypatch.setattr("posekit.sequences.arrivals.BLOCK", 27 * 5)
+    monkeypatch.setattr("posekit.sequences.plain.BLOCK", 27 * 5)
     parts = best_paths(frames, k=2, apart=detour - 0.02)
     model = MotionModel()
     assert whole.cost[1] > whole.cost[0] + 60
@@ -441,3 +447,61 @@ def test_results_are_read_only():
     for array in (paths.cost, paths.survivor, paths.joints, paths.interpolated, paths.time):
         with pytest.raises(ValueError, match="read-only"):
             array[...] = 0
+
+
+def on_both_paths(frames, **given):
+    """Search by matrices and by loops."""
+    found = []
+    for one in ("plain", "fast"):
+        with loops(one):
+            found.append(best_paths(frames, **given))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_loops_find_what_matrices_find(seed):
+    frames = sequence(seed, (14, 9, 0, 16, 12), noise=0.04 if seed % 2 else 0.0, move=0.03)
+    if seed > 3:
+        joints = frames[3].joints.copy()
+        joints[:, [8, 12]] = np.nan
+        joints[3:6, 0] = np.nan
+        frames[3] = replace(frames[3], joints=joints, deviation=np.nan_to_num(frames[3].deviation))
+    for beam in (ALL, Beam(width=8, slack=30.0), Beam(width=50, slack=5.0, survivors=7)):
+        model = MotionModel(skip=40.0, max_swing=12.0 if seed == 2 else 130.0)
+        plain, fast = on_both_paths(frames, k=3, beam=beam, model=model)
+        np.testing.assert_allclose(fast.cost, plain.cost, rtol=1e-10)
+        assert fast.survivor.tolist() == plain.survivor.tolist()
+
+
+def test_loops_leave_out_the_terms_that_a_model_leaves_out():
+    frames = sequence(2, (8, 8, 8, 8), noise=0.01)
+    for without in ("speed", "swing", "acceleration", "resting", "max_speed", "max_swing"):
+        plain, fast = on_both_paths(frames, model=MotionModel(**{without: math.inf}), beam=ALL)
+        assert fast.cost[0] == pytest.approx(plain.cost[0], rel=1e-10)
+        assert fast.survivor.tolist() == plain.survivor.tolist()
+
+
+@settings(deadline=None, derandomize=True, max_examples=40)
+@given(seed=st.integers(0, 10**6), noise=st.sampled_from([0.0, 0.01, 0.3]), even=st.booleans())
+def test_nothing_costs_less_than_its_floor(seed, noise, even):
+    frames = sequence(seed, (5, 6, 7), noise=noise, even=even)
+    model, states = MotionModel(), States.start()
+    for frame in frames[:2]:
+        states, _ = advance(states, frame, model, ALL)
+    states = states.take(np.flatnonzero(np.isfinite(states.interval).all(axis=0)))
+    channels = channels_of(frames[2].joints, frames[2].deviation)
+    floors = Floors.of(states, channels, frames[2].time, frames[2].cost, model)
+    target = Target.of(channels, frames[2].time)
+    turns = turn_costs(states, target, model)
+    least = floors.turns[:, None] + floors.to_turns
+    assert (turns >= least - 1e-9).all()
+    whole = states.cost[:, None] + frames[2].cost + step_costs(states, target, model) + turns
+    assert (whole >= floors.ends[:, None] + floors.to - 1e-9).all()
+    if noise:
+        assert (least > 0.1).all()
+
+
+def test_progress_ends_with_the_last_frame_of_the_last_search():
+    told = []
+    best_paths(sequence(0, (3, 4, 5)), k=2, progress=lambda done, total: told.append((done, total)))
+    assert told == [(k, 6) for k in range(1, 7)]
