@@ -108,9 +108,10 @@ def validate(
         typer.Option(
             "--rigid-tolerance",
             metavar="LENGTH",
-            help="How far distances inside rigid parts, and the fit of a robot, may be off.",
+            help="How far distances inside rigid parts, and the fit of a robot, may be off. Default: what a result's "
+            "postures were recovered with, 3cm at least.",
         ),
-    ] = "3cm",
+    ] = "",
     angle_tolerance: AngleTolerance = None,
     contact_margin: Annotated[
         str,
@@ -198,6 +199,7 @@ def validate(
     from posekit import files, pipeline, validators
     from posekit.files.report import columns_of
     from posekit.files.report_table import summary_table
+    from posekit.validators.validator import RIGID_TOLERANCE
 
     if output is not None:
         distinct(postures, output)
@@ -207,12 +209,13 @@ def validate(
     if not _count(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
-    judged = pipeline.JudgedWith(angle=0.001, contact_margin=0.0, walkers="paper")
+    judged = pipeline.JudgedWith(rigid=RIGID_TOLERANCE, angle=0.001, contact_margin=0.0, walkers="paper")
     if schema_of(postures).startswith("posekit.result/"):
         with about(postures):
             result = files.read_result(postures)
             own, judged = pipeline.recovered_with(result)
             figure = urdf or own
+    rigid_tolerance = rigid_tolerance or f"{100 * judged.rigid:g}cm"
     angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
     walkers = walkers or judged.walkers
     # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.

@@ -16,7 +16,8 @@ from posekit.files.postures_q import Configurations
 from posekit.files.report import PostureReport
 from posekit.files.report_columns import Columns, Place, joined
 from posekit.intake.refusal import refusal
-from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH
+from posekit.pipeline.tolerance import EXACT
+from posekit.pipeline.trees import JUDGED
 from posekit.pipeline.validate_columns import columns_of
 from posekit.pipeline.validate_listing import list_postures
 from posekit.robot.scaling import segment_lengths, shoulders_are_behind
@@ -24,6 +25,7 @@ from posekit.validators import Report as Verdicts
 from posekit.validators import Validator
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
+from posekit.validators.validator import RIGID_TOLERANCE
 from posekit.validators.walking import WALKERS
 
 BATCH: Final = 4096
@@ -128,10 +130,12 @@ def validate(
 class JudgedWith(NamedTuple):
     """What the frames of a result were judged with: of several kinds of frames, what allows most.
 
-    The angle tolerance is in degrees, the contact margin in metres (negative allows penetration); whose thresholds the
-    rules of walking had is a name, as `posekit.validators.walking.WALKERS` has it.
+    The rigid tolerance is in metres, and that of the validators where less was allowed; the angle tolerance in degrees,
+    the contact margin in metres (negative allows penetration); whose thresholds the rules of walking had is a name, as
+    `posekit.validators.walking.WALKERS` has it.
     """
 
+    rigid: float
     angle: float
     contact_margin: float
     walkers: str
@@ -166,15 +170,14 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
     judged = settings.get("judged")
     kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
     asked = _number(settings, "contact_margin", 0.0)
-    tolerances, margins = [EXACT.angle], [asked]
-    if "measured" in kinds:
-        tolerances.append(MEASURED.angle)
-    if "photograph" in kinds:
-        tolerances.append(PHOTOGRAPH.angle)
+    usual = [one for one, kind in JUDGED.items() if kind in kinds]
+    rigid = [RIGID_TOLERANCE, *(one.rigid for one in usual)]
+    angles, margins = [EXACT.angle, *(one.angle for one in usual)], [asked]
     for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
         said = settings.get(field)
         if kind in kinds and isinstance(said, dict):
-            tolerances.append(_number(said, "angle", EXACT.angle, within=f"{field}."))
+            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=f"{field}."))
+            angles.append(_number(said, "angle", EXACT.angle, within=f"{field}."))
             margins.append(_number(said, "contact", asked, within=f"{field}."))
     walkers = settings.get("walkers", "paper")
     if not (isinstance(walkers, str) and walkers in WALKERS):
@@ -185,7 +188,7 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
             " or ".join(WALKERS),
             "correct what made the result",
         )
-    return JudgedWith(max(tolerances), min(margins), walkers)
+    return JudgedWith(max(rigid), max(angles), min(margins), walkers)
 
 
 def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:
