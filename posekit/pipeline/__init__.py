@@ -13,6 +13,8 @@ from posekit.pipeline.result import result_of as result_of
 from posekit.pipeline.rooting import Rooting as Rooting
 from posekit.pipeline.scale import Scale as Scale
 from posekit.pipeline.scale import parse_scale as parse_scale
+from posekit.pipeline.scaled_following import ScaledFollowing as ScaledFollowing
+from posekit.pipeline.scaled_following import follow_scaled as follow_scaled
 from posekit.pipeline.summary import following_line as following_line
 from posekit.pipeline.summary import summary_lines as summary_lines
 from posekit.pipeline.taylor.reproduce import reproduce_taylor as reproduce_taylor

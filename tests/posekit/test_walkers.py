@@ -136,7 +136,7 @@ def test_the_command_line_takes_them(
 def test_a_result_says_what_its_frames_were_judged_with() -> None:
     scene = random_views(FIGURE, 3, np.random.default_rng(0))
     exact = result_of(recover(view_of(scene), contact_margin=0.01))
-    assert tuple(recovered_with(exact).judged) == (pytest.approx(1e-3), 0.01, "paper")
+    assert tuple(recovered_with(exact).judged) == (0.03, pytest.approx(1e-3), 0.01, "paper")
     noisy = view_of(scene.with_noise(2.0, np.random.default_rng(1)))
     noisy = replace(noisy, deviation=2.0, root=scene.joints_cam[:, 0])
     refined = result_of(recover(noisy, contact_margin=-0.01))
@@ -146,6 +146,12 @@ def test_a_result_says_what_its_frames_were_judged_with() -> None:
     assert told.angle == refined.settings["refined"]["angle"]
     older = replace(refined, settings={**refined.settings, "refined": {"angle": 14.0}})
     assert recovered_with(older).judged.contact_margin == -0.01
+    uncertain = result_of(recover(noisy, length_deviation=0.05))
+    assert (
+        recovered_with(uncertain).judged.rigid
+        == uncertain.settings["refined"]["rigid"]
+        == pytest.approx(0.075)
+    )
 
 
 @pytest.mark.parametrize(
