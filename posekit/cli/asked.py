@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from posekit.files import View
     from posekit.pipeline import Recovery, Rooting
     from posekit.pipeline.detected import Opened
-    from posekit.pipeline.left_out import LeftOut
     from posekit.validators import Ranges
 
 
@@ -48,29 +47,18 @@ class Asked:
     refine: bool | None
     length_deviation: float | None
 
-    def recover_all(
-        self, people: Sequence[Opened], path: Path, left_out: LeftOut | None
-    ) -> list[tuple[Opened, Recovery]]:
+    def recover_all(self, people: Sequence[Opened], path: Path) -> list[tuple[Opened, Recovery]]:
         """Recover everybody before anything is written; of several people, warn of those who cannot be."""
         self.check_noise(people[0].view)  # one camera sees them all
         recovered = []
         for one in people:
             try:
-                recovered.append((one, self.recover_seen(one.view, path, left_out)))
+                recovered.append((one, _some(self.recover(one.view, path), path)))
             except PosekitError as error:
                 if len(people) == 1 or (one is people[-1] and not recovered):
                     raise
                 typer.echo(f"posekit: warning: person {one.person} is left out: {error}", err=True)
         return recovered
-
-    def recover_seen(self, seen: View, path: Path, left_out: LeftOut | None) -> Recovery:
-        """Recover a view that comes from `path`, and say of the frames that were left out of it why they were."""
-        if left_out is None:
-            return _some(self.recover(seen, path), path)
-        asked = self if self.nearer is None else replace(self, nearer=left_out.of_kept(self.nearer))
-        with left_out.naming():
-            recovery = asked.recover(seen, path)
-        return _some(left_out.put_back(recovery), path)
 
     def recover(self, seen: View, path: Path) -> Recovery:
         """Recover a view that comes from `path`."""

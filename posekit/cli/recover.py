@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -28,7 +27,7 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.files import Unit
-    from posekit.pipeline import Recovery, Tolerance
+    from posekit.pipeline import Recovery
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
@@ -132,7 +131,6 @@ def recover(
     from posekit.pipeline.detected.compare import compare
     from posekit.pipeline.detected.conversion import of_person
     from posekit.pipeline.detected.given_views import given_views
-    from posekit.pipeline.left_out import open_seen
 
     for read in (view, nearer, truth, who.calibrate, who.lengths):
         distinct(output, write_urdf, read)
@@ -166,8 +164,8 @@ def recover(
         refine=uncertain.refine,
         length_deviation=uncertain.length_deviation,
     )
-    people, left_out = open_seen(view, partial(given_views, source=source, truth=truth))
-    for one, recovery in asked.recover_all(people, view, left_out):
+    people = given_views(view, source, truth)
+    for one, recovery in asked.recover_all(people, view):
         for line in one.says:
             typer.echo(line)
         alone = len(people) == 1
@@ -179,8 +177,7 @@ def recover(
         for line in says:
             typer.echo(line)
         if truth is not None:
-            known = one.view.truth if left_out is None else left_out.among_all(one.view.truth)
-            for line in compare(recovery, known).lines:
+            for line in compare(recovery, one.view.truth).lines:
                 typer.echo(line)
         typer.echo(f"written: {path}")
 
@@ -197,12 +194,6 @@ def _write(path: Path, recovery: Recovery, unit: Unit, view: Path, *, paths: int
     result = pipeline.result_of(recovery, unit=unit, explain=explain, following=following)
     files.write_result(path, result)
     return [] if following is None else [pipeline.following_line(following)]
-
-
-def _tolerance(rigid: str, tangent: str, angle: float | None, otherwise: Tolerance) -> Tolerance | None:
-    """Make the tolerance that these options ask for (`Tolerances.filled`)."""
-    given = Tolerances(rigid_tolerance=rigid, tangent_tolerance=tangent, angle_tolerance=angle)
-    return given.filled(otherwise)
 
 
 def summarize(recovery: Recovery) -> None:

@@ -33,8 +33,8 @@ class View:
         Seconds.
     image : array (F, 14, 2)
         Joints as seen, in tree order. OpenCV's convention, y down, always: pixels, or metres on the image
-        plane where the camera is Lee & Chen's. The neck is seen in every frame, unless the camera is scaled
-        orthographic.
+        plane where the camera is Lee & Chen's. The neck is seen in one frame at least, unless the camera is
+        scaled orthographic: postures hang on it.
     head_image : array (F, 5, 2), optional
         Head points as seen, in the order of `posekit.skeleton.HEAD_POINTS`.
     confidence : array (F, 19), optional
@@ -60,7 +60,7 @@ class View:
     ------
     InputError
         Where a shape is wrong, a number is infinite, a point is known in part, a name is unknown, a length is
-        not positive, or a frame lacks the neck.
+        not positive, or no frame shows the neck.
 
     Notes
     -----
@@ -103,10 +103,8 @@ class View:
             object.__setattr__(self, name, values)
         if np.isnan(self.time).any():
             raise refusal("view", "time", "NaN", "a time for every frame", "number the frames if need be")
-        unseen = np.isnan(self.image[:, 0, 0])
-        if unseen.any() and not isinstance(self.camera, ScaledOrthographicModel):
-            where = f"image[{int(np.argmax(unseen))}, 0]"
-            raise refusal("view", where, "NaN", "the neck in every frame", "drop frames without it")
+        if not isinstance(self.camera, ScaledOrthographicModel) and np.isnan(self.image[:, 0, 0]).all():
+            raise refusal("view", "image[:, 0]", "NaN", "the neck in one frame at least", "add it")
         self._check_figure()
 
     def __len__(self) -> int:

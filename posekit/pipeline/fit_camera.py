@@ -14,6 +14,7 @@ from posekit.figure import Figure
 from posekit.files import Family, LeeChenModel, OpenCVModel, View
 from posekit.head import HeadPoints, HeadPose, calibrate, solve_pose
 from posekit.pipeline.rooting import Rooting, place_roots
+from posekit.pipeline.seen import NO_NECK, neckless
 from posekit.pipeline.tolerance import Tolerance
 from posekit.placement import Placement
 from posekit.skeleton import HEAD, HEAD_POINTS
@@ -81,6 +82,7 @@ def fit_camera(
 
     A root that the view gives comes before the head's neck; the head then turns with the recovered rotation
     about that root. Where neither tells it, and the camera is known, the neck is placed (`posekit.placement`).
+    Frames that do not show the neck are as if they were not there, but for their reason.
 
     Parameters
     ----------
@@ -98,14 +100,17 @@ def fit_camera(
         Where the camera's model cannot be used, or no frame's neck can be found.
     """
     n = len(view.time)
+    shown = ~neckless(view)
     names = ("neck", *HEAD_POINTS)
     points = {name: figure.head_points[k] for k, name in enumerate(names)} | dict(view.head_points or {})
     head_points = HeadPoints.from_mapping(points)
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
+    image[~shown] = np.nan
     seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= len(names)
     rooting = rooting or Rooting()
-    # A neck that was put between the shoulders is no point of the head.
-    if "neck" in view.derived or rooting.method != "auto" or not rooting.trust_head:
+    # A neck that was put between the shoulders is no point of the head. Where all necks are given, it is only turned.
+    trusted = rooting.trust_head or np.isfinite(view.root[shown]).all()
+    if "neck" in view.derived or rooting.method != "auto" or not trusted:
         seen[:] = False
     pose: HeadPose | None = None
     model = view.camera
@@ -119,9 +124,9 @@ def fit_camera(
         pose = solve_pose(head_points, image, camera, threads=n_threads()) if seen.any() else None
     else:
         raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
-    root = view.root.copy()
+    root = np.where(shown[:, None], view.root, np.nan)
     head = np.full((n, len(HEAD), 3), np.nan)
-    reasons = [""] * n
+    reasons = ["" if there else f"frames[{k}]: {NO_NECK}" for k, there in enumerate(shown.tolist())]
     if pose is not None:
         neck = pose.points_cam[:, 0]
         unknown = np.isnan(root).any(axis=1)
@@ -155,12 +160,14 @@ def fit_camera(
 
 def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Placement | None]:
     """Say of frames without a neck why: where the head that would tell f is not seen, nothing can be placed."""
-    for k in np.flatnonzero(np.isnan(root).any(axis=1)).tolist():
-        why = (pose and pose.reasons[k]) or "its head is not seen, and so its camera is not known"
-        reasons[k] = f"frames[{k}]: {why}"
-    if reasons and all(reasons):
+    asked = [k for k, reason in enumerate(reasons) if not reason]
+    for k in asked:
+        if np.isnan(root[k]).any():
+            why = (pose and pose.reasons[k]) or "its head is not seen, and so its camera is not known"
+            reasons[k] = f"frames[{k}]: {why}"
+    if all(reasons):
         raise HeadError(
-            f"{reasons[0]}; give six head points in head_image (with the neck in image), or f and root"
+            f"{reasons[asked[0]]}; give six head points in head_image (with the neck in image), or f and root"
         )
     return [None] * len(reasons)
 
@@ -183,8 +190,12 @@ def _placed(
         placements[k] = placement
         if not len(placement.necks):
             reasons[k] = f"frames[{k}]: {placement.reason}"
-    if reasons and all(reasons):
-        raise InputError(f"{reasons[0]}; or give root")
+    if all(reasons):
+        first = reasons[int(np.argmax(~neckless(view)))]
+        raise InputError(
+            f"{first}; lengths, camera or image points may be wrong, as no frame's neck fits them: correct them, "
+            "or give root"
+        )
     return placements
 
 

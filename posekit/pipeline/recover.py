@@ -28,7 +28,7 @@ from posekit.pipeline.recovery import FrameRecovery, Recovery
 from posekit.pipeline.refiner import Refiner
 from posekit.pipeline.rooting import Rooting, tolerance_of
 from posekit.pipeline.scale import Scale
-from posekit.pipeline.seen import trunkless, with_reasons
+from posekit.pipeline.seen import lost_to, neckless, trunkless, with_reasons
 from posekit.pipeline.taylor.body import TaylorBody
 from posekit.pipeline.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.ranking import Up, load_prior
@@ -139,8 +139,9 @@ def recover(
         contact_margin=contact_margin,
         thresholds=thresholds_of(walkers),
     )
-    bare = trunkless(view, body)
-    fit = with_reasons(_fit(view, body, scale, tolerance, rooting), body, bare)
+    without_neck, bare = neckless(view), trunkless(view, body)
+    fit = _fit(view, body, scale, tolerance, rooting)
+    fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
     noise = _noise(view, body, tolerance, rooting, refine, length_deviation)
     hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
     grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand, infer=infer)
@@ -174,7 +175,7 @@ def recover(
                 family=None if fit.families is None else fit.families[k],
                 placement=None if one.fit.placements is None else one.fit.placements[k],
                 reason=one.fit.reasons[k],
-                lost_to="trunk/not_seen" if bare[k] else "root/not_known",
+                lost_to=lost_to(bool(without_neck[k]), bool(bare[k])),
                 group_within=group,
                 number=k,
                 cameras=cameras,

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from posekit.cli.judging_options import Tolerances
 from posekit.errors import InputError
 from posekit.figure import load_figure
 from posekit.files import View, parse_length, read_view, write_view
@@ -125,8 +126,6 @@ def test_every_kind_of_view(how: str, tmp_path: Path, folder: Path) -> None:
 @pytest.mark.parametrize("given", [("", "", None), ("2cm", "", None), ("", "3mm", 4.0), ("1e-8m", "", None)])
 @pytest.mark.parametrize("uncalibrated", [False, True])
 def test_tolerances_mean_what_they_mean_to_recover(given: tuple, uncalibrated: bool) -> None:
-    from posekit.cli.recover import _tolerance
-
     rigid, tangent, angle = given
     recipe = Recipe(
         rigid=parse_length(rigid, name="r") if rigid else None,
@@ -134,7 +133,8 @@ def test_tolerances_mean_what_they_mean_to_recover(given: tuple, uncalibrated: b
         angle=angle,
     )
     usual = PHOTOGRAPH if uncalibrated else MEASURED
-    assert recipe.tolerance(uncalibrated=uncalibrated) == _tolerance(rigid, tangent, angle, usual)
+    options = Tolerances(rigid_tolerance=rigid, tangent_tolerance=tangent, angle_tolerance=angle)
+    assert recipe.tolerance(uncalibrated=uncalibrated) == options.filled(usual)
 
 
 def test_where_it_is_cut_changes_nothing(tmp_path: Path, folder: Path) -> None:
@@ -176,7 +176,8 @@ def test_a_frame_without_survivors_is_a_row_with_its_reason(tmp_path: Path, fold
     assert each.index.tolist() == list(range(6))
     assert each.survivors.tolist()[2] == each.survivors.tolist()[4] == 0
     assert sum(json.loads(each.rejected[2]).values()) == 8192
-    assert each.reason[4] == "the neck is not seen"
+    assert each.reason[4] == "the neck, from which the tree grows, is not seen"
+    assert json.loads(each.rejected[4]) == {"neck/not_seen": 8192}
     empty = found[found.survivor == -1]
     assert empty.frame.tolist() == [2, 4]
     assert empty[list(COORDINATES)].isna().all(axis=None)
@@ -211,6 +212,8 @@ def test_frames_that_take_much_memory_are_recovered_in_small_pieces() -> None:
     assert sizes() == [250]
     assert sizes(noisy=True) == [166, 84]
     rows.points[100:103, 6:] = np.nan  # no arms and legs in three of them
+    assert sizes() == [100, 1, 1, 1, 147]
+    rows.points[150:] = np.nan  # nothing is grown where nobody is seen
     assert sizes() == [100, 1, 1, 1, 147]
 
 

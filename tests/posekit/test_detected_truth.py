@@ -59,6 +59,17 @@ def test_frames_are_matched_by_time() -> None:
     assert np.isfinite(given.truth[2]).all()
 
 
+def test_pictures_of_nobody_have_their_truth_too() -> None:
+    """The first picture is at the truth's second 0, whoever is in it."""
+    view, world = placed()
+    image = view.image.copy()
+    image[[0, 3]] = np.nan
+    given, told = with_truth(replace(view, image=image), world, view.time)
+    whole, _ = with_truth(view, world, view.time)
+    np.testing.assert_array_equal(given.truth, whole.truth)
+    assert told.frames == len(view)
+
+
 def test_what_is_no_truth_of_the_view_is_refused() -> None:
     view, world = placed()
     with pytest.raises(InputError, match=r"misses the key points.*--person"):

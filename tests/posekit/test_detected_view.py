@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,12 +86,9 @@ def test_a_missing_point_is_missing_and_never_at_the_origin(missing: set[int], f
     )
     names = [keypoints.layout.points[k] for k in missing]
     shoulders = not any("shoulder" in name for name in names)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore" if not shoulders else "error")
-        again = person_view(lost, view.camera, FIGURE)
-    assert len(again) == 5 - (not shoulders)
-    if not shoulders:
-        return
+    again = person_view(lost, view.camera, FIGURE)
+    assert len(again) == 5
+    assert np.isnan(again.image[frame, JOINT["neck"]]).all() == (not shoulders)
     for name in names:
         row = (
             again.image[frame, JOINT[name]]
@@ -99,7 +96,8 @@ def test_a_missing_point_is_missing_and_never_at_the_origin(missing: set[int], f
             else again.head_image[frame, HEAD_POINTS.index(name)]
         )
         assert np.isnan(row).all()
-    assert np.isnan(again.image[frame, JOINT["pelvis"]]).all() == any("hip" in name for name in names)
+    trunk = [name for name in names if "hip" in name or "shoulder" in name]
+    assert np.isnan(again.image[frame, JOINT["pelvis"]]).all() == bool(trunk)
 
 
 def test_confidences_are_kept_and_unsure_points_left_out() -> None:
@@ -133,7 +131,10 @@ def test_an_uncalibrated_camera_needs_no_neck() -> None:
     assert len(again) == 2
 
 
-def test_frames_without_the_person_are_left_out_with_a_warning_and_times_stay() -> None:
+@pytest.mark.parametrize("calibrated", [True, False])
+@pytest.mark.parametrize("shown", [[0, 1, 3], [2], [1, 2]])
+def test_pictures_without_the_person_are_frames_too(shown: list[int], calibrated: bool) -> None:
+    """Of a sequence, at its ends too: numbers and times of frames are those of the pictures."""
     view = views(4)
     keypoints = seen(view)
     gone = KeyPoints(
@@ -141,12 +142,19 @@ def test_frames_without_the_person_are_left_out_with_a_warning_and_times_stay() 
         source="a.json",
         layout=keypoints.layout,
         pictures=keypoints.pictures,
-        frame=np.array([0, 1, 3]),
-        points=keypoints.points[[0, 1, 3]],
+        frame=np.array(shown),
+        points=keypoints.points[shown],
     )
-    with pytest.warns(UserWarning, match=r"1 of 4 pictures are left out.*000002"):
-        again = person_view(gone, view.camera, FIGURE, rate=10.0)
-    np.testing.assert_allclose(again.time, [0.0, 0.1, 0.3], rtol=0, atol=1e-12)
+    camera = view.camera if calibrated else ScaledOrthographicModel(scale=None)
+    again = person_view(gone, camera, FIGURE, rate=10.0)
+    np.testing.assert_allclose(again.time, [0.0, 0.1, 0.2, 0.3], rtol=0, atol=1e-12)
+    whole = person_view(keypoints, camera, FIGURE, rate=10.0)
+    np.testing.assert_array_equal(again.image[shown], whole.image[shown])
+    others = np.setdiff1d(np.arange(4), shown)
+    for values in (again.image, again.head_image, again.confidence):
+        assert np.isnan(values[others]).all()
+    photographs = replace(gone, sequence=False)  # in which nobody is in all
+    assert len(person_view(photographs, camera, FIGURE)) == len(shown)
 
 
 def test_bad_key_points_are_refused() -> None:

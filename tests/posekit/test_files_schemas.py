@@ -236,6 +236,8 @@ def test_what_is_refused_is_invalid_for_another_validator(tmp_path, rng):
     assert not validator.is_valid(document | {"camera": {"model": "lee-chen", "f": 0}})
     assert not validator.is_valid(document | {"frames": []})
     assert not validator.is_valid(document | {"frames": [{"time": 0, "image": {"pelvis": [1, 2]}}]})
+    some = [{"time": 0, "image": {"pelvis": [1, 2]}}, {"time": 1, "image": {"neck": [1, 2]}}]
+    assert validator.is_valid(document | {"frames": some})
     assert not validator.is_valid(
         document | {"frames": [{"time": 0, "image": {"neck": [1, 2], "x": [1, 2]}}]}
     )

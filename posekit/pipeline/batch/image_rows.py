@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.files import ScaledOrthographicModel, View, read_view, write_view
+from posekit.pipeline.seen import NECK_LOST, NO_NECK, ROOT_LOST
 from posekit.skeleton import HEAD, JOINTS, POINTS
 
 IMAGE: Final = len(JOINTS)
@@ -81,10 +82,10 @@ class ImageRows:
         return np.asarray(seen.any(axis=1) if uncalibrated else seen[:, 0])
 
     @staticmethod
-    def lacking(head: View) -> str:
-        """Say why a frame is not usable."""
+    def lacking(head: View) -> tuple[str, str]:
+        """Say why a frame is not usable, and what its leaves are lost to, as `posekit.recover` says it."""
         uncalibrated = isinstance(head.camera, ScaledOrthographicModel)
-        return "no joint is seen" if uncalibrated else "the neck is not seen"
+        return ("no joint is seen", ROOT_LOST) if uncalibrated else (NO_NECK, NECK_LOST)
 
     def view(self, head: View) -> View:
         """Make the view of the rows, its camera and person those of `head`.
@@ -92,7 +93,7 @@ class ImageRows:
         Raises
         ------
         InputError
-            Where the neck is not seen in one of the frames, or a number is none.
+            Where the neck is seen in none of the frames of a calibrated camera, or a number is none.
         """
         return replace(
             head,
@@ -117,9 +118,15 @@ def nothing_seen(frame: NDArray[np.int64], time: Array) -> ImageRows:
     )
 
 
+def first_usable(view: View) -> View:
+    """Return the first frame of a view that can be recovered; the first of all where none can."""
+    rows = ImageRows.of_view(view)
+    return rows.part(np.argmax(rows.usable(view), keepdims=True)).view(view)
+
+
 def head_text(view: View) -> str:
-    """Spell a view's camera and person: the ``posekit.view/1`` document of its first frame, in metres."""
-    first = ImageRows.of_view(view).part(slice(0, 1)).view(view)
+    """Spell a view's camera and person: the ``posekit.view/1`` document of a frame (`first_usable`), in metres."""
+    first = first_usable(view)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "head.json"
         write_view(path, replace(first, unit="m"))

@@ -7,7 +7,7 @@ import re
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,7 +17,15 @@ from posekit.errors import PosekitError
 from posekit.files import View
 from posekit.intake import extra
 from posekit.pipeline.batch import digests
-from posekit.pipeline.batch.columns import TEXTS, Frames, frames_of, schema_of, table_of, unrecovered
+from posekit.pipeline.batch.columns import (
+    LEAVES,
+    TEXTS,
+    Frames,
+    frames_of,
+    schema_of,
+    table_of,
+    unrecovered,
+)
 from posekit.pipeline.batch.durable import PARTS, whole, writing
 from posekit.pipeline.batch.image_rows import ImageRows, read_head
 from posekit.pipeline.batch.recipe import Recipe
@@ -192,7 +200,9 @@ def _pieces(shard: Shard, head: View) -> Iterator[Frames]:
         for piece in portions(rows, noisy=noisy):
             part = rows.part(piece)
             usable = np.flatnonzero(part.usable(head))
-            found = unrecovered(part, part.lacking(head))
+            reason, lost_to = part.lacking(head)
+            rejected = (json.dumps({lost_to: LEAVES}),) * len(part)
+            found = replace(unrecovered(part, reason), rejected=rejected)
             yield (
                 found.with_part(usable, _recovered(part.part(usable), head, shard)) if len(usable) else found
             )
@@ -205,6 +215,7 @@ def portions(rows: ImageRows, *, noisy: bool) -> Iterator[slice]:
     noise is allowed for, and up to hundreds of megabytes where half of the body is hidden.
     """
     unseen = np.isnan(rows.points[:, : len(JOINTS), 0]).sum(axis=1)
+    unseen[unseen == len(JOINTS)] = 0  # nothing is grown there
     weight = (NOISY if noisy else 1) * HIDDEN ** np.clip(unseen - FREE, 0, 8).astype(np.float64)
     start, taken = 0, 0.0
     for k, each in enumerate(weight.tolist()):

@@ -22,7 +22,7 @@ from posekit.intake import read_json, refusal
 from posekit.keypoints import KeyPoints, swap
 from posekit.pipeline.batch import digests
 from posekit.pipeline.batch.durable import PARTS, whole, write_document
-from posekit.pipeline.batch.image_rows import ImageRows, head_text, nothing_seen, read_head
+from posekit.pipeline.batch.image_rows import ImageRows, first_usable, head_text, nothing_seen, read_head
 from posekit.pipeline.batch.recipe import Recipe
 from posekit.pipeline.batch.view_arrays import is_view_arrays, read_view_arrays
 from posekit.pipeline.batch.view_table import (
@@ -260,17 +260,12 @@ def _as_views(job: Staging, pieces: Iterator[ImageRows], seen: list[View]) -> It
             sighted.keypoints,
             sighted.camera,
             figure,
-            rate=1.0,
             minimum_confidence=source.minimum_confidence,
             deviation=source.deviation,
         )
-        number = np.round(view.time).astype(np.intp)
         if not seen or view.derived not in [one.derived for one in seen]:
-            seen.append(ImageRows.of_view(view).part(slice(0, 1)).view(view))
-        found = replace(
-            ImageRows.of_view(view, rows.frame[number]), time=rows.time[number], root=rows.root[number]
-        )
-        yield found.laid_out(rows.frame, rows.time)
+            seen.append(first_usable(view))
+        yield replace(ImageRows.of_view(view, rows.frame), time=rows.time, root=rows.root)
 
 
 def _shows_somebody(found: KeyPoints, camera: CameraModel, minimum_confidence: float) -> bool:
@@ -293,7 +288,7 @@ def _keypoints(path: Path, rows: ImageRows) -> KeyPoints:
         person=np.zeros(len(rows), dtype=np.intp),
         points=rows.points,
         confidence=rows.confidence,
-        sequence=False,
+        sequence=True,
     )
 
 

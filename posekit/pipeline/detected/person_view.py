@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from typing import Final
 
 import numpy as np
@@ -57,7 +56,8 @@ def person_view(
     Returns
     -------
     View
-        Of the pictures in which the person's neck is known (any picture where the camera is scaled orthographic).
+        Of all pictures of a sequence, those included that do not show the person: frames are pictures, in number and
+        in time. Of a collection of photographs, in which nobody is in all, those that show any joint of the person.
 
     Raises
     ------
@@ -85,25 +85,15 @@ def person_view(
     confidence = np.full((count, len(POINTS)), np.nan)
     points[keypoints.frame] = found[:, : len(POINTS)]
     confidence[keypoints.frame] = sure[:, : len(POINTS)]
-    kept = np.isfinite(points[:, : len(JOINTS), 0]).any(axis=1)
+    seen = np.isfinite(points[:, : len(JOINTS), 0])
     needs_neck = not isinstance(camera, ScaledOrthographicModel)
-    if needs_neck:
-        kept &= np.isfinite(points[:, JOINT["neck"], 0])
-    if not kept.any():
+    if not (seen[:, JOINT["neck"]] if needs_neck else seen).any():
         needed = "both shoulders, between which the neck is, are" if needs_neck else "joints are"
         raise InputError(
             f"{keypoints.source}: {needed} seen in none of {count} pictures; expected at least one; choose another "
             "--person, or a smaller --min-confidence"
         )
-    if keypoints.sequence and not kept.all():  # in a collection of photographs nobody is in all of them
-        names = [keypoints.pictures[k] for k in np.flatnonzero(~kept)]
-        lacking = "the person's neck is not known" if needs_neck else "the person is not seen"
-        warnings.warn(
-            f"{keypoints.source}: {len(names)} of {count} pictures are left out, in which {lacking} "
-            f"({', '.join(names[:3])}{', …' if len(names) > 3 else ''})",
-            UserWarning,
-            stacklevel=3,
-        )
+    kept = seen.any(axis=1) | keypoints.sequence
     return View(
         camera=camera,
         time=times(keypoints, rate)[kept],

@@ -96,9 +96,8 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled
         for row, n in zip(away, in_front, strict=True)
     ]
     best = int(np.argmin(errors))
-    height = float(
-        np.nanmedian(np.nanmax(view.image[..., 1], axis=1) - np.nanmin(view.image[..., 1], axis=1))
-    )
+    seen = view.image[np.isfinite(view.image[..., 1]).any(axis=1), :, 1]
+    height = float(np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)))
     if not errors[best] <= REFUSED * height:
         raise InputError(
             f"--truth: misses the key points by {errors[best]:.3g} px (median) however its axes are turned; expected "
