@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from posekit.cli.judging_options import Tolerances
-from posekit.cli.options import about, progress
+from posekit.cli.options import about, progress, progress_so_far
 from posekit.errors import InputError, PosekitError
 
 if TYPE_CHECKING:
     from posekit.files import View
-    from posekit.pipeline import Recovery, Rooting
+    from posekit.pipeline import Recovery, Rooting, ScaledFollowing
     from posekit.pipeline.detected import Opened
     from posekit.validators import Ranges
 
@@ -46,27 +47,67 @@ class Asked:
     rooting: Rooting
     refine: bool | None
     length_deviation: float | None
+    paths: int
+    scale_deviation: float | None
 
-    def recover_all(self, people: Sequence[Opened], path: Path) -> list[tuple[Opened, Recovery]]:
-        """Recover everybody before anything is written; of several people, warn of those who cannot be."""
+    def recover_all(
+        self, people: Sequence[Opened], path: Path
+    ) -> list[tuple[Opened, Recovery, ScaledFollowing | None]]:
+        """Recover everybody before anything is written; of several people, warn of those who cannot be.
+
+        Where the scale of their lengths is asked for, they are followed by now.
+        """
         self.check_noise(people[0].view)  # one camera sees them all
         recovered = []
         for one in people:
             try:
-                recovered.append((one, _some(self.recover(one.view, path), path)))
+                found = None if self.scale_deviation is None else self.follow_scaled(one.view, path)
+                recovery = self.recover(one.view, path) if found is None else found.recovery
+                recovered.append((one, _some(recovery, path), found))
             except PosekitError as error:
                 if len(people) == 1 or (one is people[-1] and not recovered):
                     raise
                 typer.echo(f"posekit: warning: person {one.person} is left out: {error}", err=True)
         return recovered
 
-    def recover(self, seen: View, path: Path) -> Recovery:
+    def follow_scaled(self, seen: View, path: Path) -> ScaledFollowing:
+        """Find the scale of a person's lengths with the paths through all frames.
+
+        Raises
+        ------
+        InputError
+            Where nobody says how noisy the image points are, or no path is asked for.
+        """
+        from posekit import pipeline
+
+        if not self.paths:
+            raise InputError(
+                "--follow-scale: it is found by following; expected --follow K with it; give --follow 1"
+            )
+        if self.refine is False or (
+            self.rooting.deviation is None and seen.deviation is None and not seen.derived
+        ):
+            raise InputError(
+                "--follow-scale: the scale is told by what noise can explain; expected a standard deviation in pixels; "
+                "give --deviation, 1 for points that are all but exact, and no --no-refine"
+            )
+        with progress_so_far("trying scales") as done, about(path):
+            return pipeline.follow_scaled(
+                seen,
+                lambda one: replace(self, refine=True).recover(one, path, quiet=True),
+                deviation=self.scale_deviation or 0.0,
+                k=self.paths,
+                progress=done,
+            )
+
+    def recover(self, seen: View, path: Path, *, quiet: bool = False) -> Recovery:
         """Recover a view that comes from `path`."""
         from posekit import files, pipeline
 
         uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
         per_unit = files.PER_METRE[seen.unit]
-        with progress("recovering", len(seen.time)) as done, about(path):
+        shown = nullcontext(None) if quiet else progress("recovering", len(seen.time))
+        with shown as done, about(path):
             return pipeline.recover(
                 seen,
                 checks=self.checks,

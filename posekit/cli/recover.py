@@ -26,8 +26,7 @@ from posekit.cli.recover_object import recover_object, refuse_options_of_persons
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.files import Unit
-    from posekit.pipeline import Recovery
+    from posekit.pipeline import Following, Recovery, ScaledFollowing
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
@@ -42,8 +41,6 @@ NAMED: Final = 5
 """Frames of one reason that are named."""
 REASONS: Final = 3
 """Reasons that are told."""
-MOST: Final = 1024
-"""Survivors of a frame that paths may go through: the likeliest."""
 
 
 @with_groups
@@ -108,10 +105,19 @@ def recover(
             metavar="K",
             min=0,
             max=1000,
-            help="Follow the person through the frames: the K likeliest paths through the 1024 likeliest survivors of "
-            "each; minutes where there are so many.",
+            help="Follow the person through the frames: the K likeliest paths from survivor to survivor.",
         ),
     ] = 0,
+    follow_scale: Annotated[
+        float | None,
+        typer.Option(
+            "--follow-scale",
+            metavar="FRACTION",
+            help="Then: all lengths may be off by a common factor, with this standard deviation, as 0.05; the factor "
+            "with which the frames fit and move best is applied. Where the noise is known, and the neck's place: by a "
+            "root, or six points of the head.",
+        ),
+    ] = None,
     truth: Annotated[
         Path | None,
         typer.Option(
@@ -163,37 +169,46 @@ def recover(
         rooting=pipeline.Rooting(method=uncertain.root, deviation=uncertain.deviation),  # type: ignore[arg-type]
         refine=uncertain.refine,
         length_deviation=uncertain.length_deviation,
+        paths=paths,
+        scale_deviation=follow_scale,
     )
     people = given_views(view, source, truth)
-    for one, recovery in asked.recover_all(people, view):
+    for one, recovery, scaled in asked.recover_all(people, view):
         for line in one.says:
             typer.echo(line)
         alone = len(people) == 1
         if write_urdf is not None:
             recovery.figure.write(of_person(write_urdf, one, alone=alone))
         path = of_person(output, one, alone=alone)
-        says = _write(path, recovery, one.view.unit, view, paths=paths, explain=explain)
+        following = _followed(recovery, scaled, view, paths)
+        result = pipeline.result_of(recovery, unit=one.view.unit, explain=explain, following=following)
+        files.write_result(path, result)
         summarize(recovery)
-        for line in says:
-            typer.echo(line)
+        if scaled is not None:
+            typer.echo(_scale_line(scaled))
+        if following is not None:
+            typer.echo(pipeline.following_line(following))
         if truth is not None:
             for line in compare(recovery, one.view.truth).lines:
                 typer.echo(line)
         typer.echo(f"written: {path}")
 
 
-def _write(path: Path, recovery: Recovery, unit: Unit, view: Path, *, paths: int, explain: bool) -> list[str]:
-    """Write a result, with paths through its frames where they are asked for; return what there is to say of them."""
-    from posekit import files, pipeline
-    from posekit.sequences import Beam
+def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, paths: int) -> Following | None:
+    """Follow the person through the frames, where that is asked for and not done by now."""
+    from posekit import pipeline
 
-    following = None
-    if paths:
-        with progress_so_far("following") as done, about(view):
-            following = pipeline.follow(recovery, k=paths, beam=Beam(survivors=MOST), progress=done)
-    result = pipeline.result_of(recovery, unit=unit, explain=explain, following=following)
-    files.write_result(path, result)
-    return [] if following is None else [pipeline.following_line(following)]
+    if scaled is not None or not paths:
+        return None if scaled is None else scaled.following
+    with progress_so_far("following") as done, about(view):
+        return pipeline.follow(recovery, k=paths, progress=done)
+
+
+def _scale_line(scaled: ScaledFollowing) -> str:
+    """Say which scale of the lengths was found."""
+    tried = scaled.choice.scales
+    end = "; it is the last that was tried: a farther one may be better" if scaled.at_the_end else ""
+    return f"lengths times {scaled.scale:.3f}, standard deviation {scaled.deviation:.3f} ({len(tried)} tried{end})"
 
 
 def summarize(recovery: Recovery) -> None:

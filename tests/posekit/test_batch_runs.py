@@ -364,5 +364,5 @@ def test_the_command_line(archive: Path, tmp_path: Path, command: Callable[..., 
     (tmp_path / "bad.json").write_text("{")  # outside the archive: the others keep their names
     failed = command(*arguments, tmp_path / "bad.json")
     assert failed.code == 1 and "bad.json failed: " in failed.err and str(out / "manifest.json") in failed.err
-    nowhere = command("batch", archive, "-o", out, "--cluster", "127.0.0.1:1", "--no-rank")
+    nowhere = command(*arguments, "--cluster", "127.0.0.1:1")
     assert nowhere.code == 2 and "--cluster: 127.0.0.1:1: nothing answers there" in nowhere.err

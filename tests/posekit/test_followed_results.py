@@ -124,6 +124,33 @@ def test_the_command_line_follows_and_converts(
     assert not Path("path.bvh").exists()
 
 
+def test_the_command_line_finds_the_scale_of_the_lengths(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Callable[..., Any]
+) -> None:
+    """Frames that have nothing to do with each other tell it too, by what noise can explain."""
+    monkeypatch.chdir(tmp_path)
+    scene = random_views(FIGURE, 12, np.random.default_rng(3)).with_noise(1.0, np.random.default_rng(4))
+    view = replace(view_of(scene), root=scene.joints_cam[:, 0], head_image=np.empty(0), deviation=1.0)
+    long = {name: 1.04 * length for name, length in FIGURE.lengths.items()}
+    files.write_view("long.json", replace(view, lengths=long))
+    asked = ("recover", "long.json", "-o", "r.npz", "--follow-scale", "0.04")
+    done = command(*asked, "--follow", "1")
+    assert done.code == 0, done.err
+    said = next(line for line in done.out.splitlines() if line.startswith("lengths times "))
+    assert float(said.split()[2].rstrip(",")) == pytest.approx(1 / 1.04, abs=0.02)
+    lengths = files.read_result("r.npz").settings["lengths"]
+    assert lengths["neck-pelvis"] == pytest.approx(FIGURE.lengths["neck-pelvis"], rel=0.02)
+    Path("r.npz").unlink()
+    for more, said in (
+        ((), "--follow 1"),
+        (("--follow", "1", "--no-refine"), "no --no-refine"),
+        (("--follow", "1", "--follow-scale", "3"), "at most 0.15"),
+    ):
+        refused = command(*asked, *more)
+        assert refused.code == 2 and said in refused.err and refused.err.count("\n") == 1
+        assert not Path("r.npz").exists()
+
+
 def test_the_line_on_paths_says_how_sure() -> None:
     recovery = recover(builtin_view("seq1"))
     assert "cheaper than the next" in following_line(follow(recovery, k=2))

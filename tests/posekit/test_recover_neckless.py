@@ -120,6 +120,16 @@ def test_an_evaluation_counts_them_as_empty() -> None:
     np.testing.assert_array_equal(some.errors["best"][KEPT], alone.errors["best"])
 
 
+def test_an_evaluation_goes_on_where_a_whole_part_lacks_it() -> None:
+    """Views are evaluated 256 frames at a time."""
+    scene = random_views(load_figure(), 260, np.random.default_rng(8))
+    image = scene.image.copy()
+    image[256:, 0] = np.nan
+    view = replace(view_of(scene), image=image, root=scene.joints_cam[:, 0])
+    found = evaluate(view, method=Method(noise=(0.0,), checks=("rigid-parts",))).frames.measured
+    assert (found.survivors[:256] > 0).all() and (found.survivors[256:] == 0).all()
+
+
 def test_a_result_is_read_back_with_its_empty_frames(tmp_path: Path) -> None:
     view = kinds()["the head tells f"]
     files.write_view(tmp_path / "v.json", neckless(view))

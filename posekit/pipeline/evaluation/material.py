@@ -148,7 +148,7 @@ def of_view(view: View, method: Method, name: str = "view") -> Material:
     for level, sigma in enumerate(method.noise):
         noisy = _noisy(view, sigma, draw)
         size = len(known) if method.choose is not None else AT_ONCE
-        for part in np.split(known, range(size, len(known), size)):
+        for part in _parts(noisy, known, size):
             works.append(
                 Work(
                     view=of_frames(noisy, part),
@@ -162,6 +162,17 @@ def of_view(view: View, method: Method, name: str = "view") -> Material:
                 )
             )
     return Material(works=tuple(works), clips=(name,), actions=(name,))
+
+
+def _parts(view: View, rows: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
+    """Cut frames into parts of about this size, each of which shows a neck, as a view must where the camera is known."""
+    parts: list[NDArray[np.intp]] = []
+    for part in np.split(rows, range(size, len(rows), size)):
+        if parts and not all(np.isfinite(view.image[one, 0]).any() for one in (parts[-1], part)):
+            parts[-1] = np.concatenate([parts[-1], part])
+        else:
+            parts.append(part)
+    return parts
 
 
 def _noisy(view: View, sigma: float, draw: Array) -> View:

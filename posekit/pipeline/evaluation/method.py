@@ -126,10 +126,9 @@ class Method:
         }
 
     def _parts(self, view: View, figure: Figure, rows: NDArray[np.intp]) -> Iterator[list[FrameRecovery]]:
-        some = view if len(rows) == len(view) else of_frames(view, rows)
         try:
             yield recover(
-                some,
+                view if len(rows) == len(view) else of_frames(view, rows),
                 figure=figure,
                 checks=self.checks,
                 ranges=self.table,
@@ -140,7 +139,7 @@ class Method:
             ).frames
         except PosekitError as error:
             if len(rows) == 1:
-                yield [FrameRecovery(time=float(some.time[0]), batch=None, index=0, reason=str(error))]
+                yield [FrameRecovery(time=float(view.time[rows[0]]), batch=None, index=0, reason=str(error))]
                 return
             for half in np.array_split(rows, 2):
                 yield from self._parts(view, figure, half)

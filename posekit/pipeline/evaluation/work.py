@@ -238,7 +238,7 @@ def _true_codes(frames: Sequence[FrameRecovery], truth: Array) -> tuple[NDArray[
             retained[k] = float(alive[hypothesis]) if true.known[hypothesis] else np.nan
     unplaced = np.array([frame.batch is None for frame in frames], dtype=np.bool_)
     for k in np.flatnonzero(unplaced & ~np.isnan(retained)).tolist():
-        killer[k] = "root/not_known"
+        killer[k] = frames[k].lost_to
     return code, retained, killer
 
 
