@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
 from posekit.figure import Figure
-from posekit.figure.frames import hips_frame, into, torso_frame, unit
+from posekit.figure.frames import hips_frame, torso_frame
 from posekit.skeleton import DOFS, HIPS, JOINT, TORSO
-from posekit.tree import Findings
-from posekit.tree.compiled import compiled
-from posekit.validators import anatomical_kernels
+from posekit.tree import Findings, Rule
+from posekit.validators import kernels
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
-from posekit.validators.anatomical_screen import LimbTable
+from posekit.validators.anatomical_screen import limb_numbers
+from posekit.validators.screening import screened
 
 UNSEEN = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
@@ -101,34 +100,20 @@ class AnatomicalLimb:
         )
         return Findings(value=value, lower=lower, upper=upper, tolerance=tolerance[:, judged])
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], None]:
+    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
         """Tell what is clear; see `posekit.tree.Screened`."""
-        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
-        R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
-        upper, *rest = (
-            np.ascontiguousarray(into(R_parent, unit(end - start))) for start, end in pairwise(limb)
-        )
-        table = self._table
-        places: NDArray[np.int8] = compiled(anatomical_kernels).limbs(
-            upper,
-            rest[0] if rest else np.empty((0, 3)),
-            self._signs,
-            self._joint == "shoulder",
-            table.ends,
-            table.couplings,
-            table.starts,
-            table.knots,
-            table.judged,
-            table.settings,
-        )
-        return places, None
+        return screened(self.rule, points)
 
     @cached_property
-    def _table(self) -> LimbTable:
-        known = 2 if len(self.limb) == 2 else 4
-        return LimbTable.of(self.anatomy, self._joint, known, tolerance=self.tolerance, unseen=UNSEEN)
-
-    @cached_property
-    def _signs(self) -> Array:
+    def rule(self) -> Rule:
+        """The screen as numbers: what the limb hangs on, whether it is whole, ranges, couplings and tolerances."""
         first = DOFS.index(f"{self.limb[0]}.flexion")
-        return np.array(self.figure.ik.limits.sign[first : first + 4], dtype=np.float64)
+        numbers = limb_numbers(
+            self.anatomy,
+            self._joint,
+            self.figure.ik.limits.sign[first : first + (2 if len(self.limb) == 2 else 4)],
+            rigid=len(self._parent),
+            tolerance=self.tolerance,
+            unseen=UNSEEN,
+        )
+        return Rule(kernels=kernels, kind=kernels.ANATOMICAL, numbers=numbers)

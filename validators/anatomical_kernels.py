@@ -1,8 +1,11 @@
-"""Limbs under anatomical ranges as one plain loop, for `posekit.tree.compiled`: a screen that tells what is clear.
+"""Limbs under anatomical ranges as plain loops, for `posekit.validators.kernels`: a screen that tells what is clear.
 
-It does in degrees what `posekit.validators.anatomical_checks.AnatomicalLimb.judge` does with arrays. It says that a
-limb passes, or which place it violates first, where that is clear by more than any rounding; else it is unsure, and
-the judge is asked.
+It does in degrees what `posekit.validators.anatomical_checks.AnatomicalLimb.judge` does with arrays: of every writing
+of the limb is written down how far its worst angle is outside, and which place is violated first. It says that a limb
+passes, or which place it violates first, where that is clear by more than any rounding; else it is unsure, and the
+judge is asked.
+
+The numbers of a check are laid out by `posekit.validators.anatomical_screen.limb_numbers`.
 """
 
 from __future__ import annotations
@@ -10,11 +13,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from posekit.cameras import Array
 from posekit.tree import PASSED, UNSURE
+from posekit.tree.frame_kernels import ROOM
+from posekit.validators.angle_kernels import direction, worst
+from posekit.validators.rigid_kernels import hips, torso, unknown
 
 CLEAR = 1e-7
 """Degrees within which nothing is clear: a million times the rounding."""
@@ -22,11 +25,42 @@ CLEAR = 1e-7
 SINGULAR = 1e-5
 """Sine below which an angle is nearly free, and rounding is not small any more."""
 
-AT_TURN = 6
-"""What a coupling bounds: readings are flexion, abduction, rotation, hinge, elevation and plane; then the turn."""
+CLEAR_SHARE = 1e-9
+"""The same, as a part of one: of a range that is used up, or of a tolerance."""
+
+RIGID, WHOLE, ARM, BRANCHES, POWER, LEAST, CUT, TOLERANCE, UNSEEN = range(9)
+"""What the first numbers of a check are.
+
+How many points its rigid part has; 1 for a limb of three joints; 1 for an arm, whose elevation and plane are read; how
+many branches of the ball joint differ, 0 where only the judge knows which it takes; power of the sinus, 0 without one,
+and the least of what is left of a range, to that power; the plane at which the turn is cut; tolerance, and that from
+which on a rotation is not seen: degrees.
+"""
+
+SIGNS, ENDS, JUDGED, COUPLED = 9, 13, 33, 40
+"""Where the others begin.
+
+Signs of the four angles; five numbers of each: the middle between the means, lower mean and limit, upper mean and
+limit; how many places are judged, then the reading of each; how many couplings there are, then each with its knots.
+"""
+
+COUPLING = 5
+"""Numbers of a coupling before its knots.
+
+What it bounds, by which reading; -1 for a lower and 1 for an upper end; how far the limit is beyond the mean; how many
+knots follow, reading and mean of each.
+"""
+
+ROTATION, HINGE, ELEVATION, PLANE, AT_TURN = 2, 3, 4, 5, 6
+"""Readings after flexion and abduction, which may be bounded too; then the turn, which is bounded alone."""
+
+READ, LOW, HIGH, WORST, FIRST = ROOM, ROOM + 6, ROOM + 12, ROOM + 18, ROOM + 22
+"""Where readings and their limits are written down, and of four writings what was found."""
 
 BEYOND_ALL = 1e9
 """Degrees of an end that is none."""
+
+DEGREES = 180.0 / math.pi
 
 
 def near(angle: Any, middle: Any) -> Any:
@@ -37,194 +71,201 @@ def near(angle: Any, middle: Any) -> Any:
     return middle + turn - 180.0
 
 
-def between(knots: Array, first: int, last: int, x: Any) -> Any:
-    """Interpolate linearly between knots; constant beyond the outer ones."""
-    if x <= knots[first, 0]:
-        return knots[first, 1]
-    for k in range(first + 1, last):
-        if x <= knots[k, 0]:
-            share = (x - knots[k - 1, 0]) / (knots[k, 0] - knots[k - 1, 0])
-            return knots[k - 1, 1] + share * (knots[k, 1] - knots[k - 1, 1])
-    return knots[last - 1, 1]
+def coupled(w: Array, row: int, x: Any) -> Any:
+    """Interpolate linearly between the knots of a coupling; constant beyond the outer ones, NaN of NaN."""
+    first, last = row + COUPLING, row + COUPLING + 2 * int(w[row + 4]) - 2
+    if x <= w[first] or math.isnan(x):
+        return w[first + 1] if x <= w[first] else math.nan
+    for k in range(first + 2, last + 2, 2):
+        if x <= w[k]:
+            share = (x - w[k - 2]) / (w[k] - w[k - 2])
+            return w[k - 1] + share * (w[k + 1] - w[k - 1])
+    return w[last + 1]
 
 
-def limbs(  # noqa: PLR0912, PLR0915 - one loop: what is called from it would be compiled into it again
-    upper: Array,
-    lower: Array,
-    signs: Array,
-    arm: bool,
-    ends: Array,
-    couplings: Array,
-    starts: NDArray[np.int64],
-    knots: Array,
-    judged: NDArray[np.int64],
-    settings: Array,
-) -> NDArray[np.int8]:
-    """Screen limbs, from the directions of their segments in the frame of the part they hang on.
+def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 - all limits, in the judge's order
+    """Write down the limits of one writing, whose readings are; say whether they are clear.
 
     Parameters
     ----------
-    upper : array (N, 3)
-    lower : array (N, 3) or (0, 3)
-        Empty where only the upper segment is judged.
-    signs : array (4,)
-        Of the four angles, as `posekit.figure.angles.Limits` has them.
-    arm : bool
-        Whether elevation and plane are read.
-    ends, couplings, starts, knots, judged
-        As `posekit.validators.anatomical_screen.LimbTable` has them.
-    settings : array (5,)
-        Power of the sinus, 0 without one, and what it leaves at least; the plane (degrees) at which the turn is cut;
-        tolerance, and the tolerance from which on a rotation is not seen, degrees.
-
-    Returns
-    -------
-    int8 array (N,)
-        The first place violated, `PASSED` or `UNSURE`.
+    offset : float
+        The turn of this writing without rotation, degrees.
+    free : bool
+        Whether the rotation could be any, so that nothing may depend on it.
     """
-    power, least, seam, tolerance, unseen = settings[0], settings[1], settings[2], settings[3], settings[4]
-    degrees = 180.0 / math.pi
-    whole = len(lower) > 0
-    count = len(judged)
-    # Elevation and turn are the same in both branches of the ball joint.
-    one_branch = arm and judged[count - 1] == 4 and ends[2, 1] <= -BEYOND_ALL and ends[2, 3] >= BEYOND_ALL
-    places = np.empty(len(upper), np.int8)
-    v, low, high = np.empty(6), np.empty(6), np.empty(6)
-    for n in range(len(upper)):
-        places[n] = UNSURE
-        ux, uy, uz = upper[n, 0], upper[n, 1], upper[n, 2]
-        flat = math.sqrt(ux * ux + uz * uz)
-        if not flat > SINGULAR:
+    for k in range(4):
+        w[LOW + k], w[HIGH + k] = w[at + ENDS + 5 * k + 2], w[at + ENDS + 5 * k + 4]
+    for k in range(ELEVATION, PLANE + 1):
+        w[LOW + k], w[HIGH + k] = -BEYOND_ALL, BEYOND_ALL
+    rotation_low, rotation_high = w[at + ENDS + 5 * ROTATION + 1], w[at + ENDS + 5 * ROTATION + 3]
+    couplings = int(w[at + COUPLED])
+    middle, turns, row = 0.0, 0, at + COUPLED + 1
+    for _ in range(couplings):
+        if w[row] == AT_TURN:
+            middle += coupled(w, row, w[READ + int(w[row + 1])])
+            turns += 1
+        row += COUPLING + 2 * int(w[row + 4])
+    shift = math.nan
+    if turns > 0 and not math.isnan(w[READ + ROTATION]):
+        turned = near(w[READ + ROTATION] + offset, middle / turns)
+        if math.isnan(turned):
+            return False
+        shift = w[READ + ROTATION] - turned
+    row = at + COUPLED + 1
+    for _ in range(couplings):
+        k, of = int(w[row]), int(w[row + 1])
+        if free and of == ROTATION:
+            return False
+        end = coupled(w, row, w[READ + of])
+        if k == AT_TURN:
+            k, end = ROTATION, end + shift
+        limit = end + w[row + 2] * w[row + 3]
+        if w[row + 2] < 0:
+            w[LOW + k] = worst(w[LOW + k], limit)
+            if k == ROTATION:
+                rotation_low = worst(rotation_low, end)
+        else:
+            w[HIGH + k] = -worst(-w[HIGH + k], -limit)
+            if k == ROTATION:
+                rotation_high = -worst(-rotation_high, -end)
+        row += COUPLING + 2 * int(w[row + 4])
+    power = w[at + POWER]
+    if power > 0:
+        used = 0.0
+        for k in range(3):
+            centre = w[at + ENDS + 5 * k] if k < ROTATION else (rotation_low + rotation_high) / 2
+            if k > 0:
+                if abs(1.0 - used) < CLEAR_SHARE:
+                    return False
+                left = max(1.0 - used, w[at + LEAST]) ** (1.0 / power)
+                w[LOW + k] = centre + (w[LOW + k] - centre) * left
+                w[HIGH + k] = centre + (w[HIGH + k] - centre) * left
+            if k < ROTATION:
+                off = w[READ + k] - centre
+                half = w[at + ENDS + 5 * k + 4] - centre if off >= 0 else centre - w[at + ENDS + 5 * k + 2]
+                used += (abs(off) / (half + w[at + TOLERANCE])) ** power
+    return True
+
+
+def writing(w: Array, at: int, loose: Any, to: int) -> None:
+    """Write down of one writing, whose readings and limits are, how far its worst angle is outside, and which is first.
+
+    The first is `UNSURE` where an angle is at its limit. Angles that are not known, or whose limits are not, do not
+    count.
+
+    Parameters
+    ----------
+    loose : float
+        The tolerance of the rotation, degrees; infinite where it is not seen.
+    to : int
+    """
+    most, first, edge = -math.inf, PASSED, False
+    for place in range(int(w[at + JUDGED])):
+        k = int(w[at + JUDGED + 1 + place])
+        low, value, high = w[LOW + k], w[READ + k], w[HIGH + k]
+        if math.isnan(low + value + high):
             continue
-        x, y, z, bend = 0.0, 0.0, 0.0, 1.0
-        if whole and math.isnan(lower[n, 0] + lower[n, 1] + lower[n, 2]):
-            continue
-        best, second, first_place, edge = math.inf, math.inf, PASSED, False
-        clear = True
-        for branch in range(1 if one_branch else 2):
-            alpha, beta = math.atan2(-ux, -uz), math.atan2(uy, flat)
-            if branch == 1:
-                alpha, beta = alpha + math.pi, math.pi - beta
-            hinge = 0.0
-            if whole:
-                ca, sa, cb, sb = math.cos(alpha), math.sin(alpha), math.cos(beta), math.sin(beta)
-                forward = sa * lower[n, 0] + ca * lower[n, 2]
-                x, y, z = (
-                    ca * lower[n, 0] - sa * lower[n, 2],
-                    cb * lower[n, 1] + sb * forward,
-                    -sb * lower[n, 1] + cb * forward,
-                )
-                bend = math.sqrt(x * x + y * y)
-                if not bend > SINGULAR:
-                    clear = False
-                    break
-                hinge = math.atan2(bend, -z)
-            a, b = alpha * signs[0] * degrees, beta * signs[1] * degrees
-            v[4], v[5], offset = 0.0, 0.0, 0.0
-            if arm:
-                ra, rb = a / degrees, b / degrees
-                fx, fy, fz = math.sin(ra) * math.cos(rb), math.sin(rb), math.cos(ra) * math.cos(rb)
-                size = math.sqrt(fx * fx + fy * fy)
-                if not size > SINGULAR:
-                    clear = False
-                    break
-                v[4], v[5] = math.atan2(size, fz) * degrees, math.atan2(fy, fx) * degrees
-                if abs(v[5] - seam) < CLEAR:
-                    clear = False
-                    break
-                from_side = 90.0 - (v[5] + 360.0 if v[5] < seam else v[5])
-                twist = -2.0 * math.atan2(
-                    math.sin(ra / 2) * math.sin(rb / 2), math.cos(ra / 2) * math.cos(rb / 2)
-                )
-                offset = twist * degrees - (1.0 - fz) * from_side
-            for side in range(2 if whole else 1):
-                turn = 1.0 - 2.0 * side
-                v[0], v[1] = near(a, ends[0, 0]), near(b, ends[1, 0])
-                v[2], v[3] = 0.0, 0.0
-                if whole:
-                    v[2] = near(math.atan2(-turn * y, -turn * x) * signs[2] * degrees, ends[2, 0])
-                    v[3] = near(turn * hinge * signs[3] * degrees, ends[3, 0])
-                if math.isnan(v[0] + v[1] + v[2] + v[3]):
-                    clear = False
-                    break
-                for k in range(4):
-                    low[k], high[k] = ends[k, 2], ends[k, 4]
-                low[4], high[4], low[5], high[5] = -BEYOND_ALL, BEYOND_ALL, -BEYOND_ALL, BEYOND_ALL
-                rotation_low, rotation_high = ends[2, 1], ends[2, 3]
-                turn_middle, turns = 0.0, 0
-                for c in range(len(couplings)):
-                    if couplings[c, 0] == AT_TURN:
-                        turn_middle += between(knots, starts[c], starts[c + 1], v[int(couplings[c, 1])])
-                        turns += 1
-                shift = 0.0
-                if turns > 0:
-                    turned = near(v[2] + offset, turn_middle / turns)
-                    if math.isnan(turned):
-                        clear = False
-                        break
-                    shift = v[2] - turned
-                for c in range(len(couplings)):
-                    mean = between(knots, starts[c], starts[c + 1], v[int(couplings[c, 1])])
-                    at = int(couplings[c, 0])
-                    if at == AT_TURN:
-                        mean += shift
-                        at = 2
-                    limit = mean + couplings[c, 2] * couplings[c, 3]
-                    if couplings[c, 2] < 0:
-                        low[at] = max(low[at], limit)
-                        if at == 2:
-                            rotation_low = max(rotation_low, mean)
-                    else:
-                        high[at] = min(high[at], limit)
-                        if at == 2:
-                            rotation_high = min(rotation_high, mean)
-                if power > 0.0:
-                    used = 0.0
-                    for k in range(3 if whole else 2):
-                        middle = ends[k, 0] if k < 2 else (rotation_low + rotation_high) / 2
-                        if k > 0:
-                            left = max(1.0 - used, least**power) ** (1.0 / power)
-                            low[k] = middle + (low[k] - middle) * left
-                            high[k] = middle + (high[k] - middle) * left
-                        if k < 2:
-                            off = v[k] - middle
-                            half = (ends[k, 4] - middle if off >= 0 else middle - ends[k, 2]) + tolerance
-                            used += (abs(off) / half) ** power
-                worst, first, close = -math.inf, PASSED, False
-                for place in range(count):
-                    k = judged[place]
-                    allowed = tolerance
-                    if k == 2:
-                        allowed = tolerance / bend
-                        if abs(allowed - unseen) <= 1e-9 * allowed:
-                            clear = False
-                        if allowed > unseen:
-                            continue
-                    beyond = max(low[k] - v[k], v[k] - high[k]) - allowed
-                    close = close or abs(beyond) <= CLEAR
-                    if beyond > 0 and first == PASSED:
-                        first = place
-                    worst = max(worst, beyond)
-                if worst < best:
-                    best, second, first_place, edge = worst, best, first, close
-                elif worst < second:
-                    second = worst
-            if not clear:
-                break
-        if not clear or math.isnan(best):
-            continue
-        if best < -CLEAR:
-            places[n] = PASSED
-        elif best > CLEAR and second - best > CLEAR and not edge:
-            places[n] = first_place
-    return places
+        beyond = max(low - value, value - high) - (loose if k == ROTATION else w[at + TOLERANCE])
+        edge = edge or abs(beyond) <= CLEAR
+        if beyond > 0 and first == PASSED:
+            first = place
+        most = max(most, beyond)
+    w[WORST + to], w[FIRST + to] = most, UNSURE if edge else first
+
+
+def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call costs as much as some of its steps
+    """Screen a limb: its rigid part (4 points of the torso or 3 of the hips), then two joints, or three of a whole one.
+
+    Where the end is not known, nor are rotation and hinge, nor anything that depends on them.
+    """
+    rigid, whole = int(w[at + RIGID]), w[at + WHOLE] > 0
+    if unknown(w, 0, rigid + 2):
+        return PASSED  # nothing is judged
+    R = torso(w) if rigid == 4 else hips(w, 0)
+    ux, uy, uz = direction(w, rigid, rigid + 1, R)
+    level = math.sqrt(ux * ux + uz * uz)
+    if not (level > SINGULAR and w[at + BRANCHES] > 0):
+        return UNSURE
+    alpha, beta = math.atan2(-ux, -uz) * w[at + SIGNS], math.atan2(uy, level) * w[at + SIGNS + 1]
+    flexion, abduction = alpha * DEGREES, beta * DEGREES
+    rotation, hinge, loose, free = math.nan, math.nan, math.inf, False
+    tolerance, unseen = w[at + TOLERANCE], w[at + UNSEEN]
+    seen = whole and not unknown(w, rigid + 2, rigid + 3)
+    if seen:
+        lx, ly, lz = direction(w, rigid + 1, rigid + 2, R)
+        cosine, sine = -uz / level, -ux / level
+        forward = sine * lx + cosine * lz
+        x, y, z = cosine * lx - sine * lz, level * ly + uy * forward, -uy * ly + level * forward
+        bend = math.sqrt(x * x + y * y)
+        if not abs(tolerance - unseen * bend) > CLEAR_SHARE * tolerance:
+            return UNSURE
+        hinge = math.atan2(bend, -z) * w[at + SIGNS + HINGE] * DEGREES
+        free = bend <= SINGULAR
+        if unseen * bend > tolerance:
+            if free:
+                return UNSURE
+            loose = tolerance / bend
+        if not free:
+            rotation = math.atan2(-y, -x) * w[at + SIGNS + ROTATION] * DEGREES
+    offset = 0.0
+    if w[at + ARM] > 0:
+        # As elevation_and_plane has it, of the direction itself.
+        ahead, aside, down = -ux * w[at + SIGNS], uy * w[at + SIGNS + 1], -uz
+        raised = math.sqrt(ahead * ahead + aside * aside)
+        plane = math.atan2(aside, ahead) * DEGREES
+        if not (raised > SINGULAR and abs(plane - w[at + CUT]) > CLEAR):
+            return UNSURE
+        w[READ + ELEVATION], w[READ + PLANE] = math.atan2(raised, down) * DEGREES, plane
+        if seen and not free:
+            twist = -2.0 * math.atan2(
+                math.sin(alpha / 2) * math.sin(beta / 2), math.cos(alpha / 2) * math.cos(beta / 2)
+            )
+            from_side = 90.0 - (plane + 360.0 if plane < w[at + CUT] else plane)
+            offset = twist * DEGREES - (1.0 - down) * from_side
+    else:
+        w[READ + ELEVATION], w[READ + PLANE] = math.nan, math.nan
+    count = 0
+    for branch in range(int(w[at + BRANCHES])):
+        if branch == 1:
+            flexion, abduction, rotation, offset = (
+                flexion + 180.0,
+                180.0 - abduction,
+                rotation + 180.0,
+                offset + 180.0,
+            )
+        w[READ], w[READ + 1] = near(flexion, w[at + ENDS]), near(abduction, w[at + ENDS + 5])
+        for side in range(2 if seen else 1):
+            w[READ + ROTATION] = near(rotation + 180.0 * side, w[at + ENDS + 5 * ROTATION])
+            w[READ + HINGE] = near(hinge if side == 0 else -hinge, w[at + ENDS + 5 * HINGE])
+            known = w[READ] + w[READ + 1]
+            if seen:
+                known += w[READ + HINGE] + (0.0 if free else w[READ + ROTATION])
+            if math.isnan(known) or not bounds(w, at, offset, free):
+                return UNSURE
+            writing(w, at, loose, count)
+            if w[WORST + count] < -CLEAR:
+                return PASSED
+            count += 1
+    least = math.inf
+    for i in range(count):
+        least = min(least, w[WORST + i])
+    if not least > CLEAR:
+        return UNSURE
+    first = PASSED
+    for i in range(count):
+        if w[WORST + i] <= least + CLEAR:
+            # Of writings that are equally far outside the judge may choose any.
+            if first != PASSED and w[FIRST + i] != first:
+                return UNSURE
+            first = int(w[FIRST + i])
+    return first
 
 
 COMPILED = {
     "near": "",
-    "between": "",
-    "limbs": (
-        "(f8[:, ::1], f8[:, ::1], f8[::1], b1, f8[:, ::1], f8[:, ::1], i8[::1], f8[:, ::1], i8[::1], f8[::1])"
-    ),
+    "coupled": "",
+    "bounds": "(f8[::1], i8, f8, b1)",
+    "writing": "(f8[::1], i8, f8, i8)",
+    "anatomical": "(f8[::1], i8)",
 }
-"""The kernels, in the order in which they need each other, with the types they take."""
+"""The kernels, in the order in which they need each other, with the types of those that are called."""

@@ -280,12 +280,16 @@ COMPILED = {
     "outside": "",
     "worst": "",
     "verdict": "",
-    "ball": "",
+    "ball": "(UniTuple(f8, 9), f8[::1], i8)",
     "transposed": "",
-    "pelvis": "",
-    "polar": "",
-    "neck": "",
+    "pelvis": "(f8[::1], i8)",
+    "polar": "(f8[::1],)",
+    "neck": "(f8[::1], i8)",
     "direction": "",
     "limb": "",
 }
-"""The kernels, in the order in which they need each other."""
+"""The kernels, in the order in which they need each other, with the types of those that are called.
+
+The others are compiled into those that call them, again and again: that takes long, and pays only for what is asked
+often.
+"""

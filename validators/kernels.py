@@ -16,9 +16,17 @@ from typing import Any, Final
 from posekit.cameras import Array
 from posekit.tree import PASSED, UNSURE
 from posekit.tree.frame_kernels import PRESUMED
-from posekit.validators import angle_kernels, rigid_kernels
+from posekit.validators import anatomical_kernels, angle_kernels, rigid_kernels
+from posekit.validators.anatomical_kernels import anatomical
 from posekit.validators.angle_kernels import limb, neck, pelvis
-from posekit.validators.rigid_kernels import distance, placement, unit, unknown
+from posekit.validators.rigid_kernels import (
+    distance,
+    hips,  # noqa: F401 - to be compiled
+    placement,
+    torso,  # noqa: F401 - to be compiled
+    unit,
+    unknown,
+)
 
 DISTANCE: Final = 0
 PLACEMENT: Final = 1
@@ -26,7 +34,8 @@ PELVIS: Final = 2
 NECK: Final = 3
 LIMB: Final = 4
 CAPSULES: Final = 5
-JUDGED: Final = 6
+ANATOMICAL: Final = 6
+JUDGED: Final = 7
 """Kinds of screens; the last is never sure."""
 
 CLEAR_GAP = 1e-6
@@ -128,6 +137,8 @@ def screen(kind: int, w: Array, at: int) -> Any:
         return limb(w, at)
     if kind == DISTANCE:
         return distance(w, at)
+    if kind == ANATOMICAL:
+        return anatomical(w, at)
     if kind == PLACEMENT:
         return placement(w, at)
     if kind == PELVIS:
@@ -137,10 +148,14 @@ def screen(kind: int, w: Array, at: int) -> Any:
     return UNSURE
 
 
-PARTS = (rigid_kernels, angle_kernels)
+PARTS = (rigid_kernels, angle_kernels, anatomical_kernels)
 """Other modules whose kernels are compiled with these."""
 
 COMPILED = {
+    "torso": "(f8[::1],)",
+    "hips": "(f8[::1], i8)",
+    "distance": "(f8[::1], i8)",
+    "placement": "(f8[::1], i8)",
     "clamp": "",
     "mean": "",
     "apart": "",
@@ -148,4 +163,7 @@ COMPILED = {
     "capsules": "",
     "screen": "",
 }
-"""The kernels, in the order in which they need each other."""
+"""The kernels, in the order in which they need each other, with the types of those that are called.
+
+Those of rigid parts are among them: they are wanted in many places, and asked seldom.
+"""

@@ -217,7 +217,9 @@ def _warn(pose: HeadPose, beyond: NDArray[np.bool_]) -> None:
         if not frames.size:
             continue
         worst = frames[pose.rms[frames].argmax()]
-        where = f" in {frames.size} of {misfit.size} frames, most in frames[{worst}]" if misfit.size > 1 else ""
+        where = (
+            f" in {frames.size} of {misfit.size} frames, most in frames[{worst}]" if misfit.size > 1 else ""
+        )
         warnings.warn(
             f"head point {name} does not fit the others{where}: residual {pose.residuals[worst, index]:.4g}, "
             f"rms {pose.rms[worst]:.4g} with it and {pose.rms_without[worst]:.4g} without (image units); "

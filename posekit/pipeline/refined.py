@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Array
+from posekit.pipeline.uncertainty import Covariances
 from posekit.refinement import Merged
+
+ALL = slice(None)
+
+ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,10 +34,12 @@ class RefinedSurvivors:
         Its degrees of freedom.
     p : array (N,)
         The probability that noise alone gives a chi2 as large.
-    covariance : array (N, 14, 3, 3)
-        Of every joint, square metres.
     merged : int array (N,)
         How many other leaves became the same posture.
+    covariances : Covariances
+        Of these survivors and others, found when they are read.
+    rows : slice
+        Which of those these are.
     """
 
     joints: Array
@@ -39,12 +47,18 @@ class RefinedSurvivors:
     chi2: Array
     dof: NDArray[np.intp]
     p: Array
-    covariance: Array
     merged: NDArray[np.intp]
+    covariances: Covariances
+    rows: slice
 
     def __post_init__(self) -> None:
-        for item in fields(self):
-            getattr(self, item.name).flags.writeable = False
+        for name in ARRAYS:
+            getattr(self, name).flags.writeable = False
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance of every joint (N, 14, 3, 3), square metres; NaN where it is not known."""
+        return self.covariances.read()[self.rows]
 
     def __len__(self) -> int:
         """Count the survivors."""
@@ -56,9 +70,8 @@ class RefinedSurvivors:
         order = np.argsort(merged.rows)
         unknown = ~known[merged.rows[order]]
         chosen = merged.refined.select(order)
-        joints, covariance = chosen.joints.copy(), chosen.covariance.copy()
+        joints = chosen.joints.copy()
         joints[unknown] = np.nan
-        covariance[unknown] = np.nan
         size = np.bincount(merged.group[merged.group >= 0], minlength=len(order))[order]
         return RefinedSurvivors(
             joints=joints,
@@ -66,20 +79,26 @@ class RefinedSurvivors:
             chi2=chosen.chi2.copy(),
             dof=chosen.dof.copy(),
             p=chosen.p.copy(),
-            covariance=covariance,
             merged=size - 1,
+            covariances=Covariances(chosen, unknown),
+            rows=ALL,
         )
 
     @staticmethod
     def joined(parts: Sequence[RefinedSurvivors]) -> RefinedSurvivors:
-        """Put those of one part behind those of the last."""
-        return RefinedSurvivors(
-            **{
-                item.name: np.concatenate([getattr(part, item.name) for part in parts])
-                for item in fields(RefinedSurvivors)
-            }
-        )
+        """Put those of one part behind those of the last, each of them whole."""
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in ARRAYS
+        }
+        covariances = Covariances.joined([part.covariances for part in parts])
+        return RefinedSurvivors(**arrays, covariances=covariances, rows=ALL)
 
     def part(self, rows: slice) -> RefinedSurvivors:
-        """Return some of them."""
-        return RefinedSurvivors(**{item.name: getattr(self, item.name)[rows] for item in fields(self)})
+        """Return some of them, one after the other."""
+        own = range(*self.rows.indices(len(self.covariances)))[rows]
+        arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in ARRAYS}
+        return RefinedSurvivors(
+            **arrays,
+            covariances=self.covariances,
+            rows=slice(own.start, max(own.stop, own.start)),
+        )

@@ -24,6 +24,7 @@ from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
+from posekit.pipeline.leaf_postures import leaf_postures
 from posekit.pipeline.limb_walls import LimbWalls
 from posekit.pipeline.noise import Noise, Seen
 from posekit.pipeline.rooting import Rooting
@@ -33,6 +34,7 @@ from posekit.pipeline.trees import Batch
 from posekit.ranking import deviation_of_noise
 from posekit.refinement import Sight, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import DEVIATIONS
+from posekit.refinement.trunk import TRUNK
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
 
@@ -87,7 +89,7 @@ class Lifted:
 
     def postures(self) -> Array:
         """Place the leaves (N, 14, 3), completed where that was possible."""
-        postures = self.leaves.postures()
+        postures = leaf_postures(self.leaves)
         if self.completion is None:
             return postures
         return np.where(np.isnan(postures), self.completion.postures, postures)
@@ -294,7 +296,13 @@ def _pinhole(camera: Camera) -> PinholeCamera:
 
 def _without_twins(leaves: Leaves, trunks: Trunks) -> Leaves:
     """Drop the leaves whose trunk is another than the one that was found: its twin in the same image."""
-    twin = ~trunks.carries(leaves.frame, leaves.postures())
+    # Leaves are sorted by frame and code, and the trunk's joints are a code's first bits: one of a run tells of all.
+    prefix = leaves.code >> max(leaves.level - (TRUNK - 1), 0)
+    begins = np.ones(len(prefix), dtype=np.bool_)
+    begins[1:] = (prefix[1:] != prefix[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
+    one = np.flatnonzero(begins)
+    carried = trunks.carries(leaves.frame[one], leaves.positions(range(TRUNK), one))
+    twin = ~carried[np.cumsum(begins) - 1]
     row = np.flatnonzero(twin)
     nothing = np.full(len(row), np.nan)
     why = Contradiction(

@@ -97,15 +97,13 @@ class LengthDoubt:
 
     def __str__(self) -> str:
         """Say it in one line."""
-        if self.needed == self.least:
-            return (
-                f"{self.segment} is stated as {self.stated:.3f} m, but none of {self.frames} frames shows more than "
-                f"{self.needed:.3f} m of it"
-            )
-        return (
-            f"{self.segment} is stated as {self.stated:.3f} m, but {self.unexplained} of {self.frames} frames need "
-            f"{self.needed:.3f} m or the like ({self.least:.3f} to {self.most:.3f} m)"
-        )
+        stated = f"{self.segment} is stated as {self.stated:.3f} m, but"
+        if self.needed == self.least and self.needed < self.stated:
+            return f"{stated} none of {self.frames} frames shows more than {self.needed:.3f} m of it"
+        need = f"{stated} {self.unexplained} of {self.frames} frames need {self.needed:.3f} m"
+        if self.needed == self.least and self.most > self.needed:
+            return f"{need} of it or more"
+        return f"{need} or the like ({self.least:.3f} to {self.most:.3f} m)"
 
 
 def diagnose(sight: Sight, *, level: float = LEVEL) -> list[LengthDoubt]:

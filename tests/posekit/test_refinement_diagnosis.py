@@ -99,3 +99,15 @@ def test_frames_whose_root_is_not_known_say_nothing() -> None:
 def test_without_a_root_it_is_refused() -> None:
     with pytest.raises(InputError, match="RootPrior"):
         diagnose(replace(sight_of(scene().figure), root=None))
+
+
+def test_both_directions_are_worded() -> None:
+    kind = {"segment": "pelvis-left_hip", "frames": 12, "unexplained": 9, "left": 0}
+    short = LengthDoubt(stated=0.21, needed=0.272, least=0.272, most=0.4, **kind)  # type: ignore[arg-type]
+    assert str(short) == "pelvis-left_hip is stated as 0.210 m, but 9 of 12 frames need 0.272 m of it or more"
+    long = LengthDoubt(stated=0.4, needed=0.2, least=0.2, most=0.3, **kind)  # type: ignore[arg-type]
+    assert str(long).endswith("stated as 0.400 m, but none of 12 frames shows more than 0.200 m of it")
+    about = LengthDoubt(stated=0.4, needed=0.2, least=0.18, most=0.22, **kind)  # type: ignore[arg-type]
+    assert str(about).endswith("9 of 12 frames need 0.200 m or the like (0.180 to 0.220 m)")
+    one = LengthDoubt(stated=0.2, needed=0.3, least=0.3, most=0.3, **kind)  # type: ignore[arg-type]
+    assert str(one).endswith("9 of 12 frames need 0.300 m or the like (0.300 to 0.300 m)")

@@ -130,6 +130,29 @@ def without_head() -> tuple[Leaves, Leaves]:
     return both(checks(), points[:, 0], seen(points), None)
 
 
+def anatomical() -> tuple[Leaves, Leaves]:
+    points = postures(27, VIEWS // 2, beyond=0.1)
+    return both(checks(ranges="anatomical"), points[:, 0], seen(points), points[:, N:])
+
+
+def anatomical_measured() -> tuple[Leaves, Leaves]:
+    """Pixels that are off, joints that are hidden, and every third right elbow and left knee straight."""
+    points = postures(28, VIEWS // 2, beyond=0.1)
+    for first, middle, end in (
+        ("right_shoulder", "right_elbow", "right_wrist"),
+        ("left_hip", "left_knee", "left_ankle"),
+    ):
+        along = points[::3, JOINT[middle]] - points[::3, JOINT[first]]
+        length = np.linalg.norm(points[::3, JOINT[end]] - points[::3, JOINT[middle]], axis=1)
+        points[::3, JOINT[end]] = (
+            points[::3, JOINT[middle]] + along * (length / np.linalg.norm(along, axis=1))[:, None]
+        )
+    image = seen(points)
+    image[1::3] = seen(points, noise=2.0)[1::3]
+    image[: VIEWS // 4] = hide_some(image, 29)[: VIEWS // 4]
+    return both(checks(0.05, 3.0, "anatomical"), points[:, 0], image, points[:, N:], tolerance=0.02)
+
+
 def projected_ranges() -> tuple[Leaves, Leaves]:
     points = postures(6, VIEWS // 4)
     return both(checks(ranges="table1"), points[:, 0], seen(points), points[:, N:])
@@ -230,6 +253,8 @@ CASES = (
     noisy,
     hidden,
     without_head,
+    anatomical,
+    anatomical_measured,
     projected_ranges,
     several_hypotheses,
     at_the_limits,
@@ -342,6 +367,16 @@ def test_rows_that_are_too_few_are_made_more(monkeypatch: pytest.MonkeyPatch) ->
         assert_same(*both(checks(0.05, 3.0), points[:, 0], seen(points), points[:, N:], tolerance=0.05))
     finally:
         compiled.use_threads(None)
+
+
+@pytest.mark.parametrize("ranges", ["urdf", "anatomical"])
+def test_ordinary_trees_are_grown_whole(monkeypatch: pytest.MonkeyPatch, ranges: str) -> None:
+    points = postures(30, 20 if NUMBA else 3, beyond=0.0)
+    monkeypatch.setattr(fast, "grow_steps", None)
+    image = hide_some(seen(points), 31)
+    suite = checks(0.05, 3.0, ranges)
+    with compiled.path("fast"):
+        assert len(TREE.grow(CAMERA, points[:, 0], image, suite, given=points[:, N:], tolerance=0.02).code)
 
 
 def test_checks_that_a_loop_does_not_know_are_asked_step_by_step() -> None:
