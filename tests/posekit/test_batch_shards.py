@@ -137,6 +137,17 @@ def test_tolerances_mean_what_they_mean_to_recover(given: tuple, uncalibrated: b
     assert recipe.tolerance(uncalibrated=uncalibrated) == options.filled(usual)
 
 
+@pytest.mark.parametrize(
+    ("view", "camera"),
+    [(builtin_view("seq1"), "lee-chen"), (forget_camera(seen(1)), "scaled-orthographic, its calibration")],
+)
+def test_a_deviation_is_refused_where_it_has_no_effect(view: View, camera: str) -> None:
+    recipe = Recipe(source=Source(deviation=2.0))
+    recipe.check_view(seen(1))
+    with pytest.raises(InputError, match=f"--deviation: the view's camera is {camera}"):
+        recipe.check_view(view)
+
+
 def test_where_it_is_cut_changes_nothing(tmp_path: Path, folder: Path) -> None:
     view = seen(23, 2)
     write_view_table(tmp_path / "view.parquet", view, group=5)

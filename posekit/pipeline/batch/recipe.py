@@ -190,9 +190,11 @@ class Recipe:
             camera is not an `opencv` one a deviation.
         """
         if self.source.deviation is not None and not isinstance(view.camera, OpenCVModel):
+            uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
+            camera = "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
             raise InputError(
-                f"--deviation: the view's camera is {view.camera.type}: a deviation has no effect there; expected an "
-                "opencv camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
+                f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
+                "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
             )
         if isinstance(view.camera, ScaledOrthographicModel):
             if self.root != "auto":

@@ -165,7 +165,7 @@ def of_view(view: View, method: Method, name: str = "view") -> Material:
 
 
 def _parts(view: View, rows: NDArray[np.intp], size: int) -> list[NDArray[np.intp]]:
-    """Cut frames into parts of about this size, each of which shows a neck, as a view must where the camera is known."""
+    """Cut frames into parts of about this size, each of which shows a neck somewhere, as a view must."""
     parts: list[NDArray[np.intp]] = []
     for part in np.split(rows, range(size, len(rows), size)):
         if parts and not all(np.isfinite(view.image[one, 0]).any() for one in (parts[-1], part)):
