@@ -96,8 +96,13 @@ def children(pid: int) -> list[int]:
         return []
 
 
+WARM = 0.4
+"""Part of a run after which its workers are compared: until then each loads compiled loops, which it does once whatever
+comes after."""
+
+
 class Steady:
-    """The rate between the first shard that is done and the last: processes are up by then."""
+    """The rate of the rest of a run, when processes are up and have loaded their code."""
 
     def __init__(self, memory: Memory | None) -> None:
         self.memory = memory
@@ -112,7 +117,8 @@ class Steady:
     @property
     def rates(self) -> tuple[float, float]:
         """Views a second by the clock, and by the processor time of all workers."""
-        (clock, cpu, done), (later, cpu_later, done_later) = self.seen[0], self.seen[-1]
+        later, cpu_later, done_later = self.seen[-1]
+        clock, cpu, done = next(one for one in self.seen if one[2] >= WARM * done_later)
         return (done_later - done) / (later - clock), (done_later - done) / (cpu_later - cpu)
 
 
