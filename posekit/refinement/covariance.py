@@ -24,7 +24,6 @@ from posekit.refinement.anatomy import END, MIDDLE
 from posekit.refinement.descent import BLOCK
 from posekit.refinement.equations import Equations, assemble, linearise
 from posekit.refinement.limb_terms import LimbTerms
-from posekit.refinement.loops import arrow_of, loops
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import backward, cholesky, dot, forward, turned
 from posekit.refinement.state import State, place
@@ -37,13 +36,6 @@ ANY = np.pi / np.sqrt(3.0)
 
 CAP = 0.5
 """See the module: information on a turn, times the noise over the length."""
-
-
-PLACE = {
-    joint: (limb, segment) for segment, ends in enumerate((MIDDLE, END)) for limb, joint in enumerate(ends)
-}
-IN_ORDER = [6 + 2 * limb + segment for joint in range(6, 14) for limb, segment in (PLACE[joint],)]
-"""Where the kernel writes the covariances of the limbs' joints."""
 
 
 def covariances(problem: Problem, state: State) -> Array:
@@ -65,13 +57,6 @@ def _covariances(problem: Problem, state: State, here: Equations) -> Array:
     index = np.arange(width)
     priors = np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))
     floor = ANY**-2 * 1e-6
-    compiled = loops()
-    if compiled is not None:
-        known = np.empty((n, 14, 3, 3))
-        moving = (np.ascontiguousarray(a) for a in (limbs.tangents, state.directions, state.limbs))
-        compiled.spreads(*arrow_of(here._replace(limbs=limbs)), priors, floor, *moving, known)
-        known[:, 6:] = known[:, IN_ORDER]
-        return known
     arrow = assemble(here._replace(limbs=limbs), 0.0, floor)
     arrow.matrix[index, index] += priors[:, None]
     trunk = cholesky(arrow.matrix)

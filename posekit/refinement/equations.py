@@ -7,7 +7,7 @@ unknowns are solved last.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,6 @@ from posekit.refinement.anatomy import START
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
-from posekit.refinement.loops import arrow_of, loops
 from posekit.refinement.problem import Problem
 from posekit.refinement.small import backward, cholesky, forward
 from posekit.refinement.state import State, Step, parents, trunk_offsets
@@ -219,9 +218,6 @@ def _add_turns(
 
 def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
     """Solve for the step, and the decrease of chi2 that it promises (N,), watched limits left out."""
-    compiled = loops()
-    if compiled is not None:
-        return _solve_compiled(compiled, here, damping)
     arrow = assemble(here, damping)
     last = eliminate(arrow.matrix, arrow.matrix[:, :0], arrow.gradient, damping, FLOOR)
     own = last.right[:, 0]
@@ -235,16 +231,6 @@ def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
         head = follow(arrow.head, trunk[:6])
         gain += _gain(arrow.head, head)
     return Step(trunk, limbs, head), gain - here.slack
-
-
-def _solve_compiled(compiled: Any, here: Equations, damping: Array | float) -> tuple[Step, Array]:
-    width, n = here.trunk.gradient.shape
-    reach = 0 if here.limbs is None else len(here.limbs.matrix)
-    trunk, limbs, head, gain = np.empty((width, n)), np.empty((reach, 4, n)), np.empty((3, n)), np.empty(n)
-    damped = np.full(n, damping)
-    compiled.steps(*arrow_of(here), damped, FLOOR, trunk, limbs, head, gain)
-    step = Step(trunk, None if here.limbs is None else limbs, None if here.head is None else head)
-    return step, gain - here.slack
 
 
 def follow(block: Reduced, shift: Array) -> Array:

@@ -11,7 +11,6 @@ from posekit.refinement.descent import PRECISION, STEPS
 from posekit.refinement.factors import factor_postures
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.inputs import frames_of, numbers
-from posekit.refinement.loops import count as count_leaves
 from posekit.refinement.problem import Problem
 from posekit.refinement.refined import Refined
 from posekit.refinement.search import Found, search
@@ -86,7 +85,6 @@ def refine(
     near = ~(np.abs(positions) > FARTHEST).any(axis=(1, 2))
     placeable = np.asarray(np.isfinite(positions[:, 0]).all(axis=1) & near)
     positions = np.where(placeable[:, None, None], positions, FAR)
-    count_leaves(len(positions))
     problem = sight.problem(frames, positions[:, 0])
     skull = None if head is None else _heads(head, count, frames)
     factors = factor_postures(frames, positions)

@@ -18,6 +18,7 @@ from posekit.pipeline.uncertainty import Covariances
 from posekit.refinement import covariance, refined
 from posekit.synthesis import random_views
 from posekit.tree import Leaves
+from posekit.tree.compiled import path
 
 FRAMES = 12
 
@@ -127,3 +128,21 @@ def test_twins_are_the_leaves_on_other_trunks(run: Recorded) -> None:
     assert 0 < carried.sum() < len(carried)
     np.testing.assert_array_equal(left.code, whole.code[carried])
     np.testing.assert_array_equal(left.frame, whole.frame[carried])
+
+
+@pytest.mark.parametrize("ranges", ["urdf", "anatomical"])
+def test_compiled_trees_change_no_bit_of_what_is_refined(view: View, ranges: str) -> None:
+    """So results do not depend on what a process did before."""
+    pytest.importorskip("numba")
+    found = []
+    for chosen in ("plain", "fast"):
+        with path(chosen):
+            found.append(recover(view, ranges=ranges))
+    for plain, fast in zip(found[0].frames, found[1].frames, strict=True):
+        assert plain.branches == fast.branches
+        assert plain.rejected == fast.rejected
+        assert plain.refined is not None
+        assert fast.refined is not None
+        np.testing.assert_array_equal(plain.joints, fast.joints)
+        for name in ("dof", "chi2", "p", "merged", "covariance"):
+            np.testing.assert_array_equal(getattr(plain.refined, name), getattr(fast.refined, name))
