@@ -11,7 +11,7 @@ from posekit import files
 from posekit.calibration import CalibratedCamera, read_cameras
 from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.files import OpenCVModel, Result, ScaledOrthographicModel, View
+from posekit.files import OpenCVModel, ScaledOrthographicModel, View
 from posekit.files.postures_q import read_configurations
 from posekit.keypoints import KeyPoints, check_sides, choose, list_people
 from posekit.motion import Motion, guess_up, motion_format, postures_of, read_motion, read_survivors
@@ -27,7 +27,7 @@ MOST_PEOPLE = 12
 
 
 def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
-    """Describe a file in some lines.
+    """Describe a file in some lines; results, batches and reports: `posekit.pipeline.contents`.
 
     Raises
     ------
@@ -47,8 +47,6 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
         return lines + [_camera(camera) for camera in read_cameras(path).values()]
     if what.kind is Kind.VIEW:
         return lines + _view(files.read_view(path))
-    if what.kind is Kind.RESULT:
-        return lines + _result(files.read_result(path))
     if what.kind is Kind.POSTURES:
         return lines + _postures(files.read_postures(path).joints)
     if what.kind is Kind.SURVIVORS:
@@ -186,20 +184,6 @@ def _view(view: View) -> list[str]:
         "",
         *table_lines(("point", "seen"), rows),
     ]
-
-
-def _result(result: Result) -> list[str]:
-    counts = np.array([len(frame.joints) for frame in result.frames])
-    roots = [frame.root for frame in result.frames if frame.root is not None]
-    lines = [
-        f"{len(counts)} frames, {counts.sum()} postures: median {np.median(counts):g}, most {counts.max()}, none in "
-        f"{int((counts == 0).sum())}"
-    ]
-    if roots:
-        methods = {root.method for root in roots}
-        named = ", ".join(f"{one} in {sum(root.method == one for root in roots)}" for one in sorted(methods))
-        lines.append(f"neck placed by {named} frames")
-    return lines
 
 
 def _listed(names: Sequence[str], most: int = 30) -> str:
