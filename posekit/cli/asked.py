@@ -135,18 +135,11 @@ class Asked:
         InputError
             Where the option is given for another camera than an `opencv` one.
         """
-        from posekit import files
+        from posekit.pipeline.noise import noiseless_camera, refuse_deviation
 
-        if isinstance(seen.camera, files.OpenCVModel):
-            return
-        uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
-        camera = "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
-        if self.rooting.deviation is not None:
-            raise InputError(
-                f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
-                "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
-            )
-        if seen.deviation is not None:
+        refuse_deviation(seen, self.rooting.deviation)
+        camera = noiseless_camera(seen)
+        if camera and seen.deviation is not None:
             typer.echo(
                 f"posekit: warning: the view's deviation of {seen.deviation:g} px has no effect: its camera is "
                 f"{camera}, and noise is allowed for where it is opencv",

@@ -14,7 +14,7 @@ from posekit.cameras import Array, Camera, PinholeCamera
 from posekit.errors import InputError
 from posekit.figure import Figure
 from posekit.figure.angles import Limits
-from posekit.files import View
+from posekit.files import OpenCVModel, ScaledOrthographicModel, View
 from posekit.pipeline.fit_camera import CameraFit
 from posekit.placement import DETECTED_DEVIATION, Placement
 from posekit.refinement import GIVING, RootPrior, Sight
@@ -209,3 +209,27 @@ def _step(placement: Placement | None) -> float:
         placement.deviation if math.isfinite(placement.deviation) and len(placement.necks) == 1 else 0.0
     )
     return max(placement.step, deviation, LEAST_STEP)
+
+
+def noiseless_camera(view: View) -> str:
+    """Name the camera of a view whose noise is not allowed for; empty where it is an `opencv` one."""
+    if isinstance(view.camera, OpenCVModel):
+        return ""
+    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
+    return "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
+
+
+def refuse_deviation(view: View, deviation: float | None) -> None:
+    """Refuse a deviation that is asked for where it has no effect.
+
+    Raises
+    ------
+    InputError
+        Where one is given for another camera than an `opencv` one.
+    """
+    camera = noiseless_camera(view)
+    if camera and deviation is not None:
+        raise InputError(
+            f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
+            "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
+        )

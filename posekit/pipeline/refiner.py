@@ -24,7 +24,6 @@ from posekit.pipeline.contact import contact_under_noise
 from posekit.pipeline.fit_camera import CameraFit, fit_camera
 from posekit.pipeline.grower import Grower
 from posekit.pipeline.grown import Grown
-from posekit.pipeline.leaf_postures import leaf_postures
 from posekit.pipeline.limb_walls import LimbWalls
 from posekit.pipeline.noise import Noise, Seen
 from posekit.pipeline.rooting import Rooting
@@ -89,7 +88,7 @@ class Lifted:
 
     def postures(self) -> Array:
         """Place the leaves (N, 14, 3), completed where that was possible."""
-        postures = leaf_postures(self.leaves)
+        postures = self.leaves.postures()
         if self.completion is None:
             return postures
         return np.where(np.isnan(postures), self.completion.postures, postures)

@@ -54,11 +54,11 @@ def _covariances(problem: Problem, state: State, here: Equations) -> Array:
         return np.full((state.root.shape[1], 14, 3, 3), np.nan)
     n, width = state.root.shape[1], problem.trunk_width
     limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
+    arrow = assemble(here._replace(limbs=limbs), 0.0, ANY**-2 * 1e-6)
     index = np.arange(width)
-    priors = np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))
-    floor = ANY**-2 * 1e-6
-    arrow = assemble(here._replace(limbs=limbs), 0.0, floor)
-    arrow.matrix[index, index] += priors[:, None]
+    arrow.matrix[index, index] += np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))[
+        :, None
+    ]
     trunk = cholesky(arrow.matrix)
     out = np.empty((14, 3, 3, n))
     # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.

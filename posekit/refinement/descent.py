@@ -27,9 +27,8 @@ SLOWER, FASTER = 8.0, 0.1
 
 TINY = 1e-300
 
-BLOCK = 2000
-"""Postures worked on at once: enough to spread the overhead of each operation, and no power of two, whose columns share
-a few places of the cache."""
+BLOCK = 2048
+"""Postures worked on at once: enough to spread the overhead of each operation."""
 
 PRECISION = 1e-2
 """Promised decrease of chi2 that ends the search."""

@@ -197,7 +197,12 @@ class Leaves:
 
     def postures(self) -> Array:
         """Place all joints in all nodes: (N, J, 3), camera frame, metres; NaN where a joint is unknown."""
-        return self.positions(range(len(self.joints)), np.arange(len(self.code)))
+        frames, width = self.candidates.table.shape[:2]
+        place = np.empty((len(self.code), len(self.joints)), dtype=np.intp)
+        for joint, first in enumerate(self.candidates.first[:-1]):
+            place[:, joint] = first + select(self.level, path_of(joint, self.parents))[self.code]
+        place += self.frame[:, None] * np.intp(width)
+        return np.take(self.candidates.table.reshape(frames * width, 3), place, axis=0)
 
     def length_residual(self) -> Array:
         """Return how much longer than the body's the longest drawn-out segment of each node is (N,), metres.

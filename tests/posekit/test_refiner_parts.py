@@ -13,7 +13,6 @@ import pytest
 from posekit.figure import load_figure
 from posekit.files import View
 from posekit.pipeline import Recovery, recover, refiner, result_of, view_of
-from posekit.pipeline.leaf_postures import leaf_postures
 from posekit.pipeline.uncertainty import Covariances
 from posekit.refinement import covariance, refined
 from posekit.synthesis import random_views
@@ -107,11 +106,10 @@ def test_covariances_outlive_what_they_were_found_from(run: Recorded) -> None:
 def test_leaves_are_placed_as_the_tree_places_them(run: Recorded) -> None:
     leaves, _, kept = run.grown[0]
     for some in (leaves, kept, leaves.at(5, leaves.frame[:3], leaves.code[:3] >> 8)):
-        np.testing.assert_array_equal(
-            leaf_postures(some)[:, : some.level + 1], some.postures()[:, : some.level + 1]
-        )
+        one_by_one = some.positions(range(some.level + 1), np.arange(len(some.code)))
+        np.testing.assert_array_equal(some.postures()[:, : some.level + 1], one_by_one)
     nothing = leaves.at(leaves.level, leaves.frame[:0], leaves.code[:0])
-    assert leaf_postures(nothing).shape == (0, 14, 3)
+    assert nothing.postures().shape == (0, 14, 3)
 
 
 def test_twins_are_the_leaves_on_other_trunks(run: Recorded) -> None:

@@ -11,10 +11,11 @@ from typing import Any, Final
 
 from posekit.errors import InputError
 from posekit.figure import load_figure
-from posekit.files import PER_METRE, OpenCVModel, ScaledOrthographicModel, View
+from posekit.files import PER_METRE, ScaledOrthographicModel, View
 from posekit.pipeline.batch import digests
 from posekit.pipeline.detected.camera import split_camera
 from posekit.pipeline.detected.source import Source
+from posekit.pipeline.noise import refuse_deviation
 from posekit.pipeline.recover import recover
 from posekit.pipeline.recovery import Recovery
 from posekit.pipeline.rooting import Rooting
@@ -189,13 +190,7 @@ class Recipe:
             Where a calibrated view is given a scale or Taylor's proportions, an uncalibrated one a root, or one whose
             camera is not an `opencv` one a deviation.
         """
-        if self.source.deviation is not None and not isinstance(view.camera, OpenCVModel):
-            uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-            camera = "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
-            raise InputError(
-                f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
-                "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
-            )
+        refuse_deviation(view, self.source.deviation)
         if isinstance(view.camera, ScaledOrthographicModel):
             if self.root != "auto":
                 raise InputError(
