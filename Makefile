@@ -136,7 +136,7 @@ lint: $(VENV)/dev.stamp ## ruff: format and rules
 
 .PHONY: types
 types: $(VENV)/dev.stamp ## mypy --strict
-	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/comparison/*.py examples/*.py)
+	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/*/*.py benchmarks/*/*/*.py examples/*.py)
 
 .PHONY: layers
 layers: $(VENV)/dev.stamp ## import-linter: who may import whom

@@ -18,7 +18,7 @@ from pathlib import Path
 from benchmarks.comparison import engines, gate, growth, process, trees, validation
 from benchmarks.comparison.charts import draw
 from benchmarks.comparison.measure import QUICK, TINY, Section, Sizes, machine
-from posekit.pipeline.markdown import table_lines
+from posekit.formats.markdown import table_lines
 
 SECTIONS: dict[str, Callable[[Sizes], Section]] = {
     "views": trees.section,

@@ -32,20 +32,12 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.pipeline import view_of
-from posekit.pipeline.batch import (
-    Progress,
-    Recipe,
-    Summary,
-    read_frames,
-    run_batch,
-    shard_paths,
-    write_view_table,
-)
-from posekit.pipeline.markdown import table_lines
+from posekit.batch import Progress, Recipe, Summary, read_frames, run_batch, shard_paths, write_view_table
+from posekit.body import load_figure
+from posekit.formats.markdown import table_lines
+from posekit.formats.own import View
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 PIECE = 5000
 MIB = 2**20

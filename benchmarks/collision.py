@@ -14,7 +14,7 @@ import time
 import numpy as np
 import pinocchio as pin
 
-from posekit.figure import load_figure
+from posekit.body import load_figure
 from posekit.validators import collision
 
 

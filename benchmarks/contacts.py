@@ -21,13 +21,15 @@ from numpy.typing import NDArray
 from ranges import Clip, clips_of  # type: ignore[import-not-found]  # the scripts beside this one
 from real_motion import true_code  # type: ignore[import-not-found]
 
-from posekit.figure import Figure
-from posekit.figure.capsules import Capsule
-from posekit.pipeline import MEASURED, recover, view_of
-from posekit.pipeline.markdown import table_lines
+from posekit.body import Figure
+from posekit.body.capsules import Capsule
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.tolerance import MEASURED
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.validators import load_ranges
 from posekit.validators.collision import PairCollision
+from posekit.views.builtin import view_of
 
 RADII: Mapping[str, Mapping[str, float]] = {
     "the figure's": {},

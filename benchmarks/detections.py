@@ -18,12 +18,16 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.anthropometry import lengths_from_postures, write_lengths
-from posekit.calibration import read_cameras
-from posekit.motion import postures_of, read_motion
-from posekit.pipeline import recover
-from posekit.pipeline.detected import Comparison, Opened, Source, compare, given_views
-from posekit.pipeline.markdown import table_lines
+from posekit.body.anthropometry import lengths_from_postures, write_lengths
+from posekit.evaluate import compare
+from posekit.evaluate.comparison import Comparison
+from posekit.formats.cameras import read_cameras
+from posekit.formats.markdown import table_lines
+from posekit.formats.motion import postures_of, read_motion
+from posekit.recovery import recover
+from posekit.views import given_views
+from posekit.views.opening import Opened
+from posekit.views.source import Source
 
 
 def trial(folder: Path, names: list[str], stature: float) -> list[str]:

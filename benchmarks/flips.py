@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from posekit.figure import load_figure
-from posekit.pipeline.taylor.completion import Completion, joint_checks, taylor_checks
-from posekit.pipeline.taylor.human import FLIPS, taylor_human
-from posekit.pipeline.taylor.views import Seen, exact_views
-from posekit.pipeline.tolerance import PHOTOGRAPH
+from posekit.body import load_figure
+from posekit.papers.taylor_views import Seen, exact_views
+from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
+from posekit.recovery.taylor_figure.human import FLIPS, taylor_human
+from posekit.recovery.tolerance import PHOTOGRAPH
 from posekit.synthesis import CameraSphere, random_views
 from posekit.tree import Check
 from posekit.validators import load_ranges

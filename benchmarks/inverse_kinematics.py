@@ -21,10 +21,10 @@ import time
 import numpy as np
 import pinocchio as pin
 
-from posekit.robot import load_robot
-from posekit.robot.ik import InverseKinematics
-from posekit.robot.joint_map import find_joint_map
-from posekit.robot.kinematics import Kinematics
+from posekit.robots import load_robot
+from posekit.robots.ik import InverseKinematics
+from posekit.robots.joint_map import find_joint_map
+from posekit.robots.kinematics import Kinematics
 
 STEPS = 200
 MET = 1e-3

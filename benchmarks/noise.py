@@ -14,10 +14,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from posekit.figure import load_figure
-from posekit.pipeline import recover, view_of
-from posekit.pipeline.markdown import table_lines
+from posekit.body import load_figure
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 NEAR = 0.035
 """Metres of mean joint error within which a survivor counts as near the truth."""

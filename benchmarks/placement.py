@@ -24,12 +24,12 @@ from pathlib import Path
 
 import numpy as np
 
+from posekit.body import Figure, load_figure
+from posekit.body.lengths import hips_points, torso_points
+from posekit.body.stature import stature_from_lengths
 from posekit.cameras import PinholeCamera
-from posekit.figure import Figure, load_figure
-from posekit.figure.lengths import hips_points, torso_points
-from posekit.figure.stature import stature_from_lengths
-from posekit.head.perspective import rotation
-from posekit.placement import Method, Placement, place
+from posekit.cameras.head.perspective import rotation
+from posekit.cameras.neck import Method, Placement, place
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 

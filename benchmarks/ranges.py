@@ -22,18 +22,20 @@ import numpy as np
 from numpy.typing import NDArray
 from real_motion import CHECKS, Tally, true_code  # type: ignore[import-not-found]  # the script beside this one
 
-from posekit.figure import Figure, load_figure
-from posekit.figure.frames import hips_frame
-from posekit.pipeline import MEASURED, Tolerance, recover, view_of
-from posekit.pipeline.markdown import table_lines
+from posekit.body import Figure, load_figure
+from posekit.body.frames import hips_frame
+from posekit.compiled.compiling import path
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.skeleton import DOFS, JOINT, SIDES
 from posekit.synthesis import Capture, Scene, mocap_scenes, read_capture
 from posekit.synthesis.mocap import clip_lengths
-from posekit.tree.compiled import path
 from posekit.validators import Ranges, joint_range, load_ranges
 from posekit.validators.anatomical import Anatomy, Sinus
 from posekit.validators.anatomical_limb import limb_walls
 from posekit.validators.anatomical_plausibility import plausibility
+from posekit.views.builtin import view_of
 
 TABLES = ("table1", "urdf", "anatomical")
 SPREADS = tuple(np.round(np.arange(0.0, 3.01, 0.1), 1).tolist())

@@ -22,11 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from ranking_views import Clip, Priors, Views, views_of  # type: ignore[import-not-found]  # the script beside this one
 
-from posekit.files import OpenCVModel
-from posekit.pipeline import recover
-from posekit.pipeline.detected.given_views import given_views
-from posekit.pipeline.detected.source import Source
-from posekit.pipeline.markdown import table_lines
+from posekit.formats.markdown import table_lines
+from posekit.formats.own import OpenCVModel
 from posekit.ranking import (
     Prior,
     Ranking,
@@ -39,8 +36,11 @@ from posekit.ranking import (
 )
 from posekit.ranking.prior import TERMS, WEIGHTS
 from posekit.ranking.ranking import softmax
+from posekit.recovery import recover
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 from posekit.synthesis import Capture, read_capture
+from posekit.views.given_views import given_views
+from posekit.views.source import Source
 
 TEMPERATURES = (0.002, 0.004, 0.008, 0.016, 0.032)
 

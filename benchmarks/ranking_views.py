@@ -13,15 +13,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.figure import Figure
-from posekit.files import View
-from posekit.pipeline import MEASURED, Rooting, Tolerance, recover, view_of
+from posekit.body import Figure
+from posekit.formats.own import View
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance, fit_prior
 from posekit.ranking.fitting import TEMPERATURE
+from posekit.recovery import recover
+from posekit.recovery.rooting import Rooting
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.refinement import GIVING, RootPrior, Sight, merge, refine
 from posekit.synthesis import Capture, Scene, mocap_scenes
 from posekit.validators import load_ranges
 from posekit.validators.anatomical_plausibility import plausibility
+from posekit.views.builtin import view_of
 
 CHECKS = ("rigid-parts", "joint-range", "collision")
 SOURCE = (

@@ -17,12 +17,14 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.pipeline import MEASURED, Tolerance, recover, view_of
-from posekit.pipeline.markdown import table_lines
-from posekit.pipeline.recovery import FrameRecovery
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.recovery import FrameRecovery
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.tree.bits import path_of
+from posekit.views.builtin import view_of
 
 CHECKS = ("rigid-parts", "joint-range", "collision")
 

@@ -23,11 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
-from posekit.figure import Figure, load_figure
-from posekit.pipeline import MEASURED, Tolerance, recover, recovered_with, result_of, view_of
-from posekit.pipeline.markdown import table_lines
-from posekit.pipeline.noise import Noise
-from posekit.pipeline.refiner import Refiner
+from posekit.body import Figure, load_figure
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.noise import Noise
+from posekit.recovery.refiner import Refiner
+from posekit.recovery.result import result_of
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.refinement import (
     GIVING,
     RootPrior,
@@ -42,7 +44,9 @@ from posekit.refinement import (
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
+from posekit.validation.validate import recovered_with
 from posekit.validators import PHYSICAL, Validator, load_ranges, make_checks
+from posekit.views.builtin import view_of
 
 NEAR = 0.035
 """Metres of mean joint error within which a survivor counts as near the truth."""

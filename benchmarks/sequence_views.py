@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from posekit.body import Figure
 from posekit.errors import PosekitError
-from posekit.figure import Figure
-from posekit.files import OpenCVModel, View
-from posekit.pipeline import recover
+from posekit.following import SurvivorFrame
+from posekit.formats.own import OpenCVModel, View
 from posekit.ranking import Prior, Up, fit_prior, load_prior, rank
+from posekit.recovery import recover
 from posekit.refinement import RootPrior, Sight, find_trunks, merge, refine, tolerance_of, under_noise
-from posekit.sequences import SurvivorFrame
 from posekit.skeleton import JOINTS, PARENTS, SEGMENT_NAMES, SEGMENTS
 from posekit.synthesis import Capture, Scene, Walker, mocap_scene
 from posekit.synthesis.camera_sphere import CameraSphere

@@ -37,23 +37,14 @@ from sequence_views import (  # type: ignore[import-not-found]  # the script bes
     walker_scene,
 )
 
-from posekit.pipeline.markdown import table_lines
-from posekit.pipeline.scaled_following import follow_scaled
-from posekit.placement import place
+from posekit.cameras.neck import place
+from posekit.compiled.compiling import path as loops
+from posekit.following import Beam, Estimate, Follower, Paths, SurvivorFrame, best_paths, elevations, smooth
+from posekit.formats.markdown import table_lines
 from posekit.ranking import load_prior
-from posekit.sequences import (
-    Beam,
-    Estimate,
-    Follower,
-    Paths,
-    SurvivorFrame,
-    best_paths,
-    elevations,
-    smooth,
-)
+from posekit.recovery.scaled_sequences import follow_scaled
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Capture, Scene, read_capture
-from posekit.tree.compiled import path as loops
 
 TOLD_APART = math.radians(15.0)
 LIMBS = ((5, 7), (6, 8), (9, 11), (10, 12))

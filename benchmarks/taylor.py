@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from posekit.pipeline.taylor.study import capture_study, synthetic_study
+from posekit.papers.taylor_study import capture_study, synthetic_study
 
 
 def main() -> None:

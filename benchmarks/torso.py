@@ -28,14 +28,16 @@ from torso_views import (  # type: ignore[import-not-found]  # the script beside
     with_spine,
 )
 
-from posekit.figure import load_figure
-from posekit.pipeline import MEASURED, Tolerance, recover, view_of
-from posekit.pipeline.body import FigureBody, Judges
-from posekit.pipeline.markdown import table_lines
+from posekit.body import load_figure
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.body import FigureBody, Judges
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
 from posekit.synthesis import Capture, Scene, mocap_scenes, random_views, read_capture
 from posekit.validators import load_ranges
 from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, TRUNK, drawing, save
+from posekit.views.builtin import view_of
 
 Floats = NDArray[np.float64]
 Kept = NDArray[np.bool_]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torso_views import Torsos, per_spine_length  # type: ignore[import-not-found]  # the script beside this one
 
-from posekit.pipeline import MEASURED
+from posekit.recovery.tolerance import MEASURED
 from posekit.skeleton import RIGID_SEGMENTS
 
 Floats = NDArray[np.float64]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.figure.frames import torso_frame
-from posekit.pipeline import MEASURED
+from posekit.body.frames import torso_frame
+from posekit.recovery.tolerance import MEASURED
 from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Capture, Scene
 from posekit.tree import InterpretationTree, Leaves

@@ -28,15 +28,17 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 import posekit
-from posekit.cameras import Array, Camera
-from posekit.figure import Figure, load_figure
-from posekit.files import View
-from posekit.pipeline import EXACT, MEASURED, Tolerance
-from posekit.pipeline.views import view_of
+from posekit.body import Figure, load_figure
+from posekit.cameras import Camera
+from posekit.compiled import compiling as compiled
+from posekit.formats.own import View
+from posekit.geometry import Array
+from posekit.recovery.tolerance import EXACT, MEASURED, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
-from posekit.tree import Check, InterpretationTree, Leaves, compiled, enumerate_leaves
+from posekit.tree import Check, InterpretationTree, Leaves, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
+from posekit.views.builtin import view_of
 
 CHUNK = 2000
 """Frames a call."""

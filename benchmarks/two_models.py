@@ -18,30 +18,26 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit import Validator, load_figure
-from posekit.figure import Figure
-from posekit.pipeline import MEASURED
-from posekit.pipeline.markdown import table_lines
-from posekit.pipeline.two_models import (
+from benchmarks.studies.two_models import reasons
+from benchmarks.studies.two_models.angles import excess, figure_limits, in_human_order
+from benchmarks.studies.two_models.human import (
     HELD,
     HUMAN,
-    KINDS,
     Counterpart,
-    Labelled,
-    excess,
-    figure_limits,
-    in_human_order,
     joint_columns,
-    labelled_postures,
     limits_of_human,
     limits_on_human,
     mapped_ranges,
     measure_counterparts,
     ranges_text,
-    reasons,
     without_collision,
 )
-from posekit.robot.scaling import shoulders_are_behind
+from benchmarks.studies.two_models.labelled import KINDS, Labelled, labelled_postures
+from posekit import Validator, load_figure
+from posekit.body import Figure
+from posekit.formats.markdown import table_lines
+from posekit.recovery.tolerance import MEASURED
+from posekit.robots.scaling import shoulders_are_behind
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Capture, read_capture
 from posekit.synthesis.mocap import clip_lengths

@@ -17,9 +17,9 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 
-from posekit.figure.pool import make_pool, n_threads
-from posekit.robot import load_robot
-from posekit.robot.joint_map import postures_of
+from posekit.body.pool import make_pool, n_threads
+from posekit.robots import load_robot
+from posekit.robots.joint_map import postures_of
 from posekit.validators import Validator
 
 REPEATS = 7

@@ -21,12 +21,14 @@ from numpy.typing import NDArray
 from ranges import Clip, clips_of  # type: ignore[import-not-found]  # the scripts beside this one
 from real_motion import CHECKS, true_code  # type: ignore[import-not-found]
 
-from posekit.pipeline import MEASURED, recover, view_of
-from posekit.pipeline.markdown import table_lines
+from posekit.formats.markdown import table_lines
+from posekit.recovery import recover
+from posekit.recovery.tolerance import MEASURED
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.tree import Findings
 from posekit.validators import load_ranges, walking
 from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds
+from posekit.views.builtin import view_of
 
 ACTION = "walking"
 THRESHOLDS = {"default": WalkingThresholds(), "people": PEOPLE}

@@ -3,10 +3,12 @@
 import sys
 from pathlib import Path
 
-from posekit.files import make_folder
-from posekit.pipeline import builtin_view, recover, result_of
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
+from posekit.safe_io.writing import make_folder
 from posekit.viewer import Shot, Style, subject_of, write_picture
 from posekit.viewer.plots import plot_image, plot_projections, plot_tree, save
+from posekit.views.builtin import builtin_view
 
 
 def main(folder: Path) -> None:

@@ -6,7 +6,7 @@ python examples/linkage.py
 import numpy as np
 
 from posekit.cameras import ScaledOrthographicCamera
-from posekit.linkage import Family, load_linkage, search, span
+from posekit.linkages import Family, load_linkage, search, span
 from posekit.validators.linkage import closure, nearer
 
 # An object of your own is a TOML file like urdf/linkages/four_bar.toml.

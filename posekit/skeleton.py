@@ -101,3 +101,9 @@ DOFS: Final = tuple(
 def urdf_joint_name(dof: str) -> str:
     """Name the URDF joint of a degree of freedom: ``right_elbow.flexion`` is ``right_elbow_flexion``."""
     return dof.replace(".", "_")
+
+
+def other_side(name: str) -> str:
+    """Name the landmark of the other side; the middle ones are their own."""
+    side, _, part = name.partition("_")
+    return {"right": f"left_{part}", "left": f"right_{part}"}.get(side, name)

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.skeleton import DOFS
 
 ANGLES = tuple(dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS))

@@ -8,12 +8,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure import Figure
-from posekit.figure.frames import hips_frame, torso_frame
+from posekit.body import Figure
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.compiled import check_kernels as kernels
+from posekit.geometry import Array
 from posekit.skeleton import DOFS, HIPS, JOINT, TORSO
 from posekit.tree import Findings, Rule
-from posekit.validators import kernels
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
 from posekit.validators.anatomical_screen import limb_numbers

@@ -12,7 +12,7 @@ from functools import reduce
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.validators.anatomical import DERIVED, OUTWARD, Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
 

@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.skeleton import DOFS, SIDES
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import HINGES, limb_walls, turned_near

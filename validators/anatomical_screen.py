@@ -1,12 +1,12 @@
-"""Anatomical ranges of a limb laid out flat, as `posekit.validators.anatomical_kernels` takes them."""
+"""Anatomical ranges of a limb laid out flat, as `posekit.compiled.anatomical_kernels` takes them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.compiled.anatomical_kernels import AT_TURN, BEYOND_ALL, COUPLED, JUDGED
+from posekit.geometry import Array
 from posekit.validators.anatomical import OUTWARD, Anatomy
-from posekit.validators.anatomical_kernels import AT_TURN, BEYOND_ALL, COUPLED, JUDGED
 from posekit.validators.anatomical_limb import (
     BALL,
     ELEVATION,
@@ -31,7 +31,7 @@ def limb_numbers(
     anatomy : Anatomy
     joint : {"shoulder", "hip"}
     signs : array (4,) or (2,)
-        Of the angles that are known, as `posekit.figure.angles.Limits` has them: all four, or the first two.
+        Of the angles that are known, as `posekit.body.angles.Limits` has them: all four, or the first two.
     rigid : int
         How many points the part has that the limb hangs on.
     tolerance, unseen : float
@@ -40,7 +40,7 @@ def limb_numbers(
     Returns
     -------
     array (N,)
-        As `posekit.validators.anatomical_kernels` says; ends are beyond all where the table bounds an angle otherwise.
+        As `posekit.compiled.anatomical_kernels` says; ends are beyond all where the table bounds an angle otherwise.
     """
     count, arm = len(signs), joint == "shoulder"
     names = (*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion")

@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 SEAM = -115.0
 """Degrees of the plane at which the turn is cut."""

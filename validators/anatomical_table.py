@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any, cast
 
 from posekit.errors import InputError
-from posekit.intake import cut, one_line
+from posekit.safe_io import cut, one_line
 from posekit.validators.anatomical import ANGLES, DERIVED, Anatomy, Coupling, End, Motion, Side, Sinus
 
 ELEVATION, PLANE, TURN = DERIVED

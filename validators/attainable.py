@@ -11,10 +11,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot import Robot
-from posekit.robot.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
-from posekit.robot.linkage import Carried
+from posekit.geometry import Array
+from posekit.linkages.robot_linkage import Carried
+from posekit.robots import Robot
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
 
 Groups = NDArray[np.intp]
 Invariant = Callable[[Array, Groups], Array]

@@ -14,8 +14,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot.linkage import Carried
+from posekit.geometry import Array
+from posekit.linkages.robot_linkage import Carried
 
 SINE = 0.05
 """Of the least angle that three points make: below it their plane is too uncertain to place anything."""

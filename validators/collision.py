@@ -14,13 +14,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure import Figure
-from posekit.figure.capsules import Capsule
-from posekit.figure.frames import cross
-from posekit.figure.pool import collides, make_pool
+from posekit.body import Figure
+from posekit.body.capsules import Capsule
+from posekit.body.frames import cross
+from posekit.body.pool import collides, make_pool
+from posekit.compiled import check_kernels as kernels
+from posekit.geometry import Array
 from posekit.tree import Check, Findings, Rule
-from posekit.validators import kernels
 from posekit.validators.screening import screened
 
 CONTACT_TOLERANCE = 1e-9

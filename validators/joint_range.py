@@ -12,14 +12,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure import Figure
-from posekit.figure.angles import Limits
-from posekit.figure.closed_form import ClosedForm
-from posekit.figure.frames import hips_frame, torso_frame
+from posekit.body import Figure
+from posekit.body.angles import Limits
+from posekit.body.closed_form import ClosedForm
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.compiled import check_kernels as kernels
+from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Rule
-from posekit.validators import kernels
 from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.cameras.camera import COINCIDENT
 from posekit.errors import InputError
-from posekit.intake.refusal import shown
-from posekit.linkage import SpanningTree
-from posekit.linkage.naming import meant
+from posekit.geometry import Array
+from posekit.linkages import SpanningTree
+from posekit.linkages.naming import meant
+from posekit.safe_io.refusal import shown
 from posekit.tree import Check, Findings
 
 

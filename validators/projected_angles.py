@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras import Array
-from posekit.figure import Figure
-from posekit.figure.frames import cross, torso_frame, unit
+from posekit.body import Figure
+from posekit.body.frames import cross, torso_frame, unit
+from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
 from posekit.validators.ranges import Ranges

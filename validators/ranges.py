@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 from posekit.errors import InputError
-from posekit.intake import cut, one_line, parse_toml, read_text
+from posekit.safe_io import cut, one_line, parse_toml, read_text
 from posekit.skeleton import DOFS
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_table import parse_anatomy

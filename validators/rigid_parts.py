@@ -10,13 +10,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure
+from posekit.body.frames import torso_frame
+from posekit.compiled import check_kernels as kernels
 from posekit.errors import InputError
-from posekit.figure import Figure
-from posekit.figure.frames import torso_frame
+from posekit.geometry import Array
 from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Check, Findings, Rule
-from posekit.validators import kernels
 from posekit.validators.screening import screened
 
 Mode = Literal["distances", "placement"]

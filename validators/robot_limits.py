@@ -15,9 +15,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot import Robot
-from posekit.robot.linkage import Carried
+from posekit.geometry import Array
+from posekit.linkages.robot_linkage import Carried
+from posekit.robots import Robot
 from posekit.tree import Check, Findings
 from posekit.validators.attainable import MOST, Attainable, six_volumes
 from posekit.validators.axis_points import AxisPoint, find_axis_points, place_axis_point
@@ -71,7 +71,7 @@ class RobotLimits:
     ----------
     robot : Robot
     names : tuple of str
-        Frames of the robot: the points of its linkage (`posekit.robot.linkage.linkage_of`).
+        Frames of the robot: the points of its linkage (`posekit.linkages.robot_linkage.linkage_of`).
 
     Raises
     ------
@@ -80,7 +80,7 @@ class RobotLimits:
 
     Examples
     --------
-    >>> from posekit.robot import load_robot
+    >>> from posekit.robots import load_robot
     >>> limits = RobotLimits(robot=load_robot("panda", geometry=False), names=("panda_joint3", "panda_joint5"))
     >>> [interval] = limits.distances
     >>> interval.joints, round(interval.lower, 3), round(interval.upper, 3)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.tree import Rule, frame_kernels
-from posekit.tree.compiled import compiled
-from posekit.tree.frame_kernels import NUMBERS
+from posekit.compiled import frame_kernels
+from posekit.compiled.compiling import compiled
+from posekit.compiled.frame_kernels import NUMBERS
+from posekit.geometry import Array
+from posekit.tree import Rule
 
 
 def screened(rule: Rule, points: Array) -> tuple[NDArray[np.int8], Array | None]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure
 from posekit.errors import InputError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.tree import Check
 from posekit.validators.collision import collision
 from posekit.validators.joint_range import TOLERANCE, joint_range

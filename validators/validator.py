@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure, with_head
 from posekit.errors import InputError
-from posekit.figure import Figure, with_head
-from posekit.robot import Robot
-from posekit.robot.joint_map import JointMap
-from posekit.robot.scaling import segment_lengths
+from posekit.geometry import Array
+from posekit.robots import Robot
+from posekit.robots.joint_map import JointMap
+from posekit.robots.scaling import segment_lengths
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
 from posekit.validators.joint_range import TOLERANCE
@@ -43,7 +43,7 @@ class Validator:
     urdf : str, path, Figure or Robot, optional
         ``"stick_figure"`` (the default), the built-in figure; the path of a figure's URDF; or a figure: these are
         judged in closed form. Or the name of a robot of example-robot-data (``"human"``, ``"g1"``, …), the path of its
-        URDF, or a `posekit.robot.Robot`: these are judged by inverse kinematics (docs, "Validate").
+        URDF, or a `posekit.robots.Robot`: these are judged by inverse kinematics (docs, "Validate").
     checks : sequence of str, optional
         Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
         otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
@@ -69,7 +69,7 @@ class Validator:
         What collides, of a robot: its collision bodies, its visual bodies, or capsules that are made up; ``auto``
         makes them up where no two collision bodies can touch.
     srdf, package_dirs, untrusted
-        See `posekit.robot.load_robot`.
+        See `posekit.robots.load_robot`.
     up : array (3,)
         Against gravity, in the frame of the postures: for ``balance``.
 

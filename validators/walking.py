@@ -15,10 +15,10 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.body import Figure
+from posekit.body.frames import cross, torso_frame, unit
 from posekit.errors import InputError
-from posekit.figure import Figure
-from posekit.figure.frames import cross, torso_frame, unit
+from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
 from posekit.tree import Check, Findings
 

@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from PIL import Image
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
-from posekit.intake.writing import replacing, write_text
+from posekit.geometry import Array
+from posekit.safe_io.writing import replacing, write_text
 from posekit.viewer.browser.browser import TIMEOUT
 from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from benchmarks.comparison.export import mjcf, urdf
 from benchmarks.comparison.measure import Chart, Section, Sizes, least, microseconds, version
-from posekit.figure import Figure, load_figure
+from posekit.body import Figure, load_figure
 
 Array = NDArray[np.float64]
 Verdicts = NDArray[np.bool_]

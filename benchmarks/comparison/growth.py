@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.comparison.measure import Chart, Line, Section, Sizes, least
 from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
-from posekit.figure import Figure, load_figure
-from posekit.pipeline import EXACT, MEASURED
+from posekit.body import Figure, load_figure
+from posekit.recovery.tolerance import EXACT, MEASURED
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Scene, random_views
 from posekit.tree import Check

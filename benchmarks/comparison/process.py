@@ -26,7 +26,8 @@ GROW = "from benchmarks.comparison.process import grow_views; grow_views({views}
 
 def one_view() -> None:
     """Recover one built-in view, from nothing."""
-    from posekit.pipeline import builtin_view, recover
+    from posekit.recovery import recover
+    from posekit.views.builtin import builtin_view
 
     recover(builtin_view("seq2"))
 
@@ -36,7 +37,7 @@ def grow_views(views: int) -> None:
     import numpy as np
 
     from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
-    from posekit.figure import load_figure
+    from posekit.body import load_figure
     from posekit.synthesis import random_views
 
     figure = load_figure()

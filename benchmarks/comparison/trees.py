@@ -19,12 +19,14 @@ from numpy.typing import NDArray
 
 from benchmarks.comparison.lifter import Lifter, make_lifter
 from benchmarks.comparison.measure import Chart, Cost, Section, Sizes, least, microseconds
-from posekit.figure import Figure, load_figure
-from posekit.pipeline import EXACT, Tolerance, recover, view_of
+from posekit.body import Figure, load_figure
+from posekit.recovery import recover
+from posekit.recovery.tolerance import EXACT, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
 from posekit.tree import Check, InterpretationTree, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
+from posekit.views.builtin import view_of
 
 CHUNK = 250
 """Views grown in one call: their tables stay in the processor's cache."""
@@ -101,7 +103,7 @@ def brute_force(
 
 def paths() -> tuple[str, ...]:
     """Name the ways through the tree that can be measured here."""
-    if util.find_spec("posekit.tree.compiled") is None or util.find_spec("numba") is None:
+    if util.find_spec("posekit.compiled.compiling") is None or util.find_spec("numba") is None:
         return ("plain",)
     return ("plain", "fast")
 
@@ -109,10 +111,10 @@ def paths() -> tuple[str, ...]:
 @contextmanager
 def on(path: str, threads: int | None = 1) -> Iterator[None]:
     """Take one way through the tree for a while, with so many threads."""
-    if util.find_spec("posekit.tree.compiled") is None:
+    if util.find_spec("posekit.compiled.compiling") is None:
         yield
         return
-    chosen: Any = import_module("posekit.tree.compiled")
+    chosen: Any = import_module("posekit.compiled.compiling")
     chosen.use_threads(threads)
     try:
         with chosen.path(path):

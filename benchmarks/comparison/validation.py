@@ -1,7 +1,7 @@
 """Verdicts on configurations against the bare calls behind them, on several robots.
 
 Bare is one call of Pinocchio's pool and one vectorised comparison with the limits, of as many threads. The last
-number is a whole file's judging (`posekit.pipeline.validate`), with the pairs and depths of what fails.
+number is a whole file's judging (`posekit.validation.validate`), with the pairs and depths of what fails.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.comparison.measure import Chart, Section, Sizes, least, microseconds
-from posekit.figure.pool import make_pool, n_threads
-from posekit.files.postures_q import Configurations
-from posekit.pipeline import validate
-from posekit.robot import load_robot
+from posekit.body.pool import make_pool, n_threads
+from posekit.formats.own.postures_q import Configurations
+from posekit.robots import load_robot
+from posekit.validation import validate
 from posekit.validators import Validator
 
 ROBOTS = ("stick_figure", "human", "simple_humanoid")

@@ -4,7 +4,6 @@ A camera is anything with `project` and `lift` (see `posekit.cameras.camera.Came
 tree asks for nothing else.
 """
 
-from posekit.cameras.camera import Array as Array
 from posekit.cameras.camera import Camera as Camera
 from posekit.cameras.camera import Lift as Lift
 from posekit.cameras.pinhole import PinholeCamera as PinholeCamera

@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from posekit.geometry import Array
 
 COINCIDENT = 1e-7
 """Half the distance (m) between the two candidates below which they count as one.

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras.camera import Array
 from posekit.cameras.pinhole import PinholeCamera
 from posekit.errors import CameraError
+from posekit.geometry import Array
 
 FLIP: Array = np.array([1.0, -1.0, 1.0])
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras.camera import Array, Lift, meet_sphere
+from posekit.cameras.camera import Lift, meet_sphere
 from posekit.errors import CameraError
+from posekit.geometry import Array
 
 UNDISTORTION_STEPS = 20
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras.camera import COINCIDENT, Array, Lift
+from posekit.cameras.camera import COINCIDENT, Lift
 from posekit.errors import CameraError
+from posekit.geometry import Array
 
 ROUNDING = 1e-15
 """Of the coordinates: at the bound of s the segment that sets it must not fail, nor split in two, by its last bits."""

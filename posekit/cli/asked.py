@@ -15,10 +15,12 @@ from posekit.cli.options import about, progress, progress_so_far
 from posekit.errors import InputError, PosekitError
 
 if TYPE_CHECKING:
-    from posekit.files import View
-    from posekit.pipeline import Recovery, Rooting, ScaledFollowing
-    from posekit.pipeline.detected import Opened
+    from posekit.formats.own import View
+    from posekit.recovery.recovery import Recovery
+    from posekit.recovery.rooting import Rooting
+    from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.validators import Ranges
+    from posekit.views.opening import Opened
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +80,7 @@ class Asked:
         InputError
             Where nobody says how noisy the image points are, or no path is asked for.
         """
-        from posekit import pipeline
+        from posekit import recovery
 
         if not self.paths:
             raise InputError(
@@ -92,7 +94,7 @@ class Asked:
                 "give --deviation, 1 for points that are all but exact, and no --no-refine"
             )
         with progress_so_far("trying scales") as done, about(path):
-            return pipeline.follow_scaled(
+            return recovery.follow_scaled(
                 seen,
                 lambda one: replace(self, refine=True).recover(one, path, quiet=True),
                 deviation=self.scale_deviation or 0.0,
@@ -102,22 +104,23 @@ class Asked:
 
     def recover(self, seen: View, path: Path, *, quiet: bool = False) -> Recovery:
         """Recover a view that comes from `path`."""
-        from posekit import files, pipeline
+        from posekit import objects, recovery
+        from posekit.formats import own as files
 
         uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
         per_unit = files.PER_METRE[seen.unit]
         shown = nullcontext(None) if quiet else progress("recovering", len(seen.time))
         with shown as done, about(path):
-            return pipeline.recover(
+            return recovery.recover(
                 seen,
                 checks=self.checks,
                 ranges=self.ranges,
                 rules=self.rules,
                 walkers=self.walkers,
-                tolerance=self.tolerances.filled(pipeline.PHOTOGRAPH if uncalibrated else pipeline.MEASURED),
+                tolerance=self.tolerances.filled(recovery.PHOTOGRAPH if uncalibrated else recovery.MEASURED),
                 contact_margin=self.contact_margin,
                 group=self.group,
-                scale=pipeline.parse_scale(self.scale, per_unit=per_unit) if self.scale else None,
+                scale=objects.parse_scale(self.scale, per_unit=per_unit) if self.scale else None,
                 proportions=self.proportions,
                 infer=self.infer,
                 nearer=self.nearer,
@@ -135,7 +138,7 @@ class Asked:
         InputError
             Where the option is given for another camera than an `opencv` one.
         """
-        from posekit.pipeline.noise import noiseless_camera, refuse_deviation
+        from posekit.recovery.noise import noiseless_camera, refuse_deviation
 
         refuse_deviation(seen, self.rooting.deviation)
         camera = noiseless_camera(seen)

@@ -19,7 +19,7 @@ from posekit.cli.noise_options import UncertainAsRecover
 from posekit.cli.options import ContactMargin, examples, signed_length
 
 if TYPE_CHECKING:
-    from posekit.pipeline.batch import Progress, Summary
+    from posekit.batch import Progress, Summary
 
 EXAMPLES = examples(
     "posekit batch archive/ -o results",
@@ -104,7 +104,7 @@ def batch(
     who: Who,
 ) -> None:
     """Recover an archive: every frame once, whatever dies on the way; exit 1 where some shards failed."""
-    from posekit.pipeline.batch import Recipe, run_batch
+    from posekit.batch import Recipe, run_batch
 
     recipe = Recipe(
         source=source_of(reading, who, proportions=proportions, deviation=uncertain.deviation),

@@ -86,10 +86,10 @@ def convert(
     proportions: Proportions = "figure",
 ) -> None:
     """Convert a file: key points to views, results and motion capture to what other programs open."""
-    from posekit import files
-    from posekit.pipeline.detected.camera import split_camera
-    from posekit.pipeline.detected.conversion import Conversion
-    from posekit.pipeline.detected.conversion import convert as run
+    from posekit.conversion.conversion import Conversion
+    from posekit.conversion.conversion import convert as run
+    from posekit.formats import own as files
+    from posekit.views.camera import split_camera
 
     calibration = split_camera(reading.camera)[0] if reading.camera else None
     for read in (given, view, who.lengths, who.calibrate, calibration):

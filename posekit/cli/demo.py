@@ -19,8 +19,9 @@ def demo(
     pictures: Pictures = True,
 ) -> None:
     """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables."""
-    from posekit import files, pipeline
+    from posekit import papers
+    from posekit.safe_io.writing import make_folder
 
-    files.make_folder(output)
-    for line in pipeline.demo(output, pictures=pictures):
+    make_folder(output)
+    for line in papers.demo(output, pictures=pictures):
         typer.echo(line)

@@ -9,15 +9,15 @@ from posekit.cli.detector_options import Reading, Who
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.pipeline.detected.source import Source
+    from posekit.views.source import Source
 
 
 def source_of(
     reading: Reading, who: Who, *, proportions: str = "figure", deviation: float | None = None
 ) -> Source:
     """Read the texts of the options."""
-    from posekit.files import parse_length
-    from posekit.pipeline.detected.source import Source
+    from posekit.formats.own import parse_length
+    from posekit.views.source import Source
 
     said = asdict(reading) | asdict(who)
     return Source(

@@ -16,7 +16,7 @@ from posekit.cli.options import Seed, distinct, examples, options_given, progres
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.files import View
+    from posekit.formats.own import View
     from posekit.synthesis import Capture
 
 EXAMPLES = examples(
@@ -129,10 +129,11 @@ def evaluate(
     ] = False,
 ) -> None:
     """Recover views whose truth is known, and say how good the survivors are: retained, how many, how far off."""
-    from posekit.files import View
-    from posekit.pipeline import MEASURED, evaluation
-    from posekit.pipeline.evaluation.draw import plot_paths, write_plots
-    from posekit.pipeline.evaluation.report import check_evaluation_path, summary
+    from posekit import evaluate as evaluation
+    from posekit.evaluate.draw import plot_paths, write_plots
+    from posekit.evaluate.report import check_evaluation_path, summary
+    from posekit.formats.own import View
+    from posekit.recovery.tolerance import MEASURED
     from posekit.viewer.plots.figure import drawing
 
     charts = plot_paths(output[0]) if plots else {}
@@ -196,9 +197,9 @@ def evaluate(
 
 def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capture | View:
     """Read motion, or a view."""
-    from posekit.files import read_view
-    from posekit.pipeline.detected.kinds import Kind, kind_of
-    from posekit.skeleton_map import load_skeleton_map
+    from posekit.formats.kinds import Kind, kind_of
+    from posekit.formats.own import read_view
+    from posekit.formats.skeleton_maps import load_skeleton_map
     from posekit.synthesis import read_capture
 
     what = kind_of(path, format)
@@ -228,7 +229,7 @@ def _heights(text: str) -> tuple[float, ...]:
 
 
 def _length(text: str, option: str) -> float:
-    from posekit.files import parse_length
+    from posekit.formats.own import parse_length
 
     return parse_length(text, name=option)
 

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.files import Postures, Result, View
+    from posekit.formats.own import Postures, Result, View
 
 
 def schema_of(path: Path) -> str:
     """Return the name of a file's schema, or an empty text: what is none is left to the readers' own errors."""
-    from posekit import files
-    from posekit.files.npz import open_npz
-    from posekit.files.result_npz import MAX_PADDED
+    from posekit.formats import own as files
+    from posekit.formats.own.npz import open_npz
+    from posekit.formats.own.result_npz import MAX_PADDED
 
     if path.suffix.lower() == ".npz":
         with open_npz(path, limit=MAX_PADDED) as archive:
@@ -28,7 +28,8 @@ def read_given(
     path: Path, seen: Path | None, *, explain: bool = False
 ) -> tuple[Result | Postures, View | None]:
     """Read a file of any of the three schemas, and the view behind a result; a view is recovered first."""
-    from posekit import files, pipeline
+    from posekit.formats import own as files
+    from posekit.recovery import recover, result_of
 
     name = schema_of(path)
     behind = files.read_view(seen) if seen is not None else None
@@ -38,8 +39,8 @@ def read_given(
                 "--view: the file is a view itself; expected a result beside it; leave the option out"
             )
         behind = files.read_view(path)
-        recovery = pipeline.recover(behind, group=0.05)
-        return pipeline.result_of(recovery, unit=behind.unit, explain=explain), behind
+        recovery = recover(behind, group=0.05)
+        return result_of(recovery, unit=behind.unit, explain=explain), behind
     if name.startswith("posekit.result/"):
         return files.read_result(path), behind
     if behind is not None:

@@ -31,7 +31,7 @@ def inspect(
     unit: Unit = "",
 ) -> None:
     """Say what is in a file: its format, who is in it, which joints are missing; of results what survived, and how."""
-    from posekit.pipeline.contents import describe
+    from posekit.inspection import describe
 
     source = source_of(Reading(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides), Who())
     for line in describe(file, source, unit=unit):

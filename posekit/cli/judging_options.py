@@ -10,7 +10,7 @@ import typer
 from posekit.cli.options import PHYSICAL, AngleTolerance, Rules, as_recover, rule_numbers, split
 
 if TYPE_CHECKING:
-    from posekit.pipeline import Tolerance
+    from posekit.recovery.tolerance import Tolerance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +87,8 @@ class Tolerances:
 
     def filled(self, otherwise: Tolerance) -> Tolerance | None:
         """Make the tolerance of what is given, the rest as it is `otherwise`; None where nothing is given."""
-        from posekit.pipeline import EXACT
-        from posekit.pipeline import Tolerance as Made
+        from posekit.recovery.tolerance import EXACT
+        from posekit.recovery.tolerance import Tolerance as Made
 
         rigid, tangent, angle = self.rigid, self.tangent, self.angle_tolerance
         if rigid is None and tangent is None and angle is None:
@@ -111,6 +111,6 @@ class TolerancesAsRecover(Tolerances):
 
 
 def _length(text: str, option: str) -> float | None:
-    from posekit.files import parse_length
+    from posekit.formats.own import parse_length
 
     return parse_length(text, name=option) if text else None

@@ -110,7 +110,7 @@ def options_given(ctx: typer.Context) -> list[str]:
 
 def signed_length(text: str, option: str) -> float:
     """Read a length that may be negative, metres."""
-    from posekit.files import parse_length
+    from posekit.formats.own import parse_length
 
     negative = text.startswith("-")
     return (-1.0 if negative else 1.0) * parse_length(text.removeprefix("-"), name=option)

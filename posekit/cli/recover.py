@@ -26,7 +26,9 @@ from posekit.cli.recover_object import recover_object, refuse_options_of_persons
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.pipeline import Following, Recovery, ScaledFollowing
+    from posekit.following.following import Following
+    from posekit.recovery.recovery import Recovery
+    from posekit.recovery.scaled_sequences import ScaledFollowing
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
@@ -133,10 +135,12 @@ def recover(
     ] = False,
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
-    from posekit import files, pipeline, validators
-    from posekit.pipeline.detected.compare import compare
-    from posekit.pipeline.detected.conversion import of_person
-    from posekit.pipeline.detected.given_views import given_views
+    from posekit import validators
+    from posekit.conversion.conversion import of_person
+    from posekit.evaluate.comparison import compare
+    from posekit.formats import own as files
+    from posekit.recovery import Rooting, following_line, result_of
+    from posekit.views.given_views import given_views
 
     for read in (view, nearer, truth, who.calibrate, who.lengths):
         distinct(output, write_urdf, read)
@@ -166,7 +170,7 @@ def recover(
         proportions=proportions if proportions in ("figure", "taylor") else "figure",
         nearer=None if nearer is None else files.read_nearer(nearer),
         infer=uncertain.infer,
-        rooting=pipeline.Rooting(method=uncertain.root, deviation=uncertain.deviation),  # type: ignore[arg-type]
+        rooting=Rooting(method=uncertain.root, deviation=uncertain.deviation),  # type: ignore[arg-type]
         refine=uncertain.refine,
         length_deviation=uncertain.length_deviation,
         paths=paths,
@@ -181,13 +185,13 @@ def recover(
             recovery.figure.write(of_person(write_urdf, one, alone=alone))
         path = of_person(output, one, alone=alone)
         following = _followed(recovery, scaled, view, paths)
-        result = pipeline.result_of(recovery, unit=one.view.unit, explain=explain, following=following)
+        result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         files.write_result(path, result)
         summarize(recovery)
         if scaled is not None:
             typer.echo(_scale_line(scaled))
         if following is not None:
-            typer.echo(pipeline.following_line(following))
+            typer.echo(following_line(following))
         if truth is not None:
             for line in compare(recovery, one.view.truth).lines:
                 typer.echo(line)
@@ -196,12 +200,12 @@ def recover(
 
 def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, paths: int) -> Following | None:
     """Follow the person through the frames, where that is asked for and not done by now."""
-    from posekit import pipeline
+    from posekit.recovery import follow
 
     if scaled is not None or not paths:
         return None if scaled is None else scaled.following
     with progress_so_far("following") as done, about(view):
-        return pipeline.follow(recovery, k=paths, progress=done)
+        return follow(recovery, k=paths, progress=done)
 
 
 def _scale_line(scaled: ScaledFollowing) -> str:
@@ -213,9 +217,9 @@ def _scale_line(scaled: ScaledFollowing) -> str:
 
 def summarize(recovery: Recovery) -> None:
     """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
-    from posekit.files import OpenCVModel
-    from posekit.pipeline.advice import advice_lines
-    from posekit.pipeline.summary import summary_lines
+    from posekit.formats.own import OpenCVModel
+    from posekit.recovery.advice import advice_lines
+    from posekit.recovery.summary import summary_lines
 
     for line in [*summary_lines(recovery), *advice_lines(recovery)]:
         typer.echo(line)

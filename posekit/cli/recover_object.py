@@ -33,8 +33,8 @@ def recover_object(
     view: Path, output: Path, linkage: str, scale: str, nearer: Path | None, tolerances: Tolerances
 ) -> None:
     """Recover an object from an uncalibrated view of it, and print what was found."""
-    from posekit import files, pipeline
-    from posekit.pipeline import objects
+    from posekit import objects
+    from posekit.formats import own as files
 
     files.check_object_path(output)
     thing = objects.load_object(linkage)
@@ -45,7 +45,7 @@ def recover_object(
         result = objects.recover_object(
             seen,
             thing,
-            scale=pipeline.parse_scale(scale, per_unit=per_unit) if scale else None,
+            scale=objects.parse_scale(scale, per_unit=per_unit) if scale else None,
             nearer=None if nearer is None else files.read_nearer(nearer),
             tolerance=tolerance,
             progress=done,

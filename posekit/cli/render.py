@@ -14,7 +14,7 @@ from posekit.cli.options import about, examples, numbers, progress, split
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
-    from posekit.files import Postures, Result, View
+    from posekit.formats.own import Postures, Result, View
     from posekit.viewer.scene.subject import Shown, Subject
 
 EXAMPLES = examples(
@@ -185,7 +185,7 @@ def render(
 def _write_page(
     output: Path, content: Result | Postures, view: View | None, frame: str, *, title: str
 ) -> None:
-    from posekit.files import Postures
+    from posekit.formats.own import Postures
     from posekit.viewer.page.page import write_page
 
     frames = _frames(frame, 1 if isinstance(content, Postures) else len(content.frames))
@@ -197,7 +197,7 @@ def _shown(
     content: Result | Postures, view: View | None, frame: str, posture: str, rejected: bool, *, moving: bool
 ) -> tuple[Subject, list[Shown]]:
     """Choose what is drawn of a file."""
-    from posekit.files import Result
+    from posekit.formats.own import Result
     from posekit.viewer.scene.branch import one_a_reason, rejected_of
     from posekit.viewer.scene.subject import subject_of
 

@@ -20,12 +20,13 @@ def reproduce(
     pictures: Pictures = True,
 ) -> None:
     """Write a paper's tables, reproduced, beside what it prints."""
-    from posekit import files, pipeline
+    from posekit import papers
+    from posekit.safe_io.writing import make_folder
 
     if paper not in PAPERS:
         raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")
-    files.make_folder(output)
-    make = pipeline.reproduce_lee_chen if paper == "lee-chen" else pipeline.reproduce_taylor
+    make_folder(output)
+    make = papers.reproduce_lee_chen if paper == "lee-chen" else papers.reproduce_taylor
     for line in make(output, pictures=pictures):
         typer.echo(line)
     typer.echo(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")

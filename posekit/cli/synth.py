@@ -92,7 +92,7 @@ def random(
     import numpy as np
 
     from posekit import synthesis
-    from posekit.figure import load_figure
+    from posekit.body import load_figure
 
     near, far = numbers(distance, 2, "--distance")
     sphere = synthesis.CameraSphere(distance=(near, far))
@@ -156,8 +156,8 @@ def articulated(
     """Draw a robot within its limits, seen from anywhere by a camera of which nothing is known."""
     import numpy as np
 
-    from posekit import files
-    from posekit.pipeline import objects
+    from posekit import objects
+    from posekit.formats import own as files
 
     _check_name(output)
     thing = objects.load_object(robot)
@@ -177,13 +177,14 @@ def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated:
 
     import numpy as np
 
-    from posekit import files, pipeline
+    from posekit import views
+    from posekit.formats import own as files
 
     _check_name(output)
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
-    view = pipeline.view_of(scene)
+    view = views.view_of(scene)
     if noise > 0 and scene.lee_chen_f is None:
         view = replace(view, deviation=noise)
-    files.write_view(output, pipeline.forget_camera(view) if uncalibrated else view)
+    files.write_view(output, views.forget_camera(view) if uncalibrated else view)
     typer.echo(f"written: {output} ({len(scene)} frames)")

@@ -23,10 +23,10 @@ from posekit.cli.options import (
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.cameras import Array
-    from posekit.figure import Figure
-    from posekit.files import Postures
-    from posekit.files.postures_q import Configurations
+    from posekit.body import Figure
+    from posekit.formats.own import Postures
+    from posekit.formats.own.postures_q import Configurations
+    from posekit.geometry import Array
 
 LOOSE = 0.1
 """Degrees of tolerance from which it is said."""
@@ -196,9 +196,10 @@ def validate(
     ] = False,
 ) -> None:
     """Judge postures: exit 0 if all are valid, 1 if some are not or are undecided, 2 on bad input."""
-    from posekit import files, pipeline, validators
-    from posekit.files.report import columns_of
-    from posekit.files.report_table import summary_table
+    from posekit import validation, validators
+    from posekit.formats import own as files
+    from posekit.formats.own.report import columns_of
+    from posekit.formats.own.report_table import summary_table
     from posekit.validators.validator import RIGID_TOLERANCE
 
     if output is not None:
@@ -209,11 +210,11 @@ def validate(
     if not _count(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
-    judged = pipeline.JudgedWith(rigid=RIGID_TOLERANCE, angle=0.001, contact_margin=0.0, walkers="paper")
+    judged = validation.JudgedWith(rigid=RIGID_TOLERANCE, angle=0.001, contact_margin=0.0, walkers="paper")
     if schema_of(postures).startswith("posekit.result/"):
         with about(postures):
             result = files.read_result(postures)
-            own, judged = pipeline.recovered_with(result)
+            own, judged = validation.recovered_with(result)
             figure = urdf or own
     rigid_tolerance = rigid_tolerance or f"{100 * judged.rigid:g}cm"
     angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
@@ -248,7 +249,7 @@ def validate(
         "contact_margin": contact_margin or f"{100 * margin:g}cm",
     }
     with about(postures):
-        report = pipeline.validate(
+        report = validation.validate(
             validator,
             given.postures,
             settings=settings,
@@ -275,9 +276,9 @@ def validate(
 
 def _read(path: Path) -> _Input:
     """Read a file of whatever holds postures."""
-    from posekit import files
-    from posekit.files.npz import open_npz
-    from posekit.files.postures_q import holds_configurations, read_configurations
+    from posekit.formats import own as files
+    from posekit.formats.own.npz import open_npz
+    from posekit.formats.own.postures_q import holds_configurations, read_configurations
     from posekit.synthesis import read_capture
 
     if path.suffix.lower() not in (".json", ".npz"):
@@ -295,7 +296,7 @@ def _read(path: Path) -> _Input:
 
 
 def _count(postures: Postures | Configurations) -> int:
-    from posekit.files import Postures
+    from posekit.formats.own import Postures
 
     return len(postures.joints) if isinstance(postures, Postures) else len(postures)
 

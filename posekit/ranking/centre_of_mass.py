@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.skeleton import JOINT, SIDES
 
 HEAD: Final = 0.0681

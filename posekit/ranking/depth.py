@@ -8,8 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.ranking.student import excess
 
 DOF: Final = 4.0

@@ -7,8 +7,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.ranking.image import LEAST
 
 PER_TOLERANCE: Final = 2.2

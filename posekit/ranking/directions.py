@@ -1,6 +1,6 @@
 r"""A posture as unit vectors in the torso's frame: smooth where angles are not, and turning with it.
 
-The torso's axes are those of `posekit.figure.frames.torso_frame`: x forward, y left, z from the pelvis to the neck. In
+The torso's axes are those of `posekit.body.frames.torso_frame`: x forward, y left, z from the pelvis to the neck. In
 them are told the hips' left and down, the eight segments of the limbs, and, where it is known, which way is up.
 """
 
@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.ranking.vectors import across, cross, dot, unit
 from posekit.skeleton import JOINT, SIDES, segment_name
 

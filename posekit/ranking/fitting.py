@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.ranking.directions import DIRECTIONS, directions, mirrored, rows_of
 from posekit.ranking.ground import standing
 from posekit.ranking.prior import WEIGHTS, Block, Prior, Spread

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.ranking.depth import Depth
 from posekit.ranking.image import rigid_lengths
 from posekit.ranking.prior import TERMS

@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.ranking.vectors import across, dot
 from posekit.skeleton import JOINT

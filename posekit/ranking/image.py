@@ -7,11 +7,11 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import nearest
+from posekit.geometry import Array
 from posekit.ranking.student import excess
 from posekit.ranking.vectors import dot
+from posekit.safe_io import nearest
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 
 DOF: Final = 4.0

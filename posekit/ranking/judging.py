@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.ranking.directions import directions
 from posekit.ranking.given import Given
 from posekit.ranking.ground import standing

@@ -12,11 +12,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import nearest
+from posekit.geometry import Array
 from posekit.ranking.directions import DIRECTIONS, UP, rows_of
 from posekit.ranking.student import Student
+from posekit.safe_io import nearest
 
 TERMS: Final = ("image", "posture", "gravity", "balance", "contact", "depth")
 """What a survivor is judged by."""

@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import nearest, parse_toml, read_toml, refusal, shown, write_lines
+from posekit.geometry import Array
 from posekit.ranking.directions import DIRECTIONS
 from posekit.ranking.prior import WEIGHTS, Block, Prior, Spread
 from posekit.ranking.student import Student
+from posekit.safe_io import nearest, parse_toml, read_toml, refusal, shown, write_lines
 
 SCHEMA: Final = "posekit.posture_prior/1"
 BUILT_IN: Final = ("cmu",)

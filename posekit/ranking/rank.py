@@ -8,9 +8,8 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import nearest
+from posekit.geometry import Array
 from posekit.ranking.depth import Depth
 from posekit.ranking.given import Given, numbers
 from posekit.ranking.judging import judge
@@ -18,6 +17,7 @@ from posekit.ranking.prior import TERMS, Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.ranking import Ranking, softmax
 from posekit.ranking.upright import Up
+from posekit.safe_io import nearest
 
 DEVIATION: Final = 0.012
 """Metres by which survivors are off, where nobody says: 2 px at 4 m, or a torso that gives."""

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

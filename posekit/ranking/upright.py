@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 
 LEVEL_WITHIN = 20.0
 """Degrees by which a camera that is taken to be level may not be: its standard deviation."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 
 def dot(a: Array, b: Array) -> Array:

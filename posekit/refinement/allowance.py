@@ -15,8 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.skeleton import JOINTS, PARENTS, TORSO
 from posekit.tree import Check, Findings
 

@@ -7,9 +7,9 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
-from posekit.figure import Figure
-from posekit.figure.angles import Limits
+from posekit.body import Figure
+from posekit.body.angles import Limits
+from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, JOINT, segment_name
 
 TRUNK: Final = tuple(

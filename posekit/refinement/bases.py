@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import END, MIDDLE
 from posekit.refinement.descent import BLOCK, Descent, descend
 from posekit.refinement.equations import evaluate

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import END, MIDDLE
 from posekit.refinement.descent import BLOCK
 from posekit.refinement.equations import Equations, assemble, linearise

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.equations import Watch, evaluate, linearise, solve
 from posekit.refinement.problem import Problem
 from posekit.refinement.state import State, moved

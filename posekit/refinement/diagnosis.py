@@ -18,9 +18,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError, PosekitError
-from posekit.figure import Figure
 from posekit.refinement.anatomy import END, LIMBS, MIDDLE, START, TRUNK_SEGMENTS
 from posekit.refinement.descent import PRECISION
 from posekit.refinement.limb_descent import fit_limbs

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 
 def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

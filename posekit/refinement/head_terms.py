@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.joints import neck_limits
 from posekit.refinement.limits import Signs
 from posekit.refinement.problem import Problem

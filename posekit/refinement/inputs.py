@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.refinement.anatomy import LIMBS, TRUNK_SEGMENTS
 from posekit.refinement.prior import RootPrior
 from posekit.skeleton import SEGMENT_NAMES, segment_name

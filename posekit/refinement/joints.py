@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import Bounds
 from posekit.refinement.limits import Ball, Signs, ball_limits
 from posekit.refinement.problem import Problem

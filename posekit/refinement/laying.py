@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK, Descent
 from posekit.refinement.equations import chains_of
 from posekit.refinement.factors import Columns, Rows, columns_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK, DAMPING, FASTER, LEAST, LIGHT, MOST, SLOWER, TINY
 from posekit.refinement.equations import FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms

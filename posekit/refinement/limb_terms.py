@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import END, MIDDLE
 from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.problem import Problem

@@ -6,7 +6,7 @@ segment's direction would have to turn to be inside. An axial rotation outside b
 and no direction is farther from the allowed ones than the straight limb's. Likewise the first angle of an upper segment
 that points along the abduction axis.
 
-With the angles of `posekit.figure.angles` the tangents of the upper direction d are the directions in which
+With the angles of `posekit.body.angles` the tangents of the upper direction d are the directions in which
 :math:`\alpha` and :math:`\beta` carry it, :math:`a = \partial d / \cos\beta\, \partial\alpha` and
 :math:`b = \partial d / \partial\beta`; those of the lower one :math:`f = \partial / \sin\varepsilon\,\partial\gamma`
 and :math:`e = \partial / \partial\varepsilon`. The other Euler branch has the same four, up to sign.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import Bounds
 from posekit.refinement.small import cross, dot
 

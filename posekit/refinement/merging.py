@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.refinement.refined import Refined
 
 WITHIN = 0.005

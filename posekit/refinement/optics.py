@@ -18,9 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.cameras.pinhole import undistort
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.refinement.small import dot
 
 

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras import Array, Camera, PinholeCamera
+from posekit.cameras import Camera, PinholeCamera
 from posekit.errors import InputError
+from posekit.geometry import Array
 
 FARTHEST = 1e6
 """Metres beyond which a root is taken for a mistake."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import Anatomy
 from posekit.refinement.optics import Optics
 from posekit.refinement.walls import Walls

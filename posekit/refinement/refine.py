@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
-from posekit.figure import Figure
+from posekit.body import Figure
+from posekit.geometry import Array
 from posekit.refinement.descent import PRECISION, STEPS
 from posekit.refinement.factors import factor_postures
 from posekit.refinement.freedom import degrees_of_freedom

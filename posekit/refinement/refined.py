@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure
 from posekit.errors import InputError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.refinement.covariance import covariances
 from posekit.refinement.problem import Problem
 from posekit.refinement.start import limb_directions, state_of

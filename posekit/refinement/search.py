@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.bases import Tables, assemble
 from posekit.refinement.descent import BLOCK, Descent, descend
 from posekit.refinement.equations import chains_of, evaluate

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array, Camera
+from posekit.body import Figure
+from posekit.body.angles import Limits
+from posekit.cameras import Camera
 from posekit.errors import InputError
-from posekit.figure import Figure
-from posekit.figure.angles import Limits
+from posekit.geometry import Array
 from posekit.refinement.anatomy import Anatomy
 from posekit.refinement.inputs import batch_last, length_weights, numbers, root_of, weights
 from posekit.refinement.optics import optics_of

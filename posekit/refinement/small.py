@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 TINY = 1e-300
 """Least pivot: a matrix that is positive but for rounding must not give NaN."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure.frames import fit_rotation, hips_frame, torso_frame
+from posekit.body.frames import fit_rotation, hips_frame, torso_frame
+from posekit.geometry import Array
 from posekit.refinement.anatomy import END, LIMBS, MIDDLE, Anatomy
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import ARMS, END, LEGS, MIDDLE
 from posekit.refinement.small import product, rotation, turned, unit
 

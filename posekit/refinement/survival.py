@@ -12,8 +12,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 
 MOST = 1000
 """Degrees of freedom beyond which the sum is refused: no posture has so many."""

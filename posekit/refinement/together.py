@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK
 from posekit.refinement.equations import FLOOR, assemble, eliminate, left_over, linearise
 from posekit.refinement.limb_terms import Chains, limb_terms

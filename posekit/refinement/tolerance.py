@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from posekit.body import Figure
 from posekit.cameras import Camera
 from posekit.errors import InputError
-from posekit.figure import Figure
 from posekit.refinement.optics import optics_of
 from posekit.skeleton import PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 

@@ -19,9 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, ScaledOrthographicCamera
+from posekit.body import Figure
+from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.freedom import degrees_of_freedom

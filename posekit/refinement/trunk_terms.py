@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.anatomy import LEGS, START, TRUNK_SEGMENTS
 from posekit.refinement.joints import pelvis_limits
 from posekit.refinement.limits import Ball, Signs

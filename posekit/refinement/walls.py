@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.refinement.limits import Ball, Signs
 from posekit.refinement.small import cross, product, rotation
 

@@ -8,8 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, PinholeCamera
+from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.synthesis.viewpoints import look_at, to_camera, uniform_directions
 
 ROUNDS = 200

@@ -7,10 +7,10 @@ from typing import Final
 
 import numpy as np
 
-from posekit.figure import Figure
-from posekit.intake.regular_file import check_file
-from posekit.motion import UPS, guess_up, postures_of, read_motion
-from posekit.skeleton_map import SkeletonMap
+from posekit.body import Figure
+from posekit.formats.motion import UPS, guess_up, postures_of, read_motion
+from posekit.formats.skeleton_maps import SkeletonMap
+from posekit.safe_io.regular_file import check_file
 from posekit.synthesis.capture import Capture
 
 MAX_BYTES: Final = 1_000_000_000
@@ -32,12 +32,12 @@ def read_capture(
     ----------
     path : path
     format, unit, up : str, optional
-        Where the file's own are wrong or missing; see `posekit.motion.read_motion`. A way up that neither says is
-        guessed from necks and ankles, and the capture says so.
+        Where the file's own are wrong or missing; see `posekit.formats.motion.read_motion`. A way up that neither
+        says is guessed from necks and ankles, and the capture says so.
     layout : SkeletonMap, optional
         What the points are; by their names if not given.
     figure : Figure, optional
-        Whose torso places neck and pelvis where the file has none; see `posekit.motion.postures_of`.
+        Whose torso places neck and pelvis where the file has none; see `posekit.formats.motion.postures_of`.
 
     Raises
     ------

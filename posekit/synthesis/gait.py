@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.synthesis.monotone_cubic import PeriodicMonotoneCubic
 
 SLOWEST, FASTEST = 0.5, 1.3

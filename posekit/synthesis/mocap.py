@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure, load_figure
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
+from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.capture import Capture

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
+from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

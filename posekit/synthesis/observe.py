@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array, PinholeCamera
-from posekit.figure import Figure
-from posekit.figure.frames import quaternions, torso_frame
+from posekit.body import Figure
+from posekit.body.frames import quaternions, torso_frame
+from posekit.cameras import PinholeCamera
+from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TORSO
 from posekit.synthesis.scene import Scene
 from posekit.synthesis.viewpoints import to_camera

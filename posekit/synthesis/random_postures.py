@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from posekit.cameras import Array
+from posekit.body import Figure
 from posekit.errors import InputError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.scene import Scene

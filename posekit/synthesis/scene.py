@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array, PinholeCamera
+from posekit.body import Figure
+from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.body.frames import cross, unit
 from posekit.errors import InputError
-from posekit.figure.frames import cross, unit
+from posekit.geometry import Array
 
 VERTICAL = 1e-6
 """Sine between line of sight and `up` below which no roll makes the camera upright."""

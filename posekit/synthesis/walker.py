@@ -17,11 +17,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
+from posekit.body import Figure, load_figure
+from posekit.body.frames import quaternions
+from posekit.cameras.head.points import TABLE_A2
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
-from posekit.figure.frames import quaternions
-from posekit.head.points import TABLE_A2
+from posekit.geometry import Array
 from posekit.skeleton import DOFS, SIDES
 from posekit.synthesis.gait import Gait, GaitAngles
 

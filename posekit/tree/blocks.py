@@ -9,10 +9,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.compiled.frame_kernels import REASONS
+from posekit.geometry import Array
 from posekit.tree.candidates import Branch
 from posekit.tree.check import Check
-from posekit.tree.frame_kernels import REASONS
 from posekit.tree.leaves import Leaves, Losses, Postponed
 from posekit.tree.plain import UNJUDGED, bound_of
 
@@ -30,7 +30,7 @@ class Block:
         Frame and code of the leaves.
     lost : tuple of array
         Frame, code and place of lost nodes by who rejected them, and where each group starts: see
-        `posekit.tree.kernels.sort`.
+        `posekit.compiled.tree_kernels.sort`.
     presumed : list of (check, array)
         What is to be confirmed.
     unsure : int array (U,)

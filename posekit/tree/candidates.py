@@ -11,8 +11,9 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, Camera, PinholeCamera
+from posekit.cameras import Camera, PinholeCamera
 from posekit.cameras.camera import COINCIDENT, Lift
+from posekit.geometry import Array
 from posekit.tree.bits import path_of
 
 

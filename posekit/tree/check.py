@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,13 +82,6 @@ class Check(Protocol):
         ...
 
 
-PASSED = -1
-"""Of a screen: no place is violated."""
-
-UNSURE = -2
-"""Of a screen: only the judge can tell."""
-
-
 class Screened(Check, Protocol):
     """A check that can also tell, quicker, what is clear.
 
@@ -119,8 +112,8 @@ class Rule:
     Parameters
     ----------
     kernels : module
-        Where a function ``screen`` tells what is clear in one posture (see `posekit.tree.frame_kernels.screen`). All
-        rules that a tree is grown with have the same.
+        Where a function ``screen`` tells what is clear in one posture (see `posekit.compiled.frame_kernels.screen`).
+        All rules that a tree is grown with have the same.
     kind : int
         What it takes the numbers for.
     numbers : array (N,)

@@ -7,7 +7,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, Camera
+from posekit.cameras import Camera
+from posekit.geometry import Array
 
 
 def enumerate_leaves(

@@ -16,12 +16,13 @@ from typing import Any, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array, Camera, PinholeCamera
-from posekit.tree import kernels
+from posekit.cameras import Camera, PinholeCamera
+from posekit.compiled import tree_kernels as kernels
+from posekit.compiled.compiling import compiled, n_threads
+from posekit.geometry import Array
 from posekit.tree.blocks import Block, merged
 from posekit.tree.candidates import Candidates, lift_all, rays_of
 from posekit.tree.check import Check, Screened
-from posekit.tree.compiled import compiled, n_threads
 from posekit.tree.layout import Places, places_of, programme_of
 from posekit.tree.leaves import Leaves
 from posekit.tree.steps import grow_steps

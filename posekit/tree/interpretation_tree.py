@@ -12,11 +12,12 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from posekit.cameras import Array, Camera
+from posekit.cameras import Camera
+from posekit.compiled.compiling import is_fast
+from posekit.geometry import Array
 from posekit.tree import fast, plain
 from posekit.tree.candidates import lift_all
 from posekit.tree.check import Check
-from posekit.tree.compiled import is_fast
 from posekit.tree.leaves import Leaves
 
 

@@ -10,10 +10,10 @@ from typing import NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.compiled.frame_kernels import MOST_POINTS, MOST_PRESUMED, NUMBERS, PATHS
+from posekit.geometry import Array
 from posekit.tree.bits import path_of, support_of
 from posekit.tree.check import Check, Rule, Ruled
-from posekit.tree.frame_kernels import MOST_POINTS, MOST_PRESUMED, NUMBERS, PATHS
 
 Indices = NDArray[np.int32]
 Table = NDArray[np.int64]
@@ -40,7 +40,7 @@ class Places(NamedTuple):
 
 
 class Programme(NamedTuple):
-    """Rules as `posekit.tree.frame_kernels.grow` takes them.
+    """Rules as `posekit.compiled.frame_kernels.grow` takes them.
 
     Attributes
     ----------

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.tree.bits import Codes, path_of, select, support_of
 from posekit.tree.candidates import Candidates
 

@@ -12,11 +12,12 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.tree import kernels
+from posekit.compiled import tree_kernels as kernels
+from posekit.compiled.frame_kernels import REASONS
+from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.geometry import Array
 from posekit.tree.blocks import Block
-from posekit.tree.check import PASSED, UNSURE, Check, Screened
-from posekit.tree.frame_kernels import REASONS
+from posekit.tree.check import Check, Screened
 from posekit.tree.layout import Places
 from posekit.tree.leaves import Leaves
 
@@ -35,7 +36,7 @@ def grow_steps(
     Parameters
     ----------
     loops : object
-        The kernels of `posekit.tree.kernels`, maybe compiled.
+        The kernels of `posekit.compiled.tree_kernels`, maybe compiled.
     roots : Leaves
         Of all frames.
     checks, places : sequences of sequences

@@ -1,4 +1,4 @@
-"""Whole trees of blocks of frames, where every check has a rule (`posekit.tree.frame_kernels`)."""
+"""Whole trees of blocks of frames, where every check has a rule (`posekit.compiled.frame_kernels`)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.tree import frame_kernels, kernels
+from posekit.compiled import frame_kernels
+from posekit.compiled import tree_kernels as kernels
+from posekit.compiled.compiling import compiled
+from posekit.compiled.frame_kernels import ALIVE, ASKED, GONE, MOST_PRESUMED, REASONS, UNKNOWN
 from posekit.tree.blocks import Block
 from posekit.tree.check import Check
-from posekit.tree.compiled import compiled
-from posekit.tree.frame_kernels import ALIVE, ASKED, GONE, MOST_PRESUMED, REASONS, UNKNOWN
 from posekit.tree.layout import Programme
 
 NODES, LEAVES, LOSSES, QUESTIONS = 256, 32, 96, 1
@@ -30,7 +31,7 @@ def growing(
     checks : sequence of Check
         Its checks.
     lift : tuple
-        Whether joints are to be lifted and with what, as `posekit.tree.frame_kernels.grow` takes it.
+        Whether joints are to be lifted and with what, as `posekit.compiled.frame_kernels.grow` takes it.
     """
     loops, sort = compiled(frame_kernels, programme.kernels), compiled(kernels).sort
     joints = len(programme.levels) - 1

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posekit.figure import load_figure
-from posekit.figure.angles import FREE, STRAIGHT, WORTH, Limits, ball_angles, direction_angles, limb_angles
+from posekit.body import load_figure
+from posekit.body.angles import FREE, STRAIGHT, WORTH, Limits, ball_angles, direction_angles, limb_angles
 from posekit.skeleton import DOFS, SIDES
 
 FIGURE = load_figure()

@@ -10,19 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posekit.anthropometry import (
+from posekit.body import load_figure
+from posekit.body.anthropometry import (
     SegmentLengths,
     lengths_from_proportions,
     proportion_names,
     read_lengths,
     write_lengths,
 )
-from posekit.anthropometry.body import DIMENSIONS, TRUNK, dimensions_of, lengths_of
-from posekit.anthropometry.lengths_file import BOTH_SIDES
+from posekit.body.anthropometry.body import DIMENSIONS, TRUNK, dimensions_of, lengths_of
+from posekit.body.anthropometry.lengths_file import BOTH_SIDES
+from posekit.body.lengths import hips_points, torso_points
+from posekit.body.stature import lengths_from_stature
 from posekit.errors import FigureError, InputError
-from posekit.figure import load_figure
-from posekit.figure.lengths import hips_points, torso_points
-from posekit.figure.stature import lengths_from_stature
 from posekit.skeleton import SEGMENT_NAMES
 
 FACTORS = st.lists(st.floats(0.7, 1.3), min_size=len(DIMENSIONS), max_size=len(DIMENSIONS))

@@ -6,12 +6,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate
 
-from posekit.anthropometry import lengths_from_postures, lengths_from_proportions, lengths_from_views
-from posekit.anthropometry.body import DIMENSIONS, LIMBS, TRUNK, dimensions_of, lengths_of, limb
-from posekit.anthropometry.foreshortening import OUTLIERS, cosine_variance, log_density
-from posekit.anthropometry.independent import independent_frames, unlike_neighbours
+from posekit.body import Figure, load_figure
+from posekit.body.anthropometry import lengths_from_postures, lengths_from_proportions, lengths_from_views
+from posekit.body.anthropometry.body import DIMENSIONS, LIMBS, TRUNK, dimensions_of, lengths_of, limb
+from posekit.body.anthropometry.foreshortening import OUTLIERS, cosine_variance, log_density
+from posekit.body.anthropometry.independent import independent_frames, unlike_neighbours
 from posekit.errors import FigureError, InputError
-from posekit.figure import Figure, load_figure
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SIDES
 from posekit.synthesis.random_postures import random_views
 from posekit.synthesis.walker import Walker

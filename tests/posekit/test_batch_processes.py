@@ -12,21 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit.figure import load_figure
-from posekit.pipeline import view_of
-from posekit.pipeline.batch import (
-    Recipe,
-    digests,
-    read_frames,
-    run_batch,
-    run_shard,
-    shard_paths,
-    write_view_table,
-)
-from posekit.pipeline.batch.durable import PARTS
-from posekit.pipeline.batch.shard import shards_of
-from posekit.pipeline.batch.staging import Staging, stage
+from posekit.batch import Recipe, digests, read_frames, run_batch, run_shard, shard_paths, write_view_table
+from posekit.batch.durable import PARTS
+from posekit.batch.shard import shards_of
+from posekit.batch.staging import Staging, stage
+from posekit.body import load_figure
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 RECIPE = Recipe(checks=("rigid-parts",), shard_frames=2, rank=False)
 OPTIONS = ("--checks", "rigid-parts", "--shard-frames", "2", "--no-rank")
@@ -38,7 +30,7 @@ CRASHING = f"""
 import os, pathlib, signal
 import pinocchio as pin
 from posekit.figure import load_figure
-from posekit.pipeline.batch import run_shard
+from posekit.batch import run_shard
 
 def shard(one):
     marker = pathlib.Path(os.environ["BATCH_TEST_MARKER"])

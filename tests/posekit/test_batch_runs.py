@@ -14,12 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import View, write_view
-from posekit.keypoints import write_keypoints
-from posekit.pipeline import view_of
-from posekit.pipeline.batch import (
+from posekit.batch import (
     Finished,
     Progress,
     Recipe,
@@ -31,13 +26,18 @@ from posekit.pipeline.batch import (
     shard_paths,
     write_view_table,
 )
-from posekit.pipeline.batch import run as run_module
-from posekit.pipeline.batch.durable import PARTS
-from posekit.pipeline.batch.pool import Outcome, attempt
-from posekit.pipeline.batch.run_folder import run_folder
-from posekit.pipeline.batch.staging import STAGED
-from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.batch import run as run_module
+from posekit.batch.durable import PARTS
+from posekit.batch.pool import Outcome, attempt
+from posekit.batch.run_folder import run_folder
+from posekit.batch.staging import STAGED
+from posekit.body import load_figure
+from posekit.errors import InputError
+from posekit.formats.keypoints import write_keypoints
+from posekit.formats.own import View, write_view
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
+from posekit.views.view_keypoints import view_keypoints
 
 RECIPE = Recipe(checks=("rigid-parts",), shard_frames=4, rank=False)
 

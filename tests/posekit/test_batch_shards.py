@@ -12,33 +12,29 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from posekit.batch import Recipe, Shard, run_shard, write_view_table
+from posekit.batch.durable import PARTS
+from posekit.batch.image_rows import ImageRows, head_text, nothing_seen, read_head
+from posekit.batch.shard import SHARDS, finished, portions, shards_of
+from posekit.batch.staging import STAGED, Staged, Staging, stage
+from posekit.batch.view_table import open_view_table, read_rows, write_rows
+from posekit.body import load_figure
 from posekit.cli.judging_options import Tolerances
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import View, parse_length, read_view, write_view
-from posekit.keypoints import write_keypoints
-from posekit.motion.survivors import COORDINATES
-from posekit.motion.survivors_files import read_survivors
-from posekit.pipeline import (
-    MEASURED,
-    PHOTOGRAPH,
-    Recovery,
-    builtin_view,
-    forget_camera,
-    parse_scale,
-    recover,
-    view_of,
-)
-from posekit.pipeline.batch import Recipe, Shard, run_shard, write_view_table
-from posekit.pipeline.batch.durable import PARTS
-from posekit.pipeline.batch.image_rows import ImageRows, head_text, nothing_seen, read_head
-from posekit.pipeline.batch.shard import SHARDS, finished, portions, shards_of
-from posekit.pipeline.batch.staging import STAGED, Staged, Staging, stage
-from posekit.pipeline.batch.view_table import open_view_table, read_rows, write_rows
-from posekit.pipeline.detected import Source, open_views
-from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.formats.keypoints import write_keypoints
+from posekit.formats.motion.survivors import COORDINATES
+from posekit.formats.motion.survivors_files import read_survivors
+from posekit.formats.own import View, parse_length, read_view, write_view
+from posekit.objects.scale import parse_scale
+from posekit.recovery import recover
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.tolerance import MEASURED, PHOTOGRAPH
 from posekit.skeleton import JOINTS
 from posekit.synthesis import random_views
+from posekit.views.builtin import builtin_view, forget_camera, view_of
+from posekit.views.opening import open_views
+from posekit.views.source import Source
+from posekit.views.view_keypoints import view_keypoints
 
 
 def seen(count: int, seed: int = 0) -> View:

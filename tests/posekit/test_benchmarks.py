@@ -129,7 +129,7 @@ def test_mujoco_reads_the_figure_as_pinocchio_has_it(load) -> None:
     mujoco = pytest.importorskip("mujoco")
     pin = importlib.import_module("pinocchio")
     export, engines = load("benchmarks.comparison.export"), load("benchmarks.comparison.engines")
-    figure = importlib.import_module("posekit.figure").load_figure()
+    figure = importlib.import_module("posekit.body").load_figure()
     theirs = mujoco.MjModel.from_xml_string(export.mjcf(figure.model, figure.geometry))
     state = mujoco.MjData(theirs)
     model, geometry = figure.model, figure.geometry
@@ -148,7 +148,7 @@ def test_mujoco_reads_the_figure_as_pinocchio_has_it(load) -> None:
 
 def test_engines_that_differ_are_named_with_their_distance(load) -> None:
     engines = load("benchmarks.comparison.engines")
-    figure = importlib.import_module("posekit.figure").load_figure()
+    figure = importlib.import_module("posekit.body").load_figure()
     q = engines.random_configurations(figure, 50, seed=2)
     reference = engines.pool(figure).judge(q)
     wrong = reference.copy()

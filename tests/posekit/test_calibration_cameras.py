@@ -8,15 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posekit.calibration import (
-    CalibratedCamera,
-    camera_from_focal35,
-    camera_from_fov,
-    choose_camera,
-    needs_undistortion,
-    pinhole_of,
-)
-from posekit.calibration.rotation import (
+from posekit.cameras.calibrated import CalibratedCamera, choose_camera, needs_undistortion, pinhole_of
+from posekit.cameras.guesses import camera_from_focal35, camera_from_fov
+from posekit.cameras.rotation import (
     nearest_rotation,
     rotation_from_quaternion,
     rotation_from_vector,

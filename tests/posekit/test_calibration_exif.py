@@ -9,8 +9,9 @@ import pytest
 from PIL import Image
 from PIL.TiffImagePlugin import IFDRational
 
-from posekit.calibration import camera_from_focal35, read_cameras, read_exif
+from posekit.cameras.guesses import camera_from_focal35
 from posekit.errors import InputError
+from posekit.formats.cameras import read_cameras, read_exif
 
 FOCAL, FOCAL_35, ORIENTATION, ZOOM = 0x920A, 0xA405, 0x0112, 0xA404
 PLANE_X, PLANE_Y, PLANE_UNIT, PIXELS_X, PIXELS_Y = 0xA20E, 0xA20F, 0xA210, 0xA002, 0xA003

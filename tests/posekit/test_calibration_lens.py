@@ -6,8 +6,9 @@ import cv2
 import numpy as np
 import pytest
 
-from posekit.calibration import CalibratedCamera, project, undistorted
-from posekit.calibration.projection import fold_radius
+from posekit.cameras.calibrated import CalibratedCamera
+from posekit.cameras.lens import fold_radius, project
+from posekit.cameras.undistortion import undistorted
 from posekit.errors import InputError
 
 K = np.array([[900.0, 0.0, 640.0], [0.0, 920.0, 360.0], [0.0, 0.0, 1.0]])

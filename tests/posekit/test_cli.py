@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 import typer
 
+from posekit.body import load_figure
+from posekit.cameras.head import HeadPoints
 from posekit.cli.groups import with_groups
 from posekit.cli.options import examples, numbers, options_given, rule_numbers, signed_length, split
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import (
+from posekit.formats.own import (
     ScaledOrthographicModel,
     View,
     read_object,
@@ -31,8 +32,7 @@ from posekit.files import (
     read_view,
     write_view,
 )
-from posekit.head import HeadPoints
-from posekit.pipeline.objects import load_object
+from posekit.objects import load_object
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, POINTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 
@@ -1002,7 +1002,7 @@ def test_an_interrupt_leaves_nothing_behind(
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(importlib.import_module("posekit.pipeline"), "recover", interrupted)
+    monkeypatch.setattr(importlib.import_module("posekit.recovery"), "recover", interrupted)
     outcome = run("recover", view, "-o", "r.json")
     assert (outcome.code, outcome.out) == (130, "")
     assert outcome.err in ("", "posekit: error: interrupted\n")

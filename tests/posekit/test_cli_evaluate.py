@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from posekit.figure import load_figure
-from posekit.files import write_view
-from posekit.motion import Motion, write_motion
-from posekit.pipeline import view_of
+from posekit.body import load_figure
+from posekit.formats.motion import Motion, write_motion
+from posekit.formats.own import write_view
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Walker, random_views, seq1
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 FRAMES = 12

@@ -13,17 +13,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit import files
-from posekit.calibration import CalibratedCamera, write_cameras
-from posekit.cameras import Array, PinholeCamera
-from posekit.files import OpenCVModel, View
-from posekit.keypoints import KeyPoints, write_keypoints
-from posekit.motion import Motion, write_motion
-from posekit.pipeline import result_of
-from posekit.pipeline.detected.view_keypoints import view_keypoints
-from posekit.pipeline.recover import recover
+from posekit.cameras import PinholeCamera
+from posekit.cameras.calibrated import CalibratedCamera
+from posekit.formats import own as files
+from posekit.formats.cameras import write_cameras
+from posekit.formats.keypoints import KeyPoints, write_keypoints
+from posekit.formats.motion import Motion, write_motion
+from posekit.formats.own import OpenCVModel, View
+from posekit.geometry import Array
+from posekit.recovery.conductor import recover
+from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Walker, walker_scene
+from posekit.views.view_keypoints import view_keypoints
 
 SIZE = (1920, 1080)
 K = np.array([[1400.0, 0, 960], [0, 1400.0, 540], [0, 0, 1]])

@@ -11,14 +11,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posekit.figure import load_figure
-from posekit.files import write_view
-from posekit.pipeline import recover, result_of, view_of
-from posekit.pipeline.batch import Recipe, read_frames, run_batch, shard_paths
-from posekit.pipeline.batch import run as run_module
-from posekit.pipeline.batch.pool import Outcome, attempt
-from posekit.pipeline.contents.telling import counts_line, settings_line
+from posekit.batch import Recipe, read_frames, run_batch, shard_paths
+from posekit.batch import run as run_module
+from posekit.batch.pool import Outcome, attempt
+from posekit.body import load_figure
+from posekit.formats.own import write_view
+from posekit.inspection.telling import counts_line, settings_line
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 Run = Callable[..., Any]
 

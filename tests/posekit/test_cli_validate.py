@@ -13,12 +13,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
-from posekit.files import read_report, schema
-from posekit.files.postures_q import Configurations, read_configurations, write_configurations
-from posekit.pipeline import validate as pipeline_validate
-from posekit.robot import find, load_robot
+from posekit.body import load_figure
+from posekit.formats.own import read_report, schema
+from posekit.formats.own.postures_q import Configurations, read_configurations, write_configurations
+from posekit.robots import find, load_robot
 from posekit.skeleton import JOINTS
+from posekit.validation import validate as pipeline_validate
 from posekit.validators import Validator
 
 FIGURE = load_figure()
@@ -298,7 +298,7 @@ def test_a_large_file_is_judged_in_batches_and_listed_in_part(
     run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With small bounds: the same verdicts as at once, those not valid listed with their numbers, up to the cap."""
-    module = importlib.import_module("posekit.pipeline.validate")
+    module = importlib.import_module("posekit.validation.validate")
     rng = np.random.default_rng(1)
     q = np.repeat(pin.neutral(HUMAN.model)[None], 120, axis=0)
     q[:, 7:] = rng.uniform(HUMAN.lower[7:], HUMAN.upper[7:], (120, 36))
@@ -321,8 +321,8 @@ def test_a_large_file_is_judged_in_batches_and_listed_in_part(
 
 
 def test_the_lengths_are_those_of_the_whole_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    files = importlib.import_module("posekit.files")
-    module = importlib.import_module("posekit.pipeline.validate")
+    files = importlib.import_module("posekit.formats.own")
+    module = importlib.import_module("posekit.validation.validate")
     joints = np.concatenate([STANDING * scale for scale in (0.99, 1.0, 1.0, 1.01)])
     whole = pipeline_validate(Validator(HUMAN), files.Postures(joints=joints))
     monkeypatch.setattr(module, "BATCH", 1)

@@ -12,15 +12,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.pipeline import EXACT, Recovery, recover, view_of
+from posekit.body import load_figure
+from posekit.formats.own import View
+from posekit.recovery import recover
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.tolerance import EXACT
 from posekit.skeleton import DOFS, HEAD, PARENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, Scene, random_postures, random_views
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.tree import enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 VIEWS, CHUNKS = 10_000, 4

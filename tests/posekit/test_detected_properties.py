@@ -15,20 +15,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posekit
-from posekit import files
-from posekit.anthropometry import lengths_from_proportions
-from posekit.calibration import CalibratedCamera, write_cameras
-from posekit.cameras import Array, PinholeCamera
+from posekit.body.anthropometry import lengths_from_proportions
+from posekit.cameras import PinholeCamera
+from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError, PosekitError
-from posekit.files import OpenCVModel, ScaledOrthographicModel, View
-from posekit.keypoints import KeyPoints, swap, write_keypoints
-from posekit.motion import Motion, write_motion
-from posekit.pipeline.detected.person import DEFAULT_PROPORTIONS, middle_neck
-from posekit.pipeline.detected.person_view import person_view
-from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.formats import own as files
+from posekit.formats.cameras import write_cameras
+from posekit.formats.keypoints import KeyPoints, swap, write_keypoints
+from posekit.formats.motion import Motion, write_motion
+from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
+from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
-from posekit.skeleton_map import load_skeleton_map
 from posekit.synthesis import Walker, walker_scene
+from posekit.views.person import DEFAULT_PROPORTIONS, middle_neck
+from posekit.views.person_view import person_view
+from posekit.views.view_keypoints import view_keypoints
 
 FIGURE = posekit.load_figure()
 PERSON = FIGURE.scaled(middle_neck(FIGURE.lengths))

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.files import OpenCVModel, View
-from posekit.pipeline import result_of, view_of
-from posekit.pipeline.detected.compare import compare
-from posekit.pipeline.detected.truth import TURNS, with_truth
-from posekit.pipeline.ranked import ranked, rigid_of
+from posekit.evaluate.comparison import compare
+from posekit.formats.own import OpenCVModel, View
+from posekit.geometry import Array
+from posekit.recovery.ranked import ranked, rigid_of
+from posekit.recovery.result import result_of
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
+from posekit.views.truth import TURNS, with_truth
 
 FIGURE = posekit.load_figure()
 

@@ -10,16 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import posekit
-from posekit.cameras import Array, PinholeCamera
+from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
-from posekit.files import OpenCVModel, ScaledOrthographicModel, View
-from posekit.keypoints import KeyPoints
-from posekit.pipeline import view_of
-from posekit.pipeline.detected.person_view import pelvis_fraction, person_view
-from posekit.pipeline.detected.view_keypoints import view_keypoints
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
+from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
-from posekit.skeleton_map import load_skeleton_map
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
+from posekit.views.person_view import pelvis_fraction, person_view
+from posekit.views.view_keypoints import view_keypoints
 
 FIGURE = posekit.load_figure()
 LIMBS = [k for k, name in enumerate(JOINTS) if name not in ("neck", "pelvis")]

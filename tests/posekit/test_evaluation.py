@@ -9,12 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import OpenCVModel, View
-from posekit.measures import mpjpe
-from posekit.pipeline import MEASURED, Tolerance, forget_camera, view_of
-from posekit.pipeline.evaluation import (
+from posekit.evaluate import (
     Choice,
     Method,
     Ranking,
@@ -25,13 +22,17 @@ from posekit.pipeline.evaluation import (
     evaluate,
     write_evaluation,
 )
-from posekit.pipeline.evaluation.condition import lost_to, numbers
-from posekit.pipeline.evaluation.frames import KEYS
-from posekit.pipeline.evaluation.material import of_capture, of_view
-from posekit.pipeline.evaluation.report import csv_lines, document, summary
-from posekit.pipeline.recovery import FrameRecovery
+from posekit.evaluate.condition import lost_to, numbers
+from posekit.evaluate.frames import KEYS
+from posekit.evaluate.material import of_capture, of_view
+from posekit.evaluate.report import csv_lines, document, summary
+from posekit.formats.own import OpenCVModel, View
+from posekit.measures import mpjpe
+from posekit.recovery.recovery import FrameRecovery
+from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Capture, Walker, random_views, read_capture, seq1
+from posekit.views.builtin import forget_camera, view_of
 
 FIGURE = load_figure()
 SWEEP = Sweep(yaws=(0.0, 90.0, 135.0), heights=(1.0, 2.0))

@@ -5,26 +5,23 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import ViewerError
-from posekit.figure import load_figure
+from posekit.evaluate.certificate import certify
+from posekit.evaluate.errors import best_of_frames, of_chosen, survivor_errors
+from posekit.evaluate.scores import THRESHOLDS, correct_poses, correct_poses_score, reliability
+from posekit.evaluate.sweep import Sweep, facing, middles
+from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.measures import mpjpe, pa_mpjpe
-from posekit.pipeline import EXACT, MEASURED, recover, view_of
-from posekit.pipeline.evaluation.certificate import certify
-from posekit.pipeline.evaluation.errors import best_of_frames, of_chosen, survivor_errors
-from posekit.pipeline.evaluation.scores import (
-    THRESHOLDS,
-    correct_poses,
-    correct_poses_score,
-    reliability,
-)
-from posekit.pipeline.evaluation.sweep import Sweep, facing, middles
-from posekit.pipeline.evaluation.true_branch import killers, limbs_right, true_branch
+from posekit.recovery import recover
+from posekit.recovery.tolerance import EXACT, MEASURED
 from posekit.skeleton import DOFS, JOINT, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Walker, random_postures, random_views
 from posekit.synthesis.viewpoints import to_camera
 from posekit.tree import enumerate_leaves
 from posekit.validators import load_ranges
 from posekit.viewer.plots import evaluation as plots
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 URDF = load_ranges("urdf")

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posekit.body import Figure, load_figure, with_head
+from posekit.body.figure import FRAMES
+from posekit.body.frames import quaternions
+from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import FigureError
-from posekit.figure import Figure, load_figure, with_head
-from posekit.figure.figure import FRAMES
-from posekit.figure.frames import quaternions
-from posekit.figure.lengths import hips_points, torso_points
 from posekit.skeleton import DOFS, HEAD, HEAD_POINTS, JOINT, JOINTS, POINTS, SEGMENT_NAMES, urdf_joint_name
 
 FIGURE = load_figure()

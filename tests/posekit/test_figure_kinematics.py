@@ -4,8 +4,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import Figure, load_figure
-from posekit.figure.figure import FRAMES
+from posekit.body import Figure, load_figure
+from posekit.body.figure import FRAMES
 from posekit.skeleton import POINTS
 
 FIGURES = {

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.files import Postures, Result, ResultFrame, read_postures, write_postures, write_result
-from posekit.files.npz import open_npz
+from posekit.formats.own import Postures, Result, ResultFrame, read_postures, write_postures, write_result
+from posekit.formats.own.npz import open_npz
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.files import Finding, Judged, PostureReport, Report, make_report, read_report, write_report
-from posekit.files.report import Worst, columns_of
-from posekit.files.report_columns import Columns, Place, joined
-from posekit.files.report_table import summary_table
+from posekit.formats.own import Finding, Judged, PostureReport, Report, make_report, read_report, write_report
+from posekit.formats.own.report import Worst, columns_of
+from posekit.formats.own.report_columns import Columns, Place, joined
+from posekit.formats.own.report_table import summary_table
 from posekit.tree.check import Findings
 
 VALUE = np.array([[0.5, 2.0, -1.0], [0.5, 0.4, 0.9], [np.nan, np.nan, np.nan]])

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.files import Result, ResultFrame, read_result, write_result
-from posekit.files import result_npz as result_npz_module
+from posekit.formats.own import Result, ResultFrame, read_result, write_result
+from posekit.formats.own import result_npz as result_npz_module
 from posekit.skeleton import JOINTS
 
 NQ = 29
@@ -340,7 +340,7 @@ def test_padding_is_bounded_but_never_held(tmp_path, rng, monkeypatch):
 
 
 def test_a_result_too_large_for_json_says_npz(tmp_path, rng, monkeypatch):
-    monkeypatch.setattr("posekit.intake.writing.MAX_BYTES", 10_000)
+    monkeypatch.setattr("posekit.safe_io.writing.MAX_BYTES", 10_000)
     with pytest.raises(InputError, match=r"name it \.npz"):
         write_result(tmp_path / "r.json", a_result(rng, (20,)))
     assert not list(tmp_path.iterdir())

@@ -8,9 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.batch.digests import of_values
+from posekit.batch.recipe import Recipe
+from posekit.batch.run_folder import Asked, Failure, run_folder
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import (
+from posekit.evaluate import Evaluation, Method, Sampling, Sweep, by_path, evaluate, write_evaluation
+from posekit.formats.own import (
     SCHEMAS,
     Family,
     LeeChenModel,
@@ -32,23 +36,11 @@ from posekit.files import (
     write_result,
     write_view,
 )
-from posekit.files.batch_schema import ManifestFile, SettingsFields, SourceFields
-from posekit.pipeline.batch.digests import of_values
-from posekit.pipeline.batch.recipe import Recipe
-from posekit.pipeline.batch.run_folder import Asked, Failure, run_folder
-from posekit.pipeline.detected.source import Source
-from posekit.pipeline.evaluation import (
-    Evaluation,
-    Method,
-    Sampling,
-    Sweep,
-    by_path,
-    evaluate,
-    write_evaluation,
-)
-from posekit.pipeline.tolerance import MEASURED
+from posekit.formats.own.batch_schema import ManifestFile, SettingsFields, SourceFields
+from posekit.recovery.tolerance import MEASURED
 from posekit.skeleton import JOINTS, SEGMENT_NAMES
 from posekit.synthesis import Capture
+from posekit.views.source import Source
 
 TOTALS = ("inputs", "shards", "done", "planned", "frames", "survivors", "empty")
 KINDS = (

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.files import parse_length
-from posekit.files.units import METRES, UNITS, from_metres, to_metres
+from posekit.formats.own import parse_length
+from posekit.formats.own.units import METRES, UNITS, from_metres, to_metres
 
 
 @given(st.decimals(0, 1000, places=3), st.sampled_from(UNITS))

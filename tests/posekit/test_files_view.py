@@ -14,7 +14,14 @@ from hypothesis import strategies as st
 
 from posekit.cameras.lee_chen import pinhole, points_from_paper
 from posekit.errors import CameraError, InputError
-from posekit.files import LeeChenModel, OpenCVModel, ScaledOrthographicModel, View, read_view, write_view
+from posekit.formats.own import (
+    LeeChenModel,
+    OpenCVModel,
+    ScaledOrthographicModel,
+    View,
+    read_view,
+    write_view,
+)
 from posekit.skeleton import HEAD_POINTS, JOINTS, SEGMENT_NAMES
 
 ARRAYS = ("time", "image", "head_image", "root", "truth")
@@ -155,7 +162,7 @@ def test_a_view_travels_to_another_process(rng):
 
 
 def test_the_boundary_needs_no_pinocchio():
-    code = "import sys, posekit.files; sys.exit('pinocchio' in sys.modules or 'coal' in sys.modules)"
+    code = "import sys, posekit.formats.own; sys.exit('pinocchio' in sys.modules or 'coal' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

@@ -11,17 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit import files
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.files.paths import FollowedPaths
-from posekit.motion import read_motion
-from posekit.pipeline import MEASURED, builtin_view, follow, following_line, recover, result_of, view_of
-from posekit.pipeline.admitting import least_violation
-from posekit.pipeline.advice import advice_lines
+from posekit.formats import own as files
+from posekit.formats.motion import read_motion
+from posekit.formats.own import View
+from posekit.formats.own.paths import FollowedPaths
+from posekit.recovery import recover
+from posekit.recovery.admitting import least_violation
+from posekit.recovery.advice import advice_lines
+from posekit.recovery.result import result_of
+from posekit.recovery.sequences import follow
+from posekit.recovery.summary import following_line
+from posekit.recovery.tolerance import MEASURED
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
+from posekit.views.builtin import builtin_view, view_of
 
 FIGURE = load_figure()
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posekit.grouping import group_postures, representatives
+from posekit.recovery.grouping import group_postures, representatives
 
 RADIUS = 0.05
 

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from posekit import recover
+from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.head import TABLE_A2, blocks, head_points_cam, solve_pose
-from posekit.pipeline import grower
-from posekit.pipeline.grower import Grower
-from posekit.pipeline.recover import person_of
-from posekit.pipeline.views import view_of
+from posekit.cameras.head import TABLE_A2, blocks, head_points_cam, solve_pose
+from posekit.formats.own import View
+from posekit.recovery import grower
+from posekit.recovery.conductor import person_of
+from posekit.recovery.grower import Grower
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 FRAMES = 90
 

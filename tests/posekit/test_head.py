@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.cameras import PinholeCamera, lee_chen
-from posekit.errors import CameraError, HeadError
-from posekit.head import (
+from posekit.cameras.head import (
     TABLE_A2,
     HeadPoints,
     HeadWarning,
@@ -16,7 +15,8 @@ from posekit.head import (
     head_points_cam,
     solve_pose,
 )
-from posekit.head.perspective import Heads, Placement, look, rotation
+from posekit.cameras.head.perspective import Heads, Placement, look, rotation
+from posekit.errors import CameraError, HeadError
 from posekit.skeleton import HEAD_POINTS
 
 CM = 0.01
@@ -370,7 +370,7 @@ def test_sound_heads_are_seldom_accused(rng):
         assert sum(name is not None for name in rounded.misfit) <= 2
 
 
-@pytest.mark.filterwarnings("error::posekit.head.HeadWarning")
+@pytest.mark.filterwarnings("error::posekit.cameras.head.HeadWarning")
 def test_exact_heads_are_never_accused(rng):
     R, t = random_poses(rng, 1000)
     image = view(PIXELS, R, t)
@@ -621,7 +621,7 @@ def test_head_points_cam(rng):
     np.testing.assert_allclose(head_points_cam(R[0], t[0], TABLE_A2.points), expected[0], rtol=0, atol=1e-14)
 
 
-@pytest.mark.filterwarnings("ignore::posekit.head.HeadWarning")
+@pytest.mark.filterwarnings("ignore::posekit.cameras.head.HeadWarning")
 @pytest.mark.parametrize("size", [1e-300, 1e-8, 1.0, 1e4, 1e30, 1e150])
 def test_any_image_points_give_a_pose_or_a_reason(size, rng):
     """No exception, no other warning, and what is found is finite."""

@@ -15,18 +15,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
+from posekit.body.urdf import parse
 from posekit.errors import FigureError, InputError, PosekitError
-from posekit.figure import load_figure
-from posekit.figure.urdf import parse
-from posekit.files import Postures, read_postures, read_view, write_postures, write_view
-from posekit.intake import check_mesh, open_npz, parse_json, parse_toml
-from posekit.intake.text_file import decode
-from posekit.pipeline import builtin_view
-from posekit.robot import Robot, load_robot
-from posekit.robot.find import find
-from posekit.robot.srdf import check_srdf
-from posekit.robot.urdf import check_urdf
+from posekit.formats.own import Postures, read_postures, read_view, write_postures, write_view
+from posekit.robots import Robot, load_robot
+from posekit.robots.find import find
+from posekit.robots.srdf import check_srdf
+from posekit.robots.urdf import check_urdf
+from posekit.safe_io import check_mesh, open_npz, parse_json, parse_toml
+from posekit.safe_io.text_file import decode
 from posekit.validators import load_ranges
+from posekit.views.builtin import builtin_view
 
 FIGURE = load_figure()
 LINKS = [frame.name for frame in FIGURE.model.frames]

@@ -19,10 +19,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import FigureError, InputError, PosekitError
-from posekit.figure import load_figure
-from posekit.robot import ProbeLimits, Robot, load_robot
-from posekit.robot.urdf import check_urdf
+from posekit.robots import ProbeLimits, Robot, load_robot
+from posekit.robots.urdf import check_urdf
 
 INERTIA = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
 VALID = (

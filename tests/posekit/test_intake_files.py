@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.intake import (
+from posekit.safe_io import (
     check_mesh,
     open_npz,
     parse_toml,
@@ -23,7 +23,7 @@ from posekit.intake import (
     read_toml,
     read_xml,
 )
-from posekit.intake.zip_directory import directory_size
+from posekit.safe_io.zip_directory import directory_size
 
 
 def refusal_of(call, *arguments, **options) -> str:
@@ -74,7 +74,7 @@ class TestRegularFiles:
 class TestText:
     @given(text=st.text(st.characters(exclude_characters="\0", exclude_categories=["Cs"]), min_size=1))
     def test_utf8_is_read_back(self, text: str) -> None:
-        from posekit.intake.text_file import decode
+        from posekit.safe_io.text_file import decode
 
         assert decode("x", text.encode()) == text.removeprefix("\ufeff")
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.intake import parse_json, read_json
-from posekit.intake.json_file import MAX_BYTES, MAX_DEPTH, nesting
+from posekit.safe_io import parse_json, read_json
+from posekit.safe_io.json_file import MAX_BYTES, MAX_DEPTH, nesting
 
 numbers = st.floats(allow_nan=False, allow_infinity=False) | st.integers(-(10**20), 10**20)
 documents = st.recursive(

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from posekit.errors import InputError
-from posekit.intake import writing
-from posekit.intake.writing import json_pieces, replacing, write_text
+from posekit.safe_io import writing
+from posekit.safe_io.writing import json_pieces, replacing, write_text
 
 
 def test_content_replaces_content(tmp_path):

@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.robot import load_robot
-from posekit.robot.joint_map import (
+from posekit.robots import load_robot
+from posekit.robots.joint_map import (
     BUILT_IN,
     find_joint_map,
     load_joint_map,
@@ -20,7 +20,7 @@ from posekit.robot.joint_map import (
     postures_of,
     targets_of,
 )
-from posekit.robot.scaling import model_lengths
+from posekit.robots.scaling import model_lengths
 from posekit.skeleton import JOINTS, POINTS, SIDES
 
 SUBJECT: dict[

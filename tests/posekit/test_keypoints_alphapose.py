@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints
-from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
-from posekit.skeleton_map import load_skeleton_map
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.skeleton_maps import load_skeleton_map
 
 
 def row(name: str, count: int = 17, **more: Any) -> dict[str, Any]:

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints
-from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
-from posekit.skeleton_map import SkeletonMap, load_skeleton_map
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 
 COCO = load_skeleton_map("coco_17")
 

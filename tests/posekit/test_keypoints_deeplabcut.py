@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints
-from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
-from posekit.skeleton_map import load_skeleton_map, parse_skeleton_map
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.skeleton_maps import load_skeleton_map, parse_skeleton_map
 
 COCO = load_skeleton_map("coco_17")
 
@@ -119,7 +119,7 @@ def test_names_of_ones_own_need_a_map(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="any built-in skeleton map; write a skeleton map"):
         read_keypoints(tmp_path / "v.csv")
     own = {"nose": "snout", "left_ear": "ear", "left_wrist": "paw", "pelvis": "tail"}
-    layout = parse_skeleton_map({"schema": "posekit.skeleton_map/1", "landmarks": own}, "own")
+    layout = parse_skeleton_map({"schema": "posekit.formats.skeleton_maps/1", "landmarks": own}, "own")
     assert np.isfinite(read_keypoints(tmp_path / "v.csv", layout=layout).landmarks[0, :, 0]).sum() == 4
 
 

@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints
-from posekit.keypoints.mediapipe_names import NAMES
-from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
-from posekit.skeleton_map import load_skeleton_map
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.keypoints.mediapipe_names import NAMES
+from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.skeleton_maps import load_skeleton_map
 
 MEDIAPIPE = load_skeleton_map("mediapipe_33")
 PLACES = np.random.default_rng(33).uniform(-0.1, 1.2, (33, 4)).round(4)

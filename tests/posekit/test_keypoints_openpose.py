@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints
-from posekit.keypoints.openpose_names import file_names
-from posekit.keypoints.reading import read_keypoints, suiting, write_keypoints
-from posekit.skeleton_map import load_skeleton_map
+from posekit.formats.keypoints import KeyPoints
+from posekit.formats.keypoints.openpose_names import file_names
+from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.skeleton_maps import load_skeleton_map
 
 BODY_25, BODY_25B, COCO_18 = map(load_skeleton_map, ("body_25", "body_25b", "coco_18"))
 FACES = {

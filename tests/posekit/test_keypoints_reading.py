@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints, reading
-from posekit.keypoints.format import Format
-from posekit.keypoints.given import Given
-from posekit.keypoints.reading import (
+from posekit.formats.keypoints import KeyPoints, reading
+from posekit.formats.keypoints.format import Format
+from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.reading import (
     by_name,
     chosen,
     formats,
@@ -23,7 +23,7 @@ from posekit.keypoints.reading import (
     suiting,
     write_keypoints,
 )
-from posekit.skeleton_map import LANDMARK, load_skeleton_map, skeleton_map_names
+from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, skeleton_map_names
 
 COCO = load_skeleton_map("coco_17")
 PERSON = [40, 50, 2] * 17

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posekit.figure import load_figure
-from posekit.keypoints import KeyPoints, check_sides, swap
-from posekit.keypoints.persons import select
-from posekit.keypoints.side_flips import GROUPS, flips
-from posekit.keypoints.side_gait import gait_evidence
-from posekit.keypoints.sides import SURE
-from posekit.skeleton_map import LANDMARK, load_skeleton_map, parse_skeleton_map
+from posekit.body import load_figure
+from posekit.formats.keypoints import KeyPoints, check_sides, swap
+from posekit.formats.keypoints.persons import select
+from posekit.formats.keypoints.side_flips import GROUPS, flips
+from posekit.formats.keypoints.side_gait import gait_evidence
+from posekit.formats.keypoints.sides import SURE
+from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, parse_skeleton_map
 from posekit.synthesis import Scene, Walker, random_views, walker_scene
 
 COCO = load_skeleton_map("coco_17")
@@ -115,7 +115,7 @@ def test_an_exchange_is_that_of_the_skeleton_map_and_twice_is_nothing(
 
 def test_sides_of_several_points_are_exchanged_too() -> None:
     table = {
-        "schema": "posekit.skeleton_map/1",
+        "schema": "posekit.formats.skeleton_maps/1",
         "points": ["a1", "a2", "b1", "b2", "c"],
         "landmarks": {"left_wrist": ["a1", "a2"], "right_wrist": ["b1", "b2"], "nose": "c"},
     }
@@ -301,7 +301,7 @@ def test_a_jump_is_found_where_it_is(group: str, part: slice, long: int) -> None
 def test_the_signs_are_the_best_there_are(seed: int) -> None:
     from itertools import product
 
-    from posekit.keypoints.side_flips import _bends, _signs
+    from posekit.formats.keypoints.side_flips import _bends, _signs
 
     d = np.random.default_rng(seed).normal(size=(7, 2))
     best = min(_bends(d * np.array(signs)[:, None]).sum() for signs in product((1, -1), repeat=7))

@@ -11,14 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.keypoints import KeyPoints, choose, list_people, track
-from posekit.keypoints.persons import select
-from posekit.keypoints.track_assignment import assign
-from posekit.keypoints.track_similarity import COMPARED, K, area, similarity
-from posekit.keypoints.tracking import MAX_PEOPLE
-from posekit.skeleton_map import LANDMARKS, load_skeleton_map
+from posekit.formats.keypoints import KeyPoints, choose, list_people, track
+from posekit.formats.keypoints.persons import select
+from posekit.formats.keypoints.track_assignment import assign
+from posekit.formats.keypoints.track_similarity import COMPARED, K, area, similarity
+from posekit.formats.keypoints.tracking import MAX_PEOPLE
+from posekit.formats.skeleton_maps import LANDMARKS, load_skeleton_map
+from posekit.geometry import Array
 
 COCO = load_skeleton_map("coco_17")
 BODY = np.array(

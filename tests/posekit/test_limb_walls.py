@@ -7,9 +7,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from posekit.figure import Figure, load_figure
-from posekit.figure.frames import hips_frame, torso_frame, unit
-from posekit.pipeline.limb_walls import LimbWalls
+from posekit.body import Figure, load_figure
+from posekit.body.frames import hips_frame, torso_frame, unit
+from posekit.recovery.limb_walls import LimbWalls
 from posekit.refinement import Sight
 from posekit.refinement.anatomy import LIMBS
 from posekit.refinement.equations import evaluate, linearise

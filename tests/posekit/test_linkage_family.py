@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import CameraError, InputError
-from posekit.linkage import Family, Linkage, load_linkage, name_nearer, read_nearer, span
+from posekit.linkages import Family, Linkage, load_linkage, name_nearer, read_nearer, span
 from posekit.validators.linkage import closure
 
 HUMAN = load_linkage("taylor_human")

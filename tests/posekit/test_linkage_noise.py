@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posekit.linkage import Family, Linkage, load_linkage, name_nearer, search
+from posekit.linkages import Family, Linkage, load_linkage, name_nearer, search
 
 SEEDS = 200
 SIZE = 600.0

@@ -8,9 +8,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from posekit.errors import InputError
-from posekit.linkage import Family, Linkage, Minima, load_linkage, name_nearer, search
-from posekit.linkage.residuals import Closure, Flatness, Perpendicularity, Residual, Slice
-from posekit.linkage.roots import find_roots
+from posekit.linkages import Family, Linkage, Minima, load_linkage, name_nearer, search
+from posekit.linkages.residuals import Closure, Flatness, Perpendicularity, Residual, Slice
+from posekit.linkages.roots import find_roots
 
 Edges = list[tuple[int, int]]
 KINDS = ("closure", "coplanar", "perpendicular", "collinear", "closure and coplanar")

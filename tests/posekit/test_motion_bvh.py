@@ -15,19 +15,19 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
+from posekit.body import Figure, load_figure
+from posekit.body.frames import quaternions
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
-from posekit.figure.frames import quaternions
-from posekit.motion.bvh import FORMAT, examine_bvh, read_bvh, write_bvh
-from posekit.motion.bvh_angles import continuous, euler_angles, euler_rotation
-from posekit.motion.bvh_size import CMU
-from posekit.motion.bvh_writing import NAMES
-from posekit.motion.format import UNITS
-from posekit.motion.motion import UPS, Motion
-from posekit.motion.motion_axes import up_rotation
-from posekit.motion.postures import layout_of, postures_of
+from posekit.formats.motion.bvh import FORMAT, examine_bvh, read_bvh, write_bvh
+from posekit.formats.motion.bvh_angles import continuous, euler_angles, euler_rotation
+from posekit.formats.motion.bvh_size import CMU
+from posekit.formats.motion.bvh_writing import NAMES
+from posekit.formats.motion.format import UNITS
+from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion_axes import up_rotation
+from posekit.formats.motion.postures import layout_of, postures_of
+from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map
 from posekit.skeleton import DOFS, JOINTS, POINTS
-from posekit.skeleton_map import LANDMARK, load_skeleton_map
 from posekit.synthesis.walker import Walker
 
 FIGURE = load_figure()
@@ -273,7 +273,7 @@ class TestAngles:
         np.testing.assert_allclose(euler_rotation(euler_angles(R)), R, rtol=0, atol=1e-13)
 
     def test_quaternions(self, rng: np.random.Generator) -> None:
-        from posekit.motion.bvh_angles import rotation_of_quaternion
+        from posekit.formats.motion.bvh_angles import rotation_of_quaternion
 
         R = Rotation.random(20, random_state=3).as_matrix()
         np.testing.assert_allclose(rotation_of_quaternion(quaternions(R)), R, rtol=0, atol=1e-14)
@@ -334,8 +334,8 @@ class TestAnyHierarchy:
         q = configurations(rng, 23)
         write_bvh(tmp_path / "a.bvh", FIGURE, q, seconds(23))
         whole = read_bvh(tmp_path / "a.bvh").points
-        monkeypatch.setattr("posekit.motion.bvh_kinematics._CHUNK", 1500)
-        monkeypatch.setattr("posekit.motion.bvh_file._CHUNK", 700)
+        monkeypatch.setattr("posekit.formats.motion.bvh_kinematics._CHUNK", 1500)
+        monkeypatch.setattr("posekit.formats.motion.bvh_file._CHUNK", 700)
         np.testing.assert_array_equal(read_bvh(tmp_path / "a.bvh").points, whole)
 
 

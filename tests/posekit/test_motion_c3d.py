@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.motion import Motion, read_motion, write_motion
-from posekit.motion.c3d import read_c3d, write_c3d
+from posekit.formats.motion import Motion, read_motion, write_motion
+from posekit.formats.motion.c3d import read_c3d, write_c3d
 
 INTEL, DEC, MIPS = 84, 85, 86
 
@@ -278,6 +278,6 @@ def test_what_c3d_cannot_hold_is_not_written(tmp_path, monkeypatch):
     def missing(name):
         raise ImportError(name)
 
-    monkeypatch.setattr("posekit.intake.extras.import_module", missing)
+    monkeypatch.setattr("posekit.safe_io.extras.import_module", missing)
     with pytest.raises(InputError, match=r"writing C3D needs ezc3d.*pip install 'posekit\[c3d\]'"):
         write_c3d(tmp_path / "a.c3d", motion())

@@ -12,14 +12,14 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation, Slerp
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.motion.bvh_tree import NODES, known_nodes
-from posekit.motion.glb import FORMAT, write_glb, write_postures_glb
-from posekit.motion.glb_capsule import AROUND, capsule_mesh
-from posekit.motion.glb_file import INDICES, UINT16, GlbFile
-from posekit.motion.motion import UPS
-from posekit.motion.motion_axes import up_rotation
+from posekit.formats.motion.bvh_tree import NODES, known_nodes
+from posekit.formats.motion.glb import FORMAT, write_glb, write_postures_glb
+from posekit.formats.motion.glb_capsule import AROUND, capsule_mesh
+from posekit.formats.motion.glb_file import INDICES, UINT16, GlbFile
+from posekit.formats.motion.motion import UPS
+from posekit.formats.motion.motion_axes import up_rotation
 from posekit.skeleton import POINT, POINTS
 from posekit.synthesis.walker import Walker
 
@@ -346,7 +346,7 @@ class TestContainer:
     def test_more_than_two_gigabytes_are_refused(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("posekit.motion.glb_file.MAX_BYTES", 100)
+        monkeypatch.setattr("posekit.formats.motion.glb_file.MAX_BYTES", 100)
         with pytest.raises(InputError, match="write fewer frames"):
             GlbFile().write(tmp_path / "a.glb")
 

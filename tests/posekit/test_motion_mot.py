@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from scipy.spatial.transform import Rotation
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.motion import motion_formats, write_configurations, write_motion
-from posekit.motion.mot import quaternions_of, read_mot, write_mot, yaw_pitch_roll
-from posekit.motion.motion import Motion
+from posekit.formats.motion import motion_formats, write_configurations, write_motion
+from posekit.formats.motion.mot import quaternions_of, read_mot, write_mot, yaw_pitch_roll
+from posekit.formats.motion.motion import Motion
 from posekit.skeleton import JOINTS
 from posekit.synthesis import random_postures
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.motion import UPS, Motion, guess_up, postures_of, read_motion, with_up, write_motion
-from posekit.motion.postures import layout_of
-from posekit.pipeline.taylor.completion import Completion
+from posekit.formats.motion import UPS, Motion, guess_up, postures_of, read_motion, with_up, write_motion
+from posekit.formats.motion.postures import layout_of
+from posekit.formats.skeleton_maps import LANDMARKS, SkeletonMap, load_skeleton_map, skeleton_map_names
+from posekit.recovery.taylor_figure.completion import Completion
 from posekit.skeleton import JOINT, JOINTS, POINTS
-from posekit.skeleton_map import LANDMARKS, SkeletonMap, load_skeleton_map, skeleton_map_names
 from posekit.synthesis import mocap_scene, random_postures, read_capture
 
 FIGURE = load_figure()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.motion import Motion, format_of, motion_format, motion_formats, read_motion, write_motion
-from posekit.motion.motion_checks import check_size
+from posekit.formats.motion import Motion, format_of, motion_format, motion_formats, read_motion, write_motion
+from posekit.formats.motion.motion_checks import check_size
 
 POINTS = ("trc", "c3d", "csv", "npz", "parquet")
 

@@ -7,12 +7,19 @@ import pytest
 from hypothesis import given, settings
 
 from posekit.errors import InputError
-from posekit.motion import Motion, SurvivorTable, read_motion, read_survivors, write_motion, write_survivors
-from posekit.motion.csv_table import write_csv_motion
-from posekit.motion.motion_table import rate_of
-from posekit.motion.npz import read_npz
-from posekit.motion.parquet import read_parquet_pieces, write_parquet, write_parquet_pieces
-from posekit.motion.survivors_files import read_survivor_pieces, write_survivor_pieces
+from posekit.formats.motion import (
+    Motion,
+    SurvivorTable,
+    read_motion,
+    read_survivors,
+    write_motion,
+    write_survivors,
+)
+from posekit.formats.motion.csv_table import write_csv_motion
+from posekit.formats.motion.motion_table import rate_of
+from posekit.formats.motion.npz import read_npz
+from posekit.formats.motion.parquet import read_parquet_pieces, write_parquet, write_parquet_pieces
+from posekit.formats.motion.survivors_files import read_survivor_pieces, write_survivor_pieces
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 
@@ -308,7 +315,7 @@ def test_damaged_parquet_is_refused_in_one_line(tmp_path, monkeypatch):
             assert "\n" not in str(error)
     assert refused > 20
     path.write_bytes(good)
-    monkeypatch.setattr("posekit.motion.parquet.MAX_VALUES", 500)
+    monkeypatch.setattr("posekit.formats.motion.parquet.MAX_VALUES", 500)
     with pytest.raises(InputError, match="50 rows of 13 columns"):
         read_motion(path)
     pd.DataFrame({"time": [0.0], "a_x": ["1"], "a_y": [0.0], "a_z": [0.0]}).to_parquet(path)
@@ -321,7 +328,7 @@ def test_without_pyarrow_parquet_says_what_to_install(tmp_path, monkeypatch):
         raise ImportError(name)
 
     write_motion(tmp_path / "a.parquet", motion())
-    monkeypatch.setattr("posekit.intake.extras.import_module", missing)
+    monkeypatch.setattr("posekit.safe_io.extras.import_module", missing)
     for action in (
         lambda: read_motion(tmp_path / "a.parquet"),
         lambda: write_motion(tmp_path / "b.parquet", motion()),

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 
 from posekit.errors import InputError
-from posekit.motion import Motion, read_motion, with_up, write_motion
-from posekit.motion.motion_axes import up_rotation
-from posekit.motion.trc import read_trc, write_trc
+from posekit.formats.motion import Motion, read_motion, with_up, write_motion
+from posekit.formats.motion.motion_axes import up_rotation
+from posekit.formats.motion.trc import read_trc, write_trc
 
 HEADER = (
     "PathFileType\t4\t(X/Y/Z)\twalk.trc\n"

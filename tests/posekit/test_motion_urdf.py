@@ -10,11 +10,10 @@ import pandas
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
-from posekit.figure import load_figure
-from posekit.files.postures_q import read_configurations
-from posekit.motion.motion import Motion
-from posekit.motion.urdf_folder import (
+from posekit.formats.motion.motion import Motion
+from posekit.formats.motion.urdf_folder import (
     CSV,
     FIGURE,
     FILES,
@@ -25,6 +24,7 @@ from posekit.motion.urdf_folder import (
     read_urdf_folder,
     write_urdf_folder,
 )
+from posekit.formats.own.postures_q import read_configurations
 from posekit.skeleton import DOFS, POINTS, urdf_joint_name
 
 PERSON = load_figure().scaled(
@@ -62,7 +62,9 @@ def folder(q: np.ndarray, tmp_path: Path) -> Path:
 @pytest.fixture
 def trusting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Load the figure without the child process that looks at a stranger's file first: it takes seconds."""
-    monkeypatch.setattr("posekit.motion.urdf_folder.load_figure", partial(load_figure, untrusted=False))
+    monkeypatch.setattr(
+        "posekit.formats.motion.urdf_folder.load_figure", partial(load_figure, untrusted=False)
+    )
 
 
 class TestOtherProgramsOpenIt:

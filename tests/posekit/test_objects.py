@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.studies.object_study import study_lines, study_object
 from posekit.errors import InputError
-from posekit.files import ScaledOrthographicModel
-from posekit.files.object_view import ObjectView
-from posekit.linkage import Linkage, load_linkage, span
-from posekit.pipeline import Scale
-from posekit.pipeline.objects import (
+from posekit.formats.own import ScaledOrthographicModel
+from posekit.formats.own.object_view import ObjectView
+from posekit.linkages import Linkage, load_linkage, span
+from posekit.objects import (
     ArticulatedObject,
     ObjectTolerance,
     certify,
@@ -20,13 +20,13 @@ from posekit.pipeline.objects import (
     recover_object,
     tolerance_of,
 )
-from posekit.pipeline.objects.certify import Certifier
-from posekit.pipeline.objects.draw import draw_configurations
-from posekit.pipeline.objects.spread import Spread
-from posekit.pipeline.objects.study import study_lines, study_object
-from posekit.pipeline.objects.triangles import Triangles, triangles
-from posekit.robot import load_robot
-from posekit.robot.kinematics import Kinematics, body_points
+from posekit.objects.certify import Certifier
+from posekit.objects.draw import draw_configurations
+from posekit.objects.scale import Scale
+from posekit.objects.spread import Spread
+from posekit.objects.triangles import Triangles, triangles
+from posekit.robots import load_robot
+from posekit.robots.kinematics import Kinematics, body_points
 
 SCALE = 320.0
 VALUE = Scale(how="value", value=SCALE)
@@ -253,7 +253,7 @@ class TestScale:
                 },
             )
         )
-        from posekit.linkage import Family
+        from posekit.linkages import Family
 
         family = Family(linkage=thing.linkage, image=points[:, :2] * SCALE)
         found = Triangles.of(family)
@@ -620,7 +620,7 @@ class TestBadInput:
     def test_a_linkage_file_with_a_robot(self, tmp_path):
         path = tmp_path / "forearm.toml"
         lines = [
-            'schema = "posekit.linkage/1"', 'urdf = "panda"', "unit = 1",
+            'schema = "posekit.linkages/1"', 'urdf = "panda"', "unit = 1",
             'points = ["panda_joint3", "panda_joint4", "panda_joint5"]', "[segments]",
             "panda_joint3-panda_joint4 = 0.0825", "panda_joint4-panda_joint5 = 0.4",
         ]  # fmt: skip

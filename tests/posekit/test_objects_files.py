@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.files import Family, ScaledOrthographicModel
-from posekit.files.object_result import (
+from posekit.formats.own import Family, ScaledOrthographicModel
+from posekit.formats.own.object_result import (
     ObjectFrame,
     ObjectResult,
     check_object_path,
     read_object,
     write_object,
 )
-from posekit.files.object_result_schema import ObjectFile
-from posekit.files.object_view import ObjectView, read_object_view, write_object_view
-from posekit.linkage import Linkage
+from posekit.formats.own.object_result_schema import ObjectFile
+from posekit.formats.own.object_view import ObjectView, read_object_view, write_object_view
+from posekit.linkages import Linkage
 
 ROD = Linkage.from_names(name="rod", segments={("a", "b"): 0.5, ("b", "c"): 0.3}, unit=1.0)
 RELATIVE = Linkage.from_names(name="rod", segments={("a", "b"): 5.0, ("b", "c"): 3.0})

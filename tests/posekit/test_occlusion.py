@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
+from posekit.body.frames import unit
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.figure.frames import unit
-from posekit.occlusion import Completion, Kind, Outcome, Region, Sampling, complete, reject, together
+from posekit.hidden import Completion, Kind, Outcome, Region, Sampling, complete, reject, together
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_views
 from posekit.tree import Check, InterpretationTree, Leaves

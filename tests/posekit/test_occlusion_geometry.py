@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
+from posekit.body.frames import unit
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
-from posekit.figure import load_figure
-from posekit.figure.frames import unit
-from posekit.occlusion.closure import closing_angles
-from posekit.occlusion.groups import box, distinct, largest, mean, pairs
-from posekit.occlusion.lattices import basis, onto, rotation_spacing, rotations, sphere_spacing, turned, zone
-from posekit.occlusion.rays import find_rays
+from posekit.hidden.closure import closing_angles
+from posekit.hidden.groups import box, distinct, largest, mean, pairs
+from posekit.hidden.lattices import basis, onto, rotation_spacing, rotations, sphere_spacing, turned, zone
+from posekit.hidden.rays import find_rays
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_views
 

@@ -8,22 +8,17 @@ import pytest
 
 import posekit
 from posekit.errors import InputError
-from posekit.files import OpenCVModel, View
-from posekit.pipeline import (
-    Recovery,
-    follow,
-    follow_frames,
-    forget_camera,
-    parse_scale,
-    survivor_frames,
-    view_of,
-)
-from posekit.sequences import Follower, best_paths
+from posekit.following import Follower, best_paths
+from posekit.formats.own import OpenCVModel, View
+from posekit.objects.scale import parse_scale
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.sequences import follow, follow_frames, survivor_frames
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 from posekit.synthesis import Walker, walker_scene
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
+from posekit.views.builtin import forget_camera, view_of
 
 WRIST, KNEE = JOINTS.index("right_wrist"), JOINTS.index("left_knee")
 

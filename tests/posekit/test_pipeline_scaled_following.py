@@ -9,15 +9,15 @@ import pytest
 
 import posekit
 from posekit.errors import InputError, PosekitError
-from posekit.files import OpenCVModel, View
-from posekit.pipeline import forget_camera
-from posekit.pipeline.scaled_following import SURE, follow_scaled
-from posekit.pipeline.tolerance import EXACT
-from posekit.sequences import Paths, ScaleChoice
+from posekit.following import Paths, ScaleChoice
+from posekit.formats.own import OpenCVModel, View
+from posekit.recovery.scaled_sequences import SURE, follow_scaled
+from posekit.recovery.tolerance import EXACT
 from posekit.synthesis import Walker
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
+from posekit.views.builtin import forget_camera
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +58,7 @@ def test_the_scale_of_lengths_that_are_off_is_told(view):
     assert found.recovery.figure.lengths[neck] == pytest.approx(
         view.lengths[neck] * factor * found.scale, rel=1e-6
     )
-    wrong = posekit.pipeline.follow(posekit.recover(off_by(view, factor), refine=True), k=1)
+    wrong = posekit.recovery.sequences.follow(posekit.recover(off_by(view, factor), refine=True), k=1)
     error, without = (
         np.linalg.norm(one.joints[0] - view.truth, axis=-1).mean() for one in (found.following, wrong)
     )

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
+from posekit.cameras.neck import Placement, place
+from posekit.cameras.neck.cover import cover, meet
+from posekit.cameras.neck.place import MOST, REACH
+from posekit.cameras.neck.suggestion import SUFFICES
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.placement import Placement, place
-from posekit.placement.cover import cover, meet
-from posekit.placement.place import MOST, REACH
-from posekit.placement.suggestion import SUFFICES
 from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, Scene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree

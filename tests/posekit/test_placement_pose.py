@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
+from posekit.body.lengths import torso_points
 from posekit.cameras import PinholeCamera
-from posekit.figure import load_figure
-from posekit.figure.lengths import torso_points
-from posekit.placement.pose import Poses, poses
+from posekit.cameras.neck.pose import Poses, poses
 from posekit.skeleton import JOINT, TORSO
 from posekit.synthesis import Scene, random_views
 

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
-from posekit.figure import load_figure
-from posekit.placement.body import Sight, sight
-from posekit.placement.closure import Closure
-from posekit.placement.search import Depths, search
+from posekit.cameras.neck.body import Sight, sight
+from posekit.cameras.neck.closure import Closure
+from posekit.cameras.neck.search import Depths, search
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, Scene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree

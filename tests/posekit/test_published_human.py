@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
+from posekit.body import load_figure
 from posekit.skeleton import DOFS
 
 HUMAN = "human_description/robots/human.urdf"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure import load_figure
+from posekit.body import load_figure
+from posekit.geometry import Array
 from posekit.ranking import TERMS, Depth, Ranking, Up, load_prior, rank
 from posekit.ranking.prior import WEIGHTS
 from posekit.skeleton import JOINT, JOINTS

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posekit.cameras import Array
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
+from posekit.geometry import Array
 from posekit.ranking import TERMS, Prior, Ranking, Up, fit_prior, fit_weights, load_prior, rank, write_prior
 from posekit.ranking.directions import DIRECTIONS, directions, mirrored
 from posekit.ranking.prior import WEIGHTS

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from posekit.cameras import Array
+from posekit.body import load_figure, stature_from_lengths
+from posekit.body.frames import hips_frame, torso_frame
 from posekit.errors import InputError
-from posekit.figure import load_figure, stature_from_lengths
-from posekit.figure.frames import hips_frame, torso_frame
+from posekit.geometry import Array
 from posekit.ranking import (
     Depth,
     Up,

@@ -9,23 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import Figure, load_figure
 from posekit.cameras import PinholeCamera
+from posekit.cameras.head import HeadWarning
 from posekit.errors import FigureError, HeadError, InputError
-from posekit.figure import Figure, load_figure
-from posekit.files import LeeChenModel, OpenCVModel, View, read_result, write_result
-from posekit.head import HeadWarning
-from posekit.pipeline import (
-    EXACT,
-    MEASURED,
-    FrameRecovery,
-    Recovery,
-    Tolerance,
-    builtin_view,
-    recover,
-    result_of,
-    summary_lines,
-    view_of,
-)
+from posekit.formats.own import LeeChenModel, OpenCVModel, View, read_result, write_result
+from posekit.recovery import recover
+from posekit.recovery.recovery import FrameRecovery, Recovery
+from posekit.recovery.result import result_of
+from posekit.recovery.summary import summary_lines
+from posekit.recovery.tolerance import EXACT, MEASURED, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import (
     CameraSphere,
@@ -40,6 +33,7 @@ from posekit.synthesis import (
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.validators import load_ranges
+from posekit.views.builtin import builtin_view, view_of
 
 FIGURE = load_figure()
 SEQ1 = builtin_view("seq1")
@@ -143,7 +137,7 @@ def test_more_frames_than_are_grown_together_change_nothing(monkeypatch: pytest.
     view = view_of(random_views(FIGURE, 25, np.random.default_rng(4)))
     at_once = recover(view)
     seen: list[int] = []
-    monkeypatch.setattr(import_module("posekit.pipeline.recover"), "FRAMES_AT_ONCE", 10)
+    monkeypatch.setattr(import_module("posekit.recovery.conductor"), "FRAMES_AT_ONCE", 10)
     in_parts = recover(view, progress=seen.append)
     assert seen == [10, 10, 5]
     assert codes(in_parts) == codes(at_once)

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from posekit import load_figure
-from posekit.files import View
-from posekit.pipeline import recover, view_of
-from posekit.pipeline.advice import advice_lines
+from posekit.formats.own import View
+from posekit.recovery import recover
+from posekit.recovery.advice import advice_lines
 from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 UPPER_ARMS = ("right_shoulder-right_elbow", "left_shoulder-left_elbow")

@@ -12,17 +12,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit import files
+from posekit.body import load_figure
 from posekit.errors import HeadError, InputError
-from posekit.figure import load_figure
-from posekit.files import LeeChenModel, OpenCVModel, View
-from posekit.keypoints import write_keypoints
-from posekit.pipeline import Recovery, builtin_view, follow, recover, result_of, view_of
-from posekit.pipeline.detected import compare
-from posekit.pipeline.detected.view_keypoints import view_keypoints
-from posekit.pipeline.evaluation import Method, evaluate
+from posekit.evaluate import Method, compare, evaluate
+from posekit.formats import own as files
+from posekit.formats.keypoints import write_keypoints
+from posekit.formats.own import LeeChenModel, OpenCVModel, View
+from posekit.recovery import recover
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.result import result_of
+from posekit.recovery.sequences import follow
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
+from posekit.views.builtin import builtin_view, view_of
+from posekit.views.view_keypoints import view_keypoints
 
 LOST = [0, 2]
 """The first frame among them: what is said of all frames is hardly said of that one."""

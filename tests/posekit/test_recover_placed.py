@@ -10,10 +10,11 @@ import pytest
 
 import posekit
 from posekit.errors import InputError
-from posekit.files import Result, View, read_result, write_result
-from posekit.pipeline import Rooting, forget_camera, result_of, view_of
-from posekit.pipeline.rooting import DEVIATION, tolerance_of
+from posekit.formats.own import Result, View, read_result, write_result
+from posekit.recovery.result import result_of
+from posekit.recovery.rooting import DEVIATION, Rooting, tolerance_of
 from posekit.synthesis import random_views
+from posekit.views.builtin import forget_camera, view_of
 
 FIGURE = posekit.load_figure()
 FOUND = 1e-5

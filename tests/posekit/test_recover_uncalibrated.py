@@ -6,23 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from posekit.body import load_figure, stature_from_lengths
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.figure import load_figure, stature_from_lengths
-from posekit.files import ScaledOrthographicModel, View, read_result, write_result
-from posekit.pipeline import (
-    Recovery,
-    Scale,
-    Tolerance,
-    builtin_view,
-    parse_scale,
-    recover,
-    result_of,
-    summary_lines,
-)
-from posekit.pipeline.taylor.proportions import figure_of
+from posekit.formats.own import ScaledOrthographicModel, View, read_result, write_result
+from posekit.objects.scale import Scale, parse_scale
+from posekit.recovery import recover
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.result import result_of
+from posekit.recovery.summary import summary_lines
+from posekit.recovery.taylor_figure.proportions import figure_of
+from posekit.recovery.tolerance import Tolerance
 from posekit.skeleton import JOINT, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
+from posekit.views.builtin import builtin_view
 
 FIGURE = load_figure()
 S = 400.0

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from posekit.body import Figure, load_figure
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
 from posekit.refinement import LengthDoubt, RootPrior, Sight, diagnose, find_trunks, refine
 from posekit.skeleton import SEGMENT_NAMES
 from posekit.synthesis import Scene, random_views

@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import Figure, load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
-from posekit.figure import Figure, load_figure
 from posekit.refinement import RootPrior, Sight, project, refine
 from posekit.refinement.equations import evaluate, linearise, solve
 from posekit.refinement.freedom import degrees_of_freedom
@@ -161,7 +161,7 @@ def pinocchio_jacobian(q: np.ndarray) -> np.ndarray:
     data = model.createData()
     pin.computeJointJacobians(model, data, q)
     pin.framesForwardKinematics(model, data, q)
-    from posekit.figure.figure import FRAMES
+    from posekit.body.figure import FRAMES
 
     return np.array(
         [

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
 from posekit.refinement import Merged, Refined, RootPrior, Sight, merge, refine
 from posekit.refinement.merging import groups_of
 from posekit.synthesis import random_views

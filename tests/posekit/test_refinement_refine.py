@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from posekit.cameras import Array, Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.body import Figure, load_figure
+from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
+from posekit.geometry import Array
 from posekit.refinement import Refined, RootPrior, Sight, refine
 from posekit.skeleton import JOINT, SEGMENT_NAMES
 from posekit.synthesis import Scene, random_views

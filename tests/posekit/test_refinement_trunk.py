@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera
+from posekit.body import Figure, load_figure
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.figure import Figure, load_figure
+from posekit.geometry import Array
 from posekit.refinement import (
     NoisyRange,
     RootPrior,

@@ -12,27 +12,23 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit import files
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.pipeline import (
-    MEASURED,
-    Recovery,
-    forget_camera,
-    recover,
-    recovered_with,
-    result_of,
-    sifting,
-    view_of,
-)
-from posekit.pipeline.certified import certified_within
-from posekit.pipeline.contact import contact_under_noise
-from posekit.pipeline.noise import Noise
+from posekit.formats import own as files
+from posekit.formats.own import View
+from posekit.recovery import recover, sifting
+from posekit.recovery.certified import certified_within
+from posekit.recovery.contact import contact_under_noise
+from posekit.recovery.noise import Noise
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.result import result_of
+from posekit.recovery.tolerance import MEASURED
 from posekit.refinement import GIVING
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
+from posekit.validation.validate import recovered_with
 from posekit.validators import Validator
+from posekit.views.builtin import forget_camera, view_of
 
 FIGURE = load_figure()
 PIXELS = 2.0

@@ -10,14 +10,17 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.pipeline import Recovery, recover, refiner, result_of, view_of
-from posekit.pipeline.uncertainty import Covariances
+from posekit.body import load_figure
+from posekit.compiled.compiling import path
+from posekit.formats.own import View
+from posekit.recovery import recover, refiner
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.result import result_of
+from posekit.recovery.uncertainty import Covariances
 from posekit.refinement import covariance, refined
 from posekit.synthesis import random_views
 from posekit.tree import Leaves
-from posekit.tree.compiled import path
+from posekit.views.builtin import view_of
 
 FRAMES = 12
 

@@ -7,13 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posekit.pipeline import printed, recover, reproduce_lee_chen, reproduce_taylor, view_of
-from posekit.pipeline.table2 import CameraEstimate, camera_estimates, exact_image, exact_tables
-from posekit.pipeline.tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, sequences
+from posekit.papers import lee_chen_printed as printed
+from posekit.papers.lee_chen import reproduce_lee_chen
+from posekit.papers.lee_chen_table2 import CameraEstimate, camera_estimates, exact_image, exact_tables
+from posekit.papers.lee_chen_tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, sequences
+from posekit.papers.taylor import reproduce_taylor
+from posekit.recovery import recover
 from posekit.skeleton import JOINTS
 from posekit.synthesis import seq1, seq2
 from posekit.synthesis.walker_scene import SEQ1_PHASE0, SEQ2_PHASE0, SEQ_VELOCITY
 from posekit.validators import CHECKS
+from posekit.views.builtin import view_of
 
 PHASE0 = {"seq1": SEQ1_PHASE0, "seq2": SEQ2_PHASE0}
 SCENES = {"seq1": seq1, "seq2": seq2}
@@ -91,7 +95,7 @@ def test_the_whole_of_table_2_is_near_the_print(part: str, values: np.ndarray, w
 
 def test_table_2_is_what_its_own_definition_says() -> None:
     """Lee & Chen 1985, eq. (1): (x, y, z, 1) [T] = (X, Y, H), and the image is (X / H, Y / H)."""
-    from posekit.head import TABLE_A2
+    from posekit.cameras.head import TABLE_A2
 
     tables = exact_tables()
     projected = np.concatenate([TABLE_A2.points * 100, np.ones((6, 1))], axis=1) @ tables["T"]

@@ -12,12 +12,12 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from posekit.errors import InputError
-from posekit.robot import load_robot
-from posekit.robot.ik import InverseKinematics, Reach, Solution, solve, solve_sequence
-from posekit.robot.joint_map import load_joint_map
-from posekit.robot.kinematics import BodyPoint, Kinematics, Site, body_points
-from posekit.robot.normal_equations import limited_step
-from posekit.robot.start_tables import find_branches
+from posekit.robots import load_robot
+from posekit.robots.ik import InverseKinematics, Reach, Solution, solve, solve_sequence
+from posekit.robots.joint_map import load_joint_map
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points
+from posekit.robots.normal_equations import limited_step
+from posekit.robots.start_tables import find_branches
 
 MM = 1e-3
 

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.robot import load_robot
-from posekit.robot.configuration_space import ConfigurationSpace
-from posekit.robot.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
+from posekit.robots import load_robot
+from posekit.robots.configuration_space import ConfigurationSpace
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
 
 PUBLISHED = ("human", "simple_humanoid", "talos", "g1", "ur5", "panda", "allegro_left_hand", "icub", "tiago")
 ROUNDING = 1e-10

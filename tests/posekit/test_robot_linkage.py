@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 
 from posekit.errors import InputError
-from posekit.linkage import span
-from posekit.robot import Robot, load_robot
-from posekit.robot.linkage import Carried, linkage_of
+from posekit.linkages import span
+from posekit.linkages.robot_linkage import Carried, linkage_of
+from posekit.robots import Robot, load_robot
 
 ROBOTS = ("panda", "ur5", "allegro", "solo12")
 

@@ -16,9 +16,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.robot import (
+from posekit.robots import (
     ProbeLimits,
     QuaternionWarning,
     Robot,
@@ -28,11 +28,11 @@ from posekit.robot import (
     robot_names,
     untrusted,
 )
-from posekit.robot.declared import declared_bodies
-from posekit.robot.find import robots_folder
-from posekit.robot.pairs import neutral_inside_limits
-from posekit.robot.second_reader import compare_readers
-from posekit.robot.srdf import check_srdf
+from posekit.robots.declared import declared_bodies
+from posekit.robots.find import robots_folder
+from posekit.robots.pairs import neutral_inside_limits
+from posekit.robots.second_reader import compare_readers
+from posekit.robots.srdf import check_srdf
 
 LIMIT = '<limit lower="-1" upper="2" effort="10" velocity="10"/>'
 
@@ -306,7 +306,7 @@ class TestRobot:
 
     def test_a_body_that_is_loaded_as_another_shape_is_refused(self, monkeypatch: pytest.MonkeyPatch) -> None:
         robot = Robot(urdf=ARM, with_geometry=False)
-        from posekit.robot import geometry
+        from posekit.robots import geometry
 
         tree = robot.tree
         box = tree.find("link[@name='d']/collision/geometry/sphere")
@@ -440,7 +440,7 @@ class TestChildProcess:
         robot = load_robot(path)
         assert robot.collision_pairs == (("a_0", "d_0"),)
         asked = []
-        monkeypatch.setattr("posekit.robot.loading.probe", lambda *_arguments, **_options: asked.append(1))
+        monkeypatch.setattr("posekit.robots.loading.probe", lambda *_arguments, **_options: asked.append(1))
         load_robot(path)
         load_robot("human", untrusted=True)
         assert len(asked) == 2
@@ -482,7 +482,7 @@ class TestChildProcess:
             load_robot(path, limits=ProbeLimits(memory=100_000_000))
 
     def test_processor_time_is_bounded(self, path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        burn = "from posekit.robot.probe import _set_limits; _set_limits(2**32, 1)\nwhile True: pass"
+        burn = "from posekit.robots.probe import _set_limits; _set_limits(2**32, 1)\nwhile True: pass"
         monkeypatch.setattr(untrusted, "_CODE", burn)
         with pytest.raises(InputError, match="more than 1 s of processor time"):
             load_robot(path, limits=ProbeLimits(cpu=1, wall=30))
@@ -498,7 +498,7 @@ class TestChildProcess:
 
     def test_nothing_can_be_written_there(self, tmp_path: Path) -> None:
         code = (
-            "from posekit.robot.probe import _set_limits; _set_limits(2**33, 60)\n"
+            "from posekit.robots.probe import _set_limits; _set_limits(2**33, 60)\n"
             f"open({str(tmp_path / 'w')!r}, 'wb', buffering=0).write(b'x' * 10)"
         )
         done = subprocess.run([sys.executable, "-c", code], check=False, capture_output=True, timeout=60)

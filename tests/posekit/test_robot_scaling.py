@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.robot import load_robot
-from posekit.robot.ik import InverseKinematics
-from posekit.robot.joint_map import load_joint_map, postures_of, targets_of
-from posekit.robot.kinematics import BodyPoint, Kinematics, Site
-from posekit.robot.scaling import model_lengths, scaled, segment_lengths
-from posekit.robot.stretching import shoulders_are_behind
-from posekit.robot.structure import LIMBS
+from posekit.robots import load_robot
+from posekit.robots.ik import InverseKinematics
+from posekit.robots.joint_map import load_joint_map, postures_of, targets_of
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site
+from posekit.robots.scaling import model_lengths, scaled, segment_lengths
+from posekit.robots.stretching import shoulders_are_behind
+from posekit.robots.structure import LIMBS
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, segment_name
 from posekit.synthesis import random_postures
 

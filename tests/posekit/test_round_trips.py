@@ -19,17 +19,19 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import posekit
-from posekit import files
-from posekit.calibration import CalibratedCamera, write_cameras
-from posekit.cameras import Array, PinholeCamera
-from posekit.files import OpenCVModel, View
-from posekit.keypoints import chosen, formats, read_keypoints, write_keypoints
-from posekit.motion.urdf_folder import LINK_OF
-from posekit.pipeline import result_of
-from posekit.pipeline.detected.view_keypoints import view_keypoints
-from posekit.pipeline.ranked import ranked, rigid_of
+from posekit.cameras import PinholeCamera
+from posekit.cameras.calibrated import CalibratedCamera
+from posekit.formats import own as files
+from posekit.formats.cameras import write_cameras
+from posekit.formats.keypoints import chosen, formats, read_keypoints, write_keypoints
+from posekit.formats.motion.urdf_folder import LINK_OF
+from posekit.formats.own import OpenCVModel, View
+from posekit.geometry import Array
+from posekit.recovery.ranked import ranked, rigid_of
+from posekit.recovery.result import result_of
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, POINTS
 from posekit.synthesis import Walker, walker_scene
+from posekit.views.view_keypoints import view_keypoints
 
 FIGURE = posekit.load_figure()
 FRAMES, RATE = 8, 25.0

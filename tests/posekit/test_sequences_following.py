@@ -8,9 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.files import OpenCVModel, View
-from posekit.pipeline import recover
-from posekit.sequences import (
+from posekit.following import (
     Beam,
     Follower,
     MotionModel,
@@ -21,7 +19,9 @@ from posekit.sequences import (
     elevations,
     smooth,
 )
-from posekit.sequences.smoothing import rts
+from posekit.following.smoothing import rts
+from posekit.formats.own import OpenCVModel, View
+from posekit.recovery import recover
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 from posekit.synthesis import Walker, walker_scene
 from posekit.synthesis.camera_sphere import CameraSphere

@@ -5,8 +5,8 @@ import zipfile
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
 from posekit.skeleton import JOINTS, SEGMENTS, segment_name
 from posekit.synthesis import (
     CameraSphere,

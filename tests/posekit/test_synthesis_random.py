@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
-from posekit.figure import load_figure
 from posekit.skeleton import DOFS, SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, random_postures, random_views
 from posekit.synthesis.viewpoints import look_at, to_camera, uniform_directions

@@ -6,10 +6,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.cameras import lee_chen
+from posekit.cameras.head.points import TABLE_A2
 from posekit.errors import InputError, PosekitError
-from posekit.figure import load_figure
-from posekit.head.points import TABLE_A2
 from posekit.skeleton import JOINT, POINTS, SEGMENTS, segment_name
 from posekit.synthesis import Scene, Walker, seq1, seq2, walker_scene
 

@@ -10,17 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from posekit.body import Figure, load_figure
 from posekit.errors import FigureError, InputError
-from posekit.figure import Figure, load_figure
-from posekit.linkage import Linkage, load_linkage
-from posekit.pipeline.taylor.completion import NEEDS, Completion, joint_checks, taylor_checks
-from posekit.pipeline.taylor.human import FLIPS, Human, taylor_human
-from posekit.pipeline.taylor.proportions import TABLE_1, figure_of
-from posekit.pipeline.taylor.protocol import ANGLES, SIX, accuracy, accuracy_lines
-from posekit.pipeline.taylor.study import synthetic_study
-from posekit.pipeline.taylor.survival import survival, survival_lines
-from posekit.pipeline.taylor.views import exact_views, photographs
-from posekit.pipeline.tolerance import MEASURED, PHOTOGRAPH
+from posekit.linkages import Linkage, load_linkage
+from posekit.papers.taylor_protocol import ANGLES, SIX, accuracy, accuracy_lines
+from posekit.papers.taylor_study import synthetic_study
+from posekit.papers.taylor_survival import survival, survival_lines
+from posekit.papers.taylor_views import exact_views, photographs
+from posekit.recovery.taylor_figure.completion import NEEDS, Completion, joint_checks, taylor_checks
+from posekit.recovery.taylor_figure.human import FLIPS, Human, taylor_human
+from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
+from posekit.recovery.tolerance import MEASURED, PHOTOGRAPH
 from posekit.skeleton import HIPS, JOINT, JOINTS, SEGMENTS, TORSO, segment_name
 from posekit.synthesis import CameraSphere, random_views
 from posekit.validators import PHYSICAL, judge, load_ranges

@@ -8,13 +8,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.pipeline import EXACT, MEASURED, Tolerance, recover, view_of
-from posekit.pipeline.tolerance import PHOTOGRAPH
+from posekit.recovery import recover
+from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
 from posekit.validators.rigid_parts import RigidTolerance
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 LOOSE = Tolerance(rigid=0.05, tangent=0.01, placement=False, angle=2.0)

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
-from posekit.figure import load_figure
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Branch, Check, Findings, InterpretationTree, Leaves
 from posekit.tree.candidates import lift_all

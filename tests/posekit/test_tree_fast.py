@@ -13,10 +13,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
-from posekit.figure import load_figure
+from posekit.compiled import compiling as compiled
+from posekit.compiled import tree_kernels as kernels
 from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree, Leaves, compiled, fast, kernels, whole
+from posekit.tree import Check, InterpretationTree, Leaves, fast, whole
 from posekit.tree.blocks import Block
 from posekit.tree.candidates import Candidates, lift_all, rays_of
 from posekit.tree.layout import places_of, programme_of

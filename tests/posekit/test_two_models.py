@@ -10,34 +10,28 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit import Validator, load_figure
-from posekit.errors import InputError
-from posekit.figure import Figure
-from posekit.pipeline.two_models import (
+from benchmarks.studies.two_models import reasons
+from benchmarks.studies.two_models.angles import angles_of, excess, figure_limits, in_human_order, readings
+from benchmarks.studies.two_models.human import (
     HELD,
     HUMAN,
-    KINDS,
     Counterpart,
-    Labelled,
-    angles_of,
-    excess,
-    figure_limits,
-    in_human_order,
     joint_columns,
-    labelled_postures,
     limits_of_human,
     limits_on_human,
     mapped_ranges,
     measure_counterparts,
     ranges_text,
-    readings,
-    reasons,
     without_collision,
 )
-from posekit.pipeline.two_models.reasons import CAPSULES, LONG_TRUNK, ORDER, SEARCH
-from posekit.robot import load_robot
-from posekit.robot.joint_map import find_joint_map
-from posekit.robot.scaling import scaled
+from benchmarks.studies.two_models.labelled import KINDS, Labelled, labelled_postures
+from benchmarks.studies.two_models.reasons import CAPSULES, LONG_TRUNK, ORDER, SEARCH
+from posekit import Validator, load_figure
+from posekit.body import Figure
+from posekit.errors import InputError
+from posekit.robots import load_robot
+from posekit.robots.joint_map import find_joint_map
+from posekit.robots.scaling import scaled
 from posekit.skeleton import DOFS, JOINT, JOINTS
 from posekit.synthesis import random_postures
 from posekit.validators import Report

@@ -11,19 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit import files
+from posekit.batch import Recipe
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.files import View
-from posekit.pipeline import recover, recovered_with, result_of, view_of
-from posekit.pipeline.batch import Recipe
-from posekit.pipeline.evaluation import Method
+from posekit.evaluate import Method
+from posekit.formats import own as files
+from posekit.formats.own import View
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
 from posekit.skeleton import DOFS
 from posekit.synthesis import Scene, random_views
+from posekit.validation.validate import recovered_with
 from posekit.validators import PHYSICAL, Validator, make_checks
 from posekit.validators.joint_range import joint_range
 from posekit.validators.ranges import URDF_RANGES
 from posekit.validators.walking import PEOPLE, WALKERS, WalkingThresholds, thresholds_of
+from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
 ALL = (*PHYSICAL, "walking")

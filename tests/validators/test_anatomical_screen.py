@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
+from posekit.body import load_figure
+from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.skeleton import DOFS, JOINT, SIDES
-from posekit.tree import PASSED, UNSURE
 from posekit.validators import Ranges, joint_range, load_ranges
 from posekit.validators.anatomical import Anatomy, Coupling
 from posekit.validators.anatomical_checks import AnatomicalLimb

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from posekit.figure import load_figure
-from posekit.figure.capsules import Capsule
+from posekit.body import load_figure
+from posekit.body.capsules import Capsule
 from posekit.skeleton import HEAD, JOINT, JOINTS, POINTS
 from posekit.validators import collision
 from posekit.validators.collision import CONTACT_TOLERANCE, PairCollision, segment_distance

@@ -5,7 +5,7 @@ import pytest
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.linkage import Family, Linkage, SpanningTree, load_linkage, name_nearer, span
+from posekit.linkages import Family, Linkage, SpanningTree, load_linkage, name_nearer, span
 from posekit.tree import Check
 from posekit.validators.linkage import closure, nearer
 

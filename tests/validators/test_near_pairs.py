@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.robot import load_robot
+from posekit.robots import load_robot
 from posekit.validators import Validator
 from posekit.validators.robot import contacts
 from posekit.validators.robot.collision import SelfCollision

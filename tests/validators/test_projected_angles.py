@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
+from posekit.body import load_figure
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
 from posekit.tree import Check
 from posekit.validators import Ranges, joint_range, load_ranges

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
-from posekit.robot import Robot, load_robot
+from posekit.robots import Robot, load_robot
 from posekit.skeleton import DOFS
 from posekit.synthesis import random_postures
 from posekit.validators import Judgement, Report, Validator

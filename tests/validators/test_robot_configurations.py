@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.files import write_report
-from posekit.files.postures_q import Configurations
-from posekit.pipeline import validate
-from posekit.robot import Robot, load_robot
+from posekit.formats.own import write_report
+from posekit.formats.own.postures_q import Configurations
+from posekit.robots import Robot, load_robot
+from posekit.validation import validate
 from posekit.validators import Validator
 from posekit.validators.robot import Deferred
 
@@ -166,7 +166,7 @@ def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
 
 def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     given = Configurations(q=some_q("human"))
-    module = importlib.import_module("posekit.pipeline.validate")
+    module = importlib.import_module("posekit.validation.validate")
     whole = validate(validator("human"), given, detail="verdicts").columns
     monkeypatch.setattr(module, "BATCH", 17)
     parts = validate(validator("human"), given, detail="verdicts").columns

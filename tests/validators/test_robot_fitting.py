@@ -7,9 +7,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
-from posekit.robot import load_robot
-from posekit.robot.joint_map import postures_of
+from posekit.body import load_figure
+from posekit.robots import load_robot
+from posekit.robots.joint_map import postures_of
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
 from posekit.validators import Report, Validator

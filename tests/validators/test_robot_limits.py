@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError
-from posekit.robot import Robot, load_robot
-from posekit.robot.kinematics import BodyPoint, Kinematics, Site, body_points
-from posekit.robot.linkage import Carried, linkage_of
+from posekit.linkages.robot_linkage import Carried, linkage_of
+from posekit.robots import Robot, load_robot
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points
 from posekit.validators.attainable import Attainable, six_volumes
 from posekit.validators.axis_points import find_axis_points, place_axis_point
 from posekit.validators.robot_limits import RobotLimits

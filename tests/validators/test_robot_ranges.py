@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from posekit.errors import InputError
-from posekit.robot import load_robot
+from posekit.robots import load_robot
 from posekit.validators import Validator
 from posekit.validators.robot import load_joint_limits
 

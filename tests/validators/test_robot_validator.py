@@ -7,10 +7,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
-from posekit.figure import load_figure
-from posekit.robot import QuaternionWarning, find, load_robot
-from posekit.robot.joint_map import load_joint_map
+from posekit.robots import QuaternionWarning, find, load_robot
+from posekit.robots.joint_map import load_joint_map
 from posekit.validators import Validator
 from posekit.validators.robot import ROBOT_CHECKS, ROBOT_DEFAULT
 

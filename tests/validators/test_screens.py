@@ -4,13 +4,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.figure import load_figure
-from posekit.figure.frames import fit_rotation
+from posekit.body import load_figure
+from posekit.body.frames import fit_rotation
+from posekit.compiled import angle_kernels
+from posekit.compiled.angle_kernels import TURN
+from posekit.compiled.frame_kernels import NUMBERS
+from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.skeleton import DOFS
-from posekit.tree import PASSED, UNSURE, Check, Screened
-from posekit.tree.frame_kernels import NUMBERS
-from posekit.validators import angle_kernels, collision, joint_range, rigid_parts
-from posekit.validators.angle_kernels import TURN
+from posekit.tree import Check, Screened
+from posekit.validators import collision, joint_range, rigid_parts
 
 FIGURE = load_figure()
 N = 150

@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 
 import posekit
+from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
-from posekit.figure import load_figure
 from posekit.skeleton import JOINT, JOINTS, SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 from posekit.validators import CHECKS, PHYSICAL, Report, Validator, check_names, load_ranges, make_checks

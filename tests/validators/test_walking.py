@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.figure import load_figure
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
 from posekit.validators import walking
 from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cameras import Array, ScaledOrthographicCamera
+from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
-from posekit.files import Family, Inferred, Result, ResultFrame, ScaledOrthographicModel, View
+from posekit.formats.own import Family, Inferred, Result, ResultFrame, ScaledOrthographicModel, View
+from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_postures
 from posekit.viewer.browser.studio import Studio

@@ -11,13 +11,15 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError, ViewerError
-from posekit.files import Postures
-from posekit.pipeline import builtin_view, recover, result_of
+from posekit.formats.own import Postures
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
 from posekit.viewer.browser.find import find_browser
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.page import page_html, write_page
 from posekit.viewer.scene.world import upright_world
+from posekit.views.builtin import builtin_view
 
 FLAGS = [
     "--use-gl=angle",

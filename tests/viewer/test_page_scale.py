@@ -353,7 +353,9 @@ def test_inferred_joints_of_a_calibrated_view_need_no_family(opened, walked, wal
     for frame in walked.frames:
         wrist = frame.joints[:, JOINT["left_wrist"]]
         boxes = [
-            posekit.files.Inferred(kind="circle", lower=at - 0.1, upper=at + 0.1, radius=0.1, fraction=0.5)
+            posekit.formats.own.Inferred(
+                kind="circle", lower=at - 0.1, upper=at + 0.1, radius=0.1, fraction=0.5
+            )
             for at in wrist
         ]
         frames.append(dataclasses.replace(frame, inferred=[{"left_wrist": box} for box in boxes]))

@@ -13,9 +13,9 @@ import pytest
 from posekit.cli import given as given_files
 from posekit.cli import view
 from posekit.errors import InputError, ViewerError
-from posekit.files import Postures, Result, View, write_postures, write_view
-from posekit.pipeline import builtin_view
+from posekit.formats.own import Postures, Result, View, write_postures, write_view
 from posekit.viewer.page.server import PageServer
+from posekit.views.builtin import builtin_view
 
 COMMAND = (
     "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "

@@ -16,7 +16,7 @@ import posekit
 from posekit.cli.main import main
 from posekit.cli.render import _chosen
 from posekit.errors import InputError, ViewerError
-from posekit.files import Postures, Result, View
+from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.subject import Subject, subject_of

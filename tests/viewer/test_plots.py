@@ -12,8 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError, ViewerError
-from posekit.pipeline import builtin_view, recover, result_of
-from posekit.pipeline.printed import MOTION, PHYSICAL
+from posekit.papers.lee_chen_printed import MOTION, PHYSICAL
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.viewer.plots.figure import STYLE, save
 from posekit.viewer.plots.image import plot_image
@@ -22,6 +23,7 @@ from posekit.viewer.plots.projections import letter, plot_projections, side_view
 from posekit.viewer.plots.stick import side, wave
 from posekit.viewer.plots.tree import place, plot_tree
 from posekit.viewer.plots.tree_nodes import pruned_branches, tips
+from posekit.views.builtin import builtin_view
 
 mpl = pytest.importorskip("matplotlib")
 

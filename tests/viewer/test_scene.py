@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cameras import Array, ScaledOrthographicCamera
+from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
-from posekit.files import Postures, Result, ScaledOrthographicModel, View
+from posekit.formats.own import Postures, Result, ScaledOrthographicModel, View
+from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
 from posekit.viewer.scene.body import Look, add_posture
 from posekit.viewer.scene.branch import lift_branch, one_a_reason, rejected_of

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.viewer.browser.browser import Browser
 from posekit.viewer.browser.find import find_browser

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot.configuration_space import HINGES
+from posekit.geometry import Array
+from posekit.robots.configuration_space import HINGES
 from posekit.validators.robot.subject import Subject
 
 SAME = 1e-9

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.body.pool import collides, make_pool
 from posekit.errors import InputError
-from posekit.figure.pool import collides, make_pool
+from posekit.geometry import Array
 from posekit.validators.collision import CONTACT_TOLERANCE
 from posekit.validators.robot.contacts import Contacts, find_contacts
 from posekit.validators.robot.near_pairs import NearPairs

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.deferred import Deferred
 from posekit.validators.robot.joint_range import judge_joint_range, outside_limits

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.validators.robot.near_pairs import NearPairs
 
 INSIDE: Final = 1e-6

@@ -8,9 +8,9 @@ from typing import Final, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from posekit.cameras import Array
-from posekit.robot.body_point import frame_index
-from posekit.robot.kinematics import Kinematics
+from posekit.geometry import Array
+from posekit.robots.body_point import frame_index
+from posekit.robots.kinematics import Kinematics
 from posekit.skeleton import SIDES
 
 LEG: Final = 0.491

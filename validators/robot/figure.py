@@ -9,10 +9,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
+from posekit.body import Figure
 from posekit.errors import InputError
-from posekit.figure import Figure
-from posekit.robot import check_configurations
+from posekit.geometry import Array
+from posekit.robots import check_configurations
 from posekit.skeleton import DOFS, urdf_joint_name
 from posekit.tree import Check
 from posekit.validators.ranges import Ranges

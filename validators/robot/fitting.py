@@ -8,10 +8,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot.descent import STEPS, Problem, descend
-from posekit.robot.ik import PULL, InverseKinematics
-from posekit.robot.kinematics import Kinematics
+from posekit.geometry import Array
+from posekit.robots.descent import STEPS, Problem, descend
+from posekit.robots.ik import PULL, InverseKinematics
+from posekit.robots.kinematics import Kinematics
 from posekit.validators.robot.branches import Branches
 from posekit.validators.robot.flips import Flip, find_flips
 from posekit.validators.robot.joint_range import beyond_limits

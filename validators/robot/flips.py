@@ -6,9 +6,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from posekit.cameras import Array
-from posekit.robot.configuration_space import HINGES
-from posekit.robot.kinematics import Kinematics
+from posekit.geometry import Array
+from posekit.robots.configuration_space import HINGES
+from posekit.robots.kinematics import Kinematics
 
 GRID: Final = 720
 """Angles at which it is looked which bend places the points alike."""

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE, Subject
 from posekit.validators.suite import Judgement
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
+from posekit.body import Figure, load_figure
+from posekit.body.urdf import as_figure_error
 from posekit.errors import FigureError, InputError
-from posekit.figure import Figure, load_figure
-from posekit.figure.urdf import as_figure_error
-from posekit.robot import Robot, load_robot, robot_names
-from posekit.robot.urdf import check_urdf, read_urdf
+from posekit.robots import Robot, load_robot, robot_names
+from posekit.robots.urdf import check_urdf, read_urdf
 from posekit.skeleton import DOFS, urdf_joint_name
 
 STICK_FIGURE: Final = "stick_figure"

@@ -14,11 +14,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.cameras import Array
-from posekit.figure import load_figure
-from posekit.robot.body_point import frame_index
-from posekit.robot.kinematics import Kinematics
-from posekit.robot.pairs import neutral_inside_limits
+from posekit.body import load_figure
+from posekit.geometry import Array
+from posekit.robots.body_point import frame_index
+from posekit.robots.kinematics import Kinematics
+from posekit.robots.pairs import neutral_inside_limits
 from posekit.skeleton import SIDES
 
 SHORTEST: Final = 1e-3

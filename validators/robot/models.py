@@ -9,13 +9,13 @@ from typing import Any, Final
 
 import pinocchio as pin
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.robot import Robot
-from posekit.robot.joint_map import JointMap, find_joint_map, load_joint_map
-from posekit.robot.kinematics import Kinematics
-from posekit.robot.pairs import set_pairs
-from posekit.robot.scaling import BOUNDS, model_lengths, scaled
+from posekit.geometry import Array
+from posekit.robots import Robot
+from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
+from posekit.robots.kinematics import Kinematics
+from posekit.robots.pairs import set_pairs
+from posekit.robots.scaling import BOUNDS, model_lengths, scaled
 from posekit.validators.robot.balance import Balance
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.feet import find_soles

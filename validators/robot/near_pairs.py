@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.robot.configuration_space import ConfigurationSpace
-from posekit.robot.joint_chain import JointChain
+from posekit.geometry import Array
+from posekit.robots.configuration_space import ConfigurationSpace
+from posekit.robots.joint_chain import JointChain
 
 ROOM: Final = 1e-6
 """Metres that balls are taken larger, for rounding."""

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.intake import cut, nearest, one_line, read_toml, refusal, shown
+from posekit.geometry import Array
+from posekit.safe_io import cut, nearest, one_line, read_toml, refusal, shown
 from posekit.validators.ranges import MAX_BYTES, SCHEMA
 
 KIND = "joints"

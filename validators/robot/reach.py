@@ -7,8 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.robot.kinematics import Kinematics
+from posekit.geometry import Array
+from posekit.robots.kinematics import Kinematics
 from posekit.validators.suite import Judgement
 
 RIGID = 1e-9

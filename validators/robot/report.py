@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.contacts import Contacts
 from posekit.validators.robot.deferred import Deferred

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array
-from posekit.robot.kinematics import Kinematics
+from posekit.geometry import Array
+from posekit.robots.kinematics import Kinematics
 from posekit.skeleton import SEGMENT_NAMES
 from posekit.validators.robot.reach import rigid_pairs
 from posekit.validators.suite import Judgement

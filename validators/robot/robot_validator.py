@@ -10,11 +10,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.robot import Robot, check_configurations
-from posekit.robot.joint_map import targets_of
-from posekit.robot.scaling import segment_lengths, shoulders_are_behind
+from posekit.geometry import Array
+from posekit.robots import Robot, check_configurations
+from posekit.robots.joint_map import targets_of
+from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.validators.robot.configurations import judge_quickly
 from posekit.validators.robot.fitting import Fit
 from posekit.validators.robot.joint_range import judge_joint_range

@@ -10,9 +10,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import InputError
-from posekit.robot.joint_map import JointMap
+from posekit.geometry import Array
+from posekit.robots.joint_map import JointMap
 
 ROBOT_CHECKS: Final = ("reach", "rigid-parts", "joint-range", "collision", "balance")
 ROBOT_DEFAULT: Final = ROBOT_CHECKS[:4]

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 CENTIMETRES_A_DEGREE = 0.01
 """Metres that count as one degree: what one degree moves the end of a limb of 57 cm."""

@@ -10,12 +10,12 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import Figure
 from posekit.errors import ViewerError
-from posekit.figure import Figure
-from posekit.files.camera_model import ScaledOrthographicModel
-from posekit.files.postures import Postures
-from posekit.files.result import Result, ResultFrame
-from posekit.files.view import View
+from posekit.formats.own.camera_model import ScaledOrthographicModel
+from posekit.formats.own.postures import Postures
+from posekit.formats.own.result import Result, ResultFrame
+from posekit.formats.own.view import View
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
 from posekit.viewer.page.family import family_data, inferred_data, tree_of, walk
 from posekit.viewer.scene.colours import GROUPS, SIDES, number, side

@@ -13,8 +13,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.files.family import Family
-from posekit.files.result import ResultFrame
+from posekit.formats.own.family import Family
+from posekit.formats.own.result import ResultFrame
 from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.seen import hidden
 from posekit.viewer.scene.subject import Shown

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.files.postures import Postures
-from posekit.files.result import Result
-from posekit.files.view import View
-from posekit.intake.writing import write_text
+from posekit.formats.own.postures import Postures
+from posekit.formats.own.result import Result
+from posekit.formats.own.view import View
+from posekit.safe_io.writing import write_text
 from posekit.viewer.page.data import page_data
 from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.scene import Scene

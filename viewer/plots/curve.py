@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.viewer.plots.figure import LEFT, RIGHT, drawing
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from posekit.errors import ViewerError
-from posekit.files.npz import suffix
-from posekit.intake.writing import replacing
+from posekit.formats.own.npz import suffix
+from posekit.safe_io.writing import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.files.camera_model import LeeChenModel, ScaledOrthographicModel
-from posekit.files.result import Result
-from posekit.files.view import View
+from posekit.formats.own.camera_model import LeeChenModel, ScaledOrthographicModel
+from posekit.formats.own.result import Result
+from posekit.formats.own.view import View
 from posekit.skeleton import JOINTS
 from posekit.viewer.plots.figure import RIGHT, TRUNK, drawing
 from posekit.viewer.plots.panels import panels, same_scale

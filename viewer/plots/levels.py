@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from posekit.errors import ViewerError
-from posekit.files.result import ResultFrame
+from posekit.formats.own.result import ResultFrame
 from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
 from posekit.viewer.plots.panels import panels
 from posekit.viewer.plots.tree_nodes import scale_count

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from posekit.errors import ViewerError
-from posekit.files.result import ResultFrame
+from posekit.formats.own.result import ResultFrame
 from posekit.viewer.plots.figure import MUTED, TRUNK, drawing
 from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, scale_count, tips
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from posekit.errors import ViewerError
-from posekit.files.result import ResultFrame
+from posekit.formats.own.result import ResultFrame
 
 MOST_TIPS: Final = 160
 """Ends of branches beside each other that can still be told apart in a drawing."""

@@ -9,11 +9,11 @@ from functools import lru_cache
 import numpy as np
 import pinocchio as pin
 
-from posekit.cameras import Array
+from posekit.body import Figure, with_head
+from posekit.body.capsules import Capsule
 from posekit.errors import ViewerError
-from posekit.figure import Figure, with_head
-from posekit.figure.capsules import Capsule
-from posekit.files import Inferred
+from posekit.formats.own import Inferred
+from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
 from posekit.viewer.scene.region import add_region

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from posekit.cameras import Array, Camera
+from posekit.cameras import Camera
 from posekit.errors import ViewerError
-from posekit.files import Result
+from posekit.formats.own import Result
+from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS, segment_name
 from posekit.viewer.scene.subject import Shown, Subject
 

@@ -8,9 +8,9 @@ from typing import Final
 
 import numpy as np
 
-from posekit.cameras import Array
+from posekit.body import Figure
 from posekit.errors import ViewerError
-from posekit.figure import Figure
+from posekit.geometry import Array
 from posekit.skeleton import JOINT, PARENTS, POINTS
 from posekit.viewer.scene.body import Look, add_posture
 from posekit.viewer.scene.colours import GROUPS

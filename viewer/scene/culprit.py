@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from posekit.figure.capsules import AXES
+from posekit.body.capsules import AXES
 from posekit.skeleton import HIPS, JOINT, TORSO
 
 RIGID = {"torso": TORSO, "hips": HIPS}

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.viewer.scene.world import World
 
 NEAR, FAR = 0.01, 1000.0

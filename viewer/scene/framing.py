@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array, ScaledOrthographicCamera
+from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.viewer.scene.eye import CameraEye, Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.sight import Sight
 from posekit.viewer.scene.world import World

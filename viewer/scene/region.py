@@ -5,8 +5,8 @@ from __future__ import annotations
 import meshcat.geometry as mg
 import numpy as np
 
-from posekit.cameras import Array
-from posekit.files import Inferred
+from posekit.formats.own import Inferred
+from posekit.geometry import Array
 from posekit.viewer.scene.colours import Rgb
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.shapes import add_tubes, glow

@@ -18,7 +18,7 @@ import meshcat
 import numpy as np
 import umsgpack
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 
 Json = dict[str, Any]
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera, lee_chen
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera, lee_chen
 from posekit.errors import ViewerError
-from posekit.files import LeeChenModel, OpenCVModel, Result, ResultFrame, ScaledOrthographicModel, View
+from posekit.formats.own import LeeChenModel, OpenCVModel, Result, ResultFrame, ScaledOrthographicModel, View
+from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS
 from posekit.viewer.scene.sight import Sight
 

@@ -9,7 +9,7 @@ import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.geometry import Array
 from posekit.viewer.scene.colours import Rgb, number
 from posekit.viewer.scene.scene import Json, Scene
 

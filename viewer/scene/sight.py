@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from posekit.cameras import Array, PinholeCamera, ScaledOrthographicCamera
+from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
+from posekit.geometry import Array
 from posekit.skeleton import PARENTS, POINTS
 from posekit.viewer.scene.colours import FRUSTUM, POINT_SIDES, SIDES, rgb
 from posekit.viewer.scene.scene import Scene

@@ -5,8 +5,8 @@ from __future__ import annotations
 import meshcat.geometry as mg
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 from posekit.viewer.scene.colours import Rgb, rgb
 from posekit.viewer.scene.framing import FLESH
 from posekit.viewer.scene.scene import Json, Scene

@@ -8,17 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
+from posekit.body import Figure, load_figure, with_head
 from posekit.errors import FigureError, ViewerError
-from posekit.figure import Figure, load_figure, with_head
-from posekit.files import (
-    Inferred,
-    OpenCVModel,
-    Postures,
-    Result,
-    ResultFrame,
-    View,
-)
+from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultFrame, View
+from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.viewer.scene.seen import check_camera, scale_of, sight_of, view_sight
 from posekit.viewer.scene.sight import Sight

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Array
-from posekit.figure import Figure
+from posekit.body import Figure
+from posekit.geometry import Array
 from posekit.skeleton import POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.body import Look
 from posekit.viewer.scene.colours import GROUPS, MIDDLE, Rgb

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras import Array
 from posekit.errors import ViewerError
+from posekit.geometry import Array
 
 CAMERA_UPRIGHT: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """R_world_cam of a camera that is held upright and level: it looks along the world's x, z is up."""

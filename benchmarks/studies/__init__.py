@@ -1,0 +1,1 @@
+"""What was looked into once: studies that no command reaches, not installed."""

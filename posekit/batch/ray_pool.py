@@ -1,0 +1,129 @@
+"""A Ray cluster: the same function on other machines, tasks that are tried again where a process or a machine dies.
+
+Ray, "Fault tolerance: tasks" (docs.ray.io/en/latest/ray-core/fault_tolerance/tasks.html): `max_retries` counts only
+deaths of workers and nodes; an error that a task raises is raised where its result is asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import islice
+from types import TracebackType
+from typing import Any, Final, TypeVar
+
+from posekit.batch.pool import Outcome, attempt, short
+from posekit.errors import InputError
+from posekit.safe_io import extra
+
+T = TypeVar("T")
+R = TypeVar("R")
+LOCAL: Final = "local"
+"""Instead of an address: a cluster of this machine alone, started and ended with the run."""
+AHEAD: Final = 2
+"""Tasks in flight for each core of the cluster: one that runs and one that waits."""
+ANSWERS_WITHIN: Final = 10.0
+"""Seconds for a cluster to answer at all: Ray itself waits for minutes, and complains meanwhile."""
+LEAST: Final = (2, 55)
+"""The oldest version whose retries are relied on."""
+
+
+@dataclass(eq=False)
+class RayPool:
+    """A pool of Ray's workers. The run's folder and the inputs must have the same path on every machine.
+
+    Parameters
+    ----------
+    address : str
+        As ``ray.init`` takes it, or `LOCAL`.
+    jobs : int
+        Cores of a local cluster.
+    retries : int
+        How often a task is tried again whose worker died.
+    """
+
+    address: str
+    jobs: int
+    retries: int
+    ray: Any = field(init=False)
+
+    def __enter__(self) -> RayPool:
+        """Connect.
+
+        Raises
+        ------
+        InputError
+            Where Ray is not installed or too old, or nothing answers there.
+        """
+        self.ray = extra("ray", "ray", "--cluster")
+        if tuple(int(part) for part in self.ray.__version__.split(".")[:2]) < LEAST:
+            raise InputError(
+                f"--cluster: ray is {self.ray.__version__}; expected {LEAST[0]}.{LEAST[1]} or later; update it"
+            )
+        self._call()
+        common: dict[str, Any] = {"log_to_driver": False, "logging_level": "error", "configure_logging": True}
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told of the run
+        try:
+            if self.address == LOCAL:
+                self.ray.init(num_cpus=self.jobs, include_dashboard=False, **common)
+            else:
+                self.ray.init(address=self.address, **common)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            raise self._refusal(short(str(error))) from None
+        return self
+
+    def _call(self) -> None:
+        """Refuse an address where nothing listens."""
+        found = re.fullmatch(r"(?:ray://)?\[?([^/\[\]]+?)\]?:(\d{1,5})", self.address)
+        if found is None:
+            return  # local, auto, or what Ray refuses at once
+        try:
+            socket.create_connection((found[1], int(found[2])), ANSWERS_WITHIN).close()
+        except (OSError, OverflowError, UnicodeError) as error:
+            raise self._refusal(f"nothing answers there ({short(str(error))})") from None
+
+    def _refusal(self, why: str) -> InputError:
+        return InputError(
+            f"--cluster: {self.address}: {why}; expected the address of a running cluster, or local; "
+            "start one with: ray start --head"
+        )
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Cancel what is in flight by disconnecting; a local cluster ends."""
+        self.ray.shutdown()
+
+    def run(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[Outcome[T, R]]:
+        """Do the work; see `posekit.batch.pool.Pool`."""
+        task = self.ray.remote(num_cpus=1, max_retries=self.retries)(attempt)
+        limit = AHEAD * max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+        waiting = iter(items)
+        flying: dict[Any, T] = {task.remote(work, item): item for item in islice(waiting, limit)}
+        while flying:
+            done, _ = self.ray.wait(list(flying), num_returns=1)
+            item = flying.pop(done[0])
+            for following in islice(waiting, 1):
+                flying[task.remote(work, following)] = following
+            yield self._outcome(done[0], item)
+
+    def _outcome(self, reference: Any, item: Any) -> Outcome[Any, Any]:
+        try:
+            report = self.ray.get(reference)
+        except self.ray.exceptions.RayError as error:
+            return Outcome(
+                item=item,
+                value=None,
+                error=f"its worker died: {short(str(error))}",
+                attempts=self.retries + 1,
+                died=True,
+            )
+        return Outcome(
+            item=item, value=report.value, error=report.error, fatal=report.fatal, peak=report.peak
+        )

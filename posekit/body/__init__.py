@@ -1,0 +1,7 @@
+"""The figure: a URDF, its lengths and capsules, and the way between joint positions and configurations."""
+
+from posekit.body.closed_form import with_head as with_head
+from posekit.body.figure import Configurations as Configurations
+from posekit.body.figure import Figure as Figure
+from posekit.body.loading import load_figure as load_figure
+from posekit.body.stature import stature_from_lengths as stature_from_lengths

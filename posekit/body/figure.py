@@ -1,0 +1,372 @@
+"""The stick figure: one URDF, its Pinocchio model, and the way between joint positions and q."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from posekit.body.angles import Limits
+from posekit.body.axes import axis_signs
+from posekit.body.capsules import Capsule, read_capsules
+from posekit.body.closed_form import ClosedForm, with_head
+from posekit.body.frames import quaternions, torso_frame
+from posekit.body.lengths import check_lengths
+from posekit.body.pool import collides, make_pool
+from posekit.body.stature import lengths_from_stature
+from posekit.body.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
+from posekit.errors import FigureError
+from posekit.geometry import Array
+from posekit.robots.kinematics import Kinematics, body_points
+from posekit.robots.srdf import check_srdf
+from posekit.skeleton import (
+    DOFS,
+    HEAD,
+    JOINT,
+    JOINTS,
+    POINTS,
+    SEGMENTS,
+    SIDES,
+    TORSO,
+    segment_name,
+    urdf_joint_name,
+)
+
+FRAMES = {
+    "neck": "torso",
+    "pelvis": "hips",
+    **{
+        f"{side}_{joint}": f"{side}_{link}"
+        for side in SIDES
+        for joint, link in (
+            ("shoulder", "upper_arm"),
+            ("elbow", "forearm"),
+            ("hip", "thigh"),
+            ("knee", "shank"),
+        )
+    },
+}
+"""The URDF link whose origin is each point; points that are not listed have a link of their own name."""
+
+
+NO_VELOCITY = np.arange(0)
+"""No entries of v: positions alone are wanted, no Jacobian."""
+
+
+class Configurations(NamedTuple):
+    """Configurations and how far their joints are from the postures they came from.
+
+    Attributes
+    ----------
+    q : array (N, nq)
+        In Pinocchio's order: metres, unit quaternion (x, y, z, w), radians. NaN in angles of unknown joints;
+        a head that was not seen is at neutral.
+    distance : array (N,)
+        The largest distance between a posture's joint and the same joint of forward kinematics at q, metres.
+    """
+
+    q: Array
+    distance: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Figure:
+    """A stick figure, made from URDF and SRDF text by `load_figure` and changed by `scaled`.
+
+    Parameters
+    ----------
+    urdf, srdf : str
+        The texts; the model, the lengths, limits, capsules and checked pairs are read from them.
+    source : str
+        What to call it in errors.
+
+    Raises
+    ------
+    FigureError
+        Where the texts do not describe a stick figure.
+    """
+
+    urdf: str = field(repr=False)
+    srdf: str = field(repr=False)
+    source: str = "stick_figure.urdf"
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the texts alone: they are small, and a model is built from them in milliseconds."""
+        return _figure, (self.urdf, self.srdf, self.source)
+
+    def __post_init__(self) -> None:
+        links = [link.get("name", "") for link in parse(self.urdf, self.source).findall("link")]
+        names = set(self.model.names)
+        missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
+        missing += [link for link in map(_frame_name, POINTS) if not self.model.existFrame(link)]
+        if missing or self.model.nq != 7 + len(DOFS):
+            raise FigureError(
+                f"{self.source}: not a stick figure: it has {self.model.nq} configuration variables, expected "
+                f"{7 + len(DOFS)}; missing: {', '.join(missing) or 'none'}"
+            )
+        with as_figure_error():
+            check_srdf(self.srdf, f"{self.source}, SRDF", links)
+        _ = self.limits, self.capsules
+        self._check_layout()
+
+    @cached_property
+    def model(self) -> pin.Model:
+        """Pinocchio's model, torso on a free-flyer."""
+        try:
+            return pin.buildModelFromXML(self.urdf, pin.JointModelFreeFlyer())
+        except (ValueError, RuntimeError) as error:
+            raise FigureError(
+                f"{self.source}: Pinocchio cannot read it: {str(error).splitlines()[0]}"
+            ) from error
+
+    @cached_property
+    def geometry(self) -> pin.GeometryModel:
+        """Pinocchio's geometry model with the SRDF's pairs."""
+        geometry = pin.buildGeomFromUrdfString(self.model, self.urdf, pin.GeometryType.COLLISION)
+        geometry.addAllCollisionPairs()
+        pin.removeCollisionPairsFromXML(self.model, geometry, self.srdf)
+        return geometry
+
+    @cached_property
+    def neutral_points(self) -> Array:
+        """The 19 points at the neutral configuration (19, 3), metres, torso frame."""
+        points: Array = self.forward_kinematics(pin.neutral(self.model)[None])[0]
+        points.flags.writeable = False
+        return points
+
+    @cached_property
+    def lengths(self) -> Mapping[str, float]:
+        """The 17 lengths, metres, by segment name."""
+        points = self.neutral_points
+        lengths = {segment_name((a, b)): float(np.linalg.norm(points[a] - points[b])) for a, b in SEGMENTS}
+        return MappingProxyType(lengths)
+
+    @cached_property
+    def head_points(self) -> Array:
+        """Neck and the five head points in the paper's head frame (6, 3): x forward, y up, z right, from the neck."""
+        head = self.neutral_points[[0, *HEAD]]
+        return np.stack([head[:, 0], head[:, 2], -head[:, 1]], axis=-1)
+
+    @cached_property
+    def capsules(self) -> tuple[Capsule, ...]:
+        """The collision bodies."""
+        return self._collision[0]
+
+    @cached_property
+    def collision_pairs(self) -> tuple[tuple[int, int], ...]:
+        """Index pairs into `capsules` that the SRDF leaves to be checked."""
+        return self._collision[1]
+
+    @cached_property
+    def _collision(self) -> tuple[tuple[Capsule, ...], tuple[tuple[int, int], ...]]:
+        return read_capsules(self.model, self.geometry, self.neutral_points)
+
+    @cached_property
+    def limits(self) -> Limits:
+        """Signs and limits of the 22 angles in the order of `posekit.skeleton.DOFS`, radians."""
+        index = self.angle_index
+        return Limits(
+            sign=axis_signs(self.model, self.source),
+            lower=self.model.lowerPositionLimit[index],
+            upper=self.model.upperPositionLimit[index],
+        )
+
+    @cached_property
+    def ik(self) -> ClosedForm:
+        """The closed form from points to angles."""
+        return ClosedForm(limits=self.limits, head_offsets=self._head_offsets)
+
+    @cached_property
+    def angle_index(self) -> NDArray[np.intp]:
+        """Where each of `posekit.skeleton.DOFS` stands in q."""
+        return np.array([self.model.idx_qs[self.model.getJointId(urdf_joint_name(dof))] for dof in DOFS])
+
+    @cached_property
+    def configuration_names(self) -> tuple[str, ...]:
+        """A name for each entry of q: x, y, z, qx, qy, qz, qw of the torso, then the URDF's joints."""
+        names = ["x", "y", "z", "qx", "qy", "qz", "qw"] + [""] * len(DOFS)
+        for dof, index in zip(DOFS, self.angle_index, strict=True):
+            names[index] = urdf_joint_name(dof)
+        return tuple(names)
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of URDF and SRDF: what a result names to say which figure it used."""
+        return hashlib.sha256(f"{self.urdf}\0{self.srdf}".encode()).hexdigest()
+
+    def scaled(
+        self, lengths: Mapping[str, float], head_points: Mapping[str, ArrayLike] | None = None
+    ) -> Figure:
+        """Make the same figure with other lengths; capsules grow with their part.
+
+        Parameters
+        ----------
+        lengths : mapping
+            Metres, by segment name ``a-b``, a before b in tree order; others stay. Left and right are separate.
+        head_points : mapping, optional
+            Head points in the paper's head frame, metres; with ``neck`` among them, the others count from it.
+
+        Raises
+        ------
+        FigureError
+            Where a length is unknown, not positive, or no torso or hips have such lengths.
+        """
+        check_lengths(lengths)
+        head = self._head_in_link(head_points or {})
+        text = rewrite(self.urdf, self.capsules, self.neutral_points, {**self.lengths, **lengths}, head)
+        return Figure(urdf=text, srdf=self.srdf, source=self.source)
+
+    def from_stature(self, stature: float) -> Figure:
+        """Make the figure of a person of this stature (m): see `posekit.body.stature`."""
+        lengths = lengths_from_stature(stature, dict(self.lengths))
+        ratio = lengths["neck-pelvis"] / self.lengths["neck-pelvis"]
+        head = {name: self.head_points[k + 1] * ratio for k, name in enumerate(POINTS[len(JOINTS) :])}
+        return self.scaled(lengths, head)
+
+    def with_limits(self, limits: Mapping[str, tuple[float, float]]) -> Figure:
+        """Make the same figure with other joint limits (radians), by name in `posekit.skeleton.DOFS`."""
+        named = {urdf_joint_name(dof): bounds for dof, bounds in limits.items()}
+        return Figure(urdf=replace_limits(self.urdf, named), srdf=self.srdf, source=self.source)
+
+    def write(self, path: str | Path) -> None:
+        """Write the URDF to `path` and the SRDF beside it; `posekit.load_figure` reads them again.
+
+        Raises
+        ------
+        FigureError
+            Where they cannot be written.
+        """
+        write_texts(Path(path), self.urdf, self.srdf)
+
+    def forward_kinematics(self, q: Array) -> Array:
+        """Place the 19 points by forward kinematics: Pinocchio's, for a batch.
+
+        Parameters
+        ----------
+        q : array (N, nq)
+            Configurations with unit quaternions.
+
+        Returns
+        -------
+        array (N, 19, 3)
+            Metres; NaN where q has NaN.
+
+        Raises
+        ------
+        FigureError
+            Where q has another width or a quaternion is not of unit length: Pinocchio would place a
+            non-rotation without a word.
+        """
+        if q.ndim != 2 or q.shape[1] != self.model.nq:
+            raise FigureError(f"q has shape {q.shape}; expected (N, {self.model.nq})")
+        norm = np.linalg.norm(q[:, 3:7], axis=1)
+        if (np.abs(norm - 1) > 1e-6).any():
+            raise FigureError(
+                f"the quaternion of configuration {int(np.argmax(np.abs(norm - 1)))} has length "
+                f"{norm[np.argmax(np.abs(norm - 1))]:g}; expected 1; normalise q[3:7]"
+            )
+        return self._kinematics.place(q, NO_VELOCITY).positions
+
+    def collides(self, q: Array) -> NDArray[np.bool_]:
+        """Ask coal which configurations (N, nq) penetrate in a pair that the SRDF leaves to be checked (N,)."""
+        return collides(self._pool, q.T)
+
+    def configurations(self, points: Array) -> Configurations:
+        """Turn postures into configurations, in closed form.
+
+        All branches of the decomposition are tried; the one inside the limits is taken, else the one that
+        violates them least. Where the posture has the figure's lengths, forward kinematics gives its joints
+        back; where it has not, the rigid parts are the figure's own and `distance` says how far the two are
+        apart.
+
+        Parameters
+        ----------
+        points : array (N, 14, 3) or (N, 19, 3)
+            Joints, and the head's five points where they are known, metres, any right-handed frame.
+
+        Returns
+        -------
+        Configurations
+        """
+        points = with_head(points)
+        q = self.inverse_kinematics(points)
+        placed = np.isfinite(q[:, :7]).all(axis=1)
+        distance = np.full(len(points), np.nan)
+        if placed.any():
+            joints = self.forward_kinematics(q[placed])[:, : len(JOINTS)]
+            gap = np.linalg.norm(joints - points[placed, : len(JOINTS)], axis=-1)
+            distance[placed] = np.fmax.reduce(gap, axis=1)
+        return Configurations(q, distance)
+
+    def inverse_kinematics(self, points: Array) -> Array:
+        """Turn postures (N, 19, 3) into q (N, nq), in closed form: `configurations` without the distance."""
+        R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
+        q = np.full((len(points), self.model.nq), np.nan)
+        q[:, :3] = points[:, 0]
+        q[:, 3:7] = quaternions(R_torso)
+        angles = self.ik.angles(points, R_torso)
+        angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
+        q[:, self.angle_index] = angles
+        return q
+
+    @cached_property
+    def _pool(self) -> pin.GeometryPool:
+        return make_pool(self.model, self.geometry)
+
+    @cached_property
+    def _kinematics(self) -> Kinematics:
+        return Kinematics(model=self.model, points=body_points([_frame_name(name) for name in POINTS]))
+
+    @cached_property
+    def _head_offsets(self) -> Array:
+        return np.asarray(self.neutral_points[list(HEAD)] - self.neutral_points[0])
+
+    def _head_in_link(self, head_points: Mapping[str, ArrayLike]) -> Array:
+        """Return the five head points in the head link's frame, some of them replaced."""
+        names = POINTS[len(JOINTS) :]
+        for name, point in head_points.items():
+            if name not in ("neck", *names):
+                raise FigureError(
+                    f"figure.head_points: {name!r} is not a head point; expected neck, {', '.join(names)}"
+                )
+            if np.shape(point) != (3,):
+                raise FigureError(f"figure.head_points: {name} has shape {np.shape(point)}; expected x, y, z")
+        neck = np.asarray(head_points.get("neck", np.zeros(3)), dtype=np.float64)
+        head = self._head_offsets.copy()
+        for k, name in enumerate(names):
+            if name in head_points:
+                x, y, z = np.asarray(head_points[name], dtype=np.float64) - neck
+                head[k] = x, -z, y
+        if not np.isfinite(head).all() or np.linalg.norm(head.mean(axis=0)) == 0:
+            raise FigureError("figure.head_points: the points must be finite and not centred on the neck")
+        return head
+
+    def _check_layout(self) -> None:
+        """Refuse joints that lie otherwise than the closed form takes them to: place a posture and take it back."""
+        q = pin.neutral(self.model)[None]
+        lower, upper = self.limits.lower, self.limits.upper
+        q[:, self.angle_index] = lower + 0.4 * (upper - lower)
+        points = self.forward_kinematics(q)
+        back = self.forward_kinematics(self.inverse_kinematics(points))
+        apart = np.linalg.norm(back - points, axis=-1)[0]
+        if not (apart < 1e-6).all():
+            raise FigureError(
+                f"{self.source}: the joint before {POINTS[int(np.argmin(apart < 1e-6))]!r} does not lie as the stick "
+                "figure's; expected limbs along -z, joint origins without rpy, and the stick figure's order of joints"
+            )
+
+
+def _figure(urdf: str, srdf: str, source: str) -> Figure:
+    return Figure(urdf=urdf, srdf=srdf, source=source)
+
+
+def _frame_name(point: str) -> str:
+    return FRAMES.get(point, point)

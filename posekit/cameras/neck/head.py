@@ -1,0 +1,48 @@
+"""The neck's depth from the head: eyes, ears and nose behind a known camera.
+
+The five points alone give the head's pose: a detector's neck is the middle of the shoulders, which is not rigid with
+the head (`posekit.cameras.head` needs a sixth point, because it finds f too). The neck is then the head's own, where
+the figure's head turns about; on a person it moves against the head by a centimetre or two when the head nods, which
+`offset` of the neck allows for. Meeting the neck's ray with the sphere of the neck's distance about the head would
+use its image too, but the neck mostly hangs below the head, across the line of sight: there the ray only touches that
+sphere, and a pixel's error becomes centimetres of depth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.cameras import PinholeCamera
+from posekit.cameras.neck.pose import poses
+from posekit.cameras.neck.suggestion import Suggestion, suggest
+from posekit.geometry import Array
+
+
+def head_suggestion(
+    camera: PinholeCamera,
+    figure: Figure,
+    head_image: Array,
+    ray: Array,
+    deviation: Array,
+    offset: Array,
+    bent: float,
+) -> Suggestion:
+    """Place the head in F frames and tell the neck's distance.
+
+    Parameters
+    ----------
+    head_image : array (F, 5, 2)
+        Pixels, NaN where not seen.
+    ray : array (F, 3)
+        Unit vectors to the neck's image.
+    deviation : array (F, 5)
+        Pixels.
+    offset : array (5,)
+        Metres by which the head's points may be elsewhere than on the figure's head.
+    bent : float
+        The same for its neck.
+    """
+    placed = poses(camera, figure.head_points[1:], head_image, deviation, offset)
+    seen = np.isfinite(head_image).all(axis=-1).sum(axis=1)
+    return suggest("head", placed, ray, seen, bent)

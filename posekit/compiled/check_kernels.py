@@ -1,0 +1,162 @@
+"""The checks' screens as plain loops, for `posekit.compiled.compiling`: they tell what is clear.
+
+A screen says of a posture that it passes, or which place it violates first, where that is clear by more than any
+rounding; else that it is unsure, and the check's own `judge` is asked (`posekit.tree.Screened`). So these formulas
+decide nothing that the judge would decide otherwise, and need no care at singularities: there they are unsure.
+
+`screen` knows every kind: trees are grown with it in one go (`posekit.compiled.frame_kernels`). This file has the
+capsules; rigid parts and joint ranges are in files of their own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from posekit.compiled import anatomical_kernels, angle_kernels, rigid_kernels
+from posekit.compiled.anatomical_kernels import anatomical
+from posekit.compiled.angle_kernels import limb, neck, pelvis
+from posekit.compiled.frame_kernels import PRESUMED
+from posekit.compiled.rigid_kernels import distance, placement, unit, unknown
+from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.geometry import Array
+
+DISTANCE: Final = 0
+PLACEMENT: Final = 1
+PELVIS: Final = 2
+NECK: Final = 3
+LIMB: Final = 4
+CAPSULES: Final = 5
+ANATOMICAL: Final = 6
+JUDGED: Final = 7
+"""Kinds of screens; the last is never sure."""
+
+CLEAR_GAP = 1e-6
+"""Metres between two capsules from which they are clear of contact: a thousand times what the judge cares for."""
+
+PLACED = 14
+"""Numbers that say where two capsules are."""
+
+
+def clamp(value: Any) -> Any:
+    """Bring a value into [-1, 1]."""
+    return min(max(value, -1.0), 1.0)
+
+
+def mean(w: Array, first: int, count: int) -> Any:
+    """Return the mean of some points."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(3 * first, 3 * (first + count), 3):
+        x += w[i]
+        y += w[i + 1]
+        z += w[i + 2]
+    return x / count, y / count, z / count
+
+
+def apart(
+    gx: Any, gy: Any, gz: Any, ax: Any, ay: Any, az: Any, s: Any, bx: Any, by: Any, bz: Any, t: Any
+) -> Any:
+    """Return the squared distance between s on the one segment and t on the other."""
+    x, y, z = gx + t * bx - s * ax, gy + t * by - s * ay, gz + t * bz - s * az
+    return x * x + y * y + z * z
+
+
+def capsules(w: Array, at: int) -> Any:
+    """Screen two capsules: they are clear of each other, or they penetrate, which coal must confirm.
+
+    The numbers are center and half length of each, then both radii and the contact margin, metres; and how many points
+    start and end each. Where they seem to penetrate, position and quaternion of each are what is presumed. See
+    `posekit.validators.collision` for the formulas.
+    """
+    starts_a, ends_a, starts_b, ends_b = int(w[at + 5]), int(w[at + 6]), int(w[at + 7]), int(w[at + 8])
+    second = starts_a + ends_a
+    if unknown(w, 0, second + starts_b + ends_b):
+        return PASSED
+    center_a, half_a, center_b, half_b, reach = w[at], w[at + 1], w[at + 2], w[at + 3], w[at + 4]
+    far, near, deep = half_a + half_b + reach + CLEAR_GAP, reach + CLEAR_GAP, reach - CLEAR_GAP
+    sx, sy, sz = mean(w, 0, starts_a)
+    ex, ey, ez = mean(w, starts_a, ends_a)
+    ux, uy, uz = unit(ex - sx, ey - sy, ez - sz)
+    tx, ty, tz = mean(w, second, starts_b)
+    fx, fy, fz = mean(w, second + starts_b, ends_b)
+    vx, vy, vz = unit(fx - tx, fy - ty, fz - tz)
+    sx, sy, sz = sx + center_a * ux, sy + center_a * uy, sz + center_a * uz
+    tx, ty, tz = tx + center_b * vx, ty + center_b * vy, tz + center_b * vz
+    gx, gy, gz = tx - sx, ty - sy, tz - sz
+    squared = gx * gx + gy * gy + gz * gz
+    if not squared < math.inf:
+        return UNSURE
+    if far > 0 and squared > far * far:
+        return PASSED
+    ax, ay, az, bx, by, bz = half_a * ux, half_a * uy, half_a * uz, half_b * vx, half_b * vy, half_b * vz
+    aa, bb = half_a * half_a, half_b * half_b
+    ab = ax * bx + ay * by + az * bz
+    ag, bg = ax * gx + ay * gy + az * gz, bx * gx + by * gy + bz * gz
+    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    determinant = nx * nx + ny * ny + nz * nz
+    s = 0.0
+    if determinant > 1e-30 * aa * bb:
+        mx, my, mz = gy * bz - gz * by, gz * bx - gx * bz, gx * by - gy * bx
+        s = clamp((nx * mx + ny * my + nz * mz) / determinant)
+    t = clamp((s * ab - bg) / bb)
+    least = apart(gx, gy, gz, ax, ay, az, clamp((ag + t * ab) / aa), bx, by, bz, t)
+    for end in (-1.0, 1.0):
+        least = min(least, apart(gx, gy, gz, ax, ay, az, clamp((ag + end * ab) / aa), bx, by, bz, end))
+        least = min(least, apart(gx, gy, gz, ax, ay, az, end, bx, by, bz, clamp((end * ab - bg) / bb)))
+    if near > 0 and least > near * near:
+        return PASSED
+    if not (deep > 0 and least < deep * deep):
+        return UNSURE
+    w[PRESUMED], w[PRESUMED + 1], w[PRESUMED + 2] = sx, sy, sz
+    w[PRESUMED + 7], w[PRESUMED + 8], w[PRESUMED + 9] = tx, ty, tz
+    onto(ux, uy, uz, w, PRESUMED + 3)
+    onto(vx, vy, vz, w, PRESUMED + 10)
+    return 0
+
+
+def onto(x: Any, y: Any, z: Any, q: Array, at: int) -> None:
+    """Put into q, from some place on, the unit quaternion that turns z onto an axis or its opposite."""
+    sign = -1.0 if z < 0 else 1.0
+    w = 1.0 + sign * z
+    size = math.sqrt(2.0 * w)
+    q[at], q[at + 1], q[at + 2], q[at + 3] = -sign * y / size, sign * x / size, 0.0, w / size
+
+
+def screen(kind: int, w: Array, at: int) -> Any:
+    """Screen one posture by one check, of a kind; see `posekit.compiled.frame_kernels.screen`."""
+    if kind == CAPSULES:
+        return capsules(w, at)
+    if kind == LIMB:
+        return limb(w, at)
+    if kind == DISTANCE:
+        return distance(w, at)
+    if kind == ANATOMICAL:
+        return anatomical(w, at)
+    if kind == PLACEMENT:
+        return placement(w, at)
+    if kind == PELVIS:
+        return pelvis(w, at)
+    if kind == NECK:
+        return neck(w, at)
+    return UNSURE
+
+
+PARTS = (rigid_kernels, angle_kernels, anatomical_kernels)
+"""Other modules whose kernels are compiled with these."""
+
+COMPILED = {
+    "torso": "(f8[::1],)",
+    "hips": "(f8[::1], i8)",
+    "distance": "(f8[::1], i8)",
+    "placement": "(f8[::1], i8)",
+    "clamp": "",
+    "mean": "",
+    "apart": "",
+    "onto": "",
+    "capsules": "",
+    "screen": "",
+}
+"""The kernels, in the order in which they need each other, with the types of those that are called.
+
+Those of rigid parts are among them: they are wanted in many places, and asked seldom.
+"""

@@ -1,0 +1,257 @@
+"""Whole trees as one plain loop, for `posekit.compiled.compiling`: a frame's nodes never leave a core's cache.
+
+Every function here also runs as it is, slowly. `screen` is left to be filled in: by the kernels of the checks' rules
+(`posekit.tree.Rule`). What it is not sure of ends the frame, which is then grown step by step (`posekit.tree.steps`).
+
+A node is a row of integers: its code, then which of its candidates each joint has (the branches of the joint's path,
+the last the lowest bit).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.compiled.tree_kernels import GROUP, LOST, OF_FRAME, OPEN, PLACE, Bytes, Ints, lift
+from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.geometry import Array
+
+CODE, PATHS = 0, 1
+"""Columns of a node's row."""
+
+REASONS = 4
+"""States of nodes that no check judges: at every level the first groups, before those of the checks."""
+
+SHIFT, OFFSET = 8, 2
+"""A verdict that is remembered: the number of the frame, shifted, and the place with an offset."""
+
+SURE, NOT_SURE, FULL = range(3)
+"""What becomes of a frame: it is grown, it is left, or there is no room for it."""
+
+ALIVE, GONE, ASKED, UNKNOWN = range(4)
+"""What rows are counted of: leaves, lost nodes, what is presumed, and frames that are left."""
+
+Table = NDArray[np.int64]
+
+
+MOST_POINTS, MOST_PRESUMED = 16, 16
+"""Points that a rule may read, and numbers that it may presume."""
+
+PRESUMED, ROOM, NUMBERS = 48, 64, 128
+"""Where in its one array a screen writes what is presumed, has room for what it needs, and where numbers begin."""
+
+
+def screen(kind: int, w: Array, at: int) -> Any:
+    """Tell what is clear in one posture: the first place violated, `PASSED` or `UNSURE`.
+
+    Parameters
+    ----------
+    kind : int
+        As the rule says.
+    w : array
+        The posture's points, x, y, z each, metres; what is to be confirmed is put to `PRESUMED`; from `ROOM` to before
+        `NUMBERS` all may be overwritten.
+    at : int
+        Where the numbers of the rule begin.
+    """
+    return UNSURE
+
+
+def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) -> Any:
+    """Screen many postures by one rule.
+
+    Parameters
+    ----------
+    kind : int
+    points : array (N, P, 3)
+    w : array
+        As `screen` takes it, with the rule's numbers from `NUMBERS` on.
+    places : int array (N,)
+        Filled.
+    presumed : array (N, W)
+        Filled from the top, W numbers for every place violated.
+
+    Returns
+    -------
+    int
+        How many places were violated.
+    """
+    count = 0
+    for i in range(points.shape[0]):
+        for p in range(points.shape[1]):
+            for k in range(3):
+                w[3 * p + k] = points[i, p, k]
+        places[i] = screen(kind, w, NUMBERS)
+        if places[i] >= 0:
+            for k in range(presumed.shape[1]):
+                presumed[count, k] = w[PRESUMED + k]
+            count += 1
+    return count
+
+
+def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would hand on twenty arrays
+    begin: int,
+    end: int,
+    lifts: bool,
+    rays: Array,
+    unseen: NDArray[np.bool_],
+    parents: Table,
+    first: Table,
+    lengths: Array,
+    tolerance: float,
+    table: Array,
+    states: Bytes,
+    reach: Array,
+    levels: Table,
+    checks: Table,
+    tips: Table,
+    places: Table,
+    w: Array,
+    memory: Table,
+    nodes: Ints,
+    alive: Ints,
+    lost: Ints,
+    presumed: Array,
+    asked: Table,
+    unsure: Table,
+    used: Table,
+) -> Any:
+    """Grow the trees of the frames from one to before another, as far as there is room for what becomes of them.
+
+    Parameters
+    ----------
+    begin, end : int
+    lifts : bool
+        Whether joints are to be lifted, with what follows; else they are by now.
+    rays, unseen, parents, first, lengths, tolerance, table, states, reach
+        As `posekit.compiled.tree_kernels.lift` takes them.
+    levels : int array (J + 1,)
+        Which checks are of which level: from one entry to before the next.
+    checks : int array (C, 6)
+        Of each check: kind of its screen; how many numbers it presumes; how many tips and points; where its verdicts
+        are remembered; where its numbers begin.
+    tips : int array (C, S, 3)
+        What decides what a check says: columns of a node, the bits of each that count, and by how many these are
+        shifted, so that their sum tells all choices apart.
+    places : int array (C, P, 2)
+        Of each of its points the joint, or -1 where it was given, and the column of its first candidate.
+    w : array
+        As `screen` takes it, with the numbers of all rules.
+    memory : int array
+        Room for verdicts. Not to be used again for other frames of the same numbers.
+    nodes : int array (2 * N * (1 + J),)
+        Room for the nodes of two levels, row by row.
+    alive : int array (A, 2)
+        Filled: frame and code of the leaves.
+    lost : int array (L, 4)
+        Filled: nodes without a position or rejected, frame by frame.
+    presumed, asked : array (Q, W), int array (Q,)
+        Filled: what is to be confirmed, and by which check.
+    unsure : int array (U,)
+        Filled: frames that were not grown.
+    used : int array (4,)
+        Changed: how many rows of `alive`, `lost`, `presumed` and `unsure` are filled.
+
+    Returns
+    -------
+    int
+        The first frame for which there was no room; `end` if there was.
+    """
+    n_joints = parents.shape[0]
+    wide = PATHS + n_joints
+    half = nodes.shape[0] // 2
+    n_alive, n_lost, n_presumed, n_unsure = used[ALIVE], used[GONE], used[ASKED], used[UNKNOWN]
+    for f in range(begin, end):
+        if lifts:
+            lift(f, f + 1, rays, unseen, parents, first, lengths, tolerance, table, states, reach)
+        here, there, count, status = 0, half, 1, SURE
+        for k in range(wide):
+            nodes[k] = 0
+        for level in range(1, n_joints):
+            if 2 * count * wide > half or n_lost + 2 * count > lost.shape[0]:
+                status = FULL
+                break
+            child, kept = there, 0
+            parent = PATHS + parents[level]
+            for i in range(2 * count):
+                node, side = here + (i >> 1) * wide, i & 1
+                path, code = nodes[node + parent] << 1 | side, nodes[node + CODE] << 1 | side
+                where, group = PASSED, 0
+                state = states[f, first[level] + path]
+                if state != OPEN:
+                    where, group = 0, (level - 1) * REASONS + state - 1
+                else:
+                    for k in range(PATHS, PATHS + level):
+                        nodes[child + k] = nodes[node + k]
+                    nodes[child + CODE], nodes[child + PATHS + level] = code, path
+                    for c in range(levels[level], levels[level + 1]):
+                        choice = checks[c, 4]
+                        for s in range(checks[c, 2]):
+                            tip = nodes[child + tips[c, s, 0]]
+                            choice += (tip & tips[c, s, 1]) << tips[c, s, 2]
+                        if memory[choice] >> SHIFT == f - begin + 1:
+                            where = (memory[choice] & ((1 << SHIFT) - 1)) - OFFSET
+                        else:
+                            for p in range(checks[c, 3]):
+                                column = places[c, p, 1]
+                                if places[c, p, 0] >= 0:
+                                    column += nodes[child + PATHS + places[c, p, 0]]
+                                for k in range(3):
+                                    w[3 * p + k] = table[f, column, k]
+                            where = screen(checks[c, 0], w, checks[c, 5])
+                            memory[choice] = (f - begin + 1) << SHIFT | (where + OFFSET)
+                            if where >= 0 and checks[c, 1] > 0:
+                                if n_presumed == presumed.shape[0]:
+                                    status = FULL
+                                    break
+                                for k in range(checks[c, 1]):
+                                    presumed[n_presumed, k] = w[PRESUMED + k]
+                                asked[n_presumed] = c
+                                n_presumed += 1
+                            elif where == UNSURE:
+                                status = NOT_SURE
+                                break
+                        if where >= 0:
+                            group = (n_joints - 1) * REASONS + c
+                            break
+                if status != SURE:
+                    break
+                if where >= 0:
+                    lost[n_lost, GROUP], lost[n_lost, OF_FRAME] = group, f
+                    lost[n_lost, LOST], lost[n_lost, PLACE] = code, where
+                    n_lost += 1
+                else:
+                    child += wide
+                    kept += 1
+            if status != SURE:
+                break
+            here, there, count = there, here, kept
+        if status == SURE and n_alive + count > alive.shape[0]:
+            status = FULL
+        if status == FULL:
+            return f
+        if status == NOT_SURE:
+            unsure[n_unsure] = f
+            n_unsure += 1
+            n_lost, n_presumed = used[GONE], used[ASKED]
+        else:
+            for i in range(count):
+                alive[n_alive, 0], alive[n_alive, 1] = f, nodes[here + i * wide + CODE]
+                n_alive += 1
+        used[ALIVE], used[GONE], used[ASKED], used[UNKNOWN] = n_alive, n_lost, n_presumed, n_unsure
+    return end
+
+
+COMPILED = {
+    "lift": "",
+    "screen": "",
+    "screens": "(i8, f8[:, :, ::1], f8[::1], i1[::1], f8[:, ::1])",
+    "grow": (
+        "(i8, i8, b1, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, f8[:, :, ::1], i1[:, ::1], "
+        "f8[:, ::1], i8[::1], i8[:, ::1], i8[:, :, ::1], i8[:, :, ::1], f8[::1], i8[::1], i4[::1], "
+        "i4[:, ::1], i4[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1])"
+    ),
+}
+"""The kernels, in the order in which they need each other, with the types they take."""

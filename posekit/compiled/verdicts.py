@@ -1,0 +1,9 @@
+"""What a screen says of a posture besides the place that it violates."""
+
+from __future__ import annotations
+
+PASSED = -1
+"""Of a screen: no place is violated."""
+
+UNSURE = -2
+"""Of a screen: only the judge can tell."""

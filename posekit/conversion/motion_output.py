@@ -1,0 +1,199 @@
+"""Postures that move, written: as points, as a body's angles, as tables of survivors, as postures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from posekit.conversion.moving import Moving
+from posekit.errors import InputError
+from posekit.formats import own as files
+from posekit.formats.motion import (
+    Motion,
+    guess_up,
+    motion_format,
+    motion_formats,
+    postures_of,
+    with_up,
+    write_configurations,
+    write_motion,
+    write_survivors,
+)
+from posekit.formats.motion.glb import MAX_BODIES, write_postures_glb
+from posekit.formats.motion.urdf_folder import write_urdf_folder
+from posekit.formats.own import Postures
+from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.safe_io import refusal
+
+CUSTOM: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
+"""The axis that points up in a format's files by custom; in others it stays as it is."""
+
+FIXED: Final = ("trc", "bvh", "glb")
+"""Formats in whose files y points up, and nothing else."""
+
+EVEN: Final = ("bvh", "c3d")
+"""Formats that have one time from frame to frame."""
+
+TABLES: Final = ("csv", "npz", "parquet")
+"""Formats that carry all survivors of a frame, and motion in several clips."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Output:
+    """What is to be written.
+
+    Parameters
+    ----------
+    path : Path
+    to : str
+        ``postures``, or a format of motion.
+    up : str
+        The axis that shall point up; by custom if empty.
+
+    Raises
+    ------
+    InputError
+        Where the format has an axis of its own.
+    """
+
+    path: Path
+    to: str
+    up: str = ""
+
+    def __post_init__(self) -> None:
+        if self.to in FIXED and self.up not in ("", "+y"):
+            raise refusal("--up", "", self.up, f"+y, as in every file of {self.to}", "leave it out")
+
+    def up_of(self, up: str) -> str:
+        """Return the axis that points up in the file, where it is `up` in what is written."""
+        return self.up or CUSTOM.get(self.to, "") or up
+
+
+def by_suffix(path: Path) -> str:
+    """Tell the format by the end of the name: a name without an end is a folder's.
+
+    Raises
+    ------
+    InputError
+        Where there is no such format.
+    """
+    suffix = path.suffix.lower()
+    if suffix == ".json":
+        return "postures"
+    named = [one.name for one in motion_formats().values() if suffix in one.suffixes]
+    if not suffix:
+        named = [one.name for one in motion_formats().values() if not one.suffixes]
+    if len(named) != 1:
+        known = ", ".join(end for one in motion_formats().values() for end in one.suffixes)
+        expected = f"one of {known}, .json; or none, for a folder with the person's URDF"
+        raise refusal(path, "", f"a name that ends in {suffix}", expected, "name it so, or say --to")
+    return named[0]
+
+
+def carries_points(to: str) -> bool:
+    """Tell whether a format has any points, and not only a body's joints or angles."""
+    return to != "postures" and motion_format(to).write_points is not None
+
+
+def write_points(output: Output, motion: Motion, skeleton: str = "") -> list[str]:
+    """Write points, all that there are.
+
+    Which way is up, where the file does not say it, is guessed from a body's points, if it has some.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written, or `up` is asked for and what is up now is not known.
+    """
+    says = []
+    if not motion.up and output.up_of(""):
+        try:
+            found = postures_of(motion, load_skeleton_map(skeleton) if skeleton else None)
+            motion = replace(motion, up=guess_up(found.joints, motion.source))
+            says.append(f"{motion.up} is taken as up, along which heads are above ankles")
+        except InputError as error:
+            if output.up:
+                raise InputError(f"{error}; or say which axis is up with --input-up") from None
+    up = output.up_of(motion.up)
+    turned = with_up(motion, up) if up else motion
+    write_motion(output.path, turned, output.to)
+    axis = f"{turned.up} up" if turned.up else "which way is up is not known, and axes stay as they are"
+    clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
+    return [*says, f"{len(motion)} frames{clips} of {len(motion.names)} points, {axis}"]
+
+
+def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[str]:
+    """Write postures: one a frame, or all survivors of a result where `every`.
+
+    Raises
+    ------
+    InputError
+        Where the format cannot carry them, or the file cannot be written.
+    """
+    if every:
+        return _write_every(output, found)
+    if output.to == "postures":
+        return _write_postures(output, found)
+    if found.gaps and output.to in EVEN:
+        raise InputError(
+            f"{output.path}: {found.gaps} frames have no posture, and {output.to} has one in every frame; expected "
+            "a format with times; choose trc, csv, npz, parquet, mot, glb or urdf"
+        )
+    if carries_points(output.to):
+        return write_points(output, found.motion(str(output.path)))
+    # In BVH and GLB the writers turn z to y.
+    up = "+z" if output.to in FIXED else output.up_of(found.up)
+    q, off = found.configurations(up)
+    if output.to == "urdf":
+        write_urdf_folder(output.path, found.figure, q, found.time, up=up)
+    else:
+        write_configurations(output.path, found.figure, q, found.time, output.to)
+    return [
+        f"{len(q)} frames of joint angles, {output.up_of(up)} up; the figure's joints are within {off * 100:.2g} cm of "
+        "the postures'"
+    ]
+
+
+def _write_postures(output: Output, found: Moving) -> list[str]:
+    points = found.turned(output.up) if output.up else found.points
+    head = points[:, 14:] if np.isfinite(points[:, 14:]).any() else None
+    files.write_postures(output.path, Postures(joints=points[:, :14], head=head))
+    return [f"{len(points)} postures, {output.up or found.up} up"]
+
+
+def _write_every(output: Output, found: Moving) -> list[str]:
+    writer: Callable[[Output, Moving], list[str]] | None = (
+        _write_table if output.to in TABLES else _write_bodies if output.to == "glb" else None
+    )
+    if writer is None:
+        raise InputError(
+            f"--posture: all, but {output.to} carries one posture a frame; expected {', '.join(TABLES)} or glb; "
+            "choose one of them, or --posture first"
+        )
+    return writer(output, found)
+
+
+def _write_table(output: Output, found: Moving) -> list[str]:
+    up = output.up or found.up
+    write_survivors(output.path, replace(found, points=found.turned(up)).table())
+    return [f"{len(found)} survivors of {len(np.unique(found.frame))} frames, {up} up"]
+
+
+def _write_bodies(output: Output, found: Moving) -> list[str]:
+    """Write the survivors of the first frame that has any, the best where they are too many."""
+    first = np.flatnonzero(found.frame == found.frame[0])
+    kept = first[np.sort(np.argsort(found.values["rank"][first], kind="stable")[:MAX_BODIES])]
+    q, _ = found.take(kept).configurations()
+    names = [f"survivor_{k}" for k in found.survivor[kept].tolist()]
+    write_postures_glb(output.path, found.figure, q, names=names)
+    some = (
+        f"the {len(kept)} of {len(first)} survivors"
+        if len(kept) < len(first)
+        else f"the {len(first)} survivors"
+    )
+    whose = " whose lengths fit best" if len(kept) < len(first) else ""
+    return [f"{some}{whose}, of frame {int(found.frame[0]) + 1}, the first that has any; +y up"]

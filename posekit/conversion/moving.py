@@ -1,0 +1,384 @@
+"""What moves in a file: postures over time in a world with an up, and the figure's angles where they are asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure, load_figure
+from posekit.body.anthropometry import lengths_from_postures
+from posekit.errors import InputError
+from posekit.following import bridge
+from posekit.formats import own as files
+from posekit.formats.kinds import Kind, What
+from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
+from posekit.formats.motion.motion_axes import up_rotation
+from posekit.formats.own import OpenCVModel, Result, View
+from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
+from posekit.geometry import Array
+from posekit.recovery.ranked import probabilities
+from posekit.skeleton import JOINTS, POINTS
+from posekit.validation.validate import recovered_with
+
+EVEN: Final = 0.25
+"""Share of a step by which the time of a picture may be off its place."""
+
+MOST_GAPS: Final = 4
+"""Times as many frames as there are that gaps may make."""
+
+RATE: Final = 30.0
+"""Frames a second of postures without times."""
+
+CAMERA_UP: Final = "-y"
+"""What is up in the camera frame of a camera that is held level."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moving:
+    """Postures over time, N rows.
+
+    Parameters
+    ----------
+    points : array (N, 19, 3)
+        Joints and head points, metres, in a world where `up` is up; NaN where not known.
+    time : array (N,)
+        Seconds.
+    frame, survivor : int array (N,)
+        The frame of each row, and which of its survivors it is.
+    up : str
+        ``+x`` … ``-z``.
+    figure : Figure
+        The person's.
+    says : tuple of str
+        What was done, a line each.
+    values : mapping
+        More numbers (N,) by name; of a result also ``rank``, 1 for the survivor of a frame whose lengths fit best.
+    branches : tuple of str
+        The branch code of each row; empty where there is none.
+    gaps : int
+        How many frames have no posture, and are left out.
+    """
+
+    points: Array
+    time: Array
+    frame: NDArray[np.intp]
+    survivor: NDArray[np.intp]
+    up: str
+    figure: Figure
+    says: tuple[str, ...] = ()
+    values: dict[str, Array]
+    branches: tuple[str, ...] = ()
+    gaps: int = 0
+
+    def __len__(self) -> int:
+        """Count the rows."""
+        return len(self.points)
+
+    def take(self, rows: NDArray[np.intp]) -> Moving:
+        """Take some rows."""
+        return replace(
+            self,
+            points=self.points[rows],
+            time=self.time[rows],
+            frame=self.frame[rows],
+            survivor=self.survivor[rows],
+            values={name: values[rows] for name, values in self.values.items()},
+            branches=tuple(self.branches[k] for k in rows.tolist()) if self.branches else (),
+        )
+
+    def turned(self, up: str) -> Array:
+        """Return the points with another axis up (N, 19, 3)."""
+        return self.points @ up_rotation(self.up, up).T
+
+    def motion(self, source: str) -> Motion:
+        """Return the points as a motion: one row a frame."""
+        known = np.flatnonzero(np.isfinite(self.points[..., 0]).any(axis=0))
+        names = tuple(POINTS[k] for k in known)
+        return Motion(
+            names=names,
+            points=self.points[:, known],
+            time=self.time,
+            rate=self.rate,
+            up=self.up,
+            source=source,
+        )
+
+    @property
+    def rate(self) -> float:
+        """Frames a second."""
+        steps = np.diff(np.unique(self.time))
+        return float(1 / np.median(steps)) if len(steps) else RATE
+
+    def configurations(self, up: str = "+z") -> tuple[Array, float]:
+        """Return the figure's configurations (N, nq), `up` up, and how far their joints are from the points at most."""
+        found = self.figure.configurations(self.turned(up))
+        return found.q, float(np.nanmax(found.distance, initial=0.0))
+
+    def table(self) -> SurvivorTable:
+        """Return all rows as a table of survivors."""
+        return SurvivorTable(
+            frame=self.frame,
+            time=self.time,
+            survivor=self.survivor,
+            joints=self.points[:, :14],
+            values=self.values,
+            branches=self.branches,
+        )
+
+
+def read_clips(path: Path, what: What, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
+    """Read motion: all of its clips, or the one that is named.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, or there is no such clip.
+    """
+    motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None, up=up or None)
+    return motion.of_clip(clip) if clip else motion
+
+
+def one_clip(motion: Motion) -> Motion:
+    """Refuse several clips, where one is needed.
+
+    Raises
+    ------
+    InputError
+        Where there are several: they are named.
+    """
+    if len(motion.clips) > 1:
+        names = ", ".join(motion.clips[:8]) + (", …" if len(motion.clips) > 8 else "")
+        raise InputError(
+            f"{motion.source}: {len(motion.clips)} clips ({names}); expected one; choose with --clip"
+        )
+    return motion
+
+
+def moving(
+    path: Path,
+    what: What,
+    *,
+    posture: str = "first",
+    view: View | None = None,
+    skeleton: str = "",
+    clip: str = "",
+    unit: str = "",
+    up: str = "",
+) -> Moving:
+    """Read what moves in a file.
+
+    Parameters
+    ----------
+    path : path
+    what : What
+        What the file is.
+    posture : str
+        Of a result: ``first``, the number of a survivor from 1, ``path``, or ``all``.
+    view : View, optional
+        What a result was recovered from: its camera's place in the world turns and moves the postures there.
+    skeleton : str
+        Of motion capture: a skeleton map by name or file.
+    clip, unit : str
+        Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
+    up : str
+        The axis that points up, where the file does not say it or is wrong; of a result, that of the camera's frame,
+        or of its world where there is a view.
+
+    Raises
+    ------
+    InputError
+        Where nothing in it moves, or it cannot be read.
+    """
+    if what.kind is Kind.RESULT:
+        return _of_result(files.read_result(path), posture, view, up)
+    if what.kind is Kind.VIEW:
+        return _of_truth(files.read_view(path), str(path), up)
+    if what.kind is Kind.MOTION:
+        layout = load_skeleton_map(skeleton) if skeleton else None
+        return _of_motion(one_clip(read_clips(path, what, clip=clip, unit=unit, up=up)), layout)
+    if what.kind is Kind.POSTURES:
+        given = files.read_postures(path)
+        head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
+        points = np.concatenate([given.joints, head], axis=1)
+        up = up or _guessed(given.joints, str(path))
+        return _recorded(points, np.arange(len(points)) / RATE, up)
+    remedy = "; convert the result that it is of" if what.kind is Kind.SURVIVORS else ""
+    raise InputError(
+        f"{path}: {what.kind.value}, in which nothing moves; expected a result, postures or motion{remedy}"
+    )
+
+
+def _of_result(result: Result, posture: str, view: View | None, stated: str) -> Moving:
+    figure, _ = recovered_with(result)
+    if posture == "path":
+        return _of_path(result, figure, view, stated)
+    rows: list[tuple[int, int]] = []
+    ranks: list[int] = []
+    empty = 0
+    probability = probabilities(result, figure.lengths)
+    for k in range(len(result.frames)):
+        order = np.argsort(-probability[k], kind="stable")
+        if not len(order):
+            empty += 1
+            continue
+        if posture == "all":
+            chosen = list(range(len(order)))
+        else:
+            chosen = [int(order[0]) if posture == "first" else _number(posture, len(order), k)]
+        rows += [(k, row) for row in chosen]
+        ranks += (np.argsort(order)[chosen] + 1).tolist()
+    if not rows:
+        raise InputError("result: no frame has a posture; nothing to convert")
+    joints = np.stack([result.frames[k].joints[row] for k, row in rows])
+    points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
+    says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
+    points, up = _placed(points, view, stated, says)
+    names = list(dict.fromkeys(name for frame in result.frames for name in frame.margins))
+    values = {
+        f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
+    }
+    values["probability"] = np.array([probability[k][row] for k, row in rows])
+    values["rank"] = np.array(ranks, dtype=np.float64)
+    values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
+    return Moving(
+        points=points,
+        time=np.array([result.frames[k].time for k, _ in rows]),
+        frame=np.array([k for k, _ in rows]),
+        survivor=np.array([row for _, row in rows]),
+        up=up,
+        figure=figure,
+        says=tuple(says),
+        values=values,
+        branches=tuple(result.frames[k].branches[row] for k, row in rows),
+        gaps=empty,
+    )
+
+
+def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> Moving:
+    """Take the first path through a result, its depths smoothed where the camera is known."""
+    paths = result.paths
+    if paths is None:
+        raise InputError("--posture path: the result was not followed; recover it with --follow 2")
+    smoothed = paths.smoothed[0]
+    joints = np.where(np.isnan(smoothed), paths.joints[0], smoothed)
+    known = np.flatnonzero(np.isfinite(joints).any(axis=(1, 2)))
+    time, place = _evenly(np.array([result.frames[k].time for k in known.tolist()]))
+    filled = np.full((len(time), len(JOINTS), 3), np.nan)
+    filled[place] = joints[known]
+    points = np.concatenate([bridge(time, filled), np.full((len(time), 5, 3), np.nan)], axis=1)
+    survivor = np.full(len(time), -1, dtype=np.intp)
+    survivor[place] = paths.survivor[0, known]
+    interpolated = np.full(len(time), float(len(JOINTS)))
+    interpolated[place] = paths.interpolated[0, known].sum(axis=1)
+    says = [f"the likeliest path, {int((survivor < 0).sum())} of {len(time)} frames bridged"]
+    points, up = _placed(points, view, stated, says)
+    codes = [""] * len(time)
+    for row, k in zip(place.tolist(), known.tolist(), strict=True):
+        codes[row] = result.frames[k].branches[survivor[row]] if survivor[row] >= 0 else ""
+    return Moving(
+        points=points,
+        time=time,
+        frame=np.arange(len(time)),
+        survivor=survivor,
+        up=up,
+        figure=figure,
+        says=tuple(says),
+        values={"interpolated": interpolated},
+        branches=tuple(codes),
+        gaps=len(result.frames) - len(known),
+    )
+
+
+def _evenly(time: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Put in times of pictures that were left out, where the others are whole steps apart; say where these are."""
+    steps = np.diff(time)
+    step = float(np.median(steps)) if len(steps) else 1.0
+    places = np.concatenate([[0.0], np.cumsum(np.round(steps / step))])
+    whole = np.abs(time - time[:1] - places * step) <= EVEN * step
+    if not whole.all() or places[-1] > MOST_GAPS * len(time):
+        return time, np.arange(len(time))
+    place = places.astype(np.intp)
+    every = np.arange(place[-1] + 1)
+    return np.interp(every, place, time), place
+
+
+def _placed(points: Array, view: View | None, stated: str, says: list[str]) -> tuple[Array, str]:
+    """Put points of a result into the view's world, if there is one; say where they are and what is up."""
+    up = stated or CAMERA_UP
+    if view is not None:
+        points = _in_world(points, view)
+        up = stated or _guessed(points[:, :14], "the camera's world")
+        says.append(f"in the camera's world, where {up} is up")
+    else:
+        level = f"{up} up" if stated else "as if it were held level"
+        says.append(f"in the camera's frame, {level}; with --view, in its world")
+    return points, up
+
+
+def _guessed(joints: Array, source: str) -> str:
+    """Guess which axis points up, or name the option that says it."""
+    try:
+        return guess_up(joints, source)
+    except InputError as error:
+        raise InputError(f"{error}: --input-up") from None
+
+
+def _number(posture: str, count: int, frame: int) -> int:
+    if not posture.isdigit() or not 1 <= int(posture) <= count:
+        raise InputError(
+            f"--posture: {posture!r}; expected first, path, all, or a number from 1 to {count}, "
+            f"as frame {frame + 1} has"
+        )
+    return int(posture) - 1
+
+
+def _in_world(points: Array, view: View) -> Array:
+    model = view.camera
+    if not isinstance(model, OpenCVModel) or model.R is None or model.t is None:
+        raise InputError("--view: its camera has no place in a world; expected R and t; leave the option out")
+    return np.asarray((points - model.t) @ model.R)
+
+
+def _of_truth(view: View, source: str, stated: str) -> Moving:
+    known = np.isfinite(view.truth).any(axis=(1, 2))
+    if not known.any():
+        raise InputError(
+            f"{source}: a view without truth: pictures do not move in space; expected a result; recover it first"
+        )
+    points = np.concatenate([view.truth, np.full((len(view), 5, 3), np.nan)], axis=1)[known]
+    up = stated or CAMERA_UP
+    if isinstance(view.camera, OpenCVModel) and view.camera.R is not None and view.camera.t is not None:
+        points = _in_world(points, view)
+        up = stated or _guessed(points[:, :14], source)
+    return _recorded(points, view.time[known], up)
+
+
+def _of_motion(motion: Motion, layout: SkeletonMap | None) -> Moving:
+    found = postures_of(motion, layout)
+    points = np.concatenate([found.joints, found.head], axis=1)
+    says = [f"skeleton map {found.layout.name}"]
+    if found.derived:
+        says.append(f"{' and '.join(found.derived)} placed from shoulders and hips")
+    up = motion.up or _guessed(found.joints, motion.source)
+    if not motion.up:
+        says.append(f"{up} is taken as up, along which heads are above ankles")
+    return _recorded(points, motion.time, up, says)
+
+
+def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> Moving:
+    """Make it of postures that were measured, with a figure of their own lengths."""
+    return Moving(
+        points=points,
+        time=time,
+        frame=np.arange(len(points)),
+        survivor=np.zeros(len(points), dtype=np.intp),
+        up=up,
+        figure=load_figure().scaled(lengths_from_postures(points[:, :14]).lengths.lengths),
+        says=tuple(says),
+        values={},
+    )

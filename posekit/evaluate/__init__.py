@@ -1,0 +1,16 @@
+"""How good recovery is where the truth is known: virtual cameras around real motion, or views with truth."""
+
+from posekit.evaluate.comparison import Comparison as Comparison
+from posekit.evaluate.comparison import compare as compare
+from posekit.evaluate.evaluation import Evaluation as Evaluation
+from posekit.evaluate.evaluation import evaluate as evaluate
+from posekit.evaluate.method import Method as Method
+from posekit.evaluate.ranking import Ranker as Ranker
+from posekit.evaluate.ranking import Ranking as Ranking
+from posekit.evaluate.ranking import by_probability as by_probability
+from posekit.evaluate.report import write_evaluation as write_evaluation
+from posekit.evaluate.sampling import Sampling as Sampling
+from posekit.evaluate.sequences import Choice as Choice
+from posekit.evaluate.sequences import Chooser as Chooser
+from posekit.evaluate.sequences import by_path as by_path
+from posekit.evaluate.sweep import Sweep as Sweep

@@ -1,0 +1,88 @@
+"""How far the survivors are from the truth: the best, the first-ranked, and how many there are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from posekit.formats.markdown import table_lines
+from posekit.geometry import Array
+from posekit.measures import mpjpe, pa_mpjpe
+from posekit.recovery.recovery import Recovery
+
+MEASURES: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """Errors of F frames in three measures: mean distance of the joints that are known in both, metres.
+
+    The measures: in the camera frame as it is; after moving the middle of its joints onto the truth's; after a
+    similarity (`posekit.measures.pa_mpjpe`).
+
+    Parameters
+    ----------
+    survivors : int array (F,)
+    best, first, middle : array (F, 3)
+        Of the best survivor by that measure, of the likeliest (`posekit.recovery.ranked`), and the median over all;
+        NaN where there is no survivor or no truth.
+    """
+
+    survivors: Array
+    best: Array
+    first: Array
+    middle: Array
+
+    @property
+    def lines(self) -> list[str]:
+        """The report: millimetres, over frames."""
+        known = np.isfinite(self.best[:, 0])
+        if not known.any():
+            return ["no frame has both survivors and a truth"]
+        rows = []
+        for k, name in enumerate(MEASURES):
+            row = [name]
+            for values in (self.best, self.first, self.middle):
+                median, most = np.quantile(values[known, k] * 1000, (0.5, 0.95))
+                row.append(f"{median:.0f} / {most:.0f}")
+            rows.append(row)
+        counts = self.survivors[known]
+        heading = ["mean joint error, mm", "best of N", "first-ranked", "median of N"]
+        return [
+            f"against the truth, {int(known.sum())} of {len(known)} frames (median / 95 %); N survivors: median "
+            f"{np.median(counts):g}, 95 % {np.quantile(counts, 0.95):g}",
+            *table_lines(heading, rows),
+        ]
+
+
+def compare(recovery: Recovery, truth: Array) -> Comparison:
+    """Compare the survivors of every frame with the truth (F, 14, 3), camera frame, metres."""
+    count = len(recovery.frames)
+    found = {name: np.full((count, 3), np.nan) for name in ("best", "first", "middle")}
+    ranking = recovery.ranking
+    for k, frame in enumerate(recovery.frames):
+        joints = frame.joints
+        both = np.isfinite(joints[..., 0]) & np.isfinite(truth[k, :, 0])
+        if not both.any(axis=1).all() or not len(
+            frame
+        ):  # the joints that are known are the same in all survivors
+            continue
+        errors = np.stack(_errors(joints, truth[k]), axis=-1)
+        first = ranking.of(k).order[0]
+        found["best"][k] = np.nanmin(errors, axis=0)
+        found["first"][k] = errors[first]
+        found["middle"][k] = np.nanmedian(errors, axis=0)
+    return Comparison(survivors=np.array([len(frame) for frame in recovery.frames]), **found)
+
+
+def _errors(joints: Array, truth: Array) -> tuple[Array, Array, Array]:
+    """Return the three measures of all survivors (N,)."""
+    target = np.broadcast_to(truth, joints.shape)
+    shift = np.nanmean(np.where(np.isnan(joints), np.nan, target) - joints, axis=1, keepdims=True)
+    return (
+        mpjpe(joints, target).value,
+        mpjpe(joints + shift, target).value,
+        pa_mpjpe(joints, target).value,
+    )

@@ -1,0 +1,21 @@
+"""Survivors over time: the paths through a sequence that a body can have moved along.
+
+`best_paths` chooses a survivor in each frame, `Follower` does so live; both bridge frames without one. `choose_scale`
+tells lengths by how the sequence moves, `smooth` smooths the distances of a path. See docs/sequences.md.
+"""
+
+from posekit.following.beam import Beam as Beam
+from posekit.following.best_paths import APART as APART
+from posekit.following.best_paths import best_paths as best_paths
+from posekit.following.bridging import bridge as bridge
+from posekit.following.follower import Estimate as Estimate
+from posekit.following.follower import Follower as Follower
+from posekit.following.following import Following as Following
+from posekit.following.frame import SurvivorFrame as SurvivorFrame
+from posekit.following.motion_model import MotionModel as MotionModel
+from posekit.following.paths import Paths as Paths
+from posekit.following.scales import ScaleChoice as ScaleChoice
+from posekit.following.scales import choose_scale as choose_scale
+from posekit.following.smoothing import smooth as smooth
+from posekit.following.switches import Switch as Switch
+from posekit.following.switches import elevations as elevations

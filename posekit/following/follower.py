@@ -1,0 +1,190 @@
+"""Following a person live: a frame in, the posture of some frames ago out."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError
+from posekit.following.beam import Beam
+from posekit.following.bridging import COASTING, bridge
+from posekit.following.frame import SurvivorFrame, check_order
+from posekit.following.motion_model import MotionModel
+from posekit.following.search import Step, advance
+from posekit.following.states import States
+from posekit.geometry import Array
+
+LIVE = Beam(width=128, survivors=1024)
+"""Which paths are followed live, unless told otherwise."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Estimate:
+    """One frame of the path, as far as it was known `lag` frames later.
+
+    Parameters
+    ----------
+    frame : int
+        Its number, from 0.
+    time : float
+        Seconds.
+    survivor : int
+        Which of its survivors; -1 where it was passed over.
+    joints : array (14, 3)
+        Camera frame, metres; NaN where nothing is known.
+    interpolated : bool array (14,)
+        Which joints are no survivor's: what bridges the gap, or the last known posture moved on.
+    lead : float
+        How much cheaper the path is than the cheapest that takes another survivor here, of those that are followed;
+        infinite where all take this one.
+    """
+
+    frame: int
+    time: float
+    survivor: int
+    joints: Array
+    interpolated: NDArray[np.bool_]
+    lead: float
+
+    @property
+    def bridged(self) -> bool:
+        """Whether the frame was passed over."""
+        return self.survivor < 0
+
+
+class Follower:
+    """Follows a sequence frame by frame.
+
+    `push` takes a frame and returns the estimate of the frame `lag` frames before it; `finish` returns those that are
+    left. With a lag of the whole sequence these are `best_paths`'s; with a shorter one each is the best that was known
+    by then, so that the path may change its mind in between, and memory and time of a frame are bounded.
+
+    Parameters
+    ----------
+    lag : int
+        Frames, zero or more.
+    model : MotionModel, optional
+    beam : Beam, optional
+        Which paths are followed: `LIVE` unless told otherwise.
+
+    Raises
+    ------
+    InputError
+        Where the lag is no such number.
+
+    Examples
+    --------
+    >>> follower = Follower(lag=1)
+    >>> posture = np.zeros((1, 14, 3)) + [0.0, 0.0, 4.0]
+    >>> follower.push(SurvivorFrame(time=0.0, joints=posture)) is None
+    True
+    >>> follower.push(SurvivorFrame(time=0.03, joints=posture)).frame
+    0
+    >>> [estimate.frame for estimate in follower.finish()]
+    [1]
+    """
+
+    def __init__(self, *, lag: int, model: MotionModel | None = None, beam: Beam | None = None) -> None:
+        if isinstance(lag, bool) or not isinstance(lag, int) or lag < 0:
+            raise InputError(f"lag is {lag!r}; expected a number of frames, zero or more")
+        self.lag = lag
+        self.model = model or MotionModel()
+        self.beam = beam or LIVE
+        self._states = States.start()
+        self._frames: deque[SurvivorFrame] = deque()
+        self._steps: deque[Step] = deque()
+        self._known: list[tuple[float, Array]] = []
+        self._last = -np.inf
+        self._first = 0
+
+    def push(self, frame: SurvivorFrame) -> Estimate | None:
+        """Take the next frame; return the estimate of the one `lag` before, or None while there is none.
+
+        Raises
+        ------
+        InputError
+            Where the frame does not come after the last.
+        """
+        check_order(self._last, frame.time, self._first + len(self._frames))
+        self._last = frame.time
+        self._states, step = advance(self._states, frame, self.model, self.beam)
+        self._frames.append(frame)
+        self._steps.append(step)
+        return self._tell()[0] if len(self._frames) > self.lag else None
+
+    def finish(self) -> list[Estimate]:
+        """Return the estimates of the frames that are left. More frames may follow, after these."""
+        return self._tell(every=True) if self._frames else []
+
+    def _tell(self, *, every: bool = False) -> list[Estimate]:
+        """Estimate the oldest frame that was not told yet, or all."""
+        survivors, leads = self._trace()
+        count = len(survivors) if every else 1
+        window = self._places(survivors[:count])
+        missing = np.isnan(window[..., 0])
+        whole = window
+        if missing.any():  # what comes after helps
+            window = self._places(survivors)
+            missing = np.isnan(window[..., 0])
+            time = [*(time for time, _ in self._known), *(frame.time for frame in self._frames)]
+            known = np.concatenate([*(joints[None] for _, joints in self._known), window])
+            whole = bridge(np.array(time), known)[len(self._known) :]
+        estimates = []
+        for k in range(count):
+            frame = self._frames.popleft()
+            self._steps.popleft()
+            joints, unseen = whole[k].copy(), missing[k].copy()
+            joints.flags.writeable = unseen.flags.writeable = False
+            estimates.append(
+                Estimate(
+                    frame=self._first,
+                    time=frame.time,
+                    survivor=int(survivors[k]),
+                    joints=joints,
+                    interpolated=unseen,
+                    lead=float(leads[k]),
+                )
+            )
+            self._first += 1
+            self._remember(frame.time, window[k])
+        return estimates
+
+    def _places(self, survivors: NDArray[np.intp]) -> Array:
+        """Return the joints (T, 14, 3) of survivors of the oldest frames; NaN where there is none."""
+        places = np.full((len(survivors), 14, 3), np.nan)
+        for k, (frame, chosen) in enumerate(zip(self._frames, survivors.tolist(), strict=False)):
+            if chosen >= 0:
+                places[k] = frame.joints[chosen]
+        return places
+
+    def _remember(self, time: float, joints: Array) -> None:
+        """Keep what bridges to come start from: the last places of all joints, and the neck's of a while before."""
+        if np.isnan(joints).all():
+            return
+        self._known.append((time, joints))
+        needed = []
+        lacking = np.ones(len(joints), dtype=np.bool_)
+        for at, place in reversed(self._known):
+            found = ~np.isnan(place[:, 0])
+            if at >= time - COASTING or (found & lacking).any():
+                needed.append((at, place))
+            lacking &= ~found
+        self._known = needed[::-1]
+
+    def _trace(self) -> tuple[NDArray[np.intp], Array]:
+        """Follow all ends of paths back: the best one's survivors, and by how much each is ahead of others."""
+        cost = self._states.cost
+        best = int(np.argmin(cost))
+        survivors = np.empty(len(self._steps), dtype=np.intp)
+        leads = np.empty(len(self._steps))
+        at = np.arange(len(cost))
+        for k in range(len(self._steps) - 1, -1, -1):
+            step = self._steps[k]
+            taken = step.survivor[at]
+            survivors[k] = taken[best]
+            leads[k] = cost[taken != taken[best]].min(initial=np.inf) - cost[best]
+            at = step.parent[at]
+        return survivors, leads

@@ -1,0 +1,96 @@
+"""The likeliest paths through a sequence, and what they say of every joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError
+from posekit.following.best_paths import APART
+from posekit.following.smoothing import smooth
+from posekit.following.switches import Switch, switches_of
+from posekit.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Following:
+    """K paths through the T frames of a recovery, the cheapest first.
+
+    Parameters
+    ----------
+    time : array (T,)
+        Seconds.
+    survivor : int array (K, T)
+        The survivor of each frame, an index into `FrameRecovery.joints`; -1 where the path passes the frame over.
+    joints : array (K, T, 14, 3)
+        Camera frame, metres: the survivors', and what bridges them where there is none (`posekit.following.bridge`);
+        NaN where a joint is never known.
+    interpolated : bool array (K, T, 14)
+        Which joints are bridged, or completed without having been seen.
+    deviation : array (K, T, 14)
+        Of each joint, metres; infinite where it is interpolated.
+    cost : array (K,)
+        Minus the logarithm of each path's likelihood, but for a constant.
+    lead : float
+        How much cheaper the first path is than the next that is different, by `apart`; infinite where there is none,
+        NaN where one path alone was asked for.
+    share : array (K,)
+        Of the likelihood of these paths, each one's: 1 together.
+    branches : tuple of tuple of str (K, T)
+        The branch codes of the survivors; empty where a frame is passed over.
+    scale : array (K, T), optional
+        Pixels a metre, of the survivors of an uncalibrated view; NaN where a frame is passed over.
+    exact : bool
+        Whether the first path is certain to be the cheapest of all.
+    apart : float
+        Metres by which some joint is elsewhere in another path.
+    """
+
+    time: Array
+    survivor: NDArray[np.intp]
+    joints: Array
+    interpolated: NDArray[np.bool_]
+    deviation: Array
+    cost: Array
+    lead: float
+    share: Array
+    branches: tuple[tuple[str, ...], ...]
+    scale: Array | None
+    exact: bool
+    apart: float = APART
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Count the paths."""
+        return len(self.cost)
+
+    @property
+    def bridged(self) -> NDArray[np.bool_]:
+        """Frames (K, T) that a path passes over."""
+        return np.asarray(self.survivor < 0)
+
+    def smoothed(self, path: int = 0) -> Array:
+        """Smooth the distances of a path's joints from the camera (`posekit.following.smooth`): (T, 14, 3), metres.
+
+        Lengths stay; ranges and collision are not asked again. Where the camera is not known, there are no distances.
+
+        Raises
+        ------
+        InputError
+            Where the view is uncalibrated.
+        """
+        if self.scale is not None:
+            raise InputError(
+                "an uncalibrated view tells no distances to be smoothed; expected a calibrated camera; take the joints"
+            )
+        return smooth(self.time, self.joints[path], self.deviation[path])[0]
+
+    def switches(self, path: int = 0) -> tuple[Switch, ...]:
+        """List where segments of a path change between near and far, and how fast they had to turn for it."""
+        return switches_of(self.time, self.joints[path], perspective=self.scale is None)

@@ -1,0 +1,74 @@
+"""What the search returns: the cheapest paths, what they cost, and where they had to be bridged."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.following.bridging import bridge
+from posekit.following.frame import SurvivorFrame
+from posekit.following.switches import Switch, switches_of
+from posekit.geometry import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Paths:
+    """K paths through T frames, the cheapest first.
+
+    Parameters
+    ----------
+    time : array (T,)
+        Seconds.
+    cost : array (K,)
+        Minus the log-likelihood of each, but for a constant: between two, odds are the exponential of the difference.
+    survivor : int array (K, T)
+        Which of each frame's survivors; -1 where the frame was passed over.
+    joints : array (K, T, 14, 3)
+        Camera frame, metres: the survivors', and between them what bridges them; NaN where nothing is known.
+    interpolated : bool array (K, T, 14)
+        Which joints are no survivor's.
+    codes : tuple of tuple of str (K, T)
+        The branch codes of the survivors; empty where there is none.
+    exact : bool
+        Whether it is certain that the first path is the cheapest of all: no end of a path was dropped that could have
+        become cheaper.
+    """
+
+    time: Array
+    cost: Array
+    survivor: NDArray[np.intp]
+    joints: Array
+    interpolated: NDArray[np.bool_]
+    codes: tuple[tuple[str, ...], ...]
+    exact: bool
+
+    def __post_init__(self) -> None:
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Count the paths."""
+        return len(self.cost)
+
+    @property
+    def bridged(self) -> NDArray[np.bool_]:
+        """Frames (K, T) of which no survivor was taken: their joints are interpolated."""
+        return np.asarray(self.survivor < 0)
+
+    def switches(self, path: int = 0, *, perspective: bool = True) -> tuple[Switch, ...]:
+        """List where segments of a path change between near and far, and how fast they had to turn for it."""
+        return switches_of(self.time, self.joints[path], perspective=perspective)
+
+
+def joints_of(frames: Sequence[SurvivorFrame], chosen: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
+    """Return the joints (T, 14, 3) along a path, bridged, and which of them (T, 14) no survivor has."""
+    seen = np.full((len(frames), 14, 3), np.nan)
+    for k, (frame, one) in enumerate(zip(frames, chosen.tolist(), strict=True)):
+        if one >= 0:
+            seen[k] = frame.joints[one]
+    return bridge(np.array([frame.time for frame in frames]), seen), np.isnan(seen[..., 0])

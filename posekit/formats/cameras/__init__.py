@@ -1,0 +1,10 @@
+"""Cameras as other tools write them, and guesses where none is known.
+
+A `CalibratedCamera` is what a file says; `pinhole_of` makes the camera that the interpretation tree uses of it, and
+`undistorted` takes points there where the lens has more than Brown's five coefficients.
+"""
+
+from posekit.formats.cameras.exif import read_exif as read_exif
+from posekit.formats.cameras.reading import FORMATS as FORMATS
+from posekit.formats.cameras.reading import read_cameras as read_cameras
+from posekit.formats.cameras.reading import write_cameras as write_cameras

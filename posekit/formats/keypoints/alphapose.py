@@ -1,0 +1,163 @@
+"""AlphaPose: a flat list of people with the picture's name, or one object by pictures.
+
+MVIG-SJTU/AlphaPose, docs/output.md and alphapose/utils/pPose_nms.py (``write_json``): ``[{image_id, category_id,
+keypoints: [x, y, c]*K, score, box, idx}]``, `image_id` a text. With ``--format cmu`` or ``open`` it is one object,
+``{image_id: {version, bodies: [{joints}]}}`` or ``{…: {version, people: [{pose_keypoints_2d}]}}``, of OpenPose's 18
+COCO points; the same without `image_id` stands in a file a picture. `idx` is who it is where people were tracked, a
+list where several detections were merged. Confidences of old COCO models go up to 6, and stay.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from posekit.formats.keypoints.format import Format
+from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.keypoints.named_layout import by_count
+from posekit.formats.keypoints.rows import Rows, number, numbers, whole
+from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
+from posekit.safe_io import cut, refusal, shown, write_text
+
+BODIES = {"bodies": "joints", "people": "pose_keypoints_2d"}
+"""Where the people of a picture are and where their points, by ``--format cmu`` and ``open``."""
+
+
+def suits(given: Given) -> bool:
+    """Tell whether it is one of AlphaPose's layouts; a file a picture of ``--format open`` is OpenPose's."""
+    document = given.document
+    if isinstance(document, list):
+        return bool(document) and _is_row(document[0]) and isinstance(document[0]["image_id"], str)
+    if not isinstance(document, dict) or not document:
+        return False
+    return _is_picture(document, ("bodies",)) or _is_picture(next(iter(document.values())), tuple(BODIES))
+
+
+def _is_row(entry: object) -> bool:
+    return isinstance(entry, dict) and "image_id" in entry and isinstance(entry.get("keypoints"), list)
+
+
+def _is_picture(entry: object, kinds: tuple[str, ...]) -> bool:
+    return isinstance(entry, dict) and any(isinstance(entry.get(kind), list) for kind in kinds)
+
+
+def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+    """Read AlphaPose's results.
+
+    Raises
+    ------
+    InputError
+        Where it is none of its layouts, or nothing tells what the points are.
+    """
+    rows = Rows(str(given.path))
+    by_pictures = False
+    for path, document in given.documents():
+        rows.source = str(path)
+        if isinstance(document, list):
+            _read_list(rows, document)
+            continue
+        by_pictures = True
+        pictures = {path.stem: document} if _is_picture(document, tuple(BODIES)) else document
+        if not isinstance(pictures, dict):
+            raise refusal(
+                path, "", shown(document), "a list of people, or pictures by name", "check the file"
+            )
+        for label, picture in pictures.items():
+            _read_picture(rows, label, picture)
+    rows.source = str(given.path)
+    usual = {18: load_skeleton_map("coco_18")} if by_pictures else _usual()
+    if not rows.points:
+        return rows.keypoints("alphapose", layout or next(iter(usual.values())))
+    return rows.keypoints("alphapose", by_count(len(rows.points[0]), layout, given.path, usual))
+
+
+def _usual() -> dict[int, SkeletonMap]:
+    """List what AlphaPose's models write (docs/MODEL_ZOO.md): COCO, Halpe, and Halpe without the face."""
+    body, full = load_skeleton_map("halpe_26"), load_skeleton_map("halpe_136")
+    without_face = replace(body, name="halpe_68", points=body.points + full.points[26 + 68 :])
+    return {17: load_skeleton_map("coco_17"), 26: body, 68: without_face, 136: full}
+
+
+def _read_list(rows: Rows, people: list[Any]) -> None:
+    for index, person in enumerate(people):
+        place = f"[{index}]"
+        if not _is_row(person) or not isinstance(person["image_id"], str | int):
+            expected = "a person with image_id and keypoints"
+            raise refusal(rows.source, place, shown(person), expected, "check the file")
+        _add(rows, person["image_id"], person["keypoints"], f"{place}.keypoints", person)
+
+
+def _read_picture(rows: Rows, label: str, picture: object) -> None:
+    kind = next((kind for kind in BODIES if _is_picture(picture, (kind,))), None)
+    if kind is None or not isinstance(picture, dict):
+        raise refusal(rows.source, cut(label), shown(picture), "bodies or people", "check the file")
+    rows.picture(label)
+    for index, person in enumerate(picture[kind]):
+        place = f"{cut(label)}.{kind}[{index}]"
+        if not isinstance(person, dict):
+            raise refusal(rows.source, place, shown(person), f"{{{BODIES[kind]}}}", "check the file")
+        _add(rows, label, person.get(BODIES[kind]), f"{place}.{BODIES[kind]}", person)
+
+
+def _add(rows: Rows, label: object, keypoints: object, field: str, person: dict[str, Any]) -> None:
+    found = numbers(keypoints, rows.source, field, 3)
+    found[(found == 0).all(axis=1)] = np.nan
+    identity = person.get("idx")
+    while isinstance(identity, list) and identity:
+        identity = identity[0]
+    who = whole(identity)
+    rows.add(
+        label,
+        found[:, :2],
+        found[:, 2],
+        person=-1 if who is None else who,
+        score=number(person.get("score")),
+    )
+
+
+def write(path: Path, keypoints: KeyPoints) -> None:
+    """Write the flat list, one person a line.
+
+    Lost: pictures without people, sizes, times, which points were placed though hidden, and what the points are called.
+    Other points than AlphaPose's become COCO's 17, and those that COCO has not are lost. A missing point is (0, 0, 0);
+    a confidence that is not known is written as null.
+    """
+    usual = {layout.points: layout for layout in _usual().values()}
+    target = usual.get(keypoints.layout.points, load_skeleton_map("coco_17"))
+    write_text(path, _pieces(keypoints.in_layout(target)))
+
+
+def _pieces(keypoints: KeyPoints) -> Iterator[str]:
+    separator = "["
+    for row, frame in enumerate(keypoints.frame):
+        flat = np.concatenate([keypoints.points[row], keypoints.confidence[row][:, None]], axis=1)
+        flat[np.isnan(flat[:, 0])] = 0
+        values = [None if np.isnan(value) else float(value) for value in flat.ravel()]
+        person: dict[str, Any] = {
+            "image_id": keypoints.pictures[frame],
+            "category_id": 1,
+            "keypoints": values,
+        }
+        if not np.isnan(keypoints.score[row]):
+            person["score"] = float(keypoints.score[row])
+        if keypoints.person[row] >= 0:
+            person["idx"] = int(keypoints.person[row])
+        yield f"{separator}\n {json.dumps(person, allow_nan=False)}"
+        separator = ","
+    yield "[]\n" if separator == "[" else "\n]\n"
+
+
+FORMAT = Format(
+    name="alphapose",
+    says="AlphaPose: a list of people with the picture's name, or an object by pictures (cmu, open)",
+    suits=suits,
+    read=read,
+    write=write,
+    skeletons=("coco_17", "halpe_26", "halpe_136", "coco_18"),
+)

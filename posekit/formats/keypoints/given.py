@@ -1,0 +1,131 @@
+"""What was given to be read: a file or a folder, opened once for all formats that look at it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from posekit.safe_io import cut, open_file, parse_json, read_bytes, refusal
+from posekit.safe_io.text_file import decode
+
+MAX_BYTES = 500_000_000
+"""The largest file that is read whole: twice COCO's largest annotations."""
+MAX_FILES = 1_000_000
+"""Files in a folder."""
+
+
+@dataclass(frozen=True)
+class Given:
+    """A file, or a folder of one JSON file a picture.
+
+    Parameters
+    ----------
+    path : Path
+
+    Raises
+    ------
+    InputError
+        By each property where the file cannot be read, is larger than `MAX_BYTES`, or is malformed.
+    """
+
+    path: Path
+
+    @cached_property
+    def is_folder(self) -> bool:
+        """Whether it is a folder."""
+        try:
+            return self.path.is_dir()
+        except (OSError, ValueError):  # a name that is no name: opening it says so
+            return False
+
+    @cached_property
+    def files(self) -> tuple[Path, ...]:
+        """The JSON files of a folder in the order of the numbers in their names; the file itself else."""
+        if not self.is_folder:
+            return (self.path,)
+        try:
+            entries = list(self.path.iterdir())
+        except OSError as error:
+            reason = cut(error.strerror or str(error))
+            raise refusal(self.path, "", reason, "a readable folder", "check its permissions") from None
+        found = sorted((one for one in entries if is_json_name(one.name)), key=counted)
+        if not found:
+            inside = [one.name for one in sorted(entries) if one.is_dir() and holds_json(one)]
+            raise refusal(
+                self.path,
+                "",
+                f"a folder without JSON files; {', '.join(inside[:4])} in it have some"
+                if inside
+                else "a folder without JSON files",
+                "one JSON file a picture, of one camera",
+                f"give {inside[0]}" if inside else "give that folder",
+            )
+        if len(found) > MAX_FILES:
+            raise refusal(
+                self.path, "", f"{len(found):,} files", f"at most {MAX_FILES:,}", "split the folder"
+            )
+        return tuple(found)
+
+    @cached_property
+    def suffix(self) -> str:
+        """The file's ending in lower case, as ``.json``; empty for a folder."""
+        return "" if self.is_folder else self.path.suffix.lower()
+
+    @cached_property
+    def text(self) -> str:
+        """The file as text, UTF-8."""
+        return decode(self.path, self._bytes)
+
+    @cached_property
+    def is_json(self) -> bool:
+        """Whether the (first) file is JSON: by its ending, or because it begins like it."""
+        first = self.files[0]
+        with open_file(first, limit=MAX_BYTES, too_large=TOO_LARGE) as file:
+            start = file.read(64).removeprefix(b"\xef\xbb\xbf")
+        return first.suffix.lower() == ".json" or _JSON.match(start) is not None
+
+    @cached_property
+    def document(self) -> Any:
+        """What the (first) JSON file holds; None where the file is no JSON."""
+        return _parsed(self.files[0]) if self.is_json else None
+
+    def documents(self) -> Iterator[tuple[Path, Any]]:
+        """Go through the JSON files of a folder in their order, or the one file: each with what it holds."""
+        for index, path in enumerate(self.files):
+            yield path, self.document if index == 0 else _parsed(path)
+
+    @cached_property
+    def _bytes(self) -> bytes:
+        return read_bytes(self.path, limit=MAX_BYTES, too_large=TOO_LARGE)
+
+
+TOO_LARGE = "split it by pictures"
+_JSON = re.compile(rb'\s*(\{\s*["}]|\[\s*(\{|\]|\[\s*[\[{\d-]))')
+"""How JSON begins, and TOML, whose tables have names in brackets, does not."""
+
+
+def _parsed(path: Path) -> Any:
+    return parse_json(path, read_bytes(path, limit=MAX_BYTES, too_large=TOO_LARGE))
+
+
+def is_json_name(name: str) -> bool:
+    """Tell whether a name in a folder is a JSON file's; hidden ones are other programs' business."""
+    return name.lower().endswith(".json") and not name.startswith(".")
+
+
+def holds_json(folder: Path) -> bool:
+    """Tell whether a folder has a JSON file in it."""
+    try:
+        return any(is_json_name(one.name) for one in folder.iterdir())
+    except OSError:
+        return False
+
+
+def counted(path: Path) -> tuple[list[tuple[int, str]], str]:
+    """Order names by the numbers in them: ``cam.2.json`` before ``cam.10.json``."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", path.name)
+    return [(int(part), "") if part[0] in "0123456789" else (-1, part) for part in parts], path.name

@@ -1,0 +1,233 @@
+"""MediaPipe's landmarks in CSV: a row a frame (wide), or a row a landmark (long)."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterator
+
+import numpy as np
+
+from posekit.formats.keypoints.mediapipe_names import (
+    EITHER,
+    LABELS,
+    MICROSECONDS,
+    MILLISECONDS,
+    NAMES,
+    PRESENCE,
+    SECONDS,
+    VISIBILITY,
+    in_seconds,
+    landmark,
+    one_of,
+)
+from posekit.formats.keypoints.rows import LARGEST, Rows, whole
+from posekit.formats.skeleton_maps.skeleton_map import plain
+from posekit.geometry import Array
+from posekit.safe_io import cut, refusal, shown
+
+TIMES = (*MILLISECONDS, *MICROSECONDS, *SECONDS, *EITHER)
+LANDMARK = (
+    "landmarkname",
+    "landmark",
+    "name",
+    "landmarkid",
+    "landmarkindex",
+    "landmarkidx",
+    "keypoint",
+    "joint",
+    "id",
+)
+PERSON = ("person", "personid", "pose", "poseid", "posenumber", "trackid")
+FEWEST = 4
+"""Landmarks by name that a wide table must have to be taken for one."""
+PARTS = {"x": "x", "y": "y", **dict.fromkeys(VISIBILITY, "visibility"), **dict.fromkeys(PRESENCE, "presence")}
+_PART = "|".join(sorted(PARTS, key=len, reverse=True))
+_BEHIND = re.compile(rf"(?P<name>.+?)[\s._-]+(?P<part>{_PART})\Z", re.IGNORECASE)
+_BEFORE = re.compile(rf"(?P<part>{_PART})[\s._-]*(?P<name>[^\s._-].*)\Z", re.IGNORECASE)
+_COUNTED = re.compile(
+    r"(?:pose)?[\s._-]*(?:landmarks?|lm|keypoint|kp|point|p|l)?[\s._-]*(\d{1,3})\Z", re.IGNORECASE
+)
+"""``nose_x``, ``x_nose``, ``x0``, ``landmark_0_x``."""
+
+
+def looks_like_table(text: str) -> bool:
+    """Tell by the first line whether it is a table of MediaPipe's landmarks."""
+    header = _header(text)
+    return _is_long(header) or len(_columns(header)) >= FEWEST
+
+
+def _header(text: str) -> list[str]:
+    first = text.lstrip().partition("\n")[0][:20_000]
+    try:
+        return [name.strip() for name in next(csv.reader([first]), [])]
+    except csv.Error:
+        return []
+
+
+def _is_long(header: list[str]) -> bool:
+    names = {plain(name) for name in header}
+    return {"x", "y"} <= names and bool(names & set(LANDMARK)) and bool(names & {*LABELS, *TIMES})
+
+
+def _columns(header: list[str]) -> dict[int, dict[str, int]]:
+    """Return for each landmark its columns by part: x, y, visibility; world landmarks are left out."""
+    named: dict[int, dict[str, int]] = {}
+    counted: dict[int, dict[str, int]] = {}
+    for column, name in enumerate(header):
+        match = _BEHIND.match(name) or _BEFORE.match(name)
+        if match is None or "world" in name.casefold():
+            continue
+        part = PARTS[match["part"].lower()]
+        count = _COUNTED.match(match["name"])
+        if count is not None:
+            counted.setdefault(int(count[1]), {}).setdefault(part, column)
+        elif (index := landmark(match["name"])) is not None:
+            named.setdefault(index, {}).setdefault(part, column)
+    if not named:
+        first = 1 if 0 not in counted and len(NAMES) in counted else 0
+        named = {index - first: parts for index, parts in counted.items()}
+    return {k: parts for k, parts in named.items() if k < len(NAMES) and {"x", "y"} <= set(parts)}
+
+
+def add_table(rows: Rows, text: str) -> None:
+    """Note the rows of a table.
+
+    Raises
+    ------
+    InputError
+        Where it is neither long nor wide, a line has another number of fields, or a field is no number.
+    """
+    header = _header(text)
+    if _is_long(header):
+        _add_long(rows, header, text)
+        return
+    columns = _columns(header)
+    if not columns:
+        raise refusal(
+            rows.source,
+            "line 1",
+            shown(",".join(header)),
+            "columns as nose_x, nose_y, nose_visibility, or frame, landmark, x, y, visibility",
+            "name the columns so",
+        )
+    _add_wide(rows, header, columns, text)
+
+
+def _lines(rows: Rows, header: list[str], text: str) -> Iterator[tuple[int, list[str]]]:
+    reader = csv.reader(text.lstrip().splitlines())
+    try:
+        next(reader)
+        for fields in reader:
+            if not fields:
+                continue
+            if len(fields) != len(header):
+                got, expected = f"{len(fields)} fields", f"{len(header)}, as in the first line"
+                raise refusal(rows.source, f"line {reader.line_num}", got, expected, "correct the line")
+            yield reader.line_num, fields
+    except csv.Error as error:
+        raise refusal(
+            rows.source, f"line {reader.line_num}", cut(str(error)), "CSV", "save it again"
+        ) from None
+
+
+def _value(rows: Rows, line: int, name: str, text: str) -> float:
+    """Read a field; empty and NaN are not known."""
+    text = text.strip()
+    if not text or text.casefold() in ("nan", "none", "null"):
+        return np.nan
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.inf
+    if not abs(value) <= LARGEST:
+        raise refusal(
+            rows.source, f"line {line}: {cut(name)}", shown(text), "a number, or nothing", "correct it"
+        )
+    return value
+
+
+def _time(text: str) -> float:
+    """Read a time; a date or nothing is not known."""
+    try:
+        value = float(text)
+    except ValueError:
+        return np.nan
+    return value if np.isfinite(value) else np.nan
+
+
+def _described(header: list[str]) -> tuple[int | None, int | None, str]:
+    label, time = one_of(header, LABELS), one_of(header, TIMES)
+    return (
+        header.index(label) if label is not None else None,
+        header.index(time) if time is not None else None,
+        plain(time) if time is not None else "",
+    )
+
+
+def _label(text: str) -> str:
+    """Spell a frame's number as a number: 3.0 is 3."""
+    value = text.strip()
+    try:
+        index = whole(float(value))
+    except ValueError:
+        return value
+    return value if index is None else str(index)
+
+
+def _add_wide(rows: Rows, header: list[str], columns: dict[int, dict[str, int]], text: str) -> None:
+    label, time, unit = _described(header)
+    labels, times = [], []
+    for count, (line, fields) in enumerate(_lines(rows, header, text)):
+        labels.append(rows.picture(_label(fields[label]) if label is not None else count))
+        times.append(_time(fields[time]) if time is not None else np.nan)
+        points, sure = np.full((len(NAMES), 2), np.nan), np.full(len(NAMES), np.nan)
+        for index, parts in columns.items():
+            for axis, part in enumerate("xy"):
+                points[index, axis] = _value(rows, line, header[parts[part]], fields[parts[part]])
+            surest = parts.get("visibility", parts.get("presence"))
+            if surest is not None:
+                sure[index] = _value(rows, line, header[surest], fields[surest])
+        if not np.isnan(points).all():
+            rows.add(labels[-1], points, sure)
+    _note_times(rows, labels, times, unit)
+
+
+def _add_long(rows: Rows, header: list[str], text: str) -> None:
+    label, time, unit = _described(header)
+    which = header.index(one_of(header, LANDMARK) or "")
+    x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
+    named = one_of(header, VISIBILITY) or one_of(header, PRESENCE)
+    surest = header.index(named) if named is not None else None
+    person = one_of(header, PERSON)
+    who = header.index(person) if person is not None else None
+    people: dict[tuple[str, str], tuple[Array, Array]] = {}
+    labels: dict[str, float] = {}
+    for line, fields in _lines(rows, header, text):
+        key = _label(fields[label if label is not None else time or 0])
+        labels.setdefault(key, _time(fields[time]) if time is not None else np.nan)
+        rows.picture(key)
+        index = landmark(fields[which].strip())
+        if index is None:
+            if not fields[which].strip():
+                continue
+            expected = f"a landmark's name, or its number 0 to {len(NAMES) - 1}"
+            raise refusal(
+                rows.source, f"line {line}: {header[which]}", shown(fields[which]), expected, "correct it"
+            )
+        empty = np.full((len(NAMES), 2), np.nan), np.full(len(NAMES), np.nan)
+        points, sure = people.setdefault((key, fields[who] if who is not None else ""), empty)
+        if not np.isnan(points[index]).all():
+            got, expected = f"{NAMES[index]} twice in a picture", "once, or a column person"
+            raise refusal(rows.source, f"line {line}", got, expected, "number the people")
+        points[index] = [_value(rows, line, header[k], fields[k]) for k in (x, y)]
+        if surest is not None:
+            sure[index] = _value(rows, line, header[surest], fields[surest])
+    for (key, _), (points, sure) in people.items():
+        rows.add(key, points, sure)
+    _note_times(rows, list(labels), list(labels.values()), unit)
+
+
+def _note_times(rows: Rows, labels: list[str], times: list[float], unit: str) -> None:
+    for label, time in zip(labels, in_seconds(np.array(times), unit), strict=True):
+        rows.picture(label, time=float(time))

@@ -1,0 +1,101 @@
+"""MMPose, the demos' layout: ``{meta_info, instance_info}``, the points by name in `meta_info`.
+
+MMPose 1.x (open-mmlab/mmpose), ``demo/topdown_demo_with_mmdet.py --save-predictions``: of a video, `instance_info` is a
+list of pictures ``{frame_id, instances}`` counted from 1; of a picture, the list of its people.
+``meta_info.keypoint_id2name`` names the points.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from posekit.formats.keypoints.format import Format
+from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.keypoints.mmpose_instances import add_frames, add_instances, is_frame, written_frames
+from posekit.formats.keypoints.named_layout import by_names
+from posekit.formats.keypoints.rows import Rows, whole
+from posekit.formats.skeleton_maps import SkeletonMap
+from posekit.safe_io import refusal, shown, write_text
+from posekit.safe_io.writing import json_pieces
+
+MAX_POINTS = 1000
+
+
+def suits(given: Given) -> bool:
+    """Tell whether it is an object with `meta_info` and `instance_info`."""
+    document = given.document
+    return isinstance(document, dict) and "instance_info" in document and "meta_info" in document
+
+
+def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+    """Read predictions that a demo of MMPose saved; of a folder, each file is a picture.
+
+    Raises
+    ------
+    InputError
+        Where it is not that layout, is of points in space, or its names fit no skeleton map.
+    """
+    rows = Rows(str(given.path))
+    names: list[str] = []
+    for path, document in given.documents():
+        rows.source = str(path)
+        info = document.get("instance_info") if isinstance(document, dict) else None
+        if not isinstance(info, list):
+            raise refusal(path, "instance_info", shown(info), "a list", "save it with --save-predictions")
+        found = _names(path, document.get("meta_info"))
+        if names and found != names:
+            raise refusal(
+                path, "meta_info", "other points than the files before", "the same", "split the folder"
+            )
+        names = found
+        if info and is_frame(info[0]):
+            add_frames(rows, info, "instance_info")
+        else:
+            add_instances(rows, rows.picture(path.stem), info, "instance_info")
+    rows.source = str(given.path)
+    if rows.points and len(rows.points[0]) != len(names):
+        got = f"{len(rows.points[0])} points a person, {len(names)} names in meta_info"
+        raise refusal(given.path, "meta_info", got, "a name a point", "save the file again")
+    return rows.keypoints("mmpose", by_names(names, layout, given.path))
+
+
+def _names(path: Path, meta: object) -> list[str]:
+    """Return the points' names in their order."""
+    field = "meta_info.keypoint_id2name"
+    table = meta.get("keypoint_id2name") if isinstance(meta, dict) else None
+    if not isinstance(table, dict) or not 0 < len(table) <= MAX_POINTS:
+        raise refusal(path, field, shown(table), "the points' names by number", "save it with MMPose 1.x")
+    numbered = {whole(key): name for key, name in table.items()}
+    names = [numbered.get(k) for k in range(len(table))]
+    for index, name in enumerate(names):
+        if not isinstance(name, str) or not name.strip():
+            raise refusal(path, f"{field}.{index}", shown(name), "a name", "save the file again")
+    return [str(name) for name in names]
+
+
+def write(path: Path, keypoints: KeyPoints) -> None:
+    """Write the demos' layout of a video, one picture a line.
+
+    Lost: pictures' names that are no numbers, sizes, times, and which points were placed though hidden. A confidence
+    that is not known is written as 1; a point with one that is not positive comes back as missing.
+    """
+    names = keypoints.layout.points
+    meta: dict[str, Any] = {
+        "dataset_name": keypoints.layout.name,
+        "num_keypoints": len(names),
+        "keypoint_id2name": {str(k): name for k, name in enumerate(names)},
+        "keypoint_name2id": {name: k for k, name in enumerate(names)},
+    }
+    write_text(path, json_pieces({"meta_info": meta}, "instance_info", written_frames(keypoints, 1)))
+
+
+FORMAT = Format(
+    name="mmpose",
+    says="MMPose's demos: meta_info with the points' names, instance_info with pictures or people",
+    suits=suits,
+    read=read,
+    write=write,
+    skeletons=("coco_17", "halpe_26", "coco_wholebody_133", "h36m_17"),
+)

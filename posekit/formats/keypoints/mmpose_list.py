@@ -1,0 +1,114 @@
+"""MMPose, the Inferencer's layout: a bare list of people, or of pictures ``{frame_id, instances}``, without names.
+
+``MMPoseInferencer(..., pred_out_dir=…)`` of MMPose 1.x (open-mmlab/mmpose,
+mmpose/apis/inferencers/base_mmpose_inferencer.py) writes one file a picture, named as the picture is, or one a video,
+counted from 0. What the points are is known by their number alone, and 17 are COCO's or Human3.6M's: what is at the
+places of the head tells which.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from posekit.formats.keypoints.format import Format
+from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
+from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.keypoints.mmpose_instances import (
+    add_frames,
+    add_instances,
+    is_frame,
+    is_instance,
+    written_frames,
+)
+from posekit.formats.keypoints.named_layout import by_count
+from posekit.formats.keypoints.rows import Rows
+from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
+from posekit.safe_io import refusal, shown, write_text
+
+BY_COUNT = {17: "coco_17", 26: "halpe_26", 133: "coco_wholebody_133", 136: "halpe_136"}
+
+
+def suits(given: Given) -> bool:
+    """Tell whether it is a list of MMPose's people or pictures."""
+    document = given.document
+    return (
+        isinstance(document, list) and bool(document) and (is_instance(document[0]) or is_frame(document[0]))
+    )
+
+
+def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+    """Read what the Inferencer saved; of a folder, each file is a picture.
+
+    Raises
+    ------
+    InputError
+        Where it is not that layout, is of points in space, or nothing tells what the points are.
+    """
+    rows = Rows(str(given.path))
+    for path, document in given.documents():
+        rows.source = str(path)
+        if not isinstance(document, list):
+            raise refusal(
+                path, "", shown(document), "a list of people or of pictures", "name the file that is"
+            )
+        if document and is_frame(document[0]):
+            add_frames(rows, document, "")
+        else:
+            add_instances(rows, rows.picture(path.stem), document, "")
+    rows.source = str(given.path)
+    if not rows.points:
+        return rows.keypoints("mmpose-list", layout or load_skeleton_map("coco_17"))
+    return rows.keypoints("mmpose-list", _layout(rows, layout))
+
+
+def _layout(rows: Rows, layout: SkeletonMap | None) -> SkeletonMap:
+    count = len(rows.points[0])
+    if layout is None and count == 17:
+        share = head_share(np.array(rows.points))
+        if share > HEAD_H36M:
+            return load_skeleton_map("h36m_17")
+        if not share < HEAD_COCO:
+            raise refusal(
+                rows.source,
+                "points",
+                "17 a person, unnamed",
+                "points that are clearly coco_17 or h36m_17",
+                "say which with --skeleton coco_17 or --skeleton h36m_17",
+            )
+    usual = {number: load_skeleton_map(name) for number, name in BY_COUNT.items()}
+    return by_count(count, layout, rows.source, usual)
+
+
+def write(path: Path, keypoints: KeyPoints) -> None:
+    """Write the Inferencer's layout of a video, one picture a line.
+
+    Lost, besides what `posekit.formats.keypoints.mmpose.write` loses: what the points are called. Other points than
+    those that are told by their number when it is read become COCO's 17, and those that COCO has not are lost.
+    """
+    tellable = [load_skeleton_map(name) for name in (*BY_COUNT.values(), "h36m_17")]
+    layouts = {layout.points: layout for layout in tellable}
+    target = layouts.get(keypoints.layout.points, load_skeleton_map("coco_17"))
+    write_text(path, _pieces(keypoints.in_layout(target)))
+
+
+def _pieces(keypoints: KeyPoints) -> Iterator[str]:
+    separator = "["
+    for frame in written_frames(keypoints, 0):
+        yield f"{separator}\n {json.dumps(frame, allow_nan=False)}"
+        separator = ","
+    yield "[]\n" if separator == "[" else "\n]\n"
+
+
+FORMAT = Format(
+    name="mmpose-list",
+    says="MMPose's Inferencer: a list of people or of pictures, points without names",
+    suits=suits,
+    read=read,
+    write=write,
+    skeletons=("coco_17", "h36m_17", "halpe_26", "coco_wholebody_133", "halpe_136"),
+)

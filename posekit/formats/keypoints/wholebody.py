@@ -1,0 +1,149 @@
+"""COCO-WholeBody: 133 points of body, feet, face and hands, in parts or in one list.
+
+The annotations of Jin et al. 2020 have COCO's 17 points and beside them ``foot_kpts``, ``face_kpts``,
+``lefthand_kpts``, ``righthand_kpts`` with a flag each whether the part could be labelled; results have the same parts
+with confidences (data format and evaluation of jin-s13/COCO-WholeBody). Detectors write the 133 in one list of
+``keypoints``.
+
+In annotations v = 1 is a hidden point for body and feet, and just a labelled one for face and hands, where a fraction
+says how reliable it is. Not written: times, and confidences other than such fractions.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of, check_pixels, write_annotations
+from posekit.formats.keypoints.coco_images import images_from
+from posekit.formats.keypoints.coco_parts import COUNT, PARTS, SEEN, is_wholebody, joined, parted
+from posekit.formats.keypoints.coco_people import (
+    as_confidences,
+    by_picture,
+    identities_of,
+    pictures_of,
+    scores_of,
+    tracks_of,
+)
+from posekit.formats.keypoints.coco_triples import flat
+from posekit.formats.keypoints.format import Format
+from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
+from posekit.geometry import Array
+from posekit.safe_io import cut, refusal, shown
+
+LAYOUT: Final = "coco_wholebody_133"
+
+
+def suits(given: Given) -> bool:
+    """Tell whether the first person with key points has the parts, or 133 points."""
+    document = None if given.is_folder else given.document
+    people = document.get(FIELD) if isinstance(document, dict) else document
+    if not isinstance(people, list):
+        return False
+    first = next((one for one in people if isinstance(one, dict) and is_person(one)), None)
+    return first is not None and is_wholebody(first) and type(first.get("image_id")) in (int, str)
+
+
+def is_person(entry: dict[str, Any]) -> bool:
+    """Tell whether an entry has key points of any part."""
+    return any(name in entry for name, *_ in PARTS)
+
+
+def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+    """Read annotations, or a flat list of results.
+
+    Raises
+    ------
+    InputError
+        Where the file is malformed, or the given layout has not 133 points.
+    """
+    source = given.path
+    found = load_skeleton_map(LAYOUT) if layout is None else layout
+    if len(found.points) != COUNT:
+        raise refusal(
+            source,
+            "points of a person",
+            f"{COUNT}",
+            f"{len(found.points)}, as skeleton map {cut(found.name)} has",
+            f"leave the map out, or take {LAYOUT}",
+        )
+    document = None if given.is_folder else given.document
+    if isinstance(document, list):
+        field, people = "", document
+        for place, one in enumerate(people):
+            if not isinstance(one, dict) or not is_person(one):
+                raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"', "correct it")
+        images = images_from(identities_of(source, field, people))
+    else:
+        field = FIELD
+        people, images = annotations_of(given)
+    values = joined(source, field, people)
+    frame = pictures_of(source, field, people, images)
+    if isinstance(document, list):
+        points, confidence = as_confidences(values)
+        occluded = np.zeros(confidence.shape, dtype=np.bool_)
+    else:
+        points, confidence, occluded = _flagged(source, values)
+    rows = by_picture(frame, points)
+    return KeyPoints(
+        format=FORMAT.name,
+        source=str(source),
+        sequence=False,
+        layout=found,
+        pictures=images.names,
+        size=images.size,
+        frame=frame[rows],
+        points=points[rows],
+        confidence=confidence[rows],
+        occluded=occluded[rows],
+        score=scores_of(source, field, people)[rows],
+        person=tracks_of(source, field, people)[rows],
+    )
+
+
+def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Part triples into points, confidences, and which points are hidden."""
+    third = values[..., 2]
+    if not ((third >= 0) & (third <= 2)).all():
+        odd = float(third[~((third >= 0) & (third <= 2))][0])
+        raise refusal(source, "v", f"{odd:g}", "0, 1, 2, or a fraction", "correct it")
+    fraction = third % 1 != 0
+    fraction[:, :SEEN] |= fraction[:, :SEEN].any()  # body and feet of a detector, not labelled by hand
+    points = values[..., :2].copy()
+    points[(third == 0) & ~fraction] = np.nan
+    points[fraction & (points == 0).all(axis=-1)] = np.nan
+    confidence = np.where(fraction & ~np.isnan(points[..., 0]), third, np.nan)
+    occluded = (third == 1) & ~fraction
+    occluded[:, SEEN:] = False
+    return points, confidence, occluded
+
+
+def write(path: Path, keypoints: KeyPoints) -> None:
+    """Write annotations in parts; key points of another layout are brought into this one.
+
+    Raises
+    ------
+    InputError
+        Where points are fractions of pictures of unknown size, or the file cannot be written.
+    """
+    keypoints = keypoints.in_layout(load_skeleton_map(LAYOUT))
+    check_pixels(path, keypoints)
+    visible = np.where(keypoints.occluded, 1.0, 2.0)
+    sure = keypoints.confidence[:, SEEN:]
+    visible[:, SEEN:] = np.where((sure > 0) & (sure < 1), sure, 1)
+    write_annotations(path, keypoints, keypoints.layout.points[:17], parted(flat(keypoints.points, visible)))
+
+
+FORMAT = Format(
+    name="coco-wholebody",
+    says="COCO-WholeBody annotations or results: 133 points, in parts or in one list",
+    suits=suits,
+    read=read,
+    write=write,
+    skeletons=(LAYOUT,),
+)

@@ -1,0 +1,218 @@
+"""MOT: tables of joint angles, as OpenSim writes and plots them; see *Motion (.mot) Files* in its documentation.
+
+A header (name, ``version=1``, ``nRows=``, ``nColumns=``, ``inDegrees=yes``, comments, ``endheader``), a line of column
+names, then a row a frame, separated by tabs. Columns: ``time``; the place of the torso's origin, the neck, as
+``torso_tx``, ``torso_ty``, ``torso_tz`` in metres; its rotation as ``torso_rz``, ``torso_ry``, ``torso_rx``; the 22
+angles by the names of the figure's URDF joints. All angles are in degrees.
+
+The torso's rotation is intrinsic z-y'-x'', yaw, pitch and roll of a body with x forward, y left and z up:
+
+.. math:: R = R_z(r_z) R_y(r_y) R_x(r_x)
+
+with :math:`r_y` in [-90, 90] and the other two unwrapped along the frames, so that they do not jump by a turn. At
+:math:`|r_y| = 90` (the chest straight up or down) the two others turn about one axis, and :math:`r_x` is set to 0: the
+rotation itself is kept in every case. Angles that are not known are ``nan``. The frame is that of q, the figure's
+lengths are not in the file: keep its URDF beside it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+
+from posekit.formats.motion.format import MotionFormat
+from posekit.formats.motion.motion_checks import sniffed
+from posekit.geometry import Array
+from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_text
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+
+MAX_BYTES: Final = 500_000_000
+PLACE: Final = ("torso_tx", "torso_ty", "torso_tz")
+ROTATION: Final = ("torso_rz", "torso_ry", "torso_rx")
+_CHUNK: Final = 4096
+
+
+def write_mot(path: str | Path, figure: Figure, q: Array, time: Array) -> None:
+    """Write joint angles.
+
+    Parameters
+    ----------
+    path : path
+    figure : Figure
+    q : array (T, nq)
+        In Pinocchio's order, metres, unit quaternions, radians; NaN where an angle is not known.
+    time : array (T,)
+        Seconds, ascending.
+
+    Raises
+    ------
+    InputError
+        Where shapes do not fit, a number is infinite, a quaternion is not of unit length, times do not ascend, or the
+        file cannot be written.
+    """
+    q, time = checked_configurations(path, figure, q, time)
+    names = ["time", *PLACE, *ROTATION, *figure.configuration_names[7:]]
+    values = np.concatenate(
+        [time[:, None], q[:, :3], np.degrees(_unwrapped(yaw_pitch_roll(q[:, 3:7]))), np.degrees(q[:, 7:])],
+        axis=1,
+    )
+    write_text(path, _pieces(Path(path).stem, names, values))
+
+
+def read_mot(path: str | Path, figure: Figure) -> tuple[Array, Array]:
+    """Read joint angles that `write_mot` wrote, as q (T, nq) and the frames' times (T,), seconds.
+
+    Parameters
+    ----------
+    path : path
+    figure : Figure
+        Whose joints they are.
+
+    Raises
+    ------
+    InputError
+        Where the file is no MOT, is cut off, or has not all of the figure's angles.
+    """
+    names, values, degrees = _read_table(path)
+    wanted = ["time", *PLACE, *ROTATION, *figure.configuration_names[7:]]
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        hint = nearest(missing[0], names)[:200]
+        raise refusal(path, "columns", f"no {missing[0]}", f"the {len(wanted)} columns of the figure", hint)
+    columns = values[:, [names.index(name) for name in wanted]]
+    if degrees:
+        columns[:, 4:] = np.radians(columns[:, 4:])
+    q = np.concatenate([columns[:, 1:4], quaternions_of(columns[:, 4:7]), columns[:, 7:]], axis=1)
+    return checked_configurations(path, figure, q, columns[:, 0])
+
+
+def yaw_pitch_roll(quaternions: Array) -> Array:
+    """Turn unit quaternions (T, 4), x, y, z, w, into angles (T, 3) of R = R_z R_y R_x, radians."""
+    x, y, z, w = quaternions.T
+    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=-1)
+    left_x, left_y = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z)
+    above_x, above_y = 2 * (x * z + y * w), 2 * (y * z - x * w)
+    level = np.hypot(forward[:, 0], forward[:, 1])
+    # Straight up or down the first column says nothing of the yaw: all the turning about that axis counts as yaw.
+    yaw = np.where(level < 1e-9, np.arctan2(-left_x, left_y), np.arctan2(forward[:, 1], forward[:, 0]))
+    pitch = np.arctan2(-forward[:, 2], level)
+    # The roll is what is left after that yaw, so that the three together are the rotation wherever the yaw is vague.
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    roll = np.arctan2(sin * above_x - cos * above_y, cos * left_y - sin * left_x)
+    return np.stack([yaw, pitch, roll], axis=-1)
+
+
+def quaternions_of(angles: Array) -> Array:
+    """Turn angles (T, 3) of R = R_z R_y R_x, radians, into unit quaternions (T, 4), x, y, z, w, with w >= 0."""
+    (cz, cy, cx), (sz, sy, sx) = np.cos(angles / 2).T, np.sin(angles / 2).T
+    q = np.stack(
+        [
+            cz * cy * sx - sz * sy * cx,
+            cz * sy * cx + sz * cy * sx,
+            sz * cy * cx - cz * sy * sx,
+            cz * cy * cx + sz * sy * sx,
+        ],
+        axis=-1,
+    )
+    return np.asarray(q * np.where(q[:, 3:] < 0, -1.0, 1.0))
+
+
+def checked_configurations(path: str | Path, figure: Figure, q: Array, time: Array) -> tuple[Array, Array]:
+    """Refuse configurations that are none: shapes, infinite numbers, quaternions, times out of order."""
+    q, time = np.asarray(q, dtype=np.float64), np.asarray(time, dtype=np.float64)
+    if q.ndim != 2 or q.shape[1] != figure.model.nq or time.shape != (len(q),) or len(q) == 0:
+        got = f"q of shape {q.shape}, time of shape {time.shape}"
+        raise refusal(path, "q", got, f"(T, {figure.model.nq}) and (T,), T of one or more", "reshape them")
+    if np.isinf(q).any() or not np.isfinite(time).all():
+        raise refusal(
+            path, "q", "an infinite number, or a time that is none", "finite numbers", "correct them"
+        )
+    length = np.linalg.norm(q[:, 3:7], axis=1)
+    if (np.abs(length - 1) > 1e-6).any():
+        frame = int(np.argmax(np.abs(length - 1) > 1e-6))
+        got = f"a quaternion of length {length[frame]:g}"
+        raise refusal(path, f"frame {frame}", got, "length 1", "normalise q[3:7]")
+    back = np.diff(time) <= 0
+    if back.any():
+        frame = int(np.argmax(back)) + 1
+        got = f"time {time[frame]:g} s after {time[frame - 1]:g} s"
+        raise refusal(path, f"frame {frame}", got, "times that ascend", "put the frames in order, each once")
+    q = q.copy()
+    q[:, 3:7] /= length[:, None]
+    return q, time
+
+
+def _unwrapped(angles: Array) -> Array:
+    """Take out the jumps by a turn between known frames."""
+    found = angles.copy()
+    known = np.isfinite(angles).all(axis=1)
+    found[known] = np.unwrap(angles[known], axis=0)
+    return found
+
+
+def _pieces(name: str, names: Sequence[str], values: Array) -> Iterator[str]:
+    yield f"{one_line(name)}\nversion=1\nnRows={len(values)}\nnColumns={len(names)}\ninDegrees=yes\n\n"
+    yield "Lengths are in metres, angles in degrees.\n"
+    yield "The rotation of the torso is intrinsic z-y'-x'': R = Rz(torso_rz) Ry(torso_ry) Rx(torso_rx).\n"
+    yield "\nendheader\n"
+    yield "\t".join(names) + "\n"
+    row = "\t".join(["%.12g"] * len(names)) + "\n"
+    for start in range(0, len(values), _CHUNK):
+        yield "".join(row % tuple(one) for one in values[start : start + _CHUNK].tolist())
+
+
+def _read_table(path: str | Path) -> tuple[list[str], Array, bool]:
+    """Return column names, values, and whether angles are in degrees."""
+    lines = read_text(path, limit=MAX_BYTES, too_large="split it by frames").splitlines()
+    end = next((k for k, line in enumerate(lines) if line.strip().casefold() == "endheader"), None)
+    if end is None or end + 1 >= len(lines):
+        raise refusal(
+            path, "", "no endheader", "a MOT file, with endheader before its columns", "check the format"
+        )
+    fields = dict(line.replace(" ", "").split("=", 1) for line in lines[:end] if "=" in line)
+    header = {name.casefold(): value.strip() for name, value in fields.items()}
+    names = lines[end + 1].split("\t")
+    names = [name.strip() for name in (names if len(names) > 1 else lines[end + 1].split())]
+    body = [(k, line) for k, line in enumerate(lines[end + 2 :], end + 3) if line.strip()]
+    for field, count in (("nrows", len(body)), ("ncolumns", len(names))):
+        if field in header and header[field] != str(count):
+            got = f"{count}, but the header says {shown(header[field])}"
+            raise refusal(
+                path, field, got, "as many as the header says", "the file is cut off, or correct it"
+            )
+    rows = []
+    for k, line in body:
+        row = [_number(cell) for cell in line.split()]
+        if len(row) != len(names) or any(cell is None for cell in row):
+            bad = next((cell for cell, value in zip(line.split(), row, strict=True) if value is None), None)
+            got = shown(bad) if bad is not None else f"{len(row)} numbers"
+            raise refusal(
+                path, f"line {k}", got, f"{len(names)} numbers, as there are columns", "correct the row"
+            )
+        rows.append(row)
+    if not rows:
+        raise refusal(path, "", "no frames", "a row a frame", "check how it was written")
+    return names, np.array(rows, dtype=np.float64), header.get("indegrees", "yes").casefold() != "no"
+
+
+def _number(cell: str) -> float | None:
+    try:
+        value = float(cell)
+    except ValueError:
+        return None
+    return None if math.isinf(value) or "_" in cell else value
+
+
+FORMAT = MotionFormat(
+    name="mot",
+    says="MOT, joint angles of OpenSim; read with the figure whose angles they are",
+    suffixes=(".mot", ".sto"),
+    write_configurations=write_mot,
+    suits=lambda path: b"endheader" in sniffed(path),
+)

@@ -1,0 +1,58 @@
+"""What readers and writers of motion ask alike: the first bytes of a file, one clip, the size of what moves."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from posekit.errors import InputError
+from posekit.formats.motion.motion import Motion
+from posekit.safe_io import open_file, refusal, shown
+
+_FIRST: Final = 4096
+_LARGEST: Final = 1 << 62
+SMALLEST, WIDEST = 0.1, 20.0
+"""Metres that the points of one frame span: a hand is larger, people on one stage are nearer to each other."""
+
+
+def sniffed(path: Path) -> bytes:
+    """Return the first bytes of a file; none where it cannot be read."""
+    try:
+        with open_file(path, limit=_LARGEST) as file:
+            return file.read(_FIRST)
+    except (InputError, OSError):
+        return b""
+
+
+def the_one_clip(path: str | Path, motion: Motion, format: str) -> Motion:
+    """Refuse several clips for a format that carries one."""
+    if len(motion.clips) > 1:
+        got = f"{len(motion.clips)} clips ({shown(motion.clips[0])}, …)"
+        raise refusal(path, "clips", got, f"one, for {format} holds one", "choose one by its name")
+    return motion
+
+
+def check_size(motion: Motion) -> None:
+    """Refuse points whose extent is no body's in metres: their unit is another.
+
+    Raises
+    ------
+    InputError
+        Where half of the frames span less than `SMALLEST` or more than `WIDEST`.
+    """
+    known = np.isfinite(motion.points).all(axis=-1)
+    rows = known.sum(axis=1) > 1
+    if not rows.any():
+        return
+    points = motion.points[rows]
+    extent = float(np.median(np.linalg.norm(np.nanmax(points, axis=1) - np.nanmin(points, axis=1), axis=-1)))
+    if not SMALLEST <= extent <= WIDEST:
+        raise refusal(
+            motion.source,
+            "unit",
+            f"points that span {extent:.4g} m",
+            f"{SMALLEST:g} to {WIDEST:g} m",
+            "state the unit in which the file is: m, cm, mm or in",
+        )

@@ -1,0 +1,156 @@
+"""Read and write motion: which format a file is in, and the formats by name."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from posekit.formats.motion.format import UNITS, MotionFormat
+from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion_checks import check_size
+from posekit.geometry import Array
+from posekit.safe_io import nearest, refusal, shown
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
+
+_MODULES = ("trc", "c3d", "csv_table", "npz", "parquet", "mot", "bvh", "glb", "urdf_folder")
+
+
+@cache
+def motion_formats() -> dict[str, MotionFormat]:
+    """Return the formats by name; each module has its own as `FORMAT`."""
+    found = [import_module(f"posekit.formats.motion.{name}").FORMAT for name in _MODULES]
+    return {one.name: one for one in found}
+
+
+def read_motion(
+    path: str | Path, format: str | None = None, *, unit: str | None = None, up: str | None = None
+) -> Motion:
+    """Read named points over time.
+
+    Parameters
+    ----------
+    path : path
+    format : str, optional
+        One of `motion_formats`; by the end of the file's name, or its content, if not given.
+    unit : str, optional
+        ``m``, ``cm``, ``mm`` or ``in``: instead of what the file says or is taken to be in.
+    up : str, optional
+        The axis that points up, ``+y``: instead of what the file says. Points are not turned.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, is in no format that is known, or in several (the candidates are named); where its
+        points span so little or so much that the unit must be another, unless it is stated.
+    """
+    if unit is not None and unit not in UNITS:
+        raise refusal("--unit", "", shown(unit), "a known unit", nearest(unit, UNITS))
+    if up is not None and up not in UPS:
+        raise refusal("--up", "", shown(up), "an axis", nearest(up, UPS))
+    chosen = motion_format(format) if format is not None else format_of(path)
+    if chosen.read is None:
+        got = f"{chosen.name}: {chosen.says}"
+        expected = f"points: {', '.join(one.name for one in motion_formats().values() if one.read)}"
+        raise refusal(path, "format", got, expected, "choose a file of points")
+    motion = chosen.read(Path(path), unit)
+    if unit is None:
+        check_size(motion)
+    return motion if up is None else replace(motion, up=up)
+
+
+def write_motion(path: str | Path, motion: Motion, format: str | None = None) -> None:
+    """Write named points over time, whole or not at all, in a format by name or by the end of the file's name.
+
+    Raises
+    ------
+    InputError
+        Where the format is not known or carries no points, or the file cannot be written.
+    """
+    chosen = motion_format(format) if format is not None else _by_suffix(path)
+    if chosen.write_points is None:
+        formats = ", ".join(one.name for one in motion_formats().values() if one.write_points)
+        raise refusal(
+            path, "format", f"{chosen.name}, which carries joint angles", formats, "choose one of them"
+        )
+    chosen.write_points(Path(path), motion)
+
+
+def write_configurations(
+    path: str | Path, figure: Figure, q: Array, time: Array, format: str | None = None
+) -> None:
+    """Write joint angles of a figure, whole or not at all; see `posekit.formats.motion.format.MotionFormat`.
+
+    Raises
+    ------
+    InputError
+        Where the format is not known or carries no joint angles, or the file cannot be written.
+    """
+    chosen = motion_format(format) if format is not None else _by_suffix(path)
+    if chosen.write_configurations is None:
+        formats = ", ".join(one.name for one in motion_formats().values() if one.write_configurations)
+        raise refusal(path, "format", f"{chosen.name}, which carries points", formats, "choose one of them")
+    chosen.write_configurations(Path(path), figure, q, time)
+
+
+def motion_format(name: str) -> MotionFormat:
+    """Return a format by its name.
+
+    Raises
+    ------
+    InputError
+        Where there is no such format.
+    """
+    if name not in motion_formats():
+        raise refusal("--format", "", shown(name), "a known format", nearest(name, motion_formats()))
+    return motion_formats()[name]
+
+
+def format_of(path: str | Path) -> MotionFormat:
+    """Tell a file's format, by the end of its name and by its content.
+
+    Raises
+    ------
+    InputError
+        Where neither says it, or the two say different things; the candidates are named.
+    """
+    path = Path(path)
+    if path.is_dir():
+        return _of_folders(path)
+    named = [one for one in motion_formats().values() if path.suffix.lower() in one.suffixes]
+    looks = [one for one in motion_formats().values() if one.suits is not None and one.suits(path)]
+    both = [one for one in named if one in looks] or [one for one in named if not looks or one.suits is None]
+    candidates = both or [*named, *looks]
+    if len(candidates) == 1:
+        return candidates[0]
+    if candidates:
+        names = " or ".join(dict.fromkeys(one.name for one in candidates))
+        raise refusal(path, "format", f"a file that is {names}", "one of them", "say which with --format")
+    formats = ", ".join(motion_formats())
+    raise refusal(
+        path, "format", "a file of no format of motion that is known", formats, "say which with --format"
+    )
+
+
+def _of_folders(path: Path) -> MotionFormat:
+    folders = [one for one in motion_formats().values() if not one.suffixes]
+    if len(folders) != 1:
+        names = " or ".join(one.name for one in folders) or "a file"
+        raise refusal(path, "format", "a folder", names, "say which with --format")
+    return folders[0]
+
+
+def _by_suffix(path: str | Path) -> MotionFormat:
+    """Choose the format of a file that is to be written; a name without an end is a folder's."""
+    suffix = Path(path).suffix.lower()
+    if not suffix:
+        return _of_folders(Path(path))
+    named = [one for one in motion_formats().values() if suffix in one.suffixes]
+    if len(named) != 1:
+        known = ", ".join(end for one in motion_formats().values() for end in one.suffixes)
+        raise refusal(path, "format", shown(suffix), f"one of {known}", "name the file so, or say --to")
+    return named[0]

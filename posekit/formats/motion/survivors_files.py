@@ -1,0 +1,110 @@
+"""Tables of survivors as CSV, Parquet and NPZ; Parquet also in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from posekit.formats.motion.csv_table import read_columns, write_columns
+from posekit.formats.motion.parquet import check_rows, numpy_columns, opened, write_tables
+from posekit.formats.motion.survivors import SurvivorTable, number_columns
+from posekit.safe_io import open_npz, refusal, replacing, shown
+from posekit.skeleton import JOINTS
+
+SCHEMA: Final = "posekit.survivors/1"
+MAX_BYTES: Final = 1_000_000_000
+_VALUE: Final = "values/"
+_SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
+
+
+def write_survivors(path: str | Path, table: SurvivorTable) -> None:
+    """Write a table of survivors as CSV, Parquet or NPZ by the end of the name, whole or not at all.
+
+    An NPZ holds ``joints`` (N, 14, 3), ``joint_names``, ``frame``, ``time``, ``survivor``, ``values/<name>`` and
+    ``branches``, and ``schema``.
+
+    Raises
+    ------
+    InputError
+        Where the name ends otherwise, pyarrow is not installed, or the file cannot be written.
+    """
+    kind = _kind(path)
+    if kind == "csv":
+        write_columns(path, table.columns)
+    elif kind == "parquet":
+        write_survivor_pieces(path, (table,))
+    else:
+        arrays = {
+            "schema": np.array(SCHEMA),
+            "joint_names": np.array(JOINTS),
+            "frame": table.frame,
+            "time": table.time,
+            "survivor": table.survivor,
+            "joints": table.joints,
+            **{_VALUE + name: values for name, values in table.values.items()},
+        }
+        if table.branches:
+            arrays["branches"] = np.array(table.branches, dtype=np.str_)
+        with replacing(path) as file:
+            np.savez_compressed(file, allow_pickle=False, **arrays)
+
+
+def read_survivors(path: str | Path) -> SurvivorTable:
+    """Read a table of survivors that `write_survivors` wrote, or that pandas wrote with the same columns.
+
+    Raises
+    ------
+    InputError
+        Where it is no such table, or cannot be read.
+    """
+    kind = _kind(path)
+    if kind == "csv":
+        return SurvivorTable.of_columns(read_columns(path, number_columns), str(path))
+    if kind == "parquet":
+        with opened(path) as file:
+            check_rows(path, file.metadata.num_rows, file.metadata.num_columns)
+            columns = numpy_columns(path, file.read())
+        return SurvivorTable.of_columns(columns, str(path))
+    with open_npz(path, limit=MAX_BYTES) as archive:
+        schema = str(archive.array("schema", "U", ()))
+        names = tuple(archive.array("joint_names", "U", (None,)).tolist())
+        if schema != SCHEMA or names != JOINTS:
+            raise refusal(path, "schema", shown(schema), f'"{SCHEMA}" with the 14 joints', "give such a file")
+        return SurvivorTable(
+            frame=archive.array("frame", "iu", (None,)),
+            time=archive.array("time", "f", (None,)),
+            survivor=archive.array("survivor", "iu", (None,)),
+            joints=archive.array("joints", "f", (None, len(JOINTS), 3)),
+            values={
+                name.removeprefix(_VALUE): archive.array(name, "f", (None,))
+                for name in archive.names
+                if name.startswith(_VALUE)
+            },
+            branches=tuple(archive.array("branches", "U", (None,)).tolist())
+            if "branches" in archive.names
+            else (),
+            source=str(path),
+        )
+
+
+def write_survivor_pieces(path: str | Path, tables: Iterable[SurvivorTable]) -> None:
+    """Write tables of the same columns one after the other into one Parquet file: a batch need not be held whole."""
+    write_tables(path, ((table.columns, {}) for table in tables))
+
+
+def read_survivor_pieces(path: str | Path) -> Iterator[SurvivorTable]:
+    """Read a Parquet file of survivors one row group after the other."""
+    with opened(path) as file:
+        for index in range(file.metadata.num_row_groups):
+            check_rows(path, file.metadata.row_group(index).num_rows, file.metadata.num_columns)
+            yield SurvivorTable.of_columns(numpy_columns(path, file.read_row_group(index)), str(path))
+
+
+def _kind(path: str | Path) -> str:
+    suffix = Path(path).suffix.lower()
+    if suffix not in _SUFFIXES:
+        raise refusal(path, "format", shown(suffix), f"one of {', '.join(_SUFFIXES)}", "name the file so")
+    return _SUFFIXES[suffix]

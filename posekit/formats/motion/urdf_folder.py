@@ -1,0 +1,184 @@
+"""A person as a robot: a folder with the URDF, the SRDF and the configurations, for Pinocchio, yourdfpy and MuJoCo.
+
+``figure.urdf`` and ``figure.srdf`` are the figure as `posekit.load_figure` reads it (metres, radians, REP-103: x
+forward, y left, z up). ``configurations.npz`` has ``q`` (T, 29) in Pinocchio's order (``buildModelFromUrdf`` with
+``JointModelFreeFlyer``: x, y, z, then the quaternion x, y, z, w, then the joints), ``configuration_names`` (29,) and
+``time`` (T,), and is a file of schema ``posekit.configurations/1``; ``configurations.csv`` has the same, a row a frame,
+empty where an angle is not known. ``figure_mujoco.urdf`` is the same figure on a floating joint ``root``, with a mass
+and an inertia for each link, which MuJoCo demands: they are placeholders. Its quaternion is w, x, y, z.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
+
+import numpy as np
+
+from posekit.body import Figure, load_figure
+from posekit.body.figure import FRAMES
+from posekit.body.urdf import parse
+from posekit.formats.motion.bvh_tree import POINT_NODES, checked, known_nodes
+from posekit.formats.motion.format import MotionFormat
+from posekit.formats.motion.motion import Motion
+from posekit.geometry import Array
+from posekit.safe_io import cut, open_npz, refusal, replacing, shown, write_text
+from posekit.skeleton import POINTS
+
+SCHEMA: Final = "posekit.configurations/1"
+FIGURE, SRDF, MUJOCO = "figure.urdf", "figure.srdf", "figure_mujoco.urdf"
+NPZ, CSV = "configurations.npz", "configurations.csv"
+FILES: Final = (FIGURE, SRDF, MUJOCO, NPZ, CSV)
+LINK_OF: Final = {point: FRAMES.get(point, point) for point in POINTS}
+"""The URDF link whose origin is each point."""
+
+
+def write_urdf_folder(path: str | Path, figure: Figure, q: Array, time: Array, *, up: str = "+z") -> None:
+    """Write the folder: all of its files, or none.
+
+    Parameters
+    ----------
+    path : path
+        A folder that is not there yet, is empty, or was written so before.
+    figure : Figure
+    q : array (T, nq)
+        In Pinocchio's order; NaN in angles that are not known is kept.
+    time : array (T,)
+        Seconds, ascending.
+    up : str
+        The axis of q's world that points up; it is noted in the NPZ, and q stays in its world.
+
+    Raises
+    ------
+    InputError
+        Where q or time are not what is said above, or the folder holds anything else.
+    """
+    q = checked(path, figure, q, time, up)
+    seconds = np.asarray(time, dtype=np.float64)
+    with _filling(Path(path)) as folder:
+        write_text(folder / FIGURE, [figure.urdf])
+        write_text(folder / SRDF, [figure.srdf])
+        write_text(folder / MUJOCO, [mujoco_text(figure)])
+        with replacing(folder / NPZ) as file:
+            np.savez_compressed(
+                file,
+                schema=np.array(SCHEMA),
+                configuration_names=np.array(figure.configuration_names),
+                q=q,
+                time=seconds,
+                up=np.array(up),
+            )
+        with replacing(folder / CSV) as file:
+            for piece in _table(figure, q, seconds):
+                file.write(piece)
+
+
+def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
+    """Read such a folder as the motion of the figure's points.
+
+    Parameters
+    ----------
+    path : path
+    unit : str, optional
+        URDF has metres: any other is refused.
+
+    Raises
+    ------
+    InputError
+        Where a file is missing or damaged, or the configurations are not the figure's.
+    FigureError
+        Where the URDF is no stick figure.
+    """
+    folder = Path(path)
+    if unit not in (None, "m"):
+        raise refusal(path, "unit", shown(unit), "m, for a URDF is in metres", "leave it out")
+    if not (folder / FIGURE).is_file() or not (folder / NPZ).is_file():
+        raise refusal(
+            path, "", "another folder or file", f"a folder with {FIGURE} and {NPZ}", "name that folder"
+        )
+    with open_npz(folder / NPZ) as archive:
+        q = archive.array("q", "f", (None, None)).astype(np.float64)
+        names = archive.array("configuration_names", "U", (None,)).tolist()
+        seconds = archive.array("time", "f", (None,)).astype(np.float64)
+        up = str(archive.array("up", "U", ())) if "up" in archive.names else ""
+    place, figure = folder / NPZ, load_figure(folder / FIGURE)
+    if sorted(names) != sorted(figure.configuration_names) or q.shape[1] != len(names):
+        got = f"{q.shape[1]} columns, {len(names)} names, among them {shown(names[0] if names else None)}"
+        raise refusal(
+            place, "configuration_names", got, "those of the figure beside it", "write the folder again"
+        )
+    q = checked(place, figure, q[:, [names.index(name) for name in figure.configuration_names]], seconds)
+    points = figure.forward_kinematics(np.where(np.isnan(q), 0.0, q))
+    points[known_nodes(figure, q)[:, POINT_NODES] == 0] = np.nan
+    rate = (len(seconds) - 1) / (seconds[-1] - seconds[0]) if len(seconds) > 1 else 1.0
+    return Motion(names=POINTS, points=points, time=seconds, rate=float(rate), up=up, source=str(path))
+
+
+def mujoco_text(figure: Figure) -> str:
+    """Return the figure's URDF as MuJoCo takes it: a floating root, and something to weigh in every link."""
+    robot = parse(figure.urdf, figure.source)
+    base = next(iter({link.get("name") for link in robot.findall("link")} - _children(robot)))
+    settings = {"fusestatic": "false", "boundmass": "1e-3", "boundinertia": "1e-4"}
+    ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", settings)
+    ElementTree.SubElement(robot, "link", name="world")
+    joint = ElementTree.SubElement(robot, "joint", name="root", type="floating")
+    ElementTree.SubElement(joint, "parent", link="world")
+    ElementTree.SubElement(joint, "child", link=str(base))
+    ElementTree.indent(robot)
+    return f'<?xml version="1.0"?>\n{ElementTree.tostring(robot, encoding="unicode")}\n'
+
+
+def _children(robot: ElementTree.Element) -> set[str | None]:
+    return {child.get("link") for child in robot.findall("joint/child")}
+
+
+def _table(figure: Figure, q: Array, time: Array) -> Iterator[bytes]:
+    """Spell time and q as CSV; numbers read back as they were."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["time", *figure.configuration_names])
+    for second, row in zip(time.tolist(), q.tolist(), strict=True):
+        rows.writerow([second, *(value if value == value else "" for value in row)])  # noqa: PLR0124 (NaN)
+    yield text.getvalue().encode("ascii")
+
+
+@contextmanager
+def _filling(folder: Path) -> Iterator[Path]:
+    """Give a folder beside the target, which takes its place when the block ends well."""
+    if folder.exists() and not folder.is_dir():
+        raise refusal(folder, "", "a file", "the name of a folder", "choose another name")
+    there = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+    other = [name for name in there if name not in FILES]
+    if other:
+        got = f"a folder that holds {cut(other[0])}"
+        raise refusal(folder, "", got, "a new or empty folder", "choose another name")
+    beside = folder.absolute().with_name(f".{secrets.token_hex(8)}.part")
+    try:
+        beside.mkdir()
+        yield beside
+        folder.mkdir(exist_ok=True)
+        for name in FILES:
+            (beside / name).replace(folder / name)
+    except OSError as error:
+        reason = cut(error.strerror or str(error))
+        raise refusal(
+            folder, "", reason, "a folder that can be written", "check permissions and free space"
+        ) from None
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
+
+
+FORMAT: Final = MotionFormat(
+    name="urdf",
+    says="a folder with the person's URDF and q, for Pinocchio, yourdfpy and MuJoCo",
+    suffixes=(),
+    read=read_urdf_folder,
+    write_configurations=write_urdf_folder,
+)

@@ -1,0 +1,166 @@
+"""Read and write postures given as configurations q of a robot: ``posekit.configurations/1``, JSON or NPZ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
+from posekit.formats.own.postures_q_schema import SCHEMA, ConfigurationsFile
+from posekit.formats.own.reading import read_json
+from posekit.formats.own.validation import validated
+from posekit.safe_io.refusal import nearest, refusal, shown
+from posekit.safe_io.writing import json_pieces, replacing, write_text
+
+Array = NDArray[np.float64]
+
+ROOT = ("x", "y", "z", "qx", "qy", "qz", "qw")
+"""The variables of a root that moves freely; where a file has none of them it stands at the origin."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Configurations:
+    """Configurations as a file has them.
+
+    Parameters
+    ----------
+    q : array (N, K)
+        Radians, metres; quaternions x, y, z, w.
+    names : tuple of str (K,), optional
+        The variables in the file's order; None where it does not name them.
+    source : str
+        What to call them in errors.
+    """
+
+    q: Array
+    names: tuple[str, ...] | None = None
+    source: str = "q"
+
+    def __len__(self) -> int:
+        """Count the configurations."""
+        return len(self.q)
+
+    def in_order_of(self, names: Sequence[str]) -> Array:
+        """Return q in a robot's order (N, nq).
+
+        Names are matched; without names the file's order is the robot's. Variables of the root may all be left out:
+        then the root stands at the origin.
+
+        Parameters
+        ----------
+        names : sequence of str (nq,)
+            The robot's ``configuration_names``.
+
+        Raises
+        ------
+        InputError
+            Where a name is unknown, missing or there twice, or without names the number of variables is another.
+        """
+        rooted = tuple(names[: len(ROOT)]) == ROOT
+        own = self.names
+        if own is None:
+            short = rooted and self.q.shape[1] == len(names) - len(ROOT)
+            own = tuple(names[len(ROOT) :]) if short else tuple(names)
+            if self.q.shape[1] != len(own):
+                remedy = "check which robot it is; configuration_names says what is in which place"
+                raise refusal(self.source, "q", f"{self.q.shape[1]} variables", f"{len(names)}", remedy)
+        for name in own:
+            if name not in names:
+                expected = "a variable of the robot"
+                raise refusal(
+                    self.source, "configuration_names", shown(name), expected, nearest(name, names)[:200]
+                )
+        wanted = names[len(ROOT) :] if rooted and not set(own) & set(ROOT) else names
+        missing = [name for name in wanted if name not in own]
+        if missing:
+            got = f"no {', no '.join(missing[:3])}{' …' if len(missing) > 3 else ''}"
+            raise refusal(
+                self.source, "configuration_names", got, "every variable of the robot", "add what is missing"
+            )
+        q = np.zeros((len(self.q), len(names)))
+        if rooted:
+            q[:, len(ROOT) - 1] = 1.0
+        q[:, [list(names).index(name) for name in own]] = self.q
+        return q
+
+
+def holds_configurations(path: str | Path) -> bool:
+    """Tell whether a file holds configurations: by its schema, or an NPZ without one by ``q`` without ``joints``."""
+    if suffix(path, ".json", ".npz") == ".npz":
+        with open_npz(path) as archive:
+            if "schema" in archive.names:
+                return str(archive.array("schema", "U", ())) == SCHEMA
+            return "q" in archive.names and "joints" not in archive.names
+    document = read_json(path)
+    return isinstance(document, dict) and document.get("schema") == SCHEMA
+
+
+def read_configurations(path: str | Path) -> Configurations:
+    """Read configurations.
+
+    Parameters
+    ----------
+    path : path
+        JSON of schema ``posekit.configurations/1``; or an NPZ with ``q`` (N, K) and, where its order is not the
+        robot's, ``configuration_names`` (K,).
+
+    Raises
+    ------
+    InputError
+        Where the file breaks its schema, is damaged, or would take more than 1 GB of memory.
+    """
+    if suffix(path, ".json", ".npz") == ".npz":
+        with open_npz(path) as archive:
+            archive.check_held(MAX_ARRAYS)
+            return _from_archive(archive)
+    file = validated(ConfigurationsFile, read_json(path), path)
+    width = len(file.q[0]) if file.q else len(file.configuration_names or ())
+    for index, row in enumerate(file.q):
+        if len(row) != width:
+            raise refusal(
+                path, f"q[{index}]", f"{len(row)} numbers", f"{width}, as in the first", "correct it"
+            )
+    q = np.array(file.q, dtype=np.float64).reshape(len(file.q), width)
+    return _checked(path, q, None if file.configuration_names is None else tuple(file.configuration_names))
+
+
+def write_configurations(path: str | Path, q: Array, names: Sequence[str]) -> None:
+    """Write configurations (N, K) with the names of their variables, whole or not at all, ``.json`` or ``.npz``."""
+    if suffix(path, ".json", ".npz") == ".npz":
+        with replacing(path) as file:
+            write_npz(
+                file, {"schema": np.array(SCHEMA), "configuration_names": np.array(list(names)), "q": q}
+            )
+        return
+    write_text(path, json_pieces({"schema": SCHEMA, "configuration_names": list(names)}, "q", _listed(q)))
+
+
+def _listed(q: Array) -> Iterator[list[Any]]:
+    for row in q:
+        yield row.tolist()
+
+
+def _from_archive(archive: Archive) -> Configurations:
+    q = archive.array("q", "f", (None, None)).astype(np.float64)
+    names: tuple[str, ...] | None = None
+    if "configuration_names" in archive.names:
+        names = tuple(archive.array("configuration_names", "U", (None,)).tolist())
+    return _checked(archive.path, q, names)
+
+
+def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> Configurations:
+    if np.isinf(q).any():
+        raise not_finite(path, "q", q)
+    if names is not None and len(names) != q.shape[1]:
+        expected = f"{q.shape[1]}, one a variable of q"
+        raise refusal(path, "configuration_names", f"{len(names)} names", expected, "name each once")
+    if names is not None and len(set(names)) != len(names):
+        raise refusal(
+            path, "configuration_names", "a name twice", "each variable once", "remove one of the two"
+        )
+    return Configurations(q=q, names=names, source=str(path))

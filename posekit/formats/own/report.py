@@ -1,0 +1,393 @@
+"""Write and read ``posekit.report/1``: a verdict for each posture and the findings behind it."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.npz import suffix
+from posekit.formats.own.reading import read_json
+from posekit.formats.own.report_columns import CheckCount, Columns, Place, joined
+from posekit.formats.own.report_csv import csv_lines
+from posekit.formats.own.report_schema import (
+    SCHEMA,
+    VERDICTS,
+    CheckFields,
+    PostureFields,
+    ReportFile,
+    Verdict,
+)
+from posekit.formats.own.report_table import markdown_lines
+from posekit.formats.own.validation import validated
+from posekit.safe_io.refusal import refusal, shown
+from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
+from posekit.tree.check import Findings
+
+NUMBERS = ("value", "lower", "upper", "margin")
+MOST_PLACES = 500
+"""Places of one check that the summary of a JSON file counts, the most frequent first."""
+
+SUFFIXES = (".json", ".md", ".csv")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """One judged quantity, as a report lists it; None for NaN and for a bound that is not there.
+
+    Parameters
+    ----------
+    check, where, unit : str
+        The validator, the place it judged, and the unit of the numbers.
+    value, lower, upper, margin : float or None
+        What was found, its bounds, and the distance to the nearer one (negative outside).
+    verdict : str
+        ``valid``, ``invalid`` or ``undecided``.
+    """
+
+    check: str
+    where: str
+    value: float | None
+    lower: float | None
+    upper: float | None
+    margin: float | None
+    unit: str
+    verdict: Verdict
+
+
+@dataclass(frozen=True, kw_only=True)
+class Worst:
+    """The place with the least margin of a posture, and that margin in its unit."""
+
+    check: str
+    where: str
+    margin: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PostureReport:
+    """The verdict on one posture.
+
+    Parameters
+    ----------
+    verdict : str
+        ``valid``, ``invalid`` or ``undecided``.
+    fk_distance : float or None
+        Metres from the posture to the forward kinematics of its configuration.
+    findings : sequence of Finding
+        What is behind the verdict.
+    index : int, optional
+        Which posture of the file, from 0, where not all are listed.
+    worst : Worst, optional
+        The place with the least margin; a centimetre counts as one degree.
+    residual : mapping, optional
+        Metres that each joint of a robot's fit is off, None where it is unknown.
+    undecided_by : sequence of str, optional
+        Of an undecided posture, the checks that say nothing, and ``joints`` where some are unknown.
+    """
+
+    verdict: Verdict
+    fk_distance: float | None
+    findings: Sequence[Finding]
+    index: int | None = None
+    worst: Worst | None = None
+    residual: Mapping[str, float | None] | None = None
+    undecided_by: Sequence[str] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """The verdicts on a file of postures.
+
+    Parameters
+    ----------
+    settings : mapping
+        Everything that decided the verdicts, of plain values.
+    postures : sequence of PostureReport
+        In the file's order; all of them, or those that are listed.
+    checks : mapping, optional
+        By check: postures that it rejects and leaves undecided, and violations by place.
+    listed : str, optional
+        Which postures are listed, where not all are.
+    verdicts : str, optional
+        The first letter of every posture's verdict, where not all are listed.
+    columns : Columns, optional
+        All verdicts and violations, for tables and CSV; not in the JSON file.
+    """
+
+    settings: Mapping[str, Any]
+    postures: Sequence[PostureReport]
+    checks: Mapping[str, CheckCount] | None = field(default=None, compare=False)
+    listed: str | None = None
+    verdicts: str | None = None
+    columns: Columns | None = field(default=None, compare=False, repr=False)
+
+    def __len__(self) -> int:
+        """Count the postures that were judged."""
+        return len(self.postures) if self.verdicts is None else len(self.verdicts)
+
+    @property
+    def summary(self) -> dict[str, int]:
+        """How many postures have each verdict."""
+        if self.verdicts is not None:
+            return {verdict: self.verdicts.count(verdict[0]) for verdict in VERDICTS}
+        counts = Counter(posture.verdict for posture in self.postures)
+        return {verdict: counts[verdict] for verdict in VERDICTS}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judged:
+    """What one check found in N postures at its K places.
+
+    Parameters
+    ----------
+    check, unit : str
+        The check's name and the unit of its values.
+    where : sequence of K str
+        Its places.
+    findings : Findings
+        Value (N, K), bounds and tolerance.
+    undecided : bool array (N, K), optional
+        Where nothing is said though there is a value.
+    """
+
+    check: str
+    unit: str
+    where: Sequence[str]
+    findings: Findings
+    undecided: NDArray[np.bool_] | None = None
+
+
+def make_report(
+    *,
+    settings: Mapping[str, Any],
+    verdicts: Sequence[str],
+    fk_distance: NDArray[np.float64],
+    judged: Sequence[Judged],
+    all_findings: bool = False,
+) -> Report:
+    """Make a report of what the checks found.
+
+    Parameters
+    ----------
+    settings : mapping
+        Everything that decided the verdicts, of plain values.
+    verdicts : sequence of N str
+        ``valid``, ``invalid`` or ``undecided``.
+    fk_distance : array (N,)
+        Metres; NaN where there is no configuration.
+    judged : sequence of Judged
+        The checks that were applied.
+    all_findings : bool
+        List every finding; else those that are violated, and for each check the one with the least margin
+        (an undecided one where the check decided nothing).
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    InputError
+        Where a verdict is none of the three, or the numbers of postures differ.
+    """
+    rows: list[list[Finding]] = [[] for _ in verdicts]
+    for verdict in verdicts:
+        if verdict not in VERDICTS:
+            raise refusal("report", "verdicts", shown(verdict), " or ".join(VERDICTS), "correct it")
+    for check in judged:
+        if len(check.findings.value) != len(rows):
+            counts = f"{len(check.findings.value)} postures"
+            raise refusal("report", check.check, counts, f"{len(rows)}, one a verdict", "judge all postures")
+        _list_findings(rows, check, all_findings)
+    distances = np.broadcast_to(fk_distance, len(rows)).tolist()
+    return Report(
+        settings=settings,
+        postures=tuple(
+            PostureReport(verdict=verdict, fk_distance=_number(distance), findings=tuple(findings))  # type: ignore[arg-type]
+            for verdict, distance, findings in zip(verdicts, distances, rows, strict=True)
+        ),
+    )
+
+
+def check_report_path(path: str | Path) -> None:
+    """Refuse a report's name before the work that it is for is done."""
+    suffix(path, *SUFFIXES)
+    check_target(path)
+
+
+def write_report(path: str | Path, report: Report) -> None:
+    """Write a report, whole or not at all: ``.json``, ``.md`` (tables) or ``.csv`` (one row a posture).
+
+    Raises
+    ------
+    InputError
+        Where the name ends otherwise or the file cannot be written.
+    """
+    kind = suffix(path, *SUFFIXES)
+    if kind == ".json":
+        write_text(path, json_pieces(_head(report), "postures", _fields(report)))
+        return
+    columns = columns_of(report)
+    write_lines(path, csv_lines(columns) if kind == ".csv" else markdown_lines(columns, report.settings))
+
+
+def read_report(path: str | Path) -> Report:
+    """Read a report's JSON.
+
+    Raises
+    ------
+    InputError
+        Where the file breaks the schema ``posekit.report/1``.
+    """
+    suffix(path, ".json")
+    file = validated(ReportFile, read_json(path), path)
+    return Report(
+        settings=file.settings,
+        postures=tuple(_posture(posture) for posture in file.postures),
+        checks=None if file.checks is None else {name: _count(check) for name, check in file.checks.items()},
+        listed=file.listed,
+        verdicts=file.verdicts,
+    )
+
+
+def columns_of(report: Report) -> Columns:
+    """Return a report's columns; of one without, what its listed postures tell."""
+    if report.columns is not None:
+        return report.columns
+    places: dict[Place, int] = {}
+    violations: list[tuple[int, int, float]] = []
+    worst: list[tuple[int, float]] = []
+    for k, posture in enumerate(report.postures):
+        for finding in posture.findings:
+            place = places.setdefault(Place(finding.check, finding.where, finding.unit), len(places))
+            if finding.verdict == "invalid":
+                violations.append((k, place, math.nan if finding.margin is None else finding.margin))
+        least = posture.worst
+        at = None if least is None else Place(least.check, least.where, least.unit)
+        worst.append(
+            (-1, math.nan)
+            if at is None or least is None
+            else (places.setdefault(at, len(places)), least.margin)
+        )
+    checks = list(dict.fromkeys(place.check for place in places))
+    part = Columns(
+        places=tuple(places),
+        verdict=np.array([VERDICTS.index(posture.verdict) for posture in report.postures], dtype=np.int8),
+        fk_distance=np.array(
+            [math.nan if posture.fk_distance is None else posture.fk_distance for posture in report.postures]
+        ),
+        worst_place=np.array([place for place, _ in worst], dtype=np.int32),
+        worst_margin=np.array([margin for _, margin in worst]),
+        posture=np.array([k for k, _, _ in violations], dtype=np.int64),
+        place=np.array([place for _, place, _ in violations], dtype=np.int32),
+        margin=np.array([margin for _, _, margin in violations]),
+        silent=np.array([_silent(posture, checks) for posture in report.postures], dtype=np.int16),
+        checks=checks,
+    )
+    return joined([part], part.places, checks)
+
+
+def _silent(posture: PostureReport, checks: Sequence[str]) -> int:
+    """Spell what is undecided about a posture as `Columns` has it."""
+    names = ("joints", *checks)
+    return sum(1 << names.index(name) for name in posture.undecided_by or () if name in names)
+
+
+def _head(report: Report) -> dict[str, Any]:
+    head: dict[str, Any] = {"schema": SCHEMA, "settings": dict(report.settings), "summary": report.summary}
+    if report.checks is not None:
+        head["checks"] = {
+            name: {
+                "rejected": count.rejected,
+                "undecided": count.undecided,
+                "places": dict(list(count.places.items())[:MOST_PLACES]),
+            }
+            for name, count in report.checks.items()
+        }
+    if report.listed is not None:
+        head["listed"] = report.listed
+    if report.verdicts is not None:
+        head["verdicts"] = report.verdicts
+    return head
+
+
+def _posture(posture: PostureFields) -> PostureReport:
+    names = [entry.name for entry in fields(Finding)]
+    worst = posture.worst
+    return PostureReport(
+        verdict=posture.verdict,
+        fk_distance=posture.fk_distance,
+        findings=tuple(
+            Finding(**{name: getattr(finding, name) for name in names}) for finding in posture.findings
+        ),
+        index=posture.index,
+        worst=None
+        if worst is None
+        else Worst(check=worst.check, where=worst.where, margin=worst.margin, unit=worst.unit),
+        residual=posture.residual,
+        undecided_by=None if posture.undecided_by is None else tuple(posture.undecided_by),
+    )
+
+
+def _count(check: CheckFields) -> CheckCount:
+    return CheckCount(rejected=check.rejected, undecided=check.undecided, places=check.places, worst=None)
+
+
+def _list_findings(rows: list[list[Finding]], check: Judged, every: bool) -> None:
+    """Add a check's findings to the postures that they were found in."""
+    found = check.findings
+    value = np.asarray(found.value)
+    if value.size == 0:
+        return
+    lower, upper = np.broadcast_to(found.lower, value.shape), np.broadcast_to(found.upper, value.shape)
+    margin, violated, undecided = found.margin, found.violated, found.undecided
+    if check.undecided is not None:
+        undecided = undecided | check.undecided
+    listed = np.ones(value.shape, dtype=bool)
+    if not every:
+        worst = np.where(undecided, np.inf, margin).argmin(axis=1)
+        listed = violated.copy()
+        listed[np.arange(len(value)), worst] = True
+    for posture, place in np.argwhere(listed).tolist():
+        at = posture, place
+        rows[posture].append(
+            Finding(
+                check=check.check,
+                where=check.where[place],
+                value=_number(value[at]),
+                lower=_number(lower[at]),
+                upper=_number(upper[at]),
+                margin=None if undecided[at] else _number(margin[at]),
+                unit=check.unit,
+                verdict="invalid" if violated[at] else "undecided" if undecided[at] else "valid",
+            )
+        )
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
+def _finding(finding: Finding) -> dict[str, Any]:
+    return {name: _number(value) if name in NUMBERS else value for name, value in vars(finding).items()}
+
+
+def _fields(report: Report) -> Iterator[dict[str, Any]]:
+    for posture in report.postures:
+        entry: dict[str, Any] = {} if posture.index is None else {"index": posture.index}
+        entry |= {"verdict": posture.verdict, "fk_distance": _number(posture.fk_distance)}
+        if posture.worst is not None:
+            entry["worst"] = vars(posture.worst)
+        if posture.residual is not None:
+            entry["residual"] = {name: _number(value) for name, value in posture.residual.items()}
+        if posture.undecided_by is not None:
+            entry["undecided_by"] = list(posture.undecided_by)
+        yield entry | {"findings": [_finding(finding) for finding in posture.findings]}

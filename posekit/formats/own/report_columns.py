@@ -1,0 +1,168 @@
+"""The verdicts on any number of postures, in columns: what summaries, tables and CSV are made of."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.report_schema import VERDICTS, Verdict
+
+Array = NDArray[np.float64]
+
+PER_DEGREE: Final[Mapping[str, float]] = {"deg": 1.0, "m": 0.01}
+"""What counts as one degree where margins of different units are compared: a centimetre, as at the end of a limb."""
+
+
+class Place(NamedTuple):
+    """Where a check judges, and the unit of its numbers."""
+
+    check: str
+    where: str
+    unit: str
+
+    @property
+    def name(self) -> str:
+        """The place as it is printed: ``joint_range/right_knee``."""
+        return f"{self.check}/{self.where}"
+
+
+class Row(NamedTuple):
+    """One posture: its verdict, its worst margin and where that is, its violations and their margins, the undecided."""
+
+    posture: int
+    verdict: Verdict
+    fk_distance: float
+    worst: tuple[Place, float] | None
+    violations: list[tuple[Place, float]]
+    undecided_by: list[str]
+
+
+class CheckCount(NamedTuple):
+    """What one check said about a file: postures rejected and undecided, violations by place, and the worst."""
+
+    rejected: int
+    undecided: int
+    places: dict[str, int]
+    worst: tuple[int, Place, float] | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Columns:
+    """Verdicts on N postures with M violations.
+
+    Parameters
+    ----------
+    places : sequence of Place
+    verdict : int array (N,)
+        Index into `VERDICTS`.
+    fk_distance : array (N,)
+        Metres.
+    worst_place, worst_margin : int array (N,), array (N,)
+        The place with the least margin, -1 where nothing was decided, and that margin in its unit.
+    posture, place : int array (M,)
+        Of each violation; postures in rising order.
+    margin : array (M,)
+    silent : int array (N,)
+        Bit 0: some joint is unknown; bit k + 1: the k-th check says nothing.
+    checks : sequence of str
+        The checks that were applied.
+    """
+
+    places: Sequence[Place]
+    verdict: NDArray[np.int8]
+    fk_distance: Array
+    worst_place: NDArray[np.int32]
+    worst_margin: Array
+    posture: NDArray[np.int64]
+    place: NDArray[np.int32]
+    margin: Array
+    silent: NDArray[np.int16]
+    checks: Sequence[str] = ()
+
+    def __len__(self) -> int:
+        """Count the postures."""
+        return len(self.verdict)
+
+    @property
+    def summary(self) -> dict[str, int]:
+        """How many postures have each verdict."""
+        counts = np.bincount(self.verdict, minlength=len(VERDICTS)).tolist()
+        return dict(zip(VERDICTS, counts, strict=True))
+
+    @property
+    def letters(self) -> str:
+        """The first letter of every verdict: ``vviu``."""
+        letters = np.array([verdict[0] for verdict in VERDICTS])
+        return "".join(letters[self.verdict].tolist())
+
+    def rows(self) -> Iterator[Row]:
+        """Go through the postures."""
+        starts = np.searchsorted(self.posture, np.arange(len(self) + 1)).tolist()
+        verdicts, distances = self.verdict.tolist(), self.fk_distance.tolist()
+        places, margins = self.worst_place.tolist(), self.worst_margin.tolist()
+        where, by = self.place.tolist(), self.margin.tolist()
+        silent = (self.silent != 0).tolist()
+        for k, verdict in enumerate(verdicts):
+            some = range(starts[k], starts[k + 1])
+            yield Row(
+                posture=k,
+                verdict=VERDICTS[verdict],
+                fk_distance=distances[k],
+                worst=None if places[k] < 0 else (self.places[places[k]], margins[k]),
+                violations=[(self.places[where[i]], by[i]) for i in some],
+                undecided_by=self.silent_checks(k) if silent[k] else [],
+            )
+
+    def silent_checks(self, posture: int) -> list[str]:
+        """List what is not decided about a posture: ``joints`` that are unknown, and checks that say nothing."""
+        bits = int(self.silent[posture])
+        return [name for k, name in enumerate(("joints", *self.checks)) if bits >> k & 1]
+
+    def by_check(self) -> dict[str, CheckCount]:
+        """Count for each check what it rejected, where, and which violation was the worst."""
+        of_check = np.array([place.check for place in self.places])[self.place] if len(self.place) else None
+        counts = {}
+        for k, check in enumerate(self.checks):
+            mine = np.flatnonzero(of_check == check) if of_check is not None else np.zeros(0, dtype=np.intp)
+            most = Counter(self.place[mine].tolist()).most_common()
+            worst = None
+            if len(mine):
+                units = np.array([PER_DEGREE.get(place.unit, 1.0) for place in self.places])
+                at = int(mine[np.argmin(self.margin[mine] / units[self.place[mine]])])
+                worst = int(self.posture[at]), self.places[int(self.place[at])], float(self.margin[at])
+            counts[check] = CheckCount(
+                rejected=len(np.unique(self.posture[mine])),
+                undecided=int(np.count_nonzero(self.silent >> (k + 1) & 1)),
+                places={self.places[place].where: count for place, count in most},
+                worst=worst,
+            )
+        return counts
+
+
+def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[str]) -> Columns:
+    """Put the columns of a file's batches together; postures are counted through."""
+    firsts = np.cumsum([0, *(len(part) for part in parts)])
+    empty: dict[str, NDArray[np.generic]] = {
+        "verdict": np.zeros(0, dtype=np.int8),
+        "fk_distance": np.zeros(0),
+        "worst_place": np.zeros(0, dtype=np.int32),
+        "worst_margin": np.zeros(0),
+        "place": np.zeros(0, dtype=np.int32),
+        "margin": np.zeros(0),
+        "silent": np.zeros(0, dtype=np.int16),
+    }
+    arrays = {
+        name: np.concatenate([none, *(getattr(part, name) for part in parts)]) for name, none in empty.items()
+    }
+    shifted = [part.posture + first for part, first in zip(parts, firsts[:-1].tolist(), strict=True)]
+    return Columns(
+        places=tuple(places),
+        posture=np.concatenate([np.zeros(0, dtype=np.int64), *shifted]),
+        checks=tuple(checks),
+        **arrays,
+    )

@@ -1,0 +1,92 @@
+"""The schema ``posekit.report/1``: what each check found in each posture."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final, Literal, get_args
+
+from pydantic import FailFast, Field
+
+from posekit.formats.own.validation import FEW, FileModel
+
+SCHEMA = "posekit.report/1"
+
+Verdict = Literal["valid", "invalid", "undecided"]
+VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
+
+
+class FindingFields(FileModel):
+    """One judged quantity."""
+
+    check: str = Field(description="The validator, joint_range.")
+    where: str = Field(description="The place it judged, right_elbow.flexion.")
+    value: float | None = Field(description="What was found, in `unit`; null where it is undecided.")
+    lower: float | None = Field(description="The lower bound; null where there is none.")
+    upper: float | None = Field(description="The upper bound; null where there is none.")
+    margin: float | None = Field(
+        description="Distance to the nearer bound, negative outside; null if undecided."
+    )
+    unit: str
+    verdict: Verdict
+
+
+class WorstFields(FileModel):
+    """The place with the least margin of a posture; a centimetre counts as one degree."""
+
+    check: str
+    where: str
+    margin: float
+    unit: str
+
+
+class PostureFields(FileModel):
+    """One posture."""
+
+    verdict: Verdict
+    fk_distance: float | None = Field(
+        description="Metres from the posture to the figure's nearest configuration; null where there is none."
+    )
+    findings: Annotated[list[FindingFields], FailFast()]
+    index: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="Which posture of the file, from 0; absent where all are listed."
+    )
+    worst: WorstFields | None = None
+    residual: dict[str, float | None] | None = Field(
+        default=None,
+        description="Metres that each joint of the robot's fit is off; null where it is unknown.",
+    )
+    undecided_by: list[str] | None = Field(
+        default=None,
+        description="Of an undecided posture: checks that say nothing; joints, where some are unknown.",
+    )
+
+
+class SummaryFields(FileModel):
+    """How many postures have each verdict."""
+
+    valid: Annotated[int, Field(ge=0)]
+    invalid: Annotated[int, Field(ge=0)]
+    undecided: Annotated[int, Field(ge=0)]
+
+
+class CheckFields(FileModel):
+    """What one check said about the file."""
+
+    rejected: Annotated[int, Field(ge=0)] = Field(description="Postures that it rejects.")
+    undecided: Annotated[int, Field(ge=0)] = Field(description="Postures about which it says nothing.")
+    places: Annotated[dict[str, int], FEW] = Field(
+        description="Violations by place, the most frequent first."
+    )
+
+
+class ReportFile(FileModel):
+    """The verdict on every posture of a file, with the findings behind it."""
+
+    schema_: Literal["posekit.report/1"] = Field(alias="schema")
+    settings: dict[str, Any]
+    summary: SummaryFields
+    checks: Annotated[dict[str, CheckFields], FEW] | None = None
+    listed: str | None = Field(default=None, description="Which postures are listed, where not all are.")
+    verdicts: Annotated[str, Field(pattern="^[viu]*$")] | None = Field(
+        default=None, description="One letter for every posture of the file, where not all are listed."
+    )
+    postures: Annotated[list[PostureFields], FailFast()]

@@ -1,0 +1,226 @@
+"""What was recovered, in memory: survivors frame by frame, in metres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.family import Family
+from posekit.formats.own.inferred import Inferred
+from posekit.formats.own.likelihoods import Likelihoods
+from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.root import Root
+from posekit.formats.own.units import Unit
+from posekit.safe_io.refusal import refusal
+from posekit.skeleton import JOINTS
+
+Array = NDArray[np.float64]
+
+CAMERA_FIELDS: Final = ("f", "rotation", "position", "residual")
+LEVELS: Final = ("joint", "physical", "motion")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ResultFrame:
+    """The survivors of one frame.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+    camera : mapping
+        What was recovered of the camera, each None (or NaN) where it is not known: ``f`` (metres; Lee &
+        Chen's camera alone, whose f is a length), ``rotation`` (3, 3), ``position`` (3,) in metres,
+        ``residual`` (in the unit of the image: metres where there is an f, else pixels).
+    levels : mapping
+        Survivors per level of the tree: ``joint`` names, ``physical`` and ``motion`` counts, of one length.
+    joints : array (N, 14, 3)
+        OpenCV camera frame, metres, one row a survivor.
+    q : array (N, nq)
+        Configurations in Pinocchio's order: lengths in metres, angles in radians, whatever the file's unit.
+    branches : sequence of N str
+        The near (0) or far (1) choice at each segment.
+    groups : int array (N,), optional
+        The group of each survivor.
+    margins : mapping of str to array (N,)
+        By validator, the distance to the nearest bound; NaN where undecided.
+    fk_distance : array (N,)
+        Distance between the joints and the forward kinematics of q, metres.
+    length_residual : array (N,)
+        The largest length that was lost to a tangent ray, metres.
+    rejected : mapping of str to int
+        Pruned branches by the finding that killed them.
+    pruned : sequence of mappings, optional
+        Detail on each pruned branch, of plain values.
+    family : Family, optional
+        The scales that an uncalibrated frame can have.
+    scales : array (N,), optional
+        The scale that each survivor of such a frame was recovered at, pixels a metre.
+    root : Root, optional
+        How the neck's depth was found, where the frame is calibrated and it was not given.
+    inferred : sequence of N mappings, optional
+        By survivor, then by joint that was not seen: what is known of its position (`posekit.formats.own.Inferred`).
+    probability : array (N,), optional
+        That each survivor is the one nearest to the truth; they sum to one.
+    refined : Likelihoods, optional
+        How likely and how sure each survivor is, where the noise is known and they were refined.
+    """
+
+    time: float
+    camera: Mapping[str, Any]
+    levels: Mapping[str, Sequence[Any]]
+    joints: Array
+    q: Array
+    branches: Sequence[str]
+    groups: NDArray[np.int64] | None = None
+    margins: Mapping[str, Array]
+    fk_distance: Array
+    length_residual: Array
+    rejected: Mapping[str, int]
+    pruned: Sequence[Mapping[str, Any]] | None = None
+    family: Family | None = None
+    scales: Array | None = None
+    root: Root | None = None
+    inferred: Sequence[Mapping[str, Inferred]] | None = None
+    probability: Array | None = None
+    refined: Likelihoods | None = None
+
+    @property
+    def chi2(self) -> Array | None:
+        """How badly each survivor fits what was seen (N,), where they were refined."""
+        return None if self.refined is None else self.refined.chi2
+
+    def __post_init__(self) -> None:
+        count = len(self.joints)
+        if self.probability is not None:
+            self._set("probability", self.probability, (count,))
+            if not ((self.probability >= 0) & (self.probability <= 1)).all():
+                raise _refused("probability", "a number that is none", "numbers from 0 to 1")
+        if self.refined is not None and len(self.refined) != count:
+            raise _refused("refined", f"{len(self.refined)} entries", f"{count}, one a posture")
+        if self.scales is not None:
+            self._set("scales", self.scales, (count,))
+        if self.inferred is not None and len(self.inferred) != count:
+            raise _refused("inferred", f"{len(self.inferred)} entries", f"{count}, one a posture")
+        self._set("joints", self.joints, (count, len(JOINTS), 3))
+        self._set("q", self.q, (count, np.shape(self.q)[-1]))
+        self._set("fk_distance", self.fk_distance, (count,))
+        self._set("length_residual", self.length_residual, (count,))
+        margins = {}
+        for name, values in self.margins.items():
+            margins[name] = _array(f"margins.{name}", values, (count,))
+        object.__setattr__(self, "margins", margins)
+        if self.groups is not None:
+            groups = np.array(self.groups, dtype=np.int64)
+            if groups.shape != (count,) or (groups < 0).any():
+                raise _refused("groups", f"shape {groups.shape}", f"({count},) numbers from 0")
+            groups.flags.writeable = False
+            object.__setattr__(self, "groups", groups)
+        if len(self.branches) != count:
+            raise _refused("branches", f"{len(self.branches)} codes", f"{count}, one a posture")
+        object.__setattr__(self, "branches", tuple(str(code) for code in self.branches))
+        object.__setattr__(self, "camera", _camera(self.camera))
+        if set(self.levels) != set(LEVELS) or len({len(self.levels[name]) for name in LEVELS}) != 1:
+            raise _refused("levels", ", ".join(self.levels), "joint, physical and motion, of one length")
+        levels = {
+            "joint": tuple(str(name) for name in self.levels["joint"]),
+            "physical": tuple(int(number) for number in self.levels["physical"]),
+            "motion": tuple(int(number) for number in self.levels["motion"]),
+        }
+        object.__setattr__(self, "levels", levels)
+        object.__setattr__(self, "rejected", {str(name): int(n) for name, n in self.rejected.items()})
+        if not np.isfinite(self.time):
+            raise _refused("time", str(self.time), "a finite number of seconds")
+
+    def _set(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
+        object.__setattr__(self, name, _array(name, values, shape))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Result:
+    """A recovery, as it is written and read.
+
+    Parameters
+    ----------
+    unit : "m", "cm" or "mm"
+        The unit of lengths in the file; in memory they are metres.
+    joint_names : sequence of 14 str
+        The joints, in tree order.
+    configuration_names : sequence of nq str
+        The entries of q, in Pinocchio's order.
+    settings : mapping
+        Everything that decided the result, of plain values.
+    frames : sequence of ResultFrame
+        All with the same margins; all with groups or none, and with probabilities or none.
+    paths : FollowedPaths, optional
+        The person through all frames, where they were followed.
+    """
+
+    unit: Unit
+    joint_names: Sequence[str] = JOINTS
+    configuration_names: Sequence[str]
+    settings: Mapping[str, Any]
+    frames: Sequence[ResultFrame]
+    paths: FollowedPaths | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("joint_names", "configuration_names", "frames"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        if not self.frames:
+            raise _refused("frames", "no frame", "at least one")
+        if self.joint_names != JOINTS:
+            raise _refused("joint_names", ", ".join(self.joint_names)[:60], "the 14 joints in tree order")
+        if self.paths is not None:
+            self.paths.check_against([len(frame.joints) for frame in self.frames])
+        first = self.frames[0]
+        for index, frame in enumerate(self.frames):
+            where = f"frames[{index}]"
+            if frame.q.shape[1] != len(self.configuration_names):
+                raise _refused(
+                    f"{where}.q",
+                    f"{frame.q.shape[1]} columns",
+                    f"{len(self.configuration_names)}, as there are configuration_names",
+                )
+            if set(frame.margins) != set(first.margins):
+                raise _refused(
+                    f"{where}.margins",
+                    ", ".join(frame.margins) or "none",
+                    f"those of frames[0]: {', '.join(first.margins)}",
+                )
+            for name in ("groups", "probability"):
+                if (getattr(frame, name) is None) != (getattr(first, name) is None):
+                    raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
+
+
+def _array(name: str, values: Array, shape: tuple[int, ...]) -> Array:
+    array = np.array(values, dtype=np.float64)
+    if array.shape != shape:
+        raise _refused(name, f"shape {array.shape}", f"shape {shape}")
+    if np.isinf(array).any():
+        raise _refused(name, "an infinite number", "finite numbers, or NaN where undecided")
+    array.flags.writeable = False
+    return array
+
+
+def _camera(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Normalise what is known of the camera: floats, read-only arrays and None."""
+    unknown = set(given) - set(CAMERA_FIELDS)
+    if unknown:
+        raise _refused("camera", ", ".join(sorted(unknown)), f"fields among {', '.join(CAMERA_FIELDS)}")
+    camera: dict[str, Any] = {}
+    for name, shape in zip(CAMERA_FIELDS, ((), (3, 3), (3,), ()), strict=True):
+        value = given.get(name)
+        if value is not None:
+            array = _array(f"camera.{name}", value, shape)
+            known = not np.isnan(array).any()
+            value = (array if shape else float(array)) if known else None
+        camera[name] = value
+    return camera
+
+
+def _refused(field: str, got: str, expected: str) -> Exception:
+    return refusal("result", field, got, expected, "correct what made the result")

@@ -1,0 +1,62 @@
+"""Read and write ``posekit.result/1``; the suffix decides between JSON and NPZ."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from posekit.formats.own.npz import suffix
+from posekit.formats.own.result import Result
+from posekit.formats.own.result_json import read_result_json, write_result_json
+from posekit.formats.own.result_npz import read_result_npz, write_result_npz
+from posekit.safe_io.writing import check_target
+
+
+def read_result(path: str | Path) -> Result:
+    """Read a result, in metres.
+
+    Parameters
+    ----------
+    path : path
+        ``.json`` or ``.npz``.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    InputError
+        Where the file breaks the schema ``posekit.result/1``.
+
+    Notes
+    -----
+    In JSON margins and groups are written with each posture; where no frame has a survivor, none are read.
+    """
+    return read_result_json(path) if suffix(path, ".json", ".npz") == ".json" else read_result_npz(path)
+
+
+def check_result_path(path: str | Path) -> None:
+    """Refuse a result's name before the work that it is for is done."""
+    suffix(path, ".json", ".npz")
+    check_target(path)
+
+
+def write_result(path: str | Path, result: Result) -> None:
+    """Write a result, whole or not at all.
+
+    Parameters
+    ----------
+    path : path
+        ``.json``, or ``.npz``, which is five times faster to write and to read.
+    result : Result
+        What to write; lengths are turned into ``result.unit``.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written, or would be larger than can be read again.
+    """
+    if suffix(path, ".json", ".npz") == ".json":
+        write_result_json(path, result)
+    else:
+        write_result_npz(path, result)

@@ -1,0 +1,404 @@
+"""``posekit.result/1`` as NPZ: the content of the JSON as arrays, padded to the largest number of survivors.
+
+Arrays (F frames, at most N survivors, L levels): ``schema``, ``unit``, ``settings`` (JSON text) and, where
+there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names``; ``time`` (F,); ``count``
+(F,); ``camera/f``, ``camera/rotation``, ``camera/position``, ``camera/residual``; ``levels/joint``,
+``levels/physical``, ``levels/motion`` (F, L); ``joints`` (F, N, 14, 3), ``fk_distance`` and
+``length_residual`` (F, N) in ``unit``; ``q`` (F, N, nq) in metres and radians; ``branches`` (F, N);
+``groups`` (F, N); ``margins/<name>`` (F, N); ``rejected/names`` (R,), ``rejected/counts`` (F, R). Padding and
+what is not known are NaN, -1 or an empty text. Uncalibrated: ``scales`` (F, N) and ``families`` (JSON text); with
+joints that were not seen: ``inferred`` (JSON text). ``probability`` (F, N). Refined: ``refined/chi2``,
+``refined/dof``, ``refined/p``, ``refined/merged`` (F, N), ``refined/covariance`` (F, N, 14, 6) in square units.
+Followed: ``paths/survivor``, ``paths/scale`` (K, F), ``paths/joints``, ``paths/smoothed`` (K, F, 14, 3),
+``paths/interpolated``, ``paths/deviation`` (K, F, 14), ``paths/cost``, ``paths/share`` (K,), ``paths/told`` (text).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from posekit.formats.own.family import Family
+from posekit.formats.own.inferred import Inferred
+from posekit.formats.own.likelihoods import NUMBERS, Likelihoods
+from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
+from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.reading import parse_json
+from posekit.formats.own.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
+from posekit.formats.own.result_schema import SCHEMA, ResultDetails, ResultPathsTold
+from posekit.formats.own.root import Root
+from posekit.formats.own.units import PER_METRE, UNITS, Unit, from_metres, to_metres
+from posekit.safe_io.refusal import refusal, shown
+from posekit.safe_io.writing import replacing
+from posekit.skeleton import JOINTS
+
+Array = NDArray[Any]
+
+MAX_PADDED: Final = 16_000_000_000
+"""Bytes that a result may declare with its padding, which is passed over and never held."""
+_MARGIN = "margins/"
+_REFINED = "refined/"
+_PATHS = "paths/"
+_PADDED = (
+    "joints",
+    "q",
+    "branches",
+    "groups",
+    "fk_distance",
+    "length_residual",
+    "scales",
+    "probability",
+    _MARGIN,
+    _REFINED,
+)
+
+
+def write_result_npz(path: str | Path, result: Result) -> None:
+    """Write a result as NPZ; see `posekit.formats.own.write_result`."""
+    frames, unit = result.frames, result.unit
+    arrays: dict[str, Array | Ragged] = {
+        "schema": np.array(SCHEMA),
+        "unit": np.array(unit),
+        "settings": np.array(json.dumps(dict(result.settings), allow_nan=False)),
+        "joint_names": np.array(result.joint_names),
+        "configuration_names": np.array(result.configuration_names, dtype=np.str_),
+        "time": np.array([frame.time for frame in frames], dtype=np.float64),
+        "count": np.array([len(frame.joints) for frame in frames], dtype=np.int64),
+        **_camera_arrays(frames, unit),
+        **_level_arrays(frames),
+        **_rejected_arrays(frames),
+        "joints": Ragged(rows=[from_metres(frame.joints, unit) for frame in frames], fill=np.nan),
+        "q": Ragged(rows=[frame.q for frame in frames], fill=np.nan),
+        "branches": Ragged(rows=[np.array(frame.branches, dtype=np.str_) for frame in frames], fill=""),
+        "fk_distance": Ragged(rows=[from_metres(f.fk_distance, unit) for f in frames], fill=np.nan),
+        "length_residual": Ragged(rows=[from_metres(f.length_residual, unit) for f in frames], fill=np.nan),
+    }
+    if frames[0].groups is not None:
+        arrays["groups"] = Ragged(rows=[_known(frame.groups) for frame in frames], fill=-1)
+    for name in frames[0].margins:
+        arrays[_MARGIN + name] = Ragged(rows=[frame.margins[name] for frame in frames], fill=np.nan)
+    if any(frame.pruned is not None for frame in frames):
+        pruned = [
+            None if frame.pruned is None else [dict(entry) for entry in frame.pruned] for frame in frames
+        ]
+        arrays["pruned"] = np.array(json.dumps(pruned, allow_nan=False))
+    if any(frame.family is not None for frame in frames):
+        families = [None if frame.family is None else frame.family.fields(unit) for frame in frames]
+        arrays["families"] = np.array(json.dumps(families, allow_nan=False))
+        unknown = [np.full(len(frame.joints), np.nan) for frame in frames]
+        scales = [
+            missing if frame.scales is None else frame.scales / PER_METRE[unit]
+            for frame, missing in zip(frames, unknown, strict=True)
+        ]
+        arrays["scales"] = Ragged(rows=scales, fill=np.nan)
+    if any(frame.root is not None for frame in frames):
+        roots = [None if frame.root is None else frame.root.fields(unit) for frame in frames]
+        arrays["roots"] = np.array(json.dumps(roots, allow_nan=False))
+    if any(frame.inferred is not None for frame in frames):
+        inferred = [
+            None
+            if frame.inferred is None
+            else [{name: one.fields(unit) for name, one in joints.items()} for joints in frame.inferred]
+            for frame in frames
+        ]
+        arrays["inferred"] = np.array(json.dumps(inferred, allow_nan=False))
+    if frames[0].probability is not None:
+        given = [np.empty(0) if frame.probability is None else frame.probability for frame in frames]
+        arrays["probability"] = Ragged(rows=given, fill=np.nan)
+    if any(frame.refined is not None for frame in frames):
+        likelihoods = [frame.refined or Likelihoods.nothing(len(frame.joints)) for frame in frames]
+        for name in NUMBERS:
+            arrays[_REFINED + name] = Ragged(rows=[getattr(each, name) for each in likelihoods], fill=np.nan)
+        packed = [each.packed(unit) for each in likelihoods]
+        arrays[_REFINED + "covariance"] = Ragged(rows=packed, fill=np.nan)
+    if result.paths is not None:
+        arrays |= {_PATHS + name: values for name, values in result.paths.in_unit(unit).items()}
+        arrays[_PATHS + "told"] = np.array(json.dumps(result.paths.told(unit), allow_nan=False))
+    with replacing(path) as file:
+        write_npz(file, arrays)
+
+
+def read_result_npz(path: str | Path) -> Result:
+    """Read a result from NPZ; see `posekit.formats.own.read_result`."""
+    with open_npz(path, limit=MAX_PADDED) as archive:
+        return result_in(archive)
+
+
+def result_in(archive: Archive) -> Result:
+    """Make a result of an open archive."""
+    path = archive.path
+    archive.check_held(MAX_ARRAYS, but=_PADDED)
+    _expect(archive, "schema", (SCHEMA,))
+    unit: Unit = _expect(archive, "unit", UNITS)  # type: ignore[assignment]
+    names = tuple(archive.array("joint_names", "U", (None,)).tolist())
+    if names != JOINTS:
+        raise refusal(
+            path, "joint_names", shown(names), "the 14 joints in tree order", "write the file again"
+        )
+    configuration_names = archive.array("configuration_names", "U", (None,)).tolist()
+    time = _floats(archive, "time", (None,))
+    count = archive.array("count", "iu", (len(time),)).astype(np.int64)
+    margins = [name.removeprefix(_MARGIN) for name in archive.names if name.startswith(_MARGIN)]
+    nq = len(configuration_names)
+    held = float(count.sum(dtype=np.float64)) * 8 * (len(JOINTS) * 3 + nq + len(margins) + 10)
+    if (count < 0).any() or held > MAX_ARRAYS:
+        most = f"counts from 0, at most {MAX_ARRAYS / 1e6:,.0f} MB of survivors"
+        raise refusal(path, "count", f"counts that need {held / 1e6:,.0f} MB", most, "split the result")
+    rows = {
+        name: to_metres_rows(archive, name, count, tail, unit)
+        for name, tail in (("joints", (len(JOINTS), 3)), ("fk_distance", ()), ("length_residual", ()))
+    }
+    q = _ragged_floats(archive, "q", count, (nq,))
+    branches = archive.ragged("branches", "U", count, ())
+    groups = archive.ragged("groups", "iu", count, ()) if "groups" in archive.names else None
+    margin_rows = {name: _ragged_floats(archive, _MARGIN + name, count, ()) for name in margins}
+    cameras = _cameras(archive, len(time), unit)
+    levels = _levels(archive, len(time))
+    rejected = _rejected(archive, len(time))
+    pruned = _json(archive, "pruned") if "pruned" in archive.names else [None] * len(time)
+    families, roots, inferred = _details(archive, count, unit)
+    scales = _ragged_floats(archive, "scales", count, ()) if families is not None else None
+    probability = (
+        _ragged_floats(archive, "probability", count, ()) if "probability" in archive.names else None
+    )
+    refined = _likelihoods(archive, count, unit)
+    settings = _json(archive, "settings")
+    if not isinstance(settings, dict):
+        raise refusal(path, "settings", shown(settings), "an object", "write the file again")
+    if not isinstance(pruned, list) or len(pruned) != len(time):
+        raise refusal(path, "pruned", shown(pruned), f"a list of {len(time)} entries", "write the file again")
+    return Result(
+        unit=unit,
+        configuration_names=configuration_names,
+        settings=settings,
+        frames=[
+            ResultFrame(
+                time=float(time[index]),
+                camera=cameras[index],
+                levels=levels[index],
+                joints=rows["joints"][index],
+                q=q[index],
+                branches=branches[index].tolist(),
+                groups=None if groups is None else groups[index],
+                margins={name: values[index] for name, values in margin_rows.items()},
+                fk_distance=rows["fk_distance"][index],
+                length_residual=rows["length_residual"][index],
+                rejected=rejected[index],
+                pruned=pruned[index],
+                family=None if families is None else families[index],
+                scales=None
+                if scales is None or families is None or families[index] is None
+                else scales[index] * PER_METRE[unit],
+                root=None if roots is None else roots[index],
+                inferred=None if inferred is None else inferred[index],
+                probability=None if probability is None else probability[index],
+                refined=None if refined is None else refined[index],
+            )
+            for index in range(len(time))
+        ],
+        paths=_followed(archive, len(time), unit),
+    )
+
+
+def _followed(archive: Archive, frames: int, unit: Unit) -> FollowedPaths | None:
+    """Read the paths, where there are some."""
+    if _PATHS + "survivor" not in archive.names:
+        return None
+    survivor = archive.array(_PATHS + "survivor", "iu", (None, frames))
+    K, joints = len(survivor), len(JOINTS)
+    shapes = {
+        "joints": (K, frames, joints, 3),
+        "smoothed": (K, frames, joints, 3),
+        "deviation": (K, frames, joints),
+        "cost": (K,),
+        "share": (K,),
+        "scale": (K, frames),
+    }
+    arrays: dict[str, Any] = {name: _floats(archive, _PATHS + name, shape) for name, shape in shapes.items()}
+    arrays["interpolated"] = archive.array(_PATHS + "interpolated", "b", (K, frames, joints))
+    try:
+        told = ResultPathsTold.model_validate(_json(archive, _PATHS + "told"))
+    except ValidationError:
+        raise refusal(
+            archive.path, _PATHS + "told", "another text", "what posekit writes", "write the file again"
+        ) from None
+    return FollowedPaths.of({**arrays, "survivor": survivor}, told.model_dump(), unit)
+
+
+def to_metres_rows(
+    archive: Archive, name: str, count: Array, tail: tuple[int | None, ...], unit: Unit
+) -> list[Array]:
+    """Read the rows of a padded array of lengths, in metres."""
+    return [to_metres(row, unit) for row in _ragged_floats(archive, name, count, tail)]
+
+
+def _ragged_floats(archive: Archive, name: str, count: Array, tail: tuple[int | None, ...]) -> list[Array]:
+    rows = archive.ragged(name, "f", count, tail)
+    for row in rows:
+        if np.isinf(row).any():
+            raise not_finite(archive.path, name, row)
+    return rows
+
+
+def _floats(archive: Archive, name: str, shape: tuple[int | None, ...]) -> Array:
+    values = archive.array(name, "f", shape)
+    if np.isinf(values).any():
+        raise not_finite(archive.path, name, values)
+    return values
+
+
+def _expect(archive: Archive, name: str, accepted: Sequence[str]) -> str:
+    found = str(archive.array(name, "U", ()))
+    if found not in accepted:
+        raise refusal(archive.path, name, shown(found), " or ".join(accepted), "give a file of this schema")
+    return found
+
+
+def _json(archive: Archive, name: str) -> Any:
+    text = str(archive.array(name, "U", ()))
+    return parse_json(f"{archive.path}: {name}", text.encode("utf-8", "surrogatepass"))
+
+
+def _likelihoods(archive: Archive, count: Array, unit: Unit) -> list[Likelihoods | None] | None:
+    """Read how likely and how sure survivors are; None in frames that were not refined."""
+    if _REFINED + "chi2" not in archive.names:
+        return None
+    numbers = {name: _ragged_floats(archive, _REFINED + name, count, ()) for name in NUMBERS}
+    packed = _ragged_floats(archive, _REFINED + "covariance", count, (len(JOINTS), 6))
+    return [
+        None
+        if np.isnan(numbers["chi2"][k]).any()
+        else Likelihoods(
+            covariance=Likelihoods.unpacked(packed[k], unit),
+            **{name: numbers[name][k] for name in NUMBERS},
+        )
+        for k in range(len(count))
+    ]
+
+
+def _details(
+    archive: Archive, count: Array, unit: Unit
+) -> tuple[
+    list[Family | None] | None, list[Root | None] | None, list[list[dict[str, Inferred]] | None] | None
+]:
+    """Read families, roots and inferred joints, which are kept as JSON text."""
+    kept = ("families", "roots", "inferred")
+    given = {name: _json(archive, name) for name in kept if name in archive.names}
+    try:
+        details = ResultDetails.model_validate(given)
+    except ValidationError as error:
+        where = error.errors(include_url=False)[0]["loc"]
+        raise refusal(
+            archive.path, str(where[0]), shown(where), "what posekit writes", "write the file again"
+        ) from None
+    families, roots, inferred = details.families, details.roots, details.inferred
+    for name, entries in (("families", families), ("roots", roots), ("inferred", inferred)):
+        if entries is not None and len(entries) != len(count):
+            raise refusal(
+                archive.path, name, f"{len(entries)} entries", f"{len(count)}, one a frame", "write it again"
+            )
+    return (
+        None
+        if families is None
+        else [None if family is None else Family.of(family.model_dump(), unit) for family in families],
+        None
+        if roots is None
+        else [None if root is None else Root.of(root.model_dump(), unit) for root in roots],
+        None
+        if inferred is None
+        else [
+            None
+            if rows is None
+            else [
+                {name: Inferred.of(one.model_dump(), unit) for name, one in joints.items()} for joints in rows
+            ]
+            for rows in inferred
+        ],
+    )
+
+
+def _known(groups: NDArray[np.int64] | None) -> NDArray[np.int64]:
+    return np.empty(0, np.int64) if groups is None else groups
+
+
+def _camera_arrays(frames: Sequence[ResultFrame], unit: Unit) -> dict[str, Array]:
+    """Stack what is known of the cameras, NaN where it is not."""
+    unknown = {
+        "f": np.nan,
+        "rotation": np.full((3, 3), np.nan),
+        "position": np.full(3, np.nan),
+        "residual": np.nan,
+    }
+    stacked = {
+        name: np.array(
+            [unknown[name] if frame.camera[name] is None else frame.camera[name] for frame in frames],
+            dtype=np.float64,
+        )
+        for name in CAMERA_FIELDS
+    }
+    plane = ~np.isnan(stacked["f"])
+    residual = np.where(plane, from_metres(stacked["residual"], unit), stacked["residual"])
+    return {
+        "camera/f": from_metres(stacked["f"], unit),
+        "camera/rotation": stacked["rotation"],
+        "camera/position": from_metres(stacked["position"], unit),
+        "camera/residual": residual,
+    }
+
+
+def _cameras(archive: Archive, frames: int, unit: Unit) -> list[dict[str, Any]]:
+    f = to_metres(_floats(archive, "camera/f", (frames,)), unit)
+    rotation = _floats(archive, "camera/rotation", (frames, 3, 3))
+    position = to_metres(_floats(archive, "camera/position", (frames, 3)), unit)
+    residual = _floats(archive, "camera/residual", (frames,))
+    residual = np.where(np.isnan(f), residual, to_metres(residual, unit))
+    return [
+        dict(zip(CAMERA_FIELDS, row, strict=True))
+        for row in zip(f, rotation, position, residual, strict=True)
+    ]
+
+
+def _level_arrays(frames: Sequence[ResultFrame]) -> dict[str, Array]:
+    fills = {"joint": "", "physical": -1, "motion": -1}
+    longest = max(len(frame.levels["joint"]) for frame in frames)
+    arrays = {}
+    for name in LEVELS:
+        rows = [
+            [*frame.levels[name], *[fills[name]] * (longest - len(frame.levels[name]))] for frame in frames
+        ]
+        arrays[f"levels/{name}"] = np.array(rows, dtype=np.str_ if name == "joint" else np.int64)
+    return arrays
+
+
+def _levels(archive: Archive, frames: int) -> list[dict[str, Any]]:
+    joint = archive.array("levels/joint", "U", (frames, None))
+    physical = archive.array("levels/physical", "iu", joint.shape)
+    motion = archive.array("levels/motion", "iu", joint.shape)
+    return [
+        {
+            name: values[index][joint[index] != ""].tolist()
+            for name, values in zip(LEVELS, (joint, physical, motion), strict=True)
+        }
+        for index in range(frames)
+    ]
+
+
+def _rejected_arrays(frames: Sequence[ResultFrame]) -> dict[str, Array]:
+    names = list(dict.fromkeys(name for frame in frames for name in frame.rejected))
+    counts = [[frame.rejected.get(name, -1) for name in names] for frame in frames]
+    return {
+        "rejected/names": np.array(names, dtype=np.str_),
+        "rejected/counts": np.array(counts, dtype=np.int64).reshape(len(frames), len(names)),
+    }
+
+
+def _rejected(archive: Archive, frames: int) -> list[dict[str, int]]:
+    names = archive.array("rejected/names", "U", (None,)).tolist()
+    counts = archive.array("rejected/counts", "iu", (frames, len(names))).tolist()
+    return [{name: n for name, n in zip(names, row, strict=True) if n >= 0} for row in counts]

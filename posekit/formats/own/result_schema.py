@@ -1,0 +1,268 @@
+"""The schema ``posekit.result/1``, as a JSON file holds it: lengths in its own unit, null for unknown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, FailFast, Field
+
+from posekit.formats.own.units import Unit
+from posekit.formats.own.validation import FEW, FileModel, named, refuse
+from posekit.safe_io.refusal import shown
+from posekit.skeleton import JOINTS
+
+SCHEMA = "posekit.result/1"
+
+Maybe = float | None
+Count = Annotated[int, Field(ge=0, le=2**53)]
+MaybePoint = Annotated[list[Maybe], Field(min_length=3, max_length=3)]
+Row = Annotated[list[float], Field(min_length=3, max_length=3)]
+Matrix = Annotated[list[Row], Field(min_length=3, max_length=3)]
+Names = Annotated[list[str], Field(max_length=1000), FailFast()]
+
+
+def _tree_order(names: list[str]) -> list[str]:
+    if tuple(names) != JOINTS:
+        refuse("the 14 joints in tree order", "write them in the order neck, right_shoulder, …, left_ankle")
+    return names
+
+
+def _objects(entries: list[Any]) -> list[Any]:
+    for index, entry in enumerate(entries):
+        if not isinstance(entry, dict):
+            refuse("an object", "write the result again", at=f"[{index}]", got=shown(entry))
+    return entries
+
+
+class ResultCamera(FileModel):
+    """What was recovered of the camera; null where it is not known."""
+
+    f: Maybe = Field(description="Lens to image plane, in `unit` (Lee & Chen's camera alone).")
+    rotation: Matrix | None = Field(
+        description="lee-chen: the matrix [R] of the paper's Table 2. opencv: R of p_cam = R p + t, where p "
+        "is in the world if the view gives extrinsics, else in the head's frame."
+    )
+    position: Row | None = Field(
+        description="In `unit`, in the frame of p. lee-chen: the image plane's origin. opencv: the optical "
+        "centre."
+    )
+    residual: Maybe = Field(description="Of the reprojection: in `unit` where there is an f, else in pixels.")
+
+
+class ResultLevels(FileModel):
+    """Survivors per level of the tree (Lee & Chen 1985, Tables 3 and 4)."""
+
+    joint: Names
+    physical: Annotated[list[Count], Field(max_length=1000), FailFast()]
+    motion: Annotated[list[Count], Field(max_length=1000), FailFast()]
+
+
+class ResultInferred(FileModel):
+    """What is known of the position of a joint that was not seen."""
+
+    kind: str = Field(
+        description="completed, point, circle, sphere region, depth interval or region: what the set of positions is."
+    )
+    lower: Row = Field(description="The least x, y, z of the set, in `unit`.")
+    upper: Row = Field(description="The greatest x, y, z of the set, in `unit`.")
+    radius: float = Field(
+        description="From the posture's joint to the farthest feasible position, in `unit`."
+    )
+    fraction: float = Field(description="How much of the circle or sphere is feasible.")
+
+
+Upper = Annotated[list[float], Field(min_length=6, max_length=6)]
+
+
+class ResultRefined(FileModel):
+    """How likely and how sure a survivor is that was refined."""
+
+    chi2: float = Field(description="Sum of squares of what is off over its standard deviations.")
+    dof: Count = Field(description="Its degrees of freedom.")
+    p: float = Field(description="The probability that noise alone gives a chi2 as large.")
+    merged: Count = Field(description="How many other branches became the same posture.")
+    covariance: Annotated[list[Upper | None], Field(min_length=14, max_length=14)] = Field(
+        description="Of every joint: xx, xy, xz, yy, yz, zz, in the square of `unit`."
+    )
+
+
+class ResultPosture(FileModel):
+    """One survivor."""
+
+    joints: Annotated[list[MaybePoint], Field(min_length=14, max_length=14)] = Field(
+        description="In tree order, OpenCV camera frame, in `unit`."
+    )
+    q: Annotated[list[Maybe], Field(max_length=1000), FailFast()] = Field(
+        description="Configuration in Pinocchio's order: metres and radians whatever the unit."
+    )
+    branches: Annotated[str, Field(max_length=64)] = Field(
+        description="Near (0) or far (1), segment by segment."
+    )
+    group: Count | None = Field(default=None, description="The group of similar survivors it is in.")
+    margins: Annotated[dict[str, Maybe], FEW] = Field(
+        description="By validator: the distance to the nearest bound, in the validator's own unit."
+    )
+    fk_distance: Maybe = Field(description="From the joints to the forward kinematics of q, in `unit`.")
+    length_residual: Maybe = Field(description="Length lost where a ray is tangent, in `unit`.")
+    scale: Maybe = Field(default=None, description="Uncalibrated: pixels a `unit` that it was recovered at.")
+    inferred: Annotated[dict[str, ResultInferred], named(JOINTS, "joint")] | None = Field(
+        default=None,
+        description="Joints that were not seen; those of `joints` are in the middle of their sets.",
+    )
+    probability: Annotated[float, Field(ge=0, le=1)] | None = Field(
+        default=None, description="That it is the one nearest to the truth; over a frame they sum to one."
+    )
+    refined: ResultRefined | None = Field(
+        default=None, description="How likely and how sure, where the noise is known."
+    )
+
+
+class ResultMinimum(FileModel):
+    """One local minimum of the constraints' residual."""
+
+    s: float
+    residual: float
+
+
+class ResultCurve(FileModel):
+    """The constraints' residual against the scale, the least over all flips (Taylor 2000, Figs. 7b and 8b)."""
+
+    s: Annotated[list[float], Field(max_length=100_000), FailFast()]
+    residual: Annotated[list[float], Field(max_length=100_000), FailFast()]
+
+
+class ResultFamily(FileModel):
+    """The scales that an uncalibrated frame can have (Taylor 2000, section 2)."""
+
+    how: str = Field(description="min, view, value, stature, or the constraints that fixed the scale.")
+    bound: float = Field(description="The least scale that the lengths allow, pixels a `unit`.")
+    segment: str = Field(description="The segment that sets the bound.")
+    chosen: Annotated[list[float], Field(max_length=100_000), FailFast()] = Field(
+        description="The scales that postures were recovered at, pixels a `unit`."
+    )
+    minima: Annotated[list[ResultMinimum], Field(max_length=100_000), FailFast()] = Field(
+        description="All local minima of the constraints' residual, best first."
+    )
+    curve: ResultCurve
+    mirrored: Count = Field(description="How many survivors have their mirror image among the survivors.")
+
+
+class ResultDepthMinimum(FileModel):
+    """One local minimum of the rigid parts' misfit along the neck's ray."""
+
+    depth: float
+    residual: float
+
+
+class ResultDepthCurve(FileModel):
+    """The rigid parts' misfit against the neck's depth, the least over all branches."""
+
+    depth: Annotated[list[float], Field(max_length=100_000), FailFast()]
+    residual: Annotated[list[float], Field(max_length=100_000), FailFast()]
+
+
+class ResultRoot(FileModel):
+    """Where the body was put in depth; depths are the neck's z in the camera frame, in `unit`."""
+
+    method: str = Field(
+        description="given, head or torso (perspective-n-point), or search along the neck's ray."
+    )
+    chosen: Annotated[list[float], Field(max_length=100_000), FailFast()] = Field(
+        description="The depths that postures were recovered at."
+    )
+    residual: Maybe = Field(
+        description="Reprojection error in pixels, or for a search the least misfit in `unit`."
+    )
+    residual_unit: str = Field(description="px, or a unit of length.")
+    estimate: Maybe = Field(default=None, description="The single most likely depth.")
+    deviation: Maybe = Field(description="Standard deviation of the depth, to first order.")
+    lower: Maybe = Field(description="Least feasible depth.")
+    upper: Maybe = Field(description="Greatest feasible depth.")
+    segment: str = Field(description="The segment that sets the greatest: farther away it is too short.")
+    intervals: Annotated[
+        list[Annotated[list[float], Field(min_length=2, max_length=2)]], Field(max_length=100_000), FailFast()
+    ] = Field(description="Where the rigid parts can close within the tolerance.")
+    minima: Annotated[list[ResultDepthMinimum], Field(max_length=100_000), FailFast()]
+    curve: ResultDepthCurve
+    note: str = Field(description="Why another method was not used, where that needs saying.")
+
+
+class ResultFrameFields(FileModel):
+    """One frame."""
+
+    time: float = Field(description="Seconds.")
+    camera: ResultCamera
+    levels: ResultLevels
+    postures: Annotated[list[ResultPosture], FailFast()]
+    rejected: Annotated[dict[str, Count], FEW] = Field(description="Pruned branches, by what killed them.")
+    family: ResultFamily | None = Field(default=None, description="Uncalibrated: the scales it can have.")
+    root: ResultRoot | None = Field(
+        default=None, description="Calibrated, neck not given: how its depth was found."
+    )
+    pruned: Annotated[list[Any], AfterValidator(_objects)] | None = Field(
+        default=None, description="Detail on pruned branches, an object each."
+    )
+
+
+PathPoints = Annotated[
+    list[Annotated[list[MaybePoint], Field(min_length=14, max_length=14)]],
+    Field(max_length=1_000_000),
+    FailFast(),
+]
+
+
+class ResultPath(FileModel):
+    """One path through all frames."""
+
+    survivor: Annotated[list[Annotated[int, Field(ge=-1, le=2**53)]], FailFast()] = Field(
+        description="The posture of each frame, from 0; -1 where the path passes the frame over."
+    )
+    joints: PathPoints = Field(description="Its joints, and what bridges them, in `unit`.")
+    smoothed: PathPoints = Field(description="The same with smoothed distances from the camera, in `unit`.")
+    interpolated: list[list[bool]] = Field(
+        description="Joints that are bridged, or completed without being seen."
+    )
+    deviation: list[list[Maybe]] = Field(description="Standard deviation of each joint, in `unit`.")
+    cost: float = Field(description="Minus the logarithm of its likelihood, but for a constant.")
+    share: float = Field(description="Its share of the likelihood of these paths.")
+    scale: list[Maybe] = Field(description="Uncalibrated: pixels a `unit`.")
+
+
+class ResultPaths(FileModel):
+    """One person through all frames: the survivors that a body can have moved along."""
+
+    lead: Maybe = Field(description="How much cheaper the first path is than the next that is different.")
+    exact: bool = Field(description="Whether the first path is certain to be the cheapest.")
+    apart: float = Field(description="By how much some joint is elsewhere in a different path, in `unit`.")
+    paths: Annotated[list[ResultPath], Field(min_length=1, max_length=1000), FailFast()]
+
+
+class ResultPathsTold(FileModel):
+    """What an NPZ says once of all paths, as JSON text."""
+
+    lead: Maybe
+    exact: bool
+    apart: float
+
+
+class ResultDetails(FileModel):
+    """What an NPZ keeps as JSON text: families and roots of its frames, and what was inferred in postures."""
+
+    families: list[ResultFamily | None] | None = None
+    roots: list[ResultRoot | None] | None = None
+    inferred: list[list[dict[str, ResultInferred]] | None] | None = None
+
+
+class ResultFile(FileModel):
+    """Every survivor of every frame of a view."""
+
+    hints: ClassVar[Mapping[str, str]] = {"frames": "write the result again with posekit recover"}
+
+    schema_: Literal["posekit.result/1"] = Field(alias="schema")
+    unit: Unit
+    joint_names: Annotated[Names, AfterValidator(_tree_order)]
+    configuration_names: Names
+    settings: dict[str, Any]
+    frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]
+    paths: ResultPaths | None = Field(default=None, description="One person through all frames.")

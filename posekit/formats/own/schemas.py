@@ -1,0 +1,73 @@
+"""The JSON Schemas of posekit's files, versioned, as they are published."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+from posekit.formats.own import (
+    batch_schema,
+    evaluation_schema,
+    object_result_schema,
+    postures_q_schema,
+    postures_schema,
+    report_schema,
+    result_schema,
+    view_schema,
+)
+from posekit.formats.own import nearer as nearer_schema
+from posekit.formats.own.validation import FileModel
+from posekit.safe_io.refusal import nearest, refusal, shown
+
+_MODELS: Final[dict[str, type[FileModel]]] = {
+    view_schema.SCHEMA: view_schema.ViewFile,
+    result_schema.SCHEMA: result_schema.ResultFile,
+    postures_schema.SCHEMA: postures_schema.PosturesFile,
+    report_schema.SCHEMA: report_schema.ReportFile,
+    nearer_schema.SCHEMA: nearer_schema.NearerFile,
+    object_result_schema.SCHEMA: object_result_schema.ObjectFile,
+    postures_q_schema.SCHEMA: postures_q_schema.ConfigurationsFile,
+    evaluation_schema.SCHEMA: evaluation_schema.EvaluationFile,
+    batch_schema.SCHEMA: batch_schema.BatchFile,
+    batch_schema.MANIFEST_SCHEMA: batch_schema.ManifestFile,
+}
+SCHEMAS: Final = tuple(_MODELS)
+"""The names of the schemas, each with its version: ``posekit.view/1``."""
+
+
+def schema(name: str) -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of a kind of file.
+
+    Parameters
+    ----------
+    name : str
+        One of `SCHEMAS`, or its middle: ``"posekit.view/1"``, ``"view"``.
+
+    Returns
+    -------
+    dict
+        With ``$schema``, ``$id`` (``urn:posekit:view:1``) and ``title``.
+
+    Raises
+    ------
+    InputError
+        Where there is no schema of this name.
+    """
+    known = {**{full: full for full in SCHEMAS}, **{_short(full): full for full in SCHEMAS}}
+    if name not in known:
+        raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, known))
+    full = known[name]
+    head = {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$id": f"urn:{full.replace('.', ':').replace('/', ':')}",
+    }
+    return {**head, **_MODELS[full].model_json_schema(), "title": full}
+
+
+def schema_text(name: str) -> str:
+    """Return a JSON Schema as text, two spaces a level, as the documentation prints it."""
+    return json.dumps(schema(name), indent=2, ensure_ascii=False) + "\n"
+
+
+def _short(name: str) -> str:
+    return name.removeprefix("posekit.").rpartition("/")[0]

@@ -1,0 +1,10 @@
+"""Skeleton maps: which points of a format stand for which points of the body. Data (TOML), which a user can add to."""
+
+from posekit.formats.skeleton_maps.find import find_by_names as find_by_names
+from posekit.formats.skeleton_maps.find import find_by_order as find_by_order
+from posekit.formats.skeleton_maps.reading import load_skeleton_map as load_skeleton_map
+from posekit.formats.skeleton_maps.reading import parse_skeleton_map as parse_skeleton_map
+from posekit.formats.skeleton_maps.reading import skeleton_map_names as skeleton_map_names
+from posekit.formats.skeleton_maps.skeleton_map import LANDMARK as LANDMARK
+from posekit.formats.skeleton_maps.skeleton_map import LANDMARKS as LANDMARKS
+from posekit.formats.skeleton_maps.skeleton_map import SkeletonMap as SkeletonMap

@@ -1,0 +1,115 @@
+"""One map: the points of a format by name, in its order, and what each landmark of the body is made of."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from posekit.geometry import Array
+from posekit.skeleton import POINTS, other_side
+
+LANDMARKS: Final = (*POINTS, "mid_shoulders", "mid_hips")
+"""What a map can name: the 14 joints, the head's five points, and the girdles' middles.
+
+Detectors and marker sets often have the middle of the shoulders or of the hips, which are neither the figure's neck
+nor its pelvis (the pelvis joint is some 10 cm above the line of the hips).
+"""
+LANDMARK: Final = {name: index for index, name in enumerate(LANDMARKS)}
+
+
+@dataclass(frozen=True, kw_only=True)
+class SkeletonMap:
+    """Which points of a format stand for which landmarks.
+
+    Parameters
+    ----------
+    name : str
+        As ``body_25``; a file's path where it came from one.
+    points : tuple of str
+        The format's points by name, in its order; empty where its files name their points themselves, in any order.
+    landmarks : mapping
+        Landmark of `LANDMARKS` to the names of the points whose mean it is, mostly one.
+    source : str
+        Who says so: a citation.
+    """
+
+    name: str
+    points: tuple[str, ...]
+    landmarks: Mapping[str, tuple[str, ...]]
+    source: str = ""
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """The names of all points that landmarks are made of."""
+        return tuple(dict.fromkeys(name for names in self.landmarks.values() for name in names))
+
+    def gather(self, values: Array, names: Sequence[str] = ()) -> Array:
+        """Pick the landmarks out of a format's points.
+
+        Parameters
+        ----------
+        values : array (..., K, n)
+            Points in two or three coordinates, or n = 1 for a number a point; NaN where missing.
+        names : sequence of str (K,), optional
+            The names of the points in their order; the map's own where not given. Compared without case and
+            punctuation.
+
+        Returns
+        -------
+        array (..., 21, n)
+            In the order of `LANDMARKS`; NaN where the format has none, or one of the points of a mean is missing.
+        """
+        column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
+        found = np.full((*values.shape[:-2], len(LANDMARKS), values.shape[-1]), np.nan)
+        for landmark, parts in self.landmarks.items():
+            columns = [column[plain(part)] for part in parts if plain(part) in column]
+            if len(columns) == len(parts):
+                found[..., LANDMARK[landmark], :] = values[..., columns, :].mean(axis=-2)
+        return found
+
+    def scatter(self, landmarks: Array) -> Array:
+        """Put landmarks (..., 21, n) into the format's points (..., K, n): those that are one point; NaN else."""
+        values = np.full((*landmarks.shape[:-2], len(self.points), landmarks.shape[-1]), np.nan)
+        for landmark, parts in self.landmarks.items():
+            if len(parts) == 1 and parts[0] in self.points:
+                values[..., self.points.index(parts[0]), :] = landmarks[..., LANDMARK[landmark], :]
+        return values
+
+    def over(self, names: Sequence[str]) -> SkeletonMap:
+        """Lay the map over the points of a file that names them itself, in the file's order.
+
+        Parameters
+        ----------
+        names : sequence of str (K,)
+            The file's names; compared without case and punctuation.
+
+        Returns
+        -------
+        SkeletonMap
+            Its `points` are the file's names; landmarks whose points are not all there are left out.
+        """
+        there = {plain(name): name for name in reversed(names)}
+        landmarks = {
+            landmark: tuple(there[plain(part)] for part in parts)
+            for landmark, parts in self.landmarks.items()
+            if all(plain(part) in there for part in parts)
+        }
+        return SkeletonMap(name=self.name, points=tuple(names), landmarks=landmarks, source=self.source)
+
+    def swapped(self) -> SkeletonMap:
+        """Exchange left and right, for files that have them the wrong way round."""
+        return SkeletonMap(
+            name=f"{self.name}, left and right exchanged",
+            points=self.points,
+            landmarks={other_side(landmark): parts for landmark, parts in self.landmarks.items()},
+            source=self.source,
+        )
+
+
+def plain(name: str) -> str:
+    """Reduce a name to what is compared: letters and digits, lower case; a prefix before a colon goes."""
+    return re.sub(r"[\W_]+", "", name.rpartition(":")[2].casefold())

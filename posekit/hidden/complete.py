@@ -1,0 +1,108 @@
+"""Completing survivors: every joint that was not seen gets the set of its positions, and one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.cameras import Camera
+from posekit.errors import InputError
+from posekit.geometry import Array
+from posekit.hidden.asking import Index
+from posekit.hidden.completion import Completion
+from posekit.hidden.describing import write
+from posekit.hidden.party import Party
+from posekit.hidden.plan import Plan, State
+from posekit.hidden.rays import find_rays
+from posekit.hidden.settings import Sampling
+from posekit.skeleton import JOINTS, POINTS
+from posekit.tree import Check, Leaves
+
+ROWS_AT_ONCE = 250_000
+"""Placements of a limb judged together: enough to spread NumPy's overhead, few enough for the memory."""
+
+
+def complete(
+    leaves: Leaves,
+    camera: Camera,
+    image: Array,
+    figure: Figure,
+    checks: Sequence[Check],
+    *,
+    tolerance: float = 0.0,
+    sampling: Sampling | None = None,
+) -> Completion:
+    """Fill in the joints of survivors that have no position: hidden ones, and seen ones beyond them.
+
+    Parameters
+    ----------
+    leaves : Leaves
+        Survivors of trees of the stick figure, with the head as `given` points.
+    camera : Camera
+        The one that they were grown with: its first axis counts the leaves' frames.
+    image : array (F, 14, 2)
+        The image points that they were grown with; NaN where a joint was not seen.
+    figure : Figure
+        Whose lengths the trees had; its rigid torso and hips are laid onto the known points.
+    checks : sequence of Check
+        Those that judged the trees, those of the leaves included: each that reads an unknown joint is asked now.
+    tolerance : float
+        Metres by which a segment may be too short for its image, as for the tree. Above 1e-6 the points were
+        measured: what follows from the rigid parts is then no proof, and a torso without its pelvis may spin.
+    sampling : Sampling, optional
+        How finely sets are sampled.
+
+    Returns
+    -------
+    Completion
+        One row a survivor. Known joints are unchanged; with nothing hidden, nothing is changed.
+
+    Raises
+    ------
+    InputError
+        Where a shape is wrong, or a survivor's neck is not known: nothing hangs on anything then.
+    """
+    sampling = sampling or Sampling()
+    expected = (leaves.n_frames, len(JOINTS), 2)
+    if image.shape != expected:
+        raise InputError(f"image has shape {image.shape}; expected {expected}, one row a frame of the leaves")
+    postures = leaves.postures()
+    done = Completion.of_exact(postures)
+    unknown = np.asarray(np.isnan(postures).any(axis=-1))
+    open_ = np.flatnonzero(unknown.any(axis=1))
+    if not len(open_):
+        return done.frozen()
+    rootless = open_[unknown[open_, 0]]
+    if len(rootless):
+        raise InputError(
+            f"the neck of survivor {int(rootless[0])} is not known, on which all hidden joints hang; expected the "
+            "root or the head of every frame with survivors"
+        )
+    head = np.full((leaves.n_frames, len(POINTS) - len(JOINTS), 3), np.nan)
+    head[:, : leaves.given.shape[1]] = leaves.given[:, : head.shape[1]]
+    points = np.concatenate([postures, head[leaves.frame]], axis=1)
+    root = np.full((leaves.n_frames, 3), np.nan)
+    root[leaves.frame] = postures[:, 0]
+    rays = find_rays(camera, root, image, reach=sum(figure.lengths.values()))
+    seen = np.asarray(np.isfinite(image).all(axis=-1))[leaves.frame]
+    states = np.where(unknown, np.where(seen, State.SEEN, State.HIDDEN), State.EXACT)
+    patterns, which = np.unique(states[open_], axis=0, return_inverse=True)
+    for k, pattern in enumerate(patterns):
+        plan = Plan(states=tuple(State(int(state)) for state in pattern), checks=checks)
+        party = partial(Party.of, plan=plan, figure=figure, rays=rays, tolerance=tolerance, sampling=sampling)
+        rows = open_[which.reshape(-1) == k]
+        for part in _parts(rows, plan, sampling):
+            frame = np.asarray(leaves.frame[part], dtype=np.intp)
+            write(party(points=points[part], frame=frame), done, part)
+    return done.frozen()
+
+
+def _parts(rows: Index, plan: Plan, sampling: Sampling) -> list[Index]:
+    """Split survivors, in order, so that what is judged together fits into the memory."""
+    both = any(all(plan.states[joint] == State.HIDDEN for joint in limb.free) for limb in plan.limbs)
+    each = sampling.sphere * (sampling.ends // 2 if both else 2) * (4 if plan.trunk else 1)
+    size = max(ROWS_AT_ONCE // each, 8)
+    return [rows[first : first + size] for first in range(0, len(rows), size)]

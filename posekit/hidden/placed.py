@@ -1,0 +1,61 @@
+"""Ways to place a limb, as a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.geometry import Array
+from posekit.hidden.asking import Index, Mask
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Placed:
+    """S ways to place a limb's free joints on hosts.
+
+    Parameters
+    ----------
+    host : int array (S,)
+        On which place of the trunk.
+    middle, end : array (S, 3)
+        Positions, camera frame, metres; `middle` also where it was known.
+    branch : int array (S, 2)
+        Near (0) or far (1) of a middle and of an end that were lifted.
+    excess : array (S,)
+        Metres by which the worst lifted segment is too short for its image; 0 where none is.
+    seed : int array (S,)
+        Which sample of its host's even lattice it belongs to; -1 where it was found by a closer look.
+    """
+
+    host: Index
+    middle: Array
+    end: Array
+    branch: Index
+    excess: Array
+    seed: Index
+
+    def take(self, rows: Index | Mask) -> Placed:
+        """Take some of them."""
+        return Placed(**{name: getattr(self, name)[rows] for name in FIELDS})
+
+    def and_(self, other: Placed) -> Placed:
+        """Put two tables together, by host."""
+        both = Placed(
+            **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in FIELDS}
+        )
+        return both.take(np.argsort(both.host, kind="stable"))
+
+    def replaced(self, rows: Index, by: Placed) -> Placed:
+        """Put others in the place of some."""
+        merged = {name: getattr(self, name).copy() for name in FIELDS}
+        for name, values in merged.items():
+            values[rows] = getattr(by, name)
+        return Placed(**merged)
+
+    def with_seed(self, seed: Index) -> Placed:
+        """Name other samples that they belong to."""
+        return Placed(**{name: getattr(self, name) for name in FIELDS if name != "seed"}, seed=seed)
+
+
+FIELDS = ("host", "middle", "end", "branch", "excess", "seed")

@@ -1,0 +1,46 @@
+"""Survivors that are proven to have no completion, among the branches that a tree pruned."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from posekit.hidden.completion import Completion
+from posekit.tree import Leaves
+from posekit.tree.leaves import Pruned
+
+NAME = "occluded"
+"""How the reason is named, before the joint's name."""
+
+
+def reject(leaves: Leaves, completion: Completion) -> tuple[Leaves, Completion]:
+    """Prune the survivors that are impossible, each with the joint that has no position: ``occluded/right_elbow``.
+
+    Parameters
+    ----------
+    leaves : Leaves
+    completion : Completion
+        Of all their survivors.
+
+    Returns
+    -------
+    Leaves, Completion
+        What is left, and its rows.
+    """
+    gone = completion.impossible
+    if not gone.any():
+        return leaves, completion
+    count = int(gone.sum())
+    pruned = Pruned(
+        level=leaves.level,
+        frame=leaves.frame[gone],
+        code=leaves.code[gone],
+        check=NAME,
+        where=leaves.joints,
+        unit="m",
+        place=completion.blamed[gone],
+        value=np.full(count, np.nan),
+        lower=np.full(count, -np.inf),
+        upper=np.full(count, np.inf),
+    )
+    left = leaves.keep(~gone, leaves.frame, leaves.code, leaves.level, (*leaves.pruned, pruned))
+    return left, completion.take(~gone)

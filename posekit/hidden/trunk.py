@@ -1,0 +1,212 @@
+"""Placing the rigid parts: the figure's own torso and hips, laid onto the points of them that are known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.body.frames import fit_rotation, unit
+from posekit.geometry import Array
+from posekit.hidden.asking import Index, Rows, ask
+from posekit.hidden.closure import closing_angles
+from posekit.hidden.hosts import EXACT_WITHIN, Hosts, Turn
+from posekit.hidden.lattices import circle, onto, rotation_spacing, rotations, turned
+from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, Plan, State
+from posekit.hidden.rays import Rays
+from posekit.hidden.settings import Sampling
+from posekit.skeleton import JOINT
+
+RINGS = 24
+"""Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""
+
+FEWER = 6
+"""By how much the hips are turned in coarser steps where the torso turns as well."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrunkPlacer:
+    """Places the unknown joints of torso and hips.
+
+    Parameters
+    ----------
+    plan : Plan
+    figure : Figure
+    rays : Rays
+    frame : int array (C,)
+        The frame of each core: which row of the rays.
+    tolerance : float
+        Metres by which a segment may be too short for its image.
+    sampling : Sampling
+    """
+
+    plan: Plan
+    figure: Figure
+    rays: Rays
+    frame: Index
+    tolerance: float
+    sampling: Sampling
+
+    def place(self, points: Array) -> Hosts:
+        """Place them in every way that the rigid parts allow, on cores (C, P, 3); evenly where they turn."""
+        hosts = Hosts.of(points)
+        pelvis, *hips = HIP_JOINTS
+        if any(self.plan.states[joint] for joint in TORSO_JOINTS):
+            hosts = self._turned(hosts, TORSO_JOINTS)
+            alive, _ = ask(self.plan.torso_own, Rows.of(hosts.points))
+            # Where only the torso turns, a near miss may be looked at more closely; otherwise it is gone.
+            hosts = hosts if self._torso_alone() else hosts.take(alive)
+        for joint in hips:
+            if self.plan.states[joint] == State.SEEN:
+                hosts = self._lifted(hosts, pelvis, joint)
+        if any(self.plan.states[joint] == State.HIDDEN for joint in hips):
+            hosts = self._turned(hosts, HIP_JOINTS)
+        return hosts
+
+    def _torso_alone(self) -> bool:
+        return all(self.plan.states[joint] == State.EXACT for joint in HIP_JOINTS)
+
+    def _turned(self, hosts: Hosts, joints: tuple[int, ...]) -> Hosts:
+        """Lay a rigid part on: nothing is free with two points beside the pivot, an angle with one, else all."""
+        pivot = joints[0]
+        states = self.plan.states
+        known = [k for k, joint in enumerate(joints) if k and states[joint] != State.HIDDEN]
+        free = [k for k, joint in enumerate(joints) if k and states[joint] == State.HIDDEN]
+        body = self.figure.neutral_points[list(joints)] - self.figure.neutral_points[pivot]
+        turn = Turn(
+            pivot=pivot,
+            about=joints[known[0]] if known else None,
+            free=tuple(joints[k] for k in free),
+            body=body[free],
+        )
+        seen = hosts.points[:, [joints[k] for k in known]] - hosts.points[:, pivot, None]
+        if len(known) >= 2:
+            R = fit_rotation(body[known], seen)
+            misfit = np.linalg.norm(np.einsum("nij,pj->npi", R, body[known]) - seen, axis=-1).max(axis=1)
+            # By chance some of what was measured fits: that the rest does too is not said.
+            fits = np.asarray((misfit <= EXACT_WITHIN) & (self.tolerance <= EXACT_WITHIN))
+            placed = replace(hosts.filled(R, turn), sure=hosts.sure & fits)
+            spun = np.flatnonzero(~fits) if HIP_JOINTS[0] in turn.free else np.zeros(0, dtype=np.intp)
+            return self._spun(placed, spun, body[joints.index(HIP_JOINTS[0])]) if len(spun) else placed
+        loose = bool((hosts.spacing > 0.0).any())
+        if known:
+            n = self.sampling.circle // FEWER if loose else self.sampling.circle
+            axis = unit(seen[:, 0])
+            first = onto(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
+            row = np.repeat(np.arange(len(hosts)), n)
+            R = turned(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
+            spacing = 2.0 * np.pi / n
+        else:
+            every = rotations(self.sampling.rotations // FEWER if loose else self.sampling.rotations)
+            row = np.repeat(np.arange(len(hosts)), len(every))
+            R = np.tile(every, (len(hosts), 1, 1))
+            spacing = float(rotation_spacing(len(every)))
+        placed = hosts.take(row).filled(R, turn)
+        offset = body[joints.index(HIP_JOINTS[0])]
+        if HIP_JOINTS[0] in turn.free and self._hips_seen():
+            if known:
+                row, R = self._closing(hosts, pivot, offset, np.arange(len(hosts)), axis, first)
+            else:
+                row, R = self._closing_rings(hosts, pivot, offset)
+            placed = placed.and_(hosts.take(row).uneven().filled(R, turn))
+        return replace(
+            placed,
+            tried=np.bincount(placed.core[placed.even], minlength=len(hosts.tried)).astype(np.float64),
+            spacing=np.maximum(hosts.spacing, spacing),
+            sure=np.zeros(len(hosts.sure), dtype=bool),
+            turn=turn if not loose and self._last(joints) else None,
+        )
+
+    def _spun(self, hosts: Hosts, rows: Index, offset: Array) -> Hosts:
+        """Spin measured torsos without a pelvis about the line of their shoulders.
+
+        Neck and shoulders are almost in line, and spines bend: where points are off by a centimetre, the pelvis that
+        they give is off by ten. It is left open, for the checks and the hips to decide.
+        """
+        n, right, left = self.sampling.circle, JOINT["right_shoulder"], JOINT["left_shoulder"]
+        turn = Turn(pivot=TORSO_JOINTS[0], about=None, free=(HIP_JOINTS[0],), body=offset[None])
+        axis, first = unit(hosts.points[:, left] - hosts.points[:, right]), hosts.R
+        row = np.repeat(rows, n)
+        R = turned(axis[row], np.tile(circle(n), len(rows))) @ first[row]
+        spun = hosts.take(row).filled(R, turn)
+        if self._hips_seen():
+            row, R = self._closing(hosts, turn.pivot, offset, rows, axis[rows], first[rows])
+            spun = spun.and_(hosts.take(row).uneven().filled(R, turn))
+        both = hosts.and_(spun)
+        spacing, spins = hosts.spacing.copy(), np.zeros(len(hosts.tried), dtype=bool)
+        spacing[hosts.core[rows]], spins[hosts.core[rows]] = 2.0 * np.pi / n, True
+        tried = np.bincount(both.core[both.even], minlength=len(hosts.tried)).astype(np.float64)
+        return replace(both, tried=tried, spacing=spacing, spins=spins)
+
+    def _hips_seen(self) -> bool:
+        return all(self.plan.states[joint] == State.SEEN for joint in HIP_JOINTS[1:])
+
+    def _closing(
+        self, hosts: Hosts, pivot: int, offset: Array, row: Index, axis: Array, first: Array
+    ) -> tuple[Index, Array]:
+        """Find the turns of a torso at which both hips, lifted from its pelvis, are as far apart as they must be.
+
+        The hips' line has one length: nothing that is sampled meets it.
+
+        Parameters
+        ----------
+        offset : array (3,)
+            From the pivot to the pelvis in the torso's frame.
+        row : int array (K,)
+            The host of each circle.
+        axis, first : array (K, 3), (K, 3, 3)
+            The circles, and the torso's rotation at angle zero of each.
+
+        Returns
+        -------
+        row, R
+            Hosts, and rotations.
+        """
+        which, angle = closing_angles(
+            self.figure,
+            self.rays,
+            self.frame[hosts.core[row]],
+            hosts.points[row, pivot],
+            axis,
+            np.einsum("nij,j->ni", first, offset),
+            self.sampling.circle,
+        )
+        return row[which], turned(axis[which], angle) @ first[which]
+
+    def _closing_rings(self, hosts: Hosts, pivot: int, offset: Array) -> tuple[Index, Array]:
+        """Do the same where only the neck is known: on rings of pelvis positions, spun about each root."""
+        z = np.array([0.0, 0.0, 1.0])
+        tilt = np.pi * (np.arange(RINGS) + 0.5) / RINGS
+        towards = np.stack([np.sin(tilt), np.zeros(RINGS), np.cos(tilt)], axis=1)
+        ring = onto(np.broadcast_to(unit(offset), towards.shape), towards)
+        row, R = self._closing(
+            hosts,
+            pivot,
+            offset,
+            np.repeat(np.arange(len(hosts)), RINGS),
+            np.broadcast_to(z, (len(hosts) * RINGS, 3)),
+            np.tile(ring, (len(hosts), 1, 1)),
+        )
+        spin = np.tile(circle(RINGS), len(row))
+        row, R = np.repeat(row, RINGS), np.repeat(R, RINGS, axis=0)
+        return row, turned(np.einsum("nij,j->ni", R, unit(offset)), spin) @ R
+
+    def _last(self, joints: tuple[int, ...]) -> bool:
+        """Whether nothing of the trunk hangs on the part that is turned."""
+        return joints == HIP_JOINTS or self._torso_alone()
+
+    def _lifted(self, hosts: Hosts, pelvis: int, joint: int) -> Hosts:
+        """Lift a hip that is seen from the pelvis."""
+        offset = self.figure.neutral_points[joint] - self.figure.neutral_points[pelvis]
+        lift = self.rays.lift(
+            joint,
+            self.frame[hosts.core],
+            hosts.points[:, pelvis],
+            float(np.linalg.norm(offset)),
+            self.tolerance,
+        )
+        row, branch = np.nonzero(lift.valid)
+        placed = hosts.take(row)
+        placed.points[:, joint] = lift.points[row, branch]
+        return replace(placed, tried=np.bincount(placed.core, minlength=len(hosts.tried)).astype(np.float64))

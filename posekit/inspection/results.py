@@ -1,0 +1,86 @@
+"""What is in a result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from posekit.formats.own import Result
+from posekit.formats.own.paths import FollowedPaths
+from posekit.inspection.telling import counts_line, cut_long, plural, reason_lines, settings_line, tally
+
+
+def result_lines(result: Result) -> list[str]:
+    """Describe survivors, what they were judged as and refined with, ranking, paths and settings."""
+    frames, settings = result.frames, result.settings
+    lines = [counts_line([len(frame.joints) for frame in frames]), *reason_lines(_unrecovered(settings))]
+    judged = settings.get("judged")
+    kinds = [one for one in judged if isinstance(one, str)] if isinstance(judged, list) else []
+    if kinds:
+        lines.append(f"judged as {tally(map(cut_long, kinds))}")
+    roots = [frame.root.method for frame in frames if frame.root is not None and frame.root.method != "none"]
+    if roots:
+        lines.append(f"neck placed by {tally(roots)}")
+    families = [frame.family.how for frame in frames if frame.family is not None]
+    if families:
+        lines.append(f"scale by {tally(map(cut_long, families))}")
+    inferred = [frame.inferred for frame in frames if frame.inferred]
+    if inferred:
+        names = {name for one in inferred for posture in one for name in posture}
+        lines.append(
+            f"joints not seen, and inferred in {plural(len(inferred), 'frame')}: {', '.join(sorted(names))}"
+        )
+    lines += [_refined(result), _ranked(result)]
+    lines.append("no paths through the frames" if result.paths is None else _paths(result.paths))
+    return [*lines, settings_line(settings)]
+
+
+def _unrecovered(settings: Mapping[str, Any]) -> dict[str, int]:
+    """Return in how many frames nothing was grown, by the reason."""
+    said = settings.get("unrecovered")
+    return {
+        str(reason): len(frames)
+        for reason, frames in (said.items() if isinstance(said, dict) else ())
+        if isinstance(frames, list)
+    }
+
+
+def _refined(result: Result) -> str:
+    refined = [frame.refined for frame in result.frames if frame.refined is not None and len(frame.refined)]
+    noise = result.settings.get("noise")
+    if not refined:
+        return "not refined"
+    chi2 = np.concatenate([one.chi2 / np.maximum(one.dof, 1) for one in refined])
+    told = f"; chi2 a degree of freedom: median {np.nanmedian(chi2):.2g}" if np.isfinite(chi2).any() else ""
+    deviation = noise.get("deviation") if isinstance(noise, dict) else None
+    of_points = f" with a deviation of {deviation:g} px" if isinstance(deviation, int | float) else ""
+    lengths = noise.get("lengths") if isinstance(noise, dict) else None
+    of_lengths = f", of lengths {lengths:g}" if isinstance(lengths, int | float) else ""
+    return f"refined in {plural(len(refined), 'frame')}{of_points}{of_lengths}{told}"
+
+
+def _ranked(result: Result) -> str:
+    likeliest = [
+        float(frame.probability.max())
+        for frame in result.frames
+        if frame.probability is not None and len(frame.probability)
+    ]
+    if not likeliest:
+        return "without probabilities"
+    ranking = result.settings.get("ranking")
+    by = ranking.items() if isinstance(ranking, dict) else ()
+    how = ", ".join(f"{cut_long(str(name))}: {cut_long(str(value))}" for name, value in list(by)[:5])
+    return f"ranked ({how or 'by default'}); the likeliest has a probability of {np.median(likeliest):.2g} (median)"
+
+
+def _paths(paths: FollowedPaths) -> str:
+    count, frames = paths.survivor.shape
+    lead = f"{paths.lead:.3g} cheaper than the next" if math.isfinite(paths.lead) else "without another"
+    certain = "certain to be" if paths.exact else "not certain to be"
+    return (
+        f"{count} path{'s' if count > 1 else ''}: the first {lead} that is different, {certain} the cheapest, "
+        f"{int((paths.survivor[0] < 0).sum())} of {frames} frames bridged"
+    )

@@ -1,0 +1,111 @@
+"""`posekit reproduce taylor`: the paper's objects and its experiment, beside the print."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from posekit.errors import ViewerError
+from posekit.formats.markdown import table_lines
+from posekit.papers.taylor_constrained import Constrained, constrained, constrained_lines
+from posekit.papers.taylor_study import Study, synthetic_study
+from posekit.recovery.taylor_figure.proportions import TABLE_1
+from posekit.safe_io.writing import write_json, write_lines
+
+PICTURES = 100
+"""Synthetic photographs: enough for a table in half a minute."""
+
+
+def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
+    """Write ``taylor.md`` and ``taylor.json`` into a folder, and the curves of Figs. 7b and 8b.
+
+    Parameters
+    ----------
+    folder : Path
+        Must exist.
+    pictures : bool
+        Whether to draw the curves too.
+
+    Returns
+    -------
+    list of str
+        The lines of the report.
+    """
+    objects = constrained()
+    study = synthetic_study(PICTURES)
+    lines = [
+        "# Taylor 2000, reproduced",
+        "",
+        "Everything here is synthetic: the paper's pictures and its OptoTrak data are not published. Eq. 3 is printed "
+        "upside down; the bound used is s >= sqrt(du^2 + dv^2) / l.",
+        "",
+        "## Table 1: the relative lengths used",
+        "",
+        *table_lines(
+            ("segment", "relative length"), [(name, f"{length:g}") for name, length in TABLE_1.items()]
+        ),
+        "## Figs. 7 and 8: constraints that fix the scale (section 3.3)",
+        "",
+        *constrained_lines(objects),
+        *(_curves(folder, objects) if pictures else ()),
+        *(f"#{line}" if line.startswith("#") else line for line in study.lines()),
+    ]
+    write_lines(folder / "taylor.md", lines)
+    write_json(
+        folder / "taylor.json",
+        {"table1": TABLE_1, "objects": [_plain(one) for one in objects], **_numbers(study)},
+    )
+    return lines
+
+
+def _curves(folder: Path, objects: list[Constrained]) -> list[str]:
+    """Draw the residual against the scale; return the lines that show it, or why they are missing."""
+    from posekit.viewer.plots import plot_curve, save
+
+    lines = []
+    for one in objects:
+        name = f"taylor.{one.figure.lower().replace('. ', '')}.png"
+        try:
+            save(
+                plot_curve(
+                    one.found.curve_s / one.s,
+                    one.found.curve_residual,
+                    minima=(one.found.s / one.s, one.found.residual),
+                    title=f"An object like that of {one.figure}: {one.constraint}",
+                ),
+                folder / name,
+            )
+        except ViewerError as error:
+            return [f"The curves of Figs. 7b and 8b are left out: {error}", ""]
+        lines += [f"![The residual over the scale, as in the paper's {one.figure}b]({name})", ""]
+    return lines
+
+
+def _plain(one: Constrained) -> dict[str, object]:
+    return {
+        "figure": one.figure,
+        "constraint": one.constraint,
+        "printed_degrees": one.printed,
+        "worst_degrees": one.worst.tolist(),
+        "true_s": one.s,
+        "minima": [
+            {"s": s, "residual": r}
+            for s, r in zip(one.found.s.tolist(), one.found.residual.tolist(), strict=True)
+        ],
+        "curve": {"s": one.found.curve_s.tolist(), "residual": one.found.curve_residual.tolist()},
+    }
+
+
+def _numbers(study: Study) -> dict[str, object]:
+    """Return the study's figures: survivors of the 2048 flips, and section 3.2's errors."""
+    exact = [
+        {
+            "checks": row.checks,
+            "mean": float(np.mean(row.count)),
+            "median": float(np.median(row.count)),
+            "truth": float(np.mean(row.truth)),
+        }
+        for row in study.exact
+    ]
+    return {"pictures": study.pictures, "flips": 2048, "survivors_exact": exact}

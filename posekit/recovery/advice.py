@@ -1,0 +1,47 @@
+"""What to tell whoever recovered frames and found no posture in them."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from posekit.recovery.admitting import least_violation
+from posekit.recovery.doubts import doubt_lines
+from posekit.recovery.recovery import Recovery
+from posekit.recovery.tolerance import MEASURED
+
+NAMED: Final = 3
+"""Empty frames of which the least violation is told."""
+
+
+def advice_lines(recovery: Recovery) -> list[str]:
+    """Say of frames without a posture what would admit one, and which lengths the picture does not bear out.
+
+    Of the first few frames the least violation (`posekit.recovery.admitting`); where most of the frames have none, the
+    lengths that would have to be others (`posekit.refinement.diagnose`).
+    """
+    grower = recovery.grower
+    if grower is None:
+        return []
+    empty = [k for k, frame in enumerate(recovery.frames) if not len(frame) and not frame.reason]
+    lines = []
+    for k in empty[:NAMED]:
+        frame = recovery.frames[k]
+        allowed = MEASURED if frame.judged in ("exact", "measured") else frame.tolerance
+        found = least_violation(grower, frame.number, allowed)
+        if found is not None and found.excesses:
+            lines.append(f"frame {k + 1}: the least that would admit a posture: {found}")
+        elif found is not None and frame.refined is not None:
+            lines.append(
+                f"frame {k + 1}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"
+            )
+    if len(empty) > NAMED and lines:
+        lines.append(f"and {len(empty) - NAMED} more frames without a posture")
+    # Frames whose neck could not be placed say as much of lengths as those with one: often a limb is what forbids it.
+    lost = [
+        frame.number
+        for frame in recovery.frames
+        if not len(frame) and (not frame.reason or frame.placement is not None)
+    ]
+    if len(lost) > len(recovery.frames) / 2:
+        lines += doubt_lines(recovery, grower, lost)
+    return lines

@@ -1,0 +1,153 @@
+"""What a picture's points are lifted into: the stick figure's own tree, or another with its proportions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.geometry import Array
+from posekit.linkages import Linkage
+from posekit.recovery.tolerance import Tolerance
+from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
+from posekit.tree import Check, InterpretationTree, Leaves
+from posekit.validators import Ranges, make_checks
+from posekit.validators.walking import WalkingThresholds
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judges:
+    """Which checks are asked, and with what.
+
+    Parameters
+    ----------
+    checks : tuple of str
+        Names of validators.
+    ranges : Ranges
+    rules : tuple of int
+        Rules of walking.
+    contact_margin : float
+        Metres that bodies must keep from each other.
+    thresholds : WalkingThresholds
+        Of the rules of walking.
+    """
+
+    checks: tuple[str, ...]
+    ranges: Ranges
+    rules: tuple[int, ...]
+    contact_margin: float
+    thresholds: WalkingThresholds = field(default_factory=WalkingThresholds)
+
+    def suite(self, figure: Figure, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
+        """Make the checks of a figure, with every distance measured where `exact`."""
+        return make_checks(
+            figure,
+            self.checks,
+            ranges=self.ranges,
+            rigid_tolerance=tolerance.distances,
+            rigid_mode="placement" if tolerance.placement else "distances",
+            angle_tolerance=tolerance.angle,
+            rules=self.rules,
+            thresholds=self.thresholds,
+            contact_margin=self.contact_margin,
+            exact=exact,
+        )
+
+
+class Body(Protocol):
+    """A tree over points of the body, and the way from its leaves to the figure's joints."""
+
+    @property
+    def figure(self) -> Figure:
+        """The person's figure, which certifies the postures."""
+        ...
+
+    @property
+    def tree(self) -> InterpretationTree:
+        """The tree; its first joint is the root."""
+        ...
+
+    @property
+    def linkage(self) -> Linkage:
+        """The same as a linkage: all segments whose length is known, for the scale of an uncalibrated picture."""
+        ...
+
+    @property
+    def stature(self) -> float:
+        """The person's height, metres."""
+        ...
+
+    @property
+    def inferred(self) -> tuple[str, ...]:
+        """The joints of the figure that the tree has not, and that are completed."""
+        ...
+
+    @property
+    def evidence(self) -> Sequence[tuple[tuple[int, int], float]]:
+        """Distances (m) between two of the tree's joints that lift nothing: they show that points are exact."""
+        ...
+
+    def image(self, seen: Array) -> Array:
+        """Pick the image points (F, J, 2) of the tree's joints from those of the figure's (F, 14, 2)."""
+        ...
+
+    def points(self, leaves: Leaves) -> Array:
+        """Place the figure's joints and head (N, 19, 3) in leaves, metres."""
+        ...
+
+    def checks(self, judges: Judges, tolerance: Tolerance) -> Sequence[Check]:
+        """Make the checks that prune the tree."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FigureBody:
+    """The stick figure itself: 14 joints from the neck, 13 segments, and the four distances of torso and hips.
+
+    Where some image points are `derived` from others, distances come out right by construction, and are no evidence.
+    """
+
+    figure: Figure
+    stature: float
+    inferred: tuple[str, ...] = ()
+    derived: tuple[str, ...] = ()
+
+    @cached_property
+    def tree(self) -> InterpretationTree:
+        """The tree of Lee & Chen (1985, section 2.2)."""
+        lengths = [0.0, *(self.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)]
+        return InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=np.array(lengths))
+
+    @cached_property
+    def linkage(self) -> Linkage:
+        """All 17 lengths: torso and hips are closed loops."""
+        return Linkage(
+            name="figure",
+            points=JOINTS,
+            segments=SEGMENTS,
+            lengths=np.array([self.figure.lengths[segment_name(segment)] for segment in SEGMENTS]),
+            unit=1.0,
+        )
+
+    @property
+    def evidence(self) -> Sequence[tuple[tuple[int, int], float]]:
+        """The four distances inside torso and hips; none where joints are derived."""
+        if self.derived:
+            return ()
+        return [(segment, self.figure.lengths[segment_name(segment)]) for segment in RIGID_SEGMENTS]
+
+    def image(self, seen: Array) -> Array:
+        """Take them as they are."""
+        return seen
+
+    def points(self, leaves: Leaves) -> Array:
+        """Put the head beside the joints."""
+        return np.concatenate([leaves.postures(), leaves.given[leaves.frame]], axis=1)
+
+    def checks(self, judges: Judges, tolerance: Tolerance) -> Sequence[Check]:
+        """Make the figure's own checks."""
+        return judges.suite(self.figure, tolerance)

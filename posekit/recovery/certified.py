@@ -1,0 +1,139 @@
+"""The checks that every refined posture passes: those that are asked of any posture, with what the noise allows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure
+from posekit.compiled.compiling import is_fast
+from posekit.compiled.verdicts import PASSED
+from posekit.geometry import Array
+from posekit.recovery.body import Judges
+from posekit.recovery.contact import contact_under_noise
+from posekit.recovery.noise import Noise
+from posekit.recovery.tolerance import Tolerance
+from posekit.refinement import GIVING
+from posekit.refinement.sight import LIMIT_DEVIATION
+from posekit.refinement.tolerance import DEVIATIONS
+from posekit.tree import Check, Screened
+from posekit.validators import Judgement, judge, make_checks
+from posekit.validators.validator import RIGID_TOLERANCE
+
+
+def certified_within(noise: Noise) -> Tolerance:
+    """Return how far refined postures may be off.
+
+    Angles: limits pull at what is beyond them, so an angle that feels one is known at least as well as that,
+    whatever the noise: three of those deviations do not contradict it. Distances: what is allowed of any measured body,
+    and more in proportion where lengths are known worse than such bodies'.
+    """
+    worse = max(1.0, max(noise.by_segment.values()) / max(GIVING.values()))
+    rigid = RIGID_TOLERANCE * worse
+    return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=DEVIATIONS * LIMIT_DEVIATION)
+
+
+def certifying_checks(figure: Figure, judges: Judges, tolerance: Tolerance) -> list[Check]:
+    """Make those of the checks that judge a posture by itself, as `posekit.Validator` makes them."""
+    return make_checks(
+        figure,
+        [name for name in judges.checks if name != "walking"],
+        ranges=judges.ranges,
+        rigid_tolerance=tolerance.distances,
+        rigid_mode="distances",
+        limbs=True,
+        angle_tolerance=tolerance.angle,
+        directions=True,
+        contact_margin=contact_under_noise(judges.contact_margin),
+        exact=False,
+    )
+
+
+FIRST: Final = ("rigid_parts", "joint_range")
+"""Checks that are asked before those that take longer."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contradiction:
+    """Postures that a check contradicts.
+
+    Parameters
+    ----------
+    check : str
+    where, unit : tuple of str (K,)
+        Its places.
+    row : int array (M,)
+        The postures.
+    place : int8 array (M,)
+        Where each is off most.
+    value, lower, upper : array (M,)
+        What was found there, and its bounds.
+    """
+
+    check: str
+    where: tuple[str, ...]
+    unit: tuple[str, ...]
+    row: NDArray[np.intp]
+    place: NDArray[np.int8]
+    value: Array
+    lower: Array
+    upper: Array
+
+
+def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.intp]) -> list[Contradiction]:
+    """Judge some postures (N, 19, 3); `asked` (N,) are their numbers. Each is contradicted once at most."""
+    found = []
+    quick = [check for check in checks if check.name in FIRST]
+    slow = [check for check in checks if check.name not in FIRST]
+    for part, doubtful in ((quick, _doubtful(quick, points)), (slow, None)):
+        rows = np.arange(len(asked)) if doubtful is None else np.flatnonzero(doubtful)
+        if not (part and len(rows)):
+            continue
+        open_ = np.ones(len(asked), dtype=np.bool_)
+        for judgement in judge(part, points[rows]):
+            bad = np.flatnonzero(judgement.violated.any(axis=1) & open_[rows])
+            open_[rows[bad]] = False
+            if bad.size:
+                found.append(_contradiction(judgement, bad, asked[rows[bad]]))
+        points, asked = points[open_], asked[open_]
+    return found
+
+
+def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
+    """Return which postures (N,) are not clearly valid by all checks; all of them where loops are not compiled.
+
+    A screen that passes a limb does so with less tolerance than the check has: some directions are allowed more.
+    """
+    doubtful = np.zeros(len(points), dtype=np.bool_)
+    fast = is_fast(0)
+    for check in checks:
+        own = points[:, list(check.points)]
+        if check.name == "joint_range" and not (fast and hasattr(check, "screen")):
+            return np.ones(len(points), dtype=np.bool_)
+        if check.name == "joint_range":
+            places, _ = cast(Screened, check).screen(np.ascontiguousarray(own))
+            doubtful |= places != PASSED
+        else:
+            doubtful |= check.judge(own).violated.any(axis=1)
+    return doubtful
+
+
+def _contradiction(judgement: Judgement, bad: NDArray[np.intp], row: NDArray[np.intp]) -> Contradiction:
+    off = np.where(judgement.violated[bad], judgement.margin[bad], np.inf)
+    off = np.where(np.isnan(off), -np.inf, off)
+    place = off.argmin(axis=1)
+    value, lower, upper = (table[bad, place] for table in (judgement.value, judgement.lower, judgement.upper))
+    return Contradiction(
+        check=judgement.check,
+        where=judgement.where,
+        unit=judgement.unit,
+        row=row,
+        place=place.astype(np.int8),
+        value=value,
+        lower=lower,
+        upper=upper,
+    )

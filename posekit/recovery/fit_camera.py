@@ -1,0 +1,243 @@
+"""From a view's camera and head to what the tree needs: a camera, the neck, and the head's points, per frame."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure
+from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera, lee_chen
+from posekit.cameras.head import HeadPoints, HeadPose, calibrate, solve_pose
+from posekit.cameras.neck import Placement
+from posekit.compiled.compiling import n_threads
+from posekit.errors import HeadError, InputError
+from posekit.formats.own import Family, LeeChenModel, OpenCVModel, View
+from posekit.geometry import Array
+from posekit.recovery.rooting import Rooting, place_roots
+from posekit.recovery.seen import NO_NECK, neckless
+from posekit.recovery.tolerance import Tolerance
+from posekit.skeleton import HEAD, HEAD_POINTS
+
+ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
+"""Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraFit:
+    """The camera of F frames, and where it sees the root and the head, in H hypotheses.
+
+    A calibrated frame is one hypothesis, or as many as depths were taken for its neck; an uncalibrated one as many as
+    scales were.
+
+    Parameters
+    ----------
+    camera : PinholeCamera or ScaledOrthographicCamera
+        Its first axis, where it has one, counts hypotheses.
+    frame : int array (H,)
+        The frame of each hypothesis, in order.
+    root : array (H, 3)
+        The tree's root, camera frame, metres; NaN where it is not known.
+    head : array (H, 5, 3)
+        The head's points; NaN where the head was not seen.
+    pose : HeadPose or None
+        The recovered head, where there was one to see.
+    reasons : list of str
+        For each frame why its root is not known, or an empty text.
+    families : list of Family, optional
+        For each uncalibrated frame the scales that it can have; None where the reason says why.
+    placements : list of Placement or None, optional
+        For each calibrated frame how its neck was placed; None where it was given or six head points told.
+    closed : bool
+        Whether scales were fitted to close the rigid parts.
+    """
+
+    camera: PinholeCamera | ScaledOrthographicCamera
+    frame: NDArray[np.intp]
+    root: Array
+    head: Array
+    pose: HeadPose | None
+    reasons: list[str]
+    families: list[Family | None] | None = None
+    placements: list[Placement | None] | None = None
+    closed: bool = False
+
+    def cameras(self, part: NDArray[np.intp]) -> Camera:
+        """Return the camera of some hypotheses."""
+        if isinstance(self.camera, ScaledOrthographicCamera):
+            return ScaledOrthographicCamera(
+                scale=np.asarray(self.camera.scale)[part], aspect=self.camera.aspect
+            )
+        K = self.camera.K
+        if K.ndim == 2:
+            return self.camera
+        return PinholeCamera(K=K[self.frame[part]], distortion=self.camera.distortion)
+
+
+def fit_camera(
+    view: View, figure: Figure, rooting: Rooting | None = None, tolerance: Tolerance | None = None
+) -> CameraFit:
+    """Find the camera from the head (§2.1), or the head from a known camera.
+
+    A root that the view gives comes before the head's neck; the head then turns with the recovered rotation
+    about that root. Where neither tells it, and the camera is known, the neck is placed (`posekit.cameras.neck`).
+    Frames that do not show the neck are as if they were not there, but for their reason.
+
+    Parameters
+    ----------
+    view : View
+    figure : Figure
+        The person's.
+    rooting : Rooting, optional
+        How to place the neck; a method other than ``auto`` is used even where six head points are seen.
+    tolerance : Tolerance, optional
+        What may be off, where it is not to be derived from the deviation of the image points.
+
+    Raises
+    ------
+    InputError
+        Where the camera's model cannot be used, or no frame's neck can be found.
+    """
+    n = len(view.time)
+    shown = ~neckless(view)
+    names = ("neck", *HEAD_POINTS)
+    points = {name: figure.head_points[k] for k, name in enumerate(names)} | dict(view.head_points or {})
+    head_points = HeadPoints.from_mapping(points)
+    image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
+    image[~shown] = np.nan
+    seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= len(names)
+    rooting = rooting or Rooting()
+    # A neck that was put between the shoulders is no point of the head. Where all necks are given, it is only turned.
+    trusted = rooting.trust_head or np.isfinite(view.root[shown]).all()
+    if "neck" in view.derived or rooting.method != "auto" or not trusted:
+        seen[:] = False
+    pose: HeadPose | None = None
+    model = view.camera
+    if isinstance(model, LeeChenModel):
+        pose = None
+        if seen.any() or model.f is None:
+            pose = calibrate(head_points, image, f=model.f, threads=n_threads())
+        camera = lee_chen.pinhole(_recovered_f(pose) if model.f is None else model.f)
+    elif isinstance(model, OpenCVModel):
+        camera = PinholeCamera(K=model.K, distortion=model.distortion)
+        pose = solve_pose(head_points, image, camera, threads=n_threads()) if seen.any() else None
+    else:
+        raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
+    root = np.where(shown[:, None], view.root, np.nan)
+    head = np.full((n, len(HEAD), 3), np.nan)
+    reasons = ["" if there else f"frames[{k}]: {NO_NECK}" for k, there in enumerate(shown.tolist())]
+    if pose is not None:
+        neck = pose.points_cam[:, 0]
+        unknown = np.isnan(root).any(axis=1)
+        root[unknown] = neck[unknown]
+        head = pose.points_cam[:, 1 : 1 + len(HEAD)] - neck[:, None] + root[:, None]
+    if isinstance(model, LeeChenModel) and model.f is None and pose is not None:
+        root[~pose.found] = (
+            np.nan
+        )  # a given root is of no use where f, which the head would tell, is not known
+    _check_root(np.where(np.isnan(root), np.nan, view.root), view, camera)
+    if isinstance(model, LeeChenModel) and model.f is None:
+        placements = _unplaced(root, pose, reasons)
+    else:
+        for k in np.flatnonzero(seen & np.isnan(root).any(axis=1)).tolist():
+            reasons[k] = f"frames[{k}]: {pose.reasons[k] if pose is not None else ''}"
+        placements = _placed(view, camera, figure, root, rooting, tolerance, reasons)
+    if not any(placements):
+        return CameraFit(camera=camera, frame=np.arange(n), root=root, head=head, pose=pose, reasons=reasons)
+    necks = [root[k : k + 1] if one is None or reasons[k] else one.necks for k, one in enumerate(placements)]
+    frame = np.repeat(np.arange(n), [len(each) for each in necks])
+    return CameraFit(
+        camera=camera,
+        frame=frame,
+        root=np.concatenate(necks),
+        head=head[frame],
+        pose=pose,
+        reasons=reasons,
+        placements=placements,
+    )
+
+
+def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Placement | None]:
+    """Say of frames without a neck why: where the head that would tell f is not seen, nothing can be placed."""
+    asked = [k for k, reason in enumerate(reasons) if not reason]
+    for k in asked:
+        if np.isnan(root[k]).any():
+            why = (pose and pose.reasons[k]) or "its head is not seen, and so its camera is not known"
+            reasons[k] = f"frames[{k}]: {why}"
+    if all(reasons):
+        raise HeadError(
+            f"{reasons[asked[0]]}; give six head points in head_image (with the neck in image), or f and root"
+        )
+    return [None] * len(reasons)
+
+
+def _placed(
+    view: View,
+    camera: PinholeCamera,
+    figure: Figure,
+    root: Array,
+    rooting: Rooting,
+    tolerance: Tolerance | None,
+    reasons: list[str],
+) -> list[Placement | None]:
+    """Place the necks that are not known by now, and say of the others that they need not be."""
+    placements: list[Placement | None] = [None] * len(reasons)
+    without = np.asarray(np.isnan(root).any(axis=1))
+    unknown = np.flatnonzero(without & np.array([not reason for reason in reasons]))
+    found = place_roots(view, camera, figure, unknown, rooting, tolerance) if len(unknown) else []
+    for k, placement in zip(unknown.tolist(), found, strict=True):
+        placements[k] = placement
+        if not len(placement.necks):
+            reasons[k] = f"frames[{k}]: {placement.reason}"
+    if all(reasons):
+        first = reasons[int(np.argmax(~neckless(view)))]
+        raise InputError(
+            f"{first}; lengths, camera or image points may be wrong, as no frame's neck fits them: correct them, "
+            "or give root"
+        )
+    return placements
+
+
+def _check_root(root: Array, view: View, camera: PinholeCamera) -> None:
+    """Refuse given roots that are behind the camera or far from the neck's ray, and warn of those beside it."""
+    given = np.isfinite(root).all(axis=1)
+    if not given.any():
+        return
+    behind = np.flatnonzero(given & (root[:, 2] <= 0))
+    if len(behind):
+        k = int(behind[0])
+        raise InputError(
+            f"frames[{k}].root: {root[k].tolist()} m is behind the camera; expected z > 0: x right, y down, "
+            "z forward"
+        )
+    rays = camera.normalize(view.image[:, 0])
+    rays = np.concatenate([rays, np.ones((len(rays), 1))], axis=1)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    along = np.einsum("fi,fi->f", root, rays)
+    beside = np.where(given, np.linalg.norm(root - along[:, None] * rays, axis=1), 0.0)
+    k = int(np.nanargmax(beside))
+    if beside[k] > ROOT_REFUSED:
+        raise InputError(
+            f"frames[{k}].root: {root[k].tolist()} m is {beside[k]:.3g} m beside the ray on which the neck is seen; "
+            "expected the neck, in the view's unit, OpenCV camera frame; correct it, or leave it out where a head "
+            "is seen"
+        )
+    noise = (
+        0.0 if view.deviation is None else 3 * view.deviation * root[k, 2] / float(camera.K[..., 0, 0].min())
+    )
+    if beside[k] > max(ROOT_WARNED, noise):
+        warnings.warn(
+            f"frames[{k}].root is {beside[k] * 100:.2g} cm beside the ray on which the neck is seen; "
+            "the postures start from it as it is given",
+            UserWarning,
+            stacklevel=4,
+        )
+
+
+def _recovered_f(pose: HeadPose | None) -> Array:
+    """Return f of each frame; 1 m, in frames that are not grown, where the head gave none."""
+    if pose is None:
+        raise HeadError("camera.f is null and no head is seen; give f, or six head points in head_image")
+    return np.where(pose.found, pose.f, 1.0)

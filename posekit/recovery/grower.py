@@ -1,0 +1,203 @@
+"""Trees of some frames of one view, grown together with one tolerance."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.cameras import Camera
+from posekit.formats.own import View
+from posekit.geometry import Array
+from posekit.hidden import Completion, complete, reject
+from posekit.objects.nearer import Nearer
+from posekit.recovery.body import Body, FigureBody, Judges
+from posekit.recovery.fit_camera import CameraFit
+from posekit.recovery.tolerance import EXACT, Tolerance
+from posekit.recovery.trees import Batch
+from posekit.skeleton import JOINT, TORSO
+from posekit.tree import Check, InterpretationTree, Leaves
+
+MOST_HIDDEN = 1000
+"""Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
+
+WORTH_ASKING = 64
+"""Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
+
+TRUNK = tuple(JOINT[name] for name in TORSO[1:])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Grower:
+    """Grows trees over hypotheses of a view: its frames, or its frames at several scales.
+
+    Parameters
+    ----------
+    view : View
+    fit : CameraFit
+    body : Body
+    judges : Judges
+    nearer : Nearer, optional
+        Flips given by hand.
+    infer : bool
+        Whether joints that were not seen are completed.
+    """
+
+    view: View
+    fit: CameraFit
+    body: Body
+    judges: Judges
+    nearer: Nearer | None = None
+    infer: bool = True
+
+    def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
+        """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
+        suite, measured = self.suites_of(tolerance)
+        image = self.body.image(self.view.image[self.fit.frame[chosen]])
+        tree = self.body.tree
+        camera = self.fit.cameras(chosen)
+        motion = [check for check in suite if check.name == "walking"]
+        with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
+            leaves = tree.grow(
+                camera,
+                self.fit.root[chosen],
+                image,
+                [check for check in suite if check.name != "walking"],
+                given=self.fit.head[chosen],
+                tolerance=tolerance.tangent,
+            )
+        exact = np.zeros(leaves.n_frames, dtype=np.bool_)
+        if tolerance == EXACT:
+            exact = is_exact(leaves, self.body, fitted=self.fit.closed)
+        if self.nearer is not None:
+            leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
+        physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
+        leaves = tree.prune(leaves, motion)
+        leaves, completion = self.complete(leaves, camera, image, suite, tolerance, self.fit.frame[chosen])
+        return Batch(
+            leaves=leaves,
+            physical=physical,
+            checks=measured,
+            body=self.body,
+            tolerance=tolerance,
+            exact=exact,
+            completion=completion,
+        )
+
+    def closing(self, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Return those of some hypotheses that may be exact: of frames whose torso closes to rounding, or may.
+
+        A torso that does not close in any branch, as those of measured points do not, is evidence enough: nothing is
+        left then of which `is_exact` could be true, and the tree need not be grown to see it. Many frames are only
+        asked where some are found not to close.
+        """
+        if not self.body.evidence:
+            return chosen[:0]
+        if not isinstance(self.body, FigureBody) or len(chosen) < WORTH_ASKING:
+            return chosen
+        if self._closed(chosen[:: len(chosen) // (WORTH_ASKING // 2)]).all():
+            return chosen
+        frame = self.fit.frame[chosen]
+        return chosen[np.isin(frame, frame[self._closed(chosen)])]
+
+    def _closed(self, chosen: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Say of which hypotheses (H,) some branch closes the torso exactly, or does not show it."""
+        tree, n = self.body.tree, JOINT["left_hip"]
+        stem = InterpretationTree(joints=tree.joints[:n], parents=tree.parents[:n], lengths=tree.lengths[:n])
+        suite, _ = self.suites_of(EXACT)
+        with np.errstate(over="ignore"):
+            leaves = stem.grow(
+                self.fit.cameras(chosen),
+                self.fit.root[chosen],
+                self.body.image(self.view.image[self.fit.frame[chosen]])[:, :n],
+                [check for check in suite if check.name == "rigid_parts" and max(check.points) < n],
+                tolerance=EXACT.tangent,
+            )
+        return np.bincount(leaves.frame, minlength=len(chosen)) > 0
+
+    def complete(
+        self,
+        leaves: Leaves,
+        camera: Camera,
+        image: Array,
+        suite: Sequence[Check],
+        tolerance: Tolerance,
+        frame: NDArray[np.intp],
+    ) -> tuple[Leaves, Completion | None]:
+        """Complete survivors by the joints that were not seen, and drop those that cannot be.
+
+        `frame` is the view's frame of each hypothesis.
+
+        Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
+        where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
+        """
+        unseen = np.asarray(np.isnan(image).any(axis=2))
+        placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
+        hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
+        too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
+        self._warn_of(frame[too_many & placed])
+        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
+        if not (self.infer and isinstance(self.body, FigureBody) and worth.any()):
+            return leaves, None
+        part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
+        done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
+        return reject(leaves, done.among(leaves.postures(), worth))
+
+    def _warn_of(self, frames: NDArray[np.intp]) -> None:
+        """Say of which frames nothing is inferred."""
+        if self.infer and isinstance(self.body, FigureBody) and len(frames):
+            named = ", ".join(f"frames[{k}]" for k in np.unique(frames)[:3].tolist())
+            warnings.warn(
+                f"{named}: too many survivors and hidden joints to infer ({MOST_HIDDEN} in a frame at most): "
+                "those joints stay unknown",
+                UserWarning,
+                stacklevel=4,
+            )
+
+    def suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
+        """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
+        if tolerance not in self._suites:
+            exact = self.judges.suite(self.body.figure, tolerance, exact=True)
+            self._suites[tolerance] = (self.body.checks(self.judges, tolerance), exact)
+        return self._suites[tolerance]
+
+    @cached_property
+    def _suites(self) -> dict[Tolerance, tuple[Sequence[Check], Sequence[Check]]]:
+        return {}
+
+
+def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.bool_]:
+    """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
+
+    Some distances are not used to lift anything: four inside torso and hips. That they come out right to 1e-8 m
+    is no accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible
+    there is no evidence, and a branch that happens to reach its rays must not stand for the truth. Where the scale was
+    `fitted` to close them, one of them alone is no evidence either.
+    """
+    if not body.evidence:
+        return np.zeros(leaves.n_frames, dtype=bool)
+    # Many leaves share a trunk, and stand together: one of them tells.
+    depth = max(max(segment) for segment, _ in body.evidence)
+    trunk = leaves.code >> (leaves.level - depth)
+    first = np.ones(len(trunk), dtype=bool)
+    first[1:] = (trunk[1:] != trunk[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
+    nodes = np.flatnonzero(first)
+    fits = np.ones(len(nodes), dtype=bool)
+    seen = np.zeros(len(nodes), dtype=np.int8)
+    for segment, length in body.evidence:
+        ends = leaves.positions(segment, nodes)
+        known_length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
+        known = np.isfinite(known_length)
+        fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
+        seen += known
+    exact = np.zeros(leaves.n_frames, dtype=bool)
+    exact[leaves.frame[nodes[fits & (seen > int(fitted))]]] = True
+    empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
+    for group in leaves.pruned:
+        if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
+            exact[group.frame[empty[group.frame]]] = True
+    return exact

@@ -1,0 +1,124 @@
+"""Checks of limbs as soft limits for refinement: ranges that no box of the figure's angles can say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+
+from posekit.body import Figure
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.geometry import Array
+from posekit.refinement.anatomy import LEGS, LIMBS
+from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
+from posekit.tree import Check
+from posekit.validators import Ranges
+
+ANGLES: Final = 4
+"""The most angles of a limb that are judged."""
+
+TORSO_POINTS: Final = [JOINT[name] for name in TORSO]
+HIPS_POINTS: Final = [JOINT[name] for name in HIPS]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LimbWalls:
+    """What checks of joint ranges say of limbs: `posekit.refinement.walls.Walls`.
+
+    Each limb is put onto the figure standing in its neutral posture, and judged as part of that.
+
+    Parameters
+    ----------
+    figure : Figure
+    checks : mapping
+        Those that judge each limb, with the same tolerance; of those that judge an angle again, the last counts.
+    balls : mapping
+        That of ``pelvis`` and ``neck``, where it judges no angles of the figure.
+    tolerance : float
+        Theirs, degrees.
+    on_torso : bool
+        Whether legs are judged in the torso's frame.
+    """
+
+    figure: Figure
+    checks: Mapping[int, Sequence[Check]]
+    balls: Mapping[str, Check]
+    tolerance: float
+    on_torso: bool
+
+    @staticmethod
+    def of(figure: Figure, ranges: Ranges, checks: Sequence[Check], tolerance: float) -> LimbWalls | None:
+        """Gather those of some checks that judge limbs by such ranges; None where there are none."""
+        if ranges.kind == "configuration" and ranges.anatomy is None:
+            return None
+        mine = {
+            limb: [check for check in checks if check.name == "joint_range" and joints[1] in check.points]
+            for limb, joints in enumerate(LIMBS)
+        }
+        if not any(mine.values()):
+            return None
+        projected = ranges.kind == "projected"
+        balls = {
+            check.where[0].split(".")[0]: check
+            for check in checks
+            if projected and check.name == "joint_range" and check.where[0].startswith(("pelvis", "neck"))
+        }
+        return LimbWalls(figure=figure, checks=mine, balls=balls, tolerance=tolerance, on_torso=projected)
+
+    def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
+        """Say how far limbs are beyond their limits; see `posekit.refinement.walls.Walls`."""
+        start, middle, end = LIMBS[limb]
+        part = self._torso if limb < LEGS.start or self.on_torso else self._hips
+        points = np.repeat(self.figure.neutral_points[None, : len(JOINTS)], len(upper), axis=0)
+        points[:, middle] = points[:, start] + upper @ part.T
+        points[:, end] = points[:, middle] + lower @ part.T
+        above, below = np.full((2, ANGLES, len(upper)), -np.inf)
+        place: dict[str, int] = {}
+        for check in self.checks[limb]:
+            findings = check.judge(points[:, list(check.points)])
+            # A rotation of an almost straight limb has its tolerance over the sine of the bend: its weight is that.
+            weight = np.radians(self.tolerance / np.broadcast_to(findings.tolerance, findings.value.shape))
+            for k, where in enumerate(check.where):
+                row = place.setdefault(where, len(place))
+                value = findings.value[:, k]
+                lower_, upper_ = (
+                    np.broadcast_to(limit, findings.value.shape)[:, k]
+                    for limit in (findings.lower, findings.upper)
+                )
+                known = np.isfinite(value)
+                above[row, known] = ((value - upper_) * weight[:, k])[known]
+                below[row, known] = ((lower_ - value) * weight[:, k])[known]
+        return above, below
+
+    def ball(self, part: str, turn: Array) -> tuple[Array, Array] | None:
+        """Say how far hips or heads are beyond their limits; see `posekit.refinement.walls.Walls`."""
+        check = self.balls.get(part)
+        if check is None:
+            return None
+        points = np.repeat(self.figure.neutral_points[None], len(turn), axis=0)
+        joint, ends = (JOINT["pelvis"], HIPS_POINTS[1:]) if part == "pelvis" else (JOINT["neck"], list(HEAD))
+        own = points[0, ends] - points[0, joint]
+        points[:, ends] = points[:, [joint]] + np.einsum("ij,njk,pk->npi", self._torso, turn, own)
+        findings = check.judge(points[:, list(check.points)])
+        value = findings.value
+        known = np.isfinite(value)
+        above, below = (
+            np.where(known, np.radians(off), -np.inf).T
+            for off in (value - findings.upper, findings.lower - value)
+        )
+        return above, below
+
+    @cached_property
+    def _torso(self) -> Array:
+        """The torso's frame of the figure standing."""
+        return np.asarray(
+            torso_frame(*(self.figure.neutral_points[None, joint] for joint in TORSO_POINTS))[0]
+        )
+
+    @cached_property
+    def _hips(self) -> Array:
+        """That of the hips."""
+        return np.asarray(hips_frame(*(self.figure.neutral_points[None, joint] for joint in HIPS_POINTS))[0])

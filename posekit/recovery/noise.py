@@ -1,0 +1,236 @@
+"""What is known of a view's noise: how far its image points, its necks and the person's lengths may be off."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure
+from posekit.body.angles import Limits
+from posekit.cameras import Camera, PinholeCamera
+from posekit.cameras.neck import DETECTED_DEVIATION, Placement
+from posekit.errors import InputError
+from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
+from posekit.geometry import Array
+from posekit.recovery.fit_camera import CameraFit
+from posekit.refinement import GIVING, RootPrior, Sight
+from posekit.refinement.walls import Walls
+from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
+
+JOINT_OFFSET: Final = 0.02
+"""Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
+
+LEAST_CONFIDENCE: Final = 0.25
+"""A confidence below this counts as this."""
+
+LEAST_LENGTHS: Final = 1e-4
+"""Relative deviations of lengths below this count as none."""
+
+LATERAL: Final = 10.0
+"""Deviations of an image point within which a placed neck may lie beside its ray: its image point says the rest."""
+
+LEAST_STEP: Final = 0.01
+"""Metres: the least deviation of a placed neck's depth."""
+
+TRUNK: Final = 6
+"""Joints of torso and hips: the first six."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """How far image points and lengths may be off.
+
+    Parameters
+    ----------
+    deviation : float
+        Standard deviation of each coordinate of an image point that was seen with full confidence, pixels.
+    offset : float
+        How far a detector's joints are from the figure's, standard deviation, metres.
+    lengths : float, optional
+        Relative standard deviation of all lengths; what bodies give (`posekit.refinement.GIVING`) if not given.
+    """
+
+    deviation: float
+    offset: float = 0.0
+    lengths: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.lengths is not None and not (math.isfinite(self.lengths) and 0 <= self.lengths <= 0.3):
+            raise InputError(
+                f"--length-deviation: {self.lengths!r}; expected a fraction of the length, 0 to 0.3"
+            )
+
+    @staticmethod
+    def of(view: View, deviation: float | None, lengths: float | None, *, asked: bool) -> Noise | None:
+        """Say what the noise of a view is; None where nobody does and it was not `asked` for.
+
+        The deviation that is given comes before the view's own, and that before what detectors' points have.
+        """
+        detected = bool(view.derived)
+        known = deviation or view.deviation or (DETECTED_DEVIATION if detected else None)
+        if known is None and not asked:
+            return None
+        return Noise(
+            deviation=known or DETECTED_DEVIATION,
+            offset=JOINT_OFFSET if detected else 0.0,
+            lengths=lengths,
+        )
+
+    @property
+    def by_segment(self) -> Mapping[str, float]:
+        """Relative standard deviations by segment."""
+        if self.lengths is None:
+            return GIVING
+        return dict.fromkeys(SEGMENT_NAMES, self.lengths if self.lengths >= LEAST_LENGTHS else 0.0)
+
+    @property
+    def limb(self) -> float:
+        """The largest of the limbs' lengths."""
+        return max(self.by_segment[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= TRUNK)
+
+    @property
+    def rigid(self) -> float:
+        """The largest of the distances inside torso and hips."""
+        return max(self.by_segment[segment_name(pair)] for pair in RIGID_SEGMENTS)
+
+    def of_points(self, view: View, frames: NDArray[np.intp], depth: Array, focal: Array) -> Array:
+        """Return the standard deviations of joints and head points (F, 19), pixels.
+
+        A residual that is weighted with its confidence w (Bogo et al. 2016, eq. 2) has the deviation 1 / sqrt(w).
+
+        Parameters
+        ----------
+        view : View
+        frames : int array (F,)
+        depth : array (F,)
+            Of the neck, metres.
+        focal : array (F,)
+            Focal length, pixels.
+        """
+        confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
+        beside = self.offset * focal / depth
+        return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), beside[:, None]))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Seen:
+    """What H hypotheses of a view saw, and how well.
+
+    Parameters
+    ----------
+    sight : Sight
+        Without their heads.
+    deviation : array (H, 19)
+        Of joints and head points, pixels.
+    focal : array (H,)
+        Pixels.
+    step : float
+        The largest deviation of a neck's depth, metres.
+    """
+
+    sight: Sight
+    deviation: Array
+    focal: Array
+    step: float
+
+    @property
+    def worst(self) -> float:
+        """The largest deviation of a joint that was seen, radians."""
+        seen = np.isfinite(self.sight.points()).all(axis=2)
+        angular = self.deviation[:, : len(JOINTS)] / self.focal[:, None]
+        return float(np.max(angular, where=seen, initial=0.0))
+
+    @staticmethod
+    def of(
+        view: View,
+        fit: CameraFit,
+        chosen: NDArray[np.intp],
+        camera: PinholeCamera,
+        figure: Figure,
+        noise: Noise,
+        limits: Limits | None = None,
+        walls: Walls | None = None,
+    ) -> Seen:
+        """Gather what some hypotheses saw with their `camera`; `limits` are the figure's if not given.
+
+        Those of limbs may be `walls` instead.
+        """
+        frames = fit.frame[chosen]
+        focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(chosen))
+        deviation = noise.of_points(view, frames, fit.root[chosen, 2], focal)
+        necks, step = neck_priors(fit, chosen, camera, float((deviation[:, 0] / focal).max()))
+        sight = Sight(
+            figure=figure,
+            camera=camera,
+            image=view.image[frames],
+            deviation=deviation[:, : len(JOINTS)],
+            root=necks,
+            length_deviation=noise.by_segment,
+            limits=limits,
+            walls=walls,
+        )
+        return Seen(sight=sight, deviation=deviation, focal=focal, step=step)
+
+
+def neck_priors(
+    fit: CameraFit, chosen: NDArray[np.intp], camera: Camera, beside: float
+) -> tuple[RootPrior, float]:
+    """Return what is known of the neck in some hypotheses, and the largest deviation of a depth, metres.
+
+    A neck that was given is there; one that was placed, within its step along the ray. Each hypothesis keeps its own
+    depth: how far a person is, one picture tells badly, and a single best depth would stand for a whole valley.
+
+    Parameters
+    ----------
+    fit : CameraFit
+    chosen : int array (H,)
+        Hypotheses.
+    camera : Camera
+        Theirs.
+    beside : float
+        Standard deviation of an image point, radians.
+    """
+    root = fit.root[chosen]
+    by_frame = fit.placements or [None] * len(fit.reasons)
+    step = np.array([_step(by_frame[k]) for k in fit.frame[chosen].tolist()])
+    lateral = np.where(step > 0, LATERAL * beside * root[:, 2], 0.0)
+    return RootPrior.along_ray(camera, root, depth=step, lateral=lateral), float(step.max(initial=0.0))
+
+
+def _step(placement: Placement | None) -> float:
+    """Return how far the depth may be from the nearest of the necks that were placed, metres."""
+    if placement is None:
+        return 0.0
+    deviation = (
+        placement.deviation if math.isfinite(placement.deviation) and len(placement.necks) == 1 else 0.0
+    )
+    return max(placement.step, deviation, LEAST_STEP)
+
+
+def noiseless_camera(view: View) -> str:
+    """Name the camera of a view whose noise is not allowed for; empty where it is an `opencv` one."""
+    if isinstance(view.camera, OpenCVModel):
+        return ""
+    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
+    return "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
+
+
+def refuse_deviation(view: View, deviation: float | None) -> None:
+    """Refuse a deviation that is asked for where it has no effect.
+
+    Raises
+    ------
+    InputError
+        Where one is given for another camera than an `opencv` one.
+    """
+    camera = noiseless_camera(view)
+    if camera and deviation is not None:
+        raise InputError(
+            f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
+            "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
+        )

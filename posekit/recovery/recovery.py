@@ -1,0 +1,350 @@
+"""What `recover` returns: every survivor of every frame, and why the rest is gone."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure
+from posekit.cameras.neck import Placement
+from posekit.formats.own import Family, Inferred, Root
+from posekit.geometry import Array
+from posekit.hidden import Completion
+from posekit.ranking import Ranking, deviation_of_tolerance
+from posekit.recovery.camera_record import CameraRecords
+from posekit.recovery.fit_camera import CameraFit
+from posekit.recovery.grouping import group_postures
+from posekit.recovery.grower import Grower
+from posekit.recovery.ranked import ranked
+from posekit.recovery.refined import RefinedSurvivors
+from posekit.recovery.rooting import root_of, tolerance_of
+from posekit.recovery.tolerance import Tolerance
+from posekit.recovery.trees import Batch
+from posekit.skeleton import JOINT, JOINTS
+
+
+def _inferred(completion: Completion, row: int) -> dict[str, Inferred]:
+    """Describe the joints of one survivor that were not placed by the image."""
+    return {
+        region.joint: Inferred(
+            kind=region.kind.label,
+            lower=region.lower,
+            upper=region.upper,
+            radius=region.radius,
+            fraction=region.fraction,
+        )
+        for region in completion.regions(row)
+    }
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrunedBranch:
+    """One pruned branch of the tree and the finding that killed it.
+
+    Parameters
+    ----------
+    branch : str
+        Its near-far choices up to the level where it was pruned; it stands for all leaves that begin so.
+    joint : str
+        The joint of that level.
+    reason : str
+        ``check/where``.
+    value, lower, upper : float
+        What was found, and its bounds, in `unit`.
+    """
+
+    branch: str
+    joint: str
+    reason: str
+    value: float
+    lower: float
+    upper: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameRecovery:
+    """One frame: its survivors and its losses.
+
+    Parameters
+    ----------
+    time : float
+        Seconds.
+    batch : Batch or None
+        None where the neck could not be found: nothing was grown.
+    index : int
+        The place in its batch of the frame's first hypothesis.
+    hypotheses : int
+        How many there are: one; for an uncalibrated frame as many as scales were taken, for a placed neck as depths,
+        under noise as trunks, which may be none.
+    family : Family, optional
+        The scales that an uncalibrated frame can have.
+    placement : Placement, optional
+        How the neck of a calibrated frame was placed, where it was not given.
+    reason : str
+        Why nothing was grown.
+    lost_to : str
+        The same in two words, ``what/why``, as leaves are lost to it.
+    group_within : float or None
+        Metres within which survivors are grouped.
+    number : int
+        Which frame of the view that was recovered it is.
+    cameras : CameraRecords, optional
+        Of all frames of the view.
+    """
+
+    time: float
+    batch: Batch | None
+    index: int
+    hypotheses: int = 1
+    family: Family | None = None
+    placement: Placement | None = None
+    reason: str = ""
+    lost_to: str = "root/not_known"
+    group_within: float | None = None
+    number: int = 0
+    cameras: CameraRecords | None = None
+
+    @property
+    def _rows(self) -> slice:
+        if self.batch is None:
+            return slice(0, 0)
+        offsets = self.batch.offsets
+        return slice(int(offsets[self.index]), int(offsets[self.index + self.hypotheses]))
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return int(self._rows.stop - self._rows.start)
+
+    @property
+    def joints(self) -> Array:
+        """Survivors (N, 14, 3), OpenCV camera frame, metres; NaN where a joint was not seen."""
+        return self.batch.points[self._rows, :14] if self.batch else np.empty((0, 14, 3))
+
+    @property
+    def head(self) -> Array:
+        """The head's points (5, 3), camera frame, metres; NaN where it was not seen."""
+        known = self.batch is not None and self.hypotheses
+        return self.batch.leaves.given[self.index] if self.batch and known else np.full((5, 3), np.nan)
+
+    @property
+    def scales(self) -> Array | None:
+        """The scale of each survivor (N,), pixels a metre; None where the camera is calibrated."""
+        if self.family is None or self.batch is None:
+            return None if self.family is None else np.empty(0)
+        return np.asarray(self.family.chosen[self.batch.leaves.frame[self._rows] - self.index])
+
+    @property
+    def mirrored(self) -> int:
+        """How many survivors have their mirror image among the survivors."""
+        return 0 if self.batch is None else int(self.batch.mirrored[self._rows].sum())
+
+    @property
+    def inferred(self) -> list[dict[str, Inferred]] | None:
+        """What is known of joints that were not seen, by survivor; None where all were."""
+        if self.batch is None:
+            return None
+        if self.batch.completion is not None:
+            rows = range(self._rows.start, self._rows.stop)
+            return [_inferred(self.batch.completion, row) for row in rows]
+        if not self.batch.body.inferred:
+            return None
+        columns = [JOINT[name] for name in self.batch.body.inferred]
+        return [
+            {
+                name: Inferred(kind="completed", lower=joints[column], upper=joints[column], radius=0.0)
+                for name, column in zip(self.batch.body.inferred, columns, strict=True)
+            }
+            for joints in self.joints
+        ]
+
+    @property
+    def q(self) -> Array:
+        """Survivors as configurations (N, nq) in Pinocchio's order."""
+        return self.batch.configurations.q[self._rows] if self.batch else np.empty((0, 0))
+
+    @property
+    def fk_distance(self) -> Array:
+        """How far the joints of q are from the posture's (N,), metres."""
+        return self.batch.configurations.distance[self._rows] if self.batch else np.empty(0)
+
+    @property
+    def length_residual(self) -> Array:
+        """How much too short each survivor's worst segment was for its image (N,), metres."""
+        return self.batch.length_residual[self._rows] if self.batch else np.empty(0)
+
+    @property
+    def margins(self) -> dict[str, Array]:
+        """Each validator's worst margin (N,), degrees or metres; NaN where it decided nothing."""
+        if self.batch is None:
+            return {}
+        return {name: values[self._rows] for name, values in self.batch.margins.items()}
+
+    @property
+    def refined(self) -> RefinedSurvivors | None:
+        """How likely and how sure each survivor is; None where the frame was not refined."""
+        if self.batch is None or self.batch.refined is None:
+            return None
+        return self.batch.refined.part(self._rows)
+
+    @property
+    def chi2(self) -> Array | None:
+        """How badly each survivor fits what was seen (N,), where the frame was refined."""
+        return None if self.refined is None else self.refined.chi2
+
+    @property
+    def spread(self) -> float:
+        """How far off survivors are, metres: from the noise where it is known, else from what was tolerated."""
+        if self.batch is not None and self.batch.refined is not None:
+            return self.batch.spread
+        return float(deviation_of_tolerance(self.tolerance.rigid if self.tolerance else 0.0))
+
+    @property
+    def branches(self) -> list[str]:
+        """The branch code of each survivor: 0 near, 1 far, joints in tree order from the second."""
+        if self.batch is None:
+            return []
+        leaves = self.batch.leaves
+        return [f"{code:0{leaves.level}b}" for code in leaves.code[self._rows].tolist()]
+
+    @cached_property
+    def groups(self) -> NDArray[np.intp] | None:
+        """The group of each survivor, its first member the representative; None if none were asked for."""
+        return None if self.group_within is None else group_postures(self.joints, self.group_within)
+
+    @property
+    def level_names(self) -> tuple[str, ...]:
+        """The joints of the tree, a level each."""
+        return JOINTS if self.batch is None else self.batch.leaves.joints
+
+    @property
+    def levels(self) -> dict[str, NDArray[np.int64]]:
+        """Survivors by level after the ``physical`` checks and after the ``motion`` model (§4.1.B)."""
+        if self.batch is None:
+            return {name: np.zeros(14, dtype=np.int64) for name in ("physical", "motion")}
+        part = slice(self.index, self.index + self.hypotheses)
+        motion = self.batch.motion
+        physical = motion if self.batch.physical is None else self.batch.physical
+        return {"physical": physical[part].sum(axis=0), "motion": motion[part].sum(axis=0)}
+
+    @property
+    def rejected(self) -> dict[str, int]:
+        """Leaves of the full tree lost to each reason; with the survivors they make 8192 a hypothesis."""
+        if self.batch is None:
+            return {self.lost_to: 8192}
+        if not self.hypotheses:
+            return {"noise/no_trunk": 8192}
+        lost: Counter[str] = Counter()
+        for one in self.batch.rejected[self.index : self.index + self.hypotheses]:
+            lost.update(one)
+        return dict(lost)
+
+    @property
+    def tolerance(self) -> Tolerance | None:
+        """The tolerance that this frame was judged with."""
+        return self.batch.tolerance if self.batch else None
+
+    @property
+    def judged(self) -> str | None:
+        """How the frame was judged; None where nothing was grown.
+
+        As ``exact``, ``measured``, a ``photograph``, ``noisy`` (what the deviation of its image points leads to),
+        ``refined`` (the same, and to the likeliest postures), or with tolerances that were ``given``.
+        """
+        if self.batch is None:
+            return None
+        placement = self.placement
+        noisy = placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement)
+        return "noisy" if noisy and self.batch.refined is None else self.batch.judged
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """What is known of the camera: f, rotation, position, residual (`posekit.recovery.camera_record`)."""
+        return {} if self.cameras is None else self.cameras[self.number]
+
+    @property
+    def root(self) -> Root | None:
+        """How the neck's depth was found; None where it was given, or the camera is not known."""
+        return None if self.placement is None else root_of(self.placement)
+
+    def too_short(self) -> tuple[str, float] | None:
+        """Return the first segment that is too short for its image in every branch, and by how much (m)."""
+        if self.batch is None or not self.hypotheses:
+            return None
+        leaves = self.batch.leaves
+        found = leaves.candidates.too_short(self.index) if self.hypotheses == 1 else None
+        return (
+            None
+            if found is None
+            else (f"{leaves.joints[leaves.parents[found[0]]]}-{leaves.joints[found[0]]}", found[1])
+        )
+
+    def pruned(self) -> list[PrunedBranch]:
+        """Every pruned branch with the finding that killed it, in the order of pruning."""
+        if self.batch is None:
+            return []
+        leaves = self.batch.leaves
+        return [
+            PrunedBranch(
+                branch=f"{group.code[k]:0{group.level}b}",
+                joint=leaves.joints[group.level],
+                reason=f"{group.check}/{group.where[group.place[k]]}",
+                value=float(group.value[k]),
+                lower=float(group.lower[k]),
+                upper=float(group.upper[k]),
+                unit=group.unit,
+            )
+            for group in leaves.pruned
+            for k in np.flatnonzero(
+                (group.frame >= self.index) & (group.frame < self.index + self.hypotheses)
+            )
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recovery:
+    """All frames of a view.
+
+    Parameters
+    ----------
+    figure : Figure
+        The person's figure.
+    fit : CameraFit
+    frames : list of FrameRecovery
+    settings : mapping
+        Everything that decided the result.
+    grower : Grower, optional
+        What grew the trees: it can tell what would have admitted a posture (`posekit.recovery.admitting`).
+    """
+
+    figure: Figure
+    fit: CameraFit
+    frames: list[FrameRecovery]
+    settings: Mapping[str, Any]
+    grower: Grower | None = None
+
+    @property
+    def unrecovered(self) -> dict[str, list[int]]:
+        """Frames in which nothing was grown, counted from zero, by the reason."""
+        found: dict[str, list[int]] = {}
+        for k, frame in enumerate(self.frames):
+            if frame.reason:
+                found.setdefault(re.sub(r"^frames\[\d+\]: ", "", frame.reason), []).append(k)
+        return found
+
+    @cached_property
+    def ranking(self) -> Ranking:
+        """The probability of every survivor of every frame (`posekit.ranking.rank`), of a camera held level."""
+        return ranked(self.frames, self.figure.lengths, [frame.spread for frame in self.frames])
+
+    @cached_property
+    def probability(self) -> list[Array]:
+        """The same, by frame."""
+        return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])

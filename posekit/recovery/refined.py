@@ -1,0 +1,104 @@
+"""Survivors that were refined: the likeliest postures, and how sure they are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.recovery.uncertainty import Covariances
+from posekit.refinement import Merged
+
+ALL = slice(None)
+
+ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RefinedSurvivors:
+    """N survivors under noise, in the order of the leaves that they came from.
+
+    Parameters
+    ----------
+    joints : array (N, 14, 3)
+        Camera frame, metres; NaN where a joint is not known.
+    head : array (N, 5, 3)
+        The head's points; NaN where the head was not seen.
+    chi2 : array (N,)
+        Sum of squares of what is off over its standard deviations.
+    dof : int array (N,)
+        Its degrees of freedom.
+    p : array (N,)
+        The probability that noise alone gives a chi2 as large.
+    merged : int array (N,)
+        How many other leaves became the same posture.
+    covariances : Covariances
+        Of these survivors and others, found when they are read.
+    rows : slice
+        Which of those these are.
+    """
+
+    joints: Array
+    head: Array
+    chi2: Array
+    dof: NDArray[np.intp]
+    p: Array
+    merged: NDArray[np.intp]
+    covariances: Covariances
+    rows: slice
+
+    def __post_init__(self) -> None:
+        for name in ARRAYS:
+            getattr(self, name).flags.writeable = False
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance of every joint (N, 14, 3, 3), square metres; NaN where it is not known."""
+        return self.covariances.read()[self.rows]
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return len(self.joints)
+
+    @staticmethod
+    def of(merged: Merged, known: NDArray[np.bool_]) -> RefinedSurvivors:
+        """Take what was merged; joints that are not `known` (of all leaves) become NaN."""
+        order = np.argsort(merged.rows)
+        unknown = ~known[merged.rows[order]]
+        chosen = merged.refined.select(order)
+        joints = chosen.joints.copy()
+        joints[unknown] = np.nan
+        size = np.bincount(merged.group[merged.group >= 0], minlength=len(order))[order]
+        return RefinedSurvivors(
+            joints=joints,
+            head=chosen.head.copy(),
+            chi2=chosen.chi2.copy(),
+            dof=chosen.dof.copy(),
+            p=chosen.p.copy(),
+            merged=size - 1,
+            covariances=Covariances(chosen, unknown),
+            rows=ALL,
+        )
+
+    @staticmethod
+    def joined(parts: Sequence[RefinedSurvivors]) -> RefinedSurvivors:
+        """Put those of one part behind those of the last, each of them whole."""
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in ARRAYS
+        }
+        covariances = Covariances.joined([part.covariances for part in parts])
+        return RefinedSurvivors(**arrays, covariances=covariances, rows=ALL)
+
+    def part(self, rows: slice) -> RefinedSurvivors:
+        """Return some of them, one after the other."""
+        own = range(*self.rows.indices(len(self.covariances)))[rows]
+        arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in ARRAYS}
+        return RefinedSurvivors(
+            **arrays,
+            covariances=self.covariances,
+            rows=slice(own.start, max(own.stop, own.start)),
+        )

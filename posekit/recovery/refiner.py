@@ -1,0 +1,318 @@
+"""Trees under noise: trunks first, limbs on them, then the likeliest posture of every leaf.
+
+Nothing is dropped that the noise can explain, what it cannot explain is rejected, what became one is merged, and every
+survivor passes the checks: see `posekit.refinement` and `posekit.recovery.certified`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body.angles import Limits
+from posekit.cameras import Camera, PinholeCamera
+from posekit.geometry import Array
+from posekit.hidden import Completion
+from posekit.ranking import deviation_of_noise
+from posekit.recovery.body import Judges
+from posekit.recovery.certified import Contradiction, certified_within, certifying_checks
+from posekit.recovery.contact import contact_under_noise
+from posekit.recovery.fit_camera import CameraFit, fit_camera
+from posekit.recovery.grower import Grower
+from posekit.recovery.grown import Grown
+from posekit.recovery.limb_walls import LimbWalls
+from posekit.recovery.noise import Noise, Seen
+from posekit.recovery.rooting import Rooting
+from posekit.recovery.sifting import Sifted, blocks, drop, sift
+from posekit.recovery.tolerance import Tolerance
+from posekit.recovery.trees import Batch
+from posekit.refinement import Sight, Trunks, find_trunks, tolerance_of, under_noise
+from posekit.refinement.tolerance import DEVIATIONS
+from posekit.refinement.trunk import TRUNK
+from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
+from posekit.tree import Check, InterpretationTree, Leaves
+
+ANGLE: Final = 1.0
+"""Degrees: what `under_noise` multiplies with what the noise does to each segment."""
+
+HYPOTHESES_AT_ONCE: Final = 250
+"""Hypotheses whose trees are grown together: each may have thousands of leaves."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lifted:
+    """Leaves of trees on trunks, before they are refined.
+
+    Parameters
+    ----------
+    chosen : int array (H,)
+        The hypotheses of the camera fit.
+    frame : int array (H,)
+        Whose frame each is, counted from 0.
+    frames : int array (F,)
+        The view's frames.
+    seen : Seen
+    trunks : Trunks
+        Of those hypotheses.
+    leaves : Leaves
+        On them.
+    physical : int array
+        Survivors by level, before the motion model.
+    completion : Completion or None
+        The joints that were not seen.
+    """
+
+    chosen: NDArray[np.intp]
+    frame: NDArray[np.intp]
+    frames: NDArray[np.intp]
+    seen: Seen
+    trunks: Trunks
+    leaves: Leaves
+    physical: NDArray[np.int64]
+    completion: Completion | None
+
+    @property
+    def own(self) -> NDArray[np.intp]:
+        """The hypothesis of the camera fit that each trunk was found for."""
+        return self.chosen[self.trunks.frame]
+
+    @property
+    def hypothesis(self) -> NDArray[np.intp]:
+        """The hypothesis of each leaf, counted from 0."""
+        return self.trunks.frame[self.leaves.frame]
+
+    def postures(self) -> Array:
+        """Place the leaves (N, 14, 3), completed where that was possible."""
+        postures = self.leaves.postures()
+        if self.completion is None:
+            return postures
+        return np.where(np.isnan(postures), self.completion.postures, postures)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Refiner:
+    """Grows and refines trees over the frames of a view whose noise is known.
+
+    Parameters
+    ----------
+    grower : Grower
+    noise : Noise
+    rooting : Rooting, optional
+        How necks are placed.
+    """
+
+    grower: Grower
+    noise: Noise
+    rooting: Rooting | None = None
+
+    def grow(self, frames: NDArray[np.intp]) -> dict[int, Grown]:
+        """Grow the trees of some frames of the view, and refine their leaves: hypotheses are trunks, maybe none."""
+        fit = self.fit
+        chosen = np.flatnonzero(np.isin(fit.frame, frames) & np.isfinite(fit.root).all(axis=1))
+        grown = {
+            int(k): Grown(batch=None, index=0, hypotheses=1, fit=fit)
+            for k in np.setdiff1d(frames, fit.frame[chosen])
+        }
+        for rows in blocks(fit.frame[chosen], HYPOTHESES_AT_ONCE):
+            if rows.stop > rows.start:
+                grown |= self._refine(self.lift(chosen[rows]))
+        return grown
+
+    @cached_property
+    def fit(self) -> CameraFit:
+        """The necks: those that six head points told are placed anew, with what the noise makes of them."""
+        given, view = self.grower.fit, self.grower.view
+        if given.pose is None or not np.isnan(view.root).any():
+            return given
+        rooting = replace(self.rooting or Rooting(), trust_head=False)
+        return fit_camera(view, self.grower.body.figure, rooting)
+
+    @cached_property
+    def judges(self) -> Judges:
+        """What the checks are asked with: bodies may overlap by as much as depths are off."""
+        asked = self.grower.judges
+        return replace(asked, contact_margin=contact_under_noise(asked.contact_margin))
+
+    @cached_property
+    def tolerance(self) -> Tolerance:
+        """By how much survivors may be off."""
+        return certified_within(self.noise)
+
+    @cached_property
+    def certifying(self) -> Sequence[Check]:
+        """The checks that every survivor passes."""
+        made = certifying_checks(self.grower.body.figure, self.grower.judges, self.tolerance)
+        return [check for check in made if self._can_be_told(check)]
+
+    @cached_property
+    def _measuring(self) -> Sequence[Check]:
+        """The checks that tell every margin."""
+        suite = self.judges.suite(self.grower.body.figure, self.tolerance, exact=True)
+        return [check for check in suite if self._can_be_told(check)]
+
+    @cached_property
+    def _limits(self) -> Limits:
+        """The limits that refinement keeps to: those of the ranges where they are of the figure's own angles."""
+        ranges, figure = self.grower.judges.ranges, self.grower.body.figure
+        if ranges.kind != "configuration" or not ranges.limits:
+            return figure.limits
+        radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}
+        return figure.with_limits(radians).limits
+
+    @cached_property
+    def _walls(self) -> LimbWalls | None:
+        """The limits of limbs that no box of angles can say."""
+        figure, judges = self.grower.body.figure, self.grower.judges
+        suite = judges.suite(figure, replace(self.tolerance, angle=ANGLE))
+        return LimbWalls.of(figure, judges.ranges, suite, ANGLE)
+
+    def _can_be_told(self, check: Check) -> bool:
+        """Whether the noise says enough of its points: not of a detector's head, which no arm can be said to touch."""
+        heads = check.name == "collision" and max(check.points) >= len(JOINTS)
+        return not (heads and self.grower.view.derived)
+
+    def lift(self, chosen: NDArray[np.intp]) -> Lifted:
+        """Find the trunks of some hypotheses of the fit, and put limbs on them."""
+        fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
+        frames, frame = np.unique(fit.frame[chosen], return_inverse=True)
+        camera = _pinhole(fit.cameras(chosen))
+        seen = Seen.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
+        trunks = find_trunks(seen.sight)
+        leaves, tolerance = self._leaves(trunks, chosen, camera, seen)
+        own = chosen[trunks.frame]
+        if self.grower.nearer is not None:
+            leaves = self.grower.nearer.prune(leaves, fit.frame[own])
+        physical = leaves.counts()
+        suite, _ = self.grower.suites_of(tolerance)
+        leaves = self.grower.body.tree.prune(leaves, [check for check in suite if check.name == "walking"])
+        leaves, completion = self.grower.complete(
+            leaves, fit.cameras(own), trunks.image, suite, tolerance, fit.frame[own]
+        )
+        return Lifted(
+            chosen=chosen,
+            frame=frame.reshape(-1),
+            frames=frames,
+            seen=seen,
+            trunks=trunks,
+            leaves=leaves,
+            physical=physical,
+            completion=completion,
+        )
+
+    def sift(self, lifted: Lifted) -> Sifted:
+        """Refine leaves, reject and merge."""
+        heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
+        return sift(
+            self._with_heads(lifted),
+            lifted.postures(),
+            heads[lifted.leaves.frame],
+            lifted.hypothesis,
+            lifted.frame[lifted.hypothesis],
+            self.certifying,
+        )
+
+    def _with_heads(self, lifted: Lifted) -> Sight:
+        """Return what was seen, with the head.
+
+        Only now: the head's turn, unknown at first, would lead trunks astray. A detector's ears and eyes are no points
+        of the figure's head: in one frame of six some ear is ten deviations off.
+        """
+        view, seen = self.grower.view, lifted.seen
+        head = view.head_image[self.fit.frame[lifted.chosen]]
+        if not np.isfinite(head).any() or view.derived:
+            return seen.sight
+        return replace(seen.sight, head_image=head, head_deviation=seen.deviation[:, len(JOINTS) :])
+
+    def _refine(self, lifted: Lifted) -> dict[int, Grown]:
+        """Refine leaves, and gather what is left of each frame."""
+        sifted = self.sift(lifted)
+        leaves, fit = sifted.prune(lifted.leaves), self.fit
+        depth = np.median(fit.root[lifted.chosen, 2] / lifted.seen.focal)
+        batch = Batch(
+            leaves=leaves,
+            physical=lifted.physical,
+            checks=self._measuring,
+            body=self.grower.body,
+            tolerance=self.tolerance,
+            exact=np.zeros(leaves.n_frames, dtype=np.bool_),
+            completion=None if lifted.completion is None else lifted.completion.take(sifted.kept),
+            refined=sifted.survivors,
+            spread=float(deviation_of_noise(self.noise.deviation, depth)),
+        )
+        bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
+        return {
+            frame: Grown(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
+            for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
+        }
+
+    def _leaves(
+        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: Seen
+    ) -> tuple[Leaves, Tolerance]:
+        """Grow limbs on trunks, with every angle's own allowance."""
+        fit, body = self.fit, self.grower.body
+        focal = float(np.min(camera.K[..., [0, 1], [0, 1]]))
+        allowed = tolerance_of(
+            seen.worst * focal,
+            camera,
+            body.figure,
+            float(fit.root[chosen, 2].max()),
+            length_deviation=self.noise.limb,
+            root_depth_deviation=seen.step,
+            trunks=True,
+        )
+        # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
+        longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
+        rigid = max(DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
+        tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=ANGLE)
+        suite = under_noise(self.judges.suite(body.figure, tolerance), allowed.bound)
+        tree = InterpretationTree(
+            joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
+        )
+        # Six noisy points tell a head's turn to some ten degrees: refinement weighs them, the tree does not ask.
+        given = np.full((len(trunks), len(HEAD), 3), np.nan)
+        with np.errstate(over="ignore"):
+            leaves = tree.grow(
+                fit.cameras(chosen[trunks.frame]),
+                trunks.root,
+                trunks.image,
+                [check for check in suite if check.name != "walking"],
+                given=given,
+                tolerance=tolerance.tangent,
+            )
+        return _without_twins(leaves, trunks), tolerance
+
+
+def _pinhole(camera: Camera) -> PinholeCamera:
+    if not isinstance(camera, PinholeCamera):
+        raise TypeError("only views of a calibrated camera are refined")
+    return camera
+
+
+def _without_twins(leaves: Leaves, trunks: Trunks) -> Leaves:
+    """Drop the leaves whose trunk is another than the one that was found: its twin in the same image."""
+    # Leaves are sorted by frame and code, and the trunk's joints are a code's first bits: one of a run tells of all.
+    prefix = leaves.code >> max(leaves.level - (TRUNK - 1), 0)
+    begins = np.ones(len(prefix), dtype=np.bool_)
+    begins[1:] = (prefix[1:] != prefix[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
+    one = np.flatnonzero(begins)
+    carried = trunks.carries(leaves.frame[one], leaves.positions(range(TRUNK), one))
+    twin = ~carried[np.cumsum(begins) - 1]
+    row = np.flatnonzero(twin)
+    nothing = np.full(len(row), np.nan)
+    why = Contradiction(
+        check="trunk",
+        where=("twin",),
+        unit=("",),
+        row=row,
+        place=np.zeros(len(row), dtype=np.int8),
+        value=nothing,
+        lower=np.full(len(row), -np.inf),
+        upper=np.full(len(row), np.inf),
+    )
+    return drop(leaves, twin, why)

@@ -1,0 +1,117 @@
+"""Where the neck is put where neither the view nor a head of six points says it, and what a result says of that."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure
+from posekit.cameras import PinholeCamera
+from posekit.cameras.neck import DETECTED_DEVIATION, DETECTED_OFFSET, Method, Placement, place
+from posekit.errors import InputError
+from posekit.formats.own import LeeChenModel, Root, View
+from posekit.recovery.tolerance import Tolerance
+
+DEVIATION: Final = 2.0
+"""Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
+
+MOST: Final = 1000.0
+"""Pixels: the largest deviation that is taken for one."""
+
+RELATIVE: Final = 1e-3
+"""The same on the image plane of a `lee-chen` camera, as a fraction of f: some 2 pixels of most cameras."""
+
+STEP: Final = 0.02
+"""Metres to which tolerances are rounded up, so that frames of nearly the same are grown together."""
+
+SHORTEST: Final = 0.24
+"""Metres: a forearm. A segment of this length is turned most by what its ends are off."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rooting:
+    """How the neck is to be found in a calibrated view.
+
+    Parameters
+    ----------
+    method : {"auto", "head", "torso", "search"}
+    deviation : float, optional
+        Standard deviation of image points, pixels; the view's own if not given.
+    trust_head : bool
+        Whether six head points tell the neck, without asking how well: right where they are exact.
+    """
+
+    method: Method = "auto"
+    deviation: float | None = None
+    trust_head: bool = True
+
+    def __post_init__(self) -> None:
+        if self.method not in get_args(Method):
+            raise InputError(f"--root: {self.method!r}; expected {', '.join(get_args(Method))}")
+        if self.deviation is not None and not 0 < self.deviation <= MOST:
+            raise InputError(
+                f"--deviation: {self.deviation!r}; expected a positive number of pixels, at most {MOST:g}"
+            )
+
+
+def place_roots(
+    view: View,
+    camera: PinholeCamera,
+    figure: Figure,
+    frames: NDArray[np.intp],
+    rooting: Rooting,
+    tolerance: Tolerance | None,
+) -> list[Placement]:
+    """Place the neck in some frames of a view (`posekit.cameras.neck.place`).
+
+    A view with derived joints is a detector's, whose points are farther off, of a body that gives.
+    """
+    detected = bool(view.derived)
+    deviation = rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEVIATION)
+    if isinstance(view.camera, LeeChenModel):
+        deviation = RELATIVE * float(view.camera.f or 1.0)
+    K = camera.K if camera.K.ndim == 2 else camera.K[frames]
+    return place(
+        PinholeCamera(K=K, distortion=camera.distortion),
+        figure,
+        view.image[frames],
+        view.head_image[frames],
+        method=rooting.method,
+        deviation=deviation,
+        offset=DETECTED_OFFSET if detected else 0.0,
+        tolerance=None if tolerance is None else tolerance.rigid,
+        tangent=None if tolerance is None else tolerance.tangent,
+    )
+
+
+def tolerance_of(placement: Placement) -> Tolerance:
+    """Return what a tree that grows from a placed neck is judged with: as far off as its image points let it be."""
+    rigid, tangent = (STEP * math.ceil(value / STEP) for value in (placement.tolerance, placement.tangent))
+    angle = math.degrees(math.atan2(tangent, SHORTEST))
+    return Tolerance(rigid=rigid, tangent=tangent, placement=False, angle=angle)
+
+
+def root_of(placement: Placement) -> Root:
+    """Say in a result how the neck was found."""
+    curve = placement.curve[np.isfinite(placement.curve[:, 1])]
+    return Root(
+        method=placement.method,
+        chosen=placement.depths,
+        residual=placement.residual if math.isfinite(placement.residual) else math.nan,
+        residual_unit=placement.unit,
+        estimate=placement.estimate,
+        deviation=placement.deviation,
+        lower=placement.lower,
+        upper=placement.upper,
+        segment=placement.segment,
+        intervals=placement.intervals,
+        minima_depth=placement.minima[:, 0],
+        minima_residual=placement.minima[:, 1],
+        curve_depth=curve[:, 0],
+        curve_residual=curve[:, 1],
+        note="; ".join([*([placement.reason] if placement.reason else []), *placement.notes]),
+    )

@@ -1,0 +1,58 @@
+"""Which frames show enough of a body for a posture to be recovered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own import ScaledOrthographicModel, View
+from posekit.recovery.body import Body
+
+NO_NECK: Final = "the neck, from which the tree grows, is not seen"
+"""Why nothing grows in a calibrated frame that does not show the neck."""
+
+NECK_LOST, TRUNK_LOST, ROOT_LOST = "neck/not_seen", "trunk/not_seen", "root/not_known"
+"""What all leaves of a frame are lost to in which nothing grows."""
+
+
+def neckless(view: View) -> NDArray[np.bool_]:
+    """Tell which frames (F,) of a calibrated view do not show the neck; none of an uncalibrated one.
+
+    There another joint may be the root, and the scale is what says why a frame has none (`fit_scale`).
+    """
+    if isinstance(view.camera, ScaledOrthographicModel):
+        return np.zeros(len(view), dtype=np.bool_)
+    return np.asarray(np.isnan(view.image[:, 0, 0]))
+
+
+def trunkless(view: View, body: Body) -> NDArray[np.bool_]:
+    """Tell which frames (F,) show none of the joints that hang on the tree's root.
+
+    The root alone is a position and no posture: wrists or knees that are seen beside it have nothing to hang on.
+    """
+    seen = np.asarray(np.isfinite(body.image(view.image)).all(axis=2))
+    return np.asarray(~seen[:, _hanging(body)].any(axis=1))
+
+
+def with_reasons(reasons: Sequence[str], body: Body, bare: NDArray[np.bool_]) -> list[str]:
+    """Say of `trunkless` frames why nothing grows in them; those that have a reason by now keep it."""
+    joints = body.tree.joints
+    hanging = ", ".join(joints[k] for k in _hanging(body).tolist())
+    says = (
+        f"none of {hanging} is seen, so that nothing hangs on the {joints[0]}: there is no posture to recover"
+    )
+    return [reason or (f"frames[{k}]: {says}" if bare[k] else "") for k, reason in enumerate(reasons)]
+
+
+def lost_to(without_neck: bool, without_trunk: bool) -> str:
+    """Say in two words what a frame is lost to in which nothing grows."""
+    return NECK_LOST if without_neck else TRUNK_LOST if without_trunk else ROOT_LOST
+
+
+def _hanging(body: Body) -> NDArray[np.intp]:
+    """Return the joints whose parent is the root, which is the first."""
+    parents = np.asarray(body.tree.parents)
+    return np.flatnonzero((parents == 0) & (np.arange(len(parents)) > 0))

@@ -1,0 +1,81 @@
+"""What the command line prints of a recovery and of a report."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from posekit.following.following import Following
+from posekit.recovery.recovery import FrameRecovery, Recovery
+
+SHOWN = 4
+"""How many reasons, and how many frames at each end of a long sequence, are printed."""
+
+
+def summary_lines(recovery: Recovery) -> list[str]:
+    """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
+    frames = list(enumerate(recovery.frames))
+    lines = [
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected by (leaves, 8192 a tree)"
+    ]
+    cut = len(frames) - 2 * SHOWN
+    for k, frame in frames:
+        if cut > 1 and SHOWN <= k < len(frames) - SHOWN:
+            if k == SHOWN:
+                lines.append(f"{'…':>5} {cut} frames between")
+            continue
+        lines.append(_frame_line(k, frame))
+    counts = [len(frame) for frame in recovery.frames]
+    lines.append(
+        f"{sum(counts)} postures in {len(counts)} frames: median {np.median(counts):g}, most {max(counts)}, "
+        f"none in {counts.count(0)}"
+    )
+    return lines + _scale_lines(recovery)
+
+
+def _scale_lines(recovery: Recovery) -> list[str]:
+    """Describe the scales of an uncalibrated view, and where its mirror images could not be told apart."""
+    families = [frame.family for frame in recovery.frames if frame.family is not None]
+    if not families:
+        return []
+    s = np.concatenate([family.chosen for family in families])
+    segment, count = Counter(family.segment for family in families).most_common(1)[0]
+    found = sum(len(frame) > 0 for frame in recovery.frames)
+    mirrored = sum(frame.mirrored > 0 for frame in recovery.frames)
+    return [
+        f"scale by {families[0].how}: {s.min():.6g} to {s.max():.6g} pixels a metre; the bound is set by {segment} in "
+        f"{count} of {len(families)} frames",
+        f"mirror images told apart in {found - mirrored} of {found} frames with postures"
+        + (f"; in {mirrored} a posture and its mirror image both survive" if mirrored else ""),
+    ]
+
+
+def _frame_line(k: int, frame: FrameRecovery) -> str:
+    groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
+    judged = frame.judged or "-"
+    if frame.reason:
+        return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
+    lost = Counter(frame.rejected).most_common()
+    if not len(frame):  # what the last ones died of comes first
+        lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
+    most = ", ".join(f"{reason} {count}" for reason, count in lost[:SHOWN])
+    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
+
+
+def following_line(following: Following) -> str:
+    """Describe the paths through a recovery in a line."""
+    lead = following.lead
+    bridged = int(following.bridged[0].sum())
+    sure = (
+        f"{lead:.3g} cheaper than the next that is different"
+        if np.isfinite(lead)
+        else "without another that differs by a limb"
+        if np.isinf(lead)
+        else "how sure is not asked (--follow 2)"
+    )
+    count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
+    return (
+        f"{count}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
+        f"{len(following.switches())} changes between near and far"
+    )

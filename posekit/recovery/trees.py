@@ -1,0 +1,135 @@
+"""Trees that were grown together, and what their leaves are as postures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Configurations
+from posekit.geometry import Array
+from posekit.hidden import Completion
+from posekit.objects.mirror import mirrored
+from posekit.recovery.body import Body
+from posekit.recovery.refined import RefinedSurvivors
+from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.skeleton import JOINTS, SEGMENTS, segment_name
+from posekit.tree import Check, Leaves
+from posekit.validators import judge
+
+LEVEL = 5e-10
+"""Metres of depth up to which neither end of a segment is nearer: rounding."""
+
+JUDGED: Final = {
+    EXACT: "exact",
+    MEASURED: "measured",
+    replace(MEASURED, hips=1.0): "measured",  # where nothing is left with less for the hips
+    PHOTOGRAPH: "photograph",
+}
+"""What frames are said to be judged as, by their tolerance."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Batch:
+    """Frames whose trees were grown together.
+
+    Parameters
+    ----------
+    leaves : Leaves
+        What survived all checks.
+    physical : int array (F, 14), optional
+        Survivors by level before the motion model, where one was asked.
+    checks : sequence of Check
+        The checks that judged them, every distance measured, for margins.
+    body : Body
+        What the trees are of.
+    tolerance : Tolerance
+    exact : bool array (F,)
+        Where there is evidence that the image points are exact, of frames that were judged so.
+    completion : Completion, optional
+        The survivors' joints that were not seen; of the leaves before the motion model.
+    refined : RefinedSurvivors, optional
+        The likeliest postures near the leaves, where the noise is known.
+    spread : float
+        How far off these are, metres (`posekit.ranking.deviation_of_noise`).
+    """
+
+    leaves: Leaves
+    physical: NDArray[np.int64] | None
+    checks: Sequence[Check]
+    body: Body
+    tolerance: Tolerance
+    exact: NDArray[np.bool_]
+    completion: Completion | None = None
+    refined: RefinedSurvivors | None = None
+    spread: float = 0.0
+
+    @cached_property
+    def judged(self) -> str:
+        """How its frames were judged: see `FrameRecovery.judged`."""
+        return "refined" if self.refined is not None else JUDGED.get(self.tolerance, "given")
+
+    @cached_property
+    def points(self) -> Array:
+        """All survivors with their heads (N, 19, 3), camera frame, metres."""
+        if self.refined is not None:
+            return np.concatenate([self.refined.joints, self.refined.head], axis=1)
+        points = self.body.points(self.leaves)
+        if self.completion is not None:
+            filled = self.completion.postures
+            joints = points[:, : len(JOINTS)]
+            points[:, : len(JOINTS)] = np.where(np.isnan(joints), filled, joints)
+        return points
+
+    @cached_property
+    def configurations(self) -> Configurations:
+        """The configurations of all survivors."""
+        return self.body.figure.configurations(self.points)
+
+    @cached_property
+    def margins(self) -> dict[str, Array]:
+        """The worst margin of each survivor (N,), by validator: degrees or metres."""
+        return {judgement.check: judgement.worst for judgement in judge(self.checks, self.points)}
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """The unit of each validator's margins."""
+        return {check.name: check.unit for check in self.checks}
+
+    @cached_property
+    def mirrored(self) -> NDArray[np.bool_]:
+        """Survivors (N,) whose mirror image survives too: the same picture with near and far exchanged throughout."""
+        leaves = self.leaves
+        return mirrored(leaves.postures()[..., 2], leaves.parents, leaves.frame, level=LEVEL)
+
+    @cached_property
+    def motion(self) -> NDArray[np.int64]:
+        """Survivors by level after the motion model (F, 14)."""
+        return self.leaves.counts()
+
+    @cached_property
+    def rejected(self) -> list[dict[str, int]]:
+        """Lost leaves by frame and reason."""
+        return self.leaves.rejected()
+
+    @cached_property
+    def offsets(self) -> NDArray[np.int64]:
+        """Where each frame's survivors start and the last ends (F + 1,)."""
+        return self.leaves.offsets()
+
+    @cached_property
+    def length_residual(self) -> Array:
+        """How much too short each survivor's worst segment was (N,), metres: what refinement lengthened it by."""
+        if self.refined is None:
+            return self.leaves.length_residual()
+        lengths = self.body.figure.lengths
+        longer = [
+            np.linalg.norm(self.refined.joints[:, a] - self.refined.joints[:, b], axis=1)
+            - lengths[segment_name((a, b))]
+            for a, b in SEGMENTS
+        ]
+        return np.asarray(np.fmax.reduce([np.zeros(len(self.refined)), *longer]))

@@ -1,0 +1,245 @@
+"""Joint maps: which frames of a model stand for the 14 joints and the head's points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+import pinocchio as pin
+
+from posekit.errors import InputError
+from posekit.geometry import Array
+from posekit.robots.kinematics import BodyPoint, Kinematics, Site, find_frame, frame_index
+from posekit.safe_io import nearest, one_line, parse_toml, read_toml, refusal, shown
+from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS
+
+SCHEMA: Final = "posekit.joint_map/1"
+MAX_BYTES: Final = 100_000
+MAX_SITES: Final = 16
+"""Frames in one mean."""
+
+BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
+"""The maps that come with the package, in the order in which they are tried."""
+
+FEWEST: Final = 3
+"""Points that a map must have: fewer do not tell how a body is turned."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointMap:
+    """Which places of a model stand for which points of a posture.
+
+    Parameters
+    ----------
+    name : str
+        What to call it in reports and errors.
+    points : mapping
+        Points of `posekit.skeleton.POINTS` that every such model has; joints that are in neither mapping are absent.
+    optional : mapping
+        Points that are left out where a model has not their frames.
+    """
+
+    name: str
+    points: Mapping[str, BodyPoint]
+    optional: Mapping[str, BodyPoint]
+
+    @property
+    def absent(self) -> tuple[str, ...]:
+        """The joints that no such model has."""
+        return tuple(joint for joint in JOINTS if joint not in self.points and joint not in self.optional)
+
+    def missing(self, model: pin.Model) -> tuple[str, ...]:
+        """List the frames that the map needs and a model has not."""
+        frames = frame_index(model)
+        needed = [site.frame for point in self.points.values() for site in point.sites]
+        return tuple(dict.fromkeys(frame for frame in needed if frame not in frames))
+
+    def kinematics(self, model: pin.Model) -> Kinematics:
+        """Make the kinematics of the points that a model has, in the order of `posekit.skeleton.POINTS`.
+
+        Raises
+        ------
+        InputError
+            Where the model has not a frame that the map needs (the nearest names are given).
+        """
+        frames = frame_index(model)
+        for name, point in self.points.items():
+            for site in point.sites:
+                find_frame(frames, site.frame, f"joint map {self.name!r}: {name}")
+        chosen = dict(self.points)
+        for name, point in self.optional.items():
+            if all(site.frame in frames for site in point.sites):
+                chosen[name] = point
+        return Kinematics(model=model, points=tuple(chosen[name] for name in POINTS if name in chosen))
+
+
+def targets_of(postures: Array, kinematics: Kinematics) -> Array:
+    """Pick a model's points out of postures.
+
+    Parameters
+    ----------
+    postures : array (N, 14, 3) or (N, 19, 3)
+        Joints, and the head's points, metres; NaN is unknown.
+    kinematics : Kinematics
+        Its points are named after `posekit.skeleton.POINTS`: see `JointMap.kinematics`.
+
+    Returns
+    -------
+    array (N, P, 3)
+        In the order of the kinematics' points.
+
+    Raises
+    ------
+    InputError
+        Where postures have another shape, or a point is not of the skeleton.
+    """
+    if postures.ndim != 3 or postures.shape[1:] not in ((len(JOINTS), 3), (len(POINTS), 3)):
+        raise InputError(
+            f"postures have shape {postures.shape}; expected (N, {len(JOINTS)}, 3) or (N, {len(POINTS)}, 3)"
+        )
+    columns = [_point_index(name) for name in kinematics.names]
+    padded = np.full((len(postures), len(POINTS), 3), np.nan)
+    padded[:, : postures.shape[1]] = postures
+    return padded[:, columns]
+
+
+def postures_of(positions: Array, kinematics: Kinematics) -> Array:
+    """Put a model's points (N, P, 3) into postures (N, 19, 3), NaN where it has none: `targets_of` backwards."""
+    postures = np.full((len(positions), len(POINTS), 3), np.nan)
+    postures[:, [_point_index(name) for name in kinematics.names]] = positions
+    return postures
+
+
+def load_joint_map(name: str | Path) -> JointMap:
+    """Load a joint map by name (one of `BUILT_IN`) or from a TOML file.
+
+    Raises
+    ------
+    InputError
+        Where there is no such map, or it is not what `posekit.joint_map/1` says.
+    """
+    if str(name) in BUILT_IN:
+        text = resources.files("posekit.urdf").joinpath("joint_maps", f"{name}.toml").read_text("utf-8")
+        return parse_joint_map(parse_toml(text, str(name)), str(name))
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        raise refusal(
+            "", "joint map", shown(str(name)), f"{', '.join(BUILT_IN)} or a TOML file", "choose one of them"
+        )
+    return parse_joint_map(read_toml(path, limit=MAX_BYTES), str(path))
+
+
+def find_joint_map(model: pin.Model) -> JointMap:
+    """Choose the built-in map whose frames a model has.
+
+    Raises
+    ------
+    InputError
+        Where none fits: the one that comes nearest is named, with the frames that it misses.
+    """
+    maps = [load_joint_map(name) for name in BUILT_IN]
+    missing = [joint_map.missing(model) for joint_map in maps]
+    for joint_map, frames in zip(maps, missing, strict=True):
+        if not frames:
+            return joint_map
+    share = [len(lost) / len(known.points) for lost, known in zip(missing, maps, strict=True)]
+    best = int(np.argmin(share))
+    lost = missing[best]
+    tail = ", …" if len(lost) > 4 else ""
+    raise InputError(
+        one_line(
+            f"model {model.name!r}: no built-in joint map fits; the nearest, {maps[best].name}, needs frames that it "
+            f"has not: {', '.join(lost[:4])}{tail}; {nearest(lost[0], list(frame_index(model))[:1000])[:200]}; "
+            f"write a joint map ({SCHEMA}) that names the model's frames"
+        )
+    )
+
+
+def parse_joint_map(table: Mapping[str, Any], source: str) -> JointMap:
+    """Make a joint map of a parsed TOML table.
+
+    Raises
+    ------
+    InputError
+        Where it is not what `posekit.joint_map/1` says.
+    """
+    if table.get("schema") != SCHEMA:
+        raise refusal(
+            source, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line"
+        )
+    unknown = sorted(set(table) - {"schema", "points", "optional"})
+    if unknown:
+        raise refusal(source, unknown[0], "an unknown entry", "schema, [points], [optional]", "remove it")
+    both: list[Mapping[str, BodyPoint]] = []
+    for part in ("points", "optional"):
+        entries = table.get(part, {})
+        if not isinstance(entries, dict):
+            raise refusal(source, part, shown(entries), "a table", f"write [{part}] above the points")
+        both.append(
+            MappingProxyType({name: _point(name, entry, source, part) for name, entry in entries.items()})
+        )
+    points, optional = both
+    twice = sorted(set(points) & set(optional))
+    if twice:
+        raise refusal(
+            source, f"optional.{twice[0]}", "a point that is in [points] too", "one of them", "drop one"
+        )
+    if len(points) < FEWEST:
+        raise refusal(source, "points", f"{len(points)} points", f"at least {FEWEST}", "name more joints")
+    return JointMap(name=source, points=points, optional=optional)
+
+
+def _point(name: str, entry: object, source: str, part: str) -> BodyPoint:
+    field = f"{part}.{name}"
+    if name not in POINT:
+        kind = f"a joint or one of {', '.join(HEAD_POINTS)}"
+        raise refusal(source, field, "an unknown point", kind, nearest(name, POINTS))
+    if isinstance(entry, dict) and "mean" in entry:
+        means = entry["mean"]
+        if set(entry) != {"mean"} or not isinstance(means, list) or not 1 <= len(means) <= MAX_SITES:
+            raise refusal(
+                source,
+                field,
+                shown(entry),
+                f"mean = [1 to {MAX_SITES} frames] and nothing else",
+                "correct it",
+            )
+        return BodyPoint(
+            name=name, sites=tuple(_site(site, source, f"{field}.mean[{k}]") for k, site in enumerate(means))
+        )
+    return BodyPoint(name=name, sites=(_site(entry, source, field),))
+
+
+def _site(entry: object, source: str, field: str) -> Site:
+    if isinstance(entry, str):
+        entry = {"frame": entry}
+    expected = "a frame's name, or { frame = …, offset = [x, y, z], weight = … }"
+    if not isinstance(entry, dict) or set(entry) - {"frame", "offset", "weight"}:
+        raise refusal(source, field, shown(entry), expected, "correct it")
+    frame = entry.get("frame")
+    if not isinstance(frame, str) or not frame:
+        raise refusal(source, f"{field}.frame", shown(frame), "a frame's name", "name a link or a joint")
+    offset = entry.get("offset", [0.0, 0.0, 0.0])
+    if not isinstance(offset, list) or len(offset) != 3 or not all(map(_is_number, offset)):
+        raise refusal(source, f"{field}.offset", shown(offset), "[x, y, z], metres", "give three numbers")
+    weight = entry.get("weight", 1.0)
+    if not _is_number(weight) or not weight > 0:
+        raise refusal(source, f"{field}.weight", shown(weight), "a positive number", "correct it")
+    x, y, z = map(float, offset)
+    return Site(frame=frame, offset=(x, y, z), weight=float(weight))
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _point_index(name: str) -> int:
+    if name not in POINT:
+        raise InputError(f"point {name!r} is not of the skeleton; {nearest(name, POINTS)}")
+    return POINT[name]

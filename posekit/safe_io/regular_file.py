@@ -1,0 +1,86 @@
+"""Open regular files alone, with a bound on their size: no directory, pipe or device, none that grows."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from posekit.errors import InputError
+from posekit.safe_io.refusal import cut, refusal
+
+_OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
+"""Opening a pipe would wait for its other end: one that took the file's place after the first look must not."""
+
+
+def read_bytes(path: str | Path, *, limit: int, too_large: str = "split it") -> bytes:
+    """Read a regular file of at most `limit` bytes, which is checked before a byte is read.
+
+    Parameters
+    ----------
+    path : path
+        The file; symbolic links are followed.
+    limit : int
+        Bytes.
+    too_large : str
+        What to do about a file that is larger.
+
+    Raises
+    ------
+    InputError
+        Where it is missing, not readable, no regular file, empty or larger.
+    """
+    with open_file(path, limit=limit, too_large=too_large) as file:
+        try:
+            data = file.read(limit + 1)
+        except OSError as error:
+            raise unreadable(path, error) from None
+    if len(data) > limit:
+        raise _too_large(path, len(data), limit, too_large)
+    return data
+
+
+@contextmanager
+def open_file(path: str | Path, *, limit: int, too_large: str = "split it") -> Iterator[BinaryIO]:
+    """Open a regular file of at most `limit` bytes for reading; see `read_bytes`."""
+    check_file(path, limit=limit, too_large=too_large)
+    try:
+        handle = os.open(path, _OPEN_FLAGS)
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+    with os.fdopen(handle, "rb") as file:
+        _check_status(path, os.fstat(handle), limit, too_large)
+        yield file
+
+
+def check_file(path: str | Path, *, limit: int, too_large: str = "split it") -> None:
+    """Refuse a path that is missing, no regular file, empty, or larger than `limit` bytes."""
+    try:
+        status = Path(path).stat()
+    except (OSError, ValueError) as error:
+        raise unreadable(path, error) from None
+    _check_status(path, status, limit, too_large)
+
+
+def unreadable(path: str | Path, error: Exception) -> InputError:
+    """Word the operating system's refusal to give a file."""
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return refusal(path, "", cut(reason), "a readable file", "check the name and the permissions")
+
+
+def _check_status(path: str | Path, status: os.stat_result, limit: int, too_large: str) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise refusal(path, "", "a directory", "a file", "name one file in it")
+    if not stat.S_ISREG(status.st_mode):
+        raise refusal(path, "", "a pipe or a device", "a regular file", "save its content to a file first")
+    if status.st_size == 0:
+        raise refusal(path, "", "an empty file", "a file with content", "check how it was written")
+    if status.st_size > limit:
+        raise _too_large(path, status.st_size, limit, too_large)
+
+
+def _too_large(path: str | Path, size: int, limit: int, remedy: str) -> InputError:
+    return refusal(path, "", f"{size / 1e6:,.1f} MB", f"at most {limit / 1e6:,.0f} MB", remedy)

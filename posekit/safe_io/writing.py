@@ -1,0 +1,153 @@
+"""Write files whole or not at all: beside the target first, then renamed over it."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import shutil
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from posekit.errors import InputError
+from posekit.safe_io.json_file import MAX_BYTES
+from posekit.safe_io.refusal import cut, refusal
+
+
+@contextmanager
+def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
+    """Open a file that takes the place of `path` when the block ends well, and vanishes when it does not.
+
+    Parameters
+    ----------
+    path : path
+        The target. An existing regular file is replaced and its permissions are kept; a symbolic link is
+        followed.
+    sync : bool
+        Whether to wait until the content is on the disk before the rename.
+
+    Yields
+    ------
+    binary file
+        Seekable, in the target's directory.
+
+    Raises
+    ------
+    InputError
+        Where the directory does not exist or may not be written, where the target is a directory or a
+        device, and where the disk refuses (full, for instance).
+    """
+    done = False
+    beside = None
+    try:
+        target = _target(path)
+        beside = target.with_name(f".{secrets.token_hex(8)}.part")
+        with beside.open("xb") as file:
+            yield file
+            file.flush()
+            if sync:
+                os.fsync(file.fileno())
+        if target.exists():
+            shutil.copymode(target, beside)
+        beside.replace(target)
+        done = True
+    except OSError as error:
+        reason = cut(error.strerror or str(error))
+        raise refusal(
+            path, "", reason, "a file that can be written", "check permissions and free space"
+        ) from None
+    finally:
+        if beside is not None and not done:
+            beside.unlink(missing_ok=True)
+
+
+def _target(path: str | Path) -> Path:
+    """Follow links and refuse what may not be replaced: a device that is renamed over is gone."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise refusal(path, "", "a directory", "the name of a file", "add a file name")
+    if target.exists() and not target.is_file():
+        raise refusal(path, "", "a device or a pipe", "the name of a file", "choose another name")
+    if not target.parent.is_dir():
+        raise refusal(path, "", "a directory that does not exist", "an existing one", "create it first")
+    return target
+
+
+def check_target(path: str | Path) -> None:
+    """Refuse a name that cannot be written: a folder, or one in a folder that is not there."""
+    _target(path)
+
+
+def write_text(path: str | Path, pieces: Iterable[str]) -> None:
+    """Write pieces of text as one UTF-8 file of at most 1e8 bytes, whole or not at all.
+
+    The bound is that of `posekit.safe_io.read_json`: what is written can be read again.
+    """
+    written = 0
+    with replacing(path) as file:
+        for piece in pieces:
+            written += file.write(piece.encode("utf-8"))
+            if written > MAX_BYTES:
+                raise too_large_to_read(path)
+
+
+def write_lines(path: str | Path, lines: Iterable[str]) -> None:
+    """Write lines of text."""
+    write_text(path, (f"{line}\n" for line in lines))
+
+
+def write_json(path: str | Path, document: object) -> None:
+    """Write a small document of plain values as JSON, indented."""
+    write_text(path, [json.dumps(document, indent=1, allow_nan=False), "\n"])
+
+
+def make_folder(path: str | Path) -> None:
+    """Make a folder for results, and those above it.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be made.
+    """
+    try:
+        Path(path).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refusal(
+            path, "", error.strerror or str(error), "a folder for results", "choose another name"
+        ) from None
+
+
+def too_large_to_read(path: str | Path) -> InputError:
+    """Word why a JSON file that could not be read again is not written."""
+    return refusal(
+        path,
+        "",
+        f"more than {MAX_BYTES / 1e6:.0f} MB of JSON",
+        "a file that can be read again",
+        "name it .npz where the command writes that, or split the input",
+    )
+
+
+def json_pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterator[str]:
+    """Spell ``{**head, name: [items]}`` as JSON, one entry and one item a line, without holding it whole.
+
+    Raises
+    ------
+    ValueError
+        Where a number is not finite: what may be unknown is to be given as None.
+    """
+    yield "{\n"
+    for key, value in head.items():
+        yield f" {_spell(key)}: {_spell(value)},\n"
+    yield f" {_spell(name)}: ["
+    separator = "\n"
+    for item in items:
+        yield f"{separator}  {_spell(item)}"
+        separator = ",\n"
+    yield "\n ]\n}\n"
+
+
+def _spell(value: Any) -> str:
+    return json.dumps(value, allow_nan=False)

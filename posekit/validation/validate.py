@@ -1,0 +1,256 @@
+"""From postures, of any number, to a report of verdicts: in batches, with bounded memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Final, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure, load_figure
+from posekit.formats.own import Postures, Report, Result
+from posekit.formats.own.postures_q import Configurations
+from posekit.formats.own.report import PostureReport
+from posekit.formats.own.report_columns import Columns, Place, joined
+from posekit.recovery.tolerance import EXACT
+from posekit.recovery.trees import JUDGED
+from posekit.robots.scaling import segment_lengths, shoulders_are_behind
+from posekit.safe_io.refusal import refusal
+from posekit.validation.validate_columns import columns_of
+from posekit.validation.validate_listing import list_postures
+from posekit.validators import Report as Verdicts
+from posekit.validators import Validator
+from posekit.validators.robot import Contacts
+from posekit.validators.robot.settings import OF_POSITIONS
+from posekit.validators.validator import RIGID_TOLERANCE
+from posekit.validators.walking import WALKERS
+
+BATCH: Final = 4096
+"""Postures that are judged at once."""
+
+QUICK: Final = 4
+"""Times as many configurations, which need no search: the fewer calls, the less time is lost between threads."""
+
+LISTED: Final = 10_000
+"""Postures that a report lists one by one: all of a file that has no more, else the first that are not valid."""
+
+Detail = Literal["findings", "margins", "verdicts"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Given:
+    """What is to be judged: postures, or configurations in the validator's order."""
+
+    joints: NDArray[np.float64] | None
+    head: NDArray[np.float64] | None
+    q: NDArray[np.float64] | None
+    sequence: NDArray[np.intp] | None
+
+    def __len__(self) -> int:
+        return len(self.q) if self.q is not None else len(self.joints) if self.joints is not None else 0
+
+
+def validate(
+    validator: Validator,
+    postures: Postures | Configurations,
+    *,
+    settings: dict[str, Any] | None = None,
+    every: bool = False,
+    sequence: NDArray[np.intp] | None = None,
+    distances: bool | None = None,
+    detail: Detail = "findings",
+) -> Report:
+    """Judge a file of postures.
+
+    Parameters
+    ----------
+    validator : Validator
+    postures : Postures or Configurations
+    settings : dict, optional
+        What decided the verdicts, to be written with them.
+    every : bool
+        List every finding, not only violations and each check's worst.
+    sequence : int array (N,), optional
+        Which sequence in time each posture belongs to: see `Validator.check`.
+    distances : bool, optional
+        Whether to measure the nearest pair of bodies of every posture of a robot that `detail` shows; by default
+        where none is a mesh. Of those that collide it is measured in any case.
+    detail : {"findings", "margins", "verdicts"}
+        What is wanted of the postures: findings one by one, as JSON has them; the least margin of each, as CSV; or
+        the verdicts alone, with what is behind those that are not valid, as summaries and Markdown have them.
+
+    Returns
+    -------
+    posekit.formats.own.Report
+    """
+    if isinstance(postures, Configurations):
+        given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
+    else:
+        given = _Given(joints=postures.joints, head=postures.head, q=None, sequence=sequence)
+    applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
+    checks = [name.replace("-", "_") for name in applied]
+    places: dict[Place, int] = {}
+    parts: list[Columns] = []
+    listed: list[PostureReport] = []
+    all_listed = len(given) <= LISTED
+    for first, verdicts in _batches(validator, given):
+        contacts = _contacts(verdicts, distances, every=detail != "verdicts")
+        columns = columns_of(verdicts, contacts, places, checks, margins=detail != "verdicts")
+        parts.append(columns)
+        if detail != "findings" or (not all_listed and len(listed) == LISTED):
+            continue
+        rows = (
+            np.arange(len(columns)) if all_listed else np.flatnonzero(columns.verdict)[: LISTED - len(listed)]
+        )
+        listed += list_postures(
+            verdicts, contacts, columns, list(places), rows, every=every, first=None if all_listed else first
+        )
+    columns = joined(parts, list(places), checks)
+    not_valid = len(columns) - columns.summary["valid"]
+    return Report(
+        settings={
+            **validator.describe(),
+            "checks": applied,
+            **_lengths_of(validator, given),
+            **(settings or {}),
+        },
+        postures=tuple(listed),
+        checks=columns.by_check(),
+        listed=None
+        if all_listed or detail != "findings"
+        else f"the first {len(listed)} of {not_valid} that are not valid",
+        verdicts=None if all_listed and detail == "findings" else columns.letters,
+        columns=columns,
+    )
+
+
+class JudgedWith(NamedTuple):
+    """What the frames of a result were judged with: of several kinds of frames, what allows most.
+
+    The rigid tolerance is in metres, and that of the validators where less was allowed; the angle tolerance in degrees,
+    the contact margin in metres (negative allows penetration); whose thresholds the rules of walking had is a name, as
+    `posekit.validators.walking.WALKERS` has it.
+    """
+
+    rigid: float
+    angle: float
+    contact_margin: float
+    walkers: str
+
+
+class RecoveredWith(NamedTuple):
+    """Whose postures a result holds, and what they were judged with."""
+
+    figure: Figure
+    judged: JudgedWith
+
+
+def recovered_with(result: Result) -> RecoveredWith:
+    """Return what a result was recovered with, by its settings.
+
+    Where they are mute, it is taken as the built-in figure's, exact, and by the paper.
+
+    Raises
+    ------
+    InputError
+        Where the settings say what is no tolerance, margin or name.
+    """
+    figure, settings = load_figure(), result.settings
+    lengths = settings.get("lengths")
+    if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
+        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
+    return RecoveredWith(figure, _judged(settings))
+
+
+def _judged(settings: Mapping[str, Any]) -> JudgedWith:
+    """Return what frames were judged with."""
+    judged = settings.get("judged")
+    kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
+    asked = _number(settings, "contact_margin", 0.0)
+    usual = [one for one, kind in JUDGED.items() if kind in kinds]
+    rigid = [RIGID_TOLERANCE, *(one.rigid for one in usual)]
+    angles, margins = [EXACT.angle, *(one.angle for one in usual)], [asked]
+    for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
+        said = settings.get(field)
+        if kind in kinds and isinstance(said, dict):
+            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=f"{field}."))
+            angles.append(_number(said, "angle", EXACT.angle, within=f"{field}."))
+            margins.append(_number(said, "contact", asked, within=f"{field}."))
+    walkers = settings.get("walkers", "paper")
+    if not (isinstance(walkers, str) and walkers in WALKERS):
+        raise refusal(
+            "result",
+            "settings.walkers",
+            repr(walkers)[:40],
+            " or ".join(WALKERS),
+            "correct what made the result",
+        )
+    return JudgedWith(max(rigid), max(angles), min(margins), walkers)
+
+
+def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:
+    """Return a number of a result's settings, or refuse what is none."""
+    value = settings.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise refusal(
+            "result",
+            f"settings.{within}{name}",
+            repr(value)[:40],
+            "a finite number",
+            "correct what made the result",
+        )
+    return float(value)
+
+
+def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdicts]]:
+    """Judge batch by batch; the lengths are those of the whole file."""
+    lengths = behind = None
+    if given.joints is not None and validator.lengths == "median":
+        lengths, behind = segment_lengths(given.joints), shoulders_are_behind(given.joints)
+    size = BATCH * (QUICK if given.q is not None else 1)
+    for first in range(0, len(given), size):
+        rows = slice(first, first + size)
+        if given.q is not None:
+            yield first, validator.check(q=given.q[rows])
+        elif given.joints is not None:
+            head = None if given.head is None else given.head[rows]
+            which = None if given.sequence is None else given.sequence[rows]
+            yield (
+                first,
+                validator.check(given.joints[rows], head, sequence=which, lengths=lengths, behind=behind),
+            )
+
+
+def _ordered(validator: Validator, given: Configurations) -> NDArray[np.float64]:
+    """Return q in the validator's order; as it is where that is the file's."""
+    names = validator.configuration_names
+    if given.q.shape[1] == len(names) and given.names in (None, tuple(names)):
+        return given.q
+    return given.in_order_of(names)
+
+
+def _lengths_of(validator: Validator, given: _Given) -> dict[str, Any]:
+    """Say whose lengths the model had."""
+    if given.joints is None:
+        return {"given": "configurations"}
+    settings: dict[str, Any] = {"given": "joint positions", "lengths_from": validator.lengths}
+    if validator.lengths == "median":
+        lengths = segment_lengths(given.joints)
+        settings["lengths"] = {name: round(length, 6) for name, length in lengths.items()}
+    return settings
+
+
+def _contacts(verdicts: Verdicts, distances: bool | None, *, every: bool) -> Contacts | None:
+    """Ask which bodies touch, of a robot; a figure's own check has said it pair by pair.
+
+    The nearest pair is asked for of `every` posture, or of those alone that are undecided: what is rejected has a
+    margin below zero anyway, and nothing is shown of what is valid.
+    """
+    if not verdicts.colliders:
+        return None
+    if distances is None:
+        distances = not any(collider.has_meshes for collider in verdicts.colliders)
+    return verdicts.contacts(nearest=distances if every else verdicts.undecided & distances)

@@ -1,0 +1,144 @@
+"""Open a detector's file: people chosen and followed, sides checked, a camera and lengths given: views."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from posekit.errors import InputError
+from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people, read_keypoints, swap
+from posekit.formats.keypoints.persons import RULES
+from posekit.formats.own import View
+from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.safe_io import shown
+from posekit.views.camera import in_pixels, sighting
+from posekit.views.person import person
+from posekit.views.person_view import person_view
+from posekit.views.source import Source
+
+MOST: Final = 10
+"""Numbers of people that are listed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened:
+    """One person's view.
+
+    Parameters
+    ----------
+    person : int
+        The number to choose them by.
+    view : View
+    says : tuple of str
+        What it was made of, a line each: format, person, camera, lengths.
+    """
+
+    person: int
+    view: View
+    says: tuple[str, ...]
+
+
+def read_detections(path: str | Path, source: Source) -> KeyPoints:
+    """Read a detector's file as a user says it is to be read; points in pixels where that can be known."""
+    layout = load_skeleton_map(source.skeleton) if source.skeleton else None
+    found = read_keypoints(path, source.format or None, layout)
+    return in_pixels(swap(found) if source.swap_sides else found, source.size)
+
+
+def open_views(path: str | Path, source: Source) -> list[Opened]:
+    """Make a view of one person, or one of each.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, nobody is in it, or what is said of camera, person and lengths does not fit.
+    """
+    found = read_detections(path, source)
+    if not len(found):
+        raise InputError(
+            f"{path}: nobody was detected in {len(found.pictures)} pictures; expected a person; give another file"
+        )
+    sighted = sighting(found, source)
+    people = list_people(sighted.keypoints)
+    figure, of_lengths = person(source, sighted.camera, found.layout, Path(path))
+    if source.person != "all":
+        chosen = [choose_person(sighted.keypoints, source.person or "largest")]
+    else:
+        chosen = [choose(sighted.keypoints, one.person) for one in people]
+    opened = []
+    for one in chosen:
+        number = int(one.person[0]) if len(one) else -1
+        try:
+            view = person_view(
+                one,
+                sighted.camera,
+                figure,
+                rate=source.rate,
+                minimum_confidence=source.minimum_confidence,
+                deviation=source.deviation,
+            )
+        except InputError as error:
+            if len(chosen) == 1:
+                raise
+            warnings.warn(f"person {number} is left out: {error}", UserWarning, stacklevel=2)
+            continue
+        _warn_of_sides(one, source)
+        says = (
+            f"{found.source}: {found.format}, {found.layout.name}, {len(found.pictures)} pictures",
+            f"{_who(one, source.person or 'largest', len(people))}: in {len(one)} pictures{_mean_confidence(one)}",
+            sighted.says,
+            of_lengths,
+        )
+        opened.append(Opened(person=number, view=view, says=says))
+    if not opened:
+        raise InputError(
+            f"{path}: of none of its {len(people)} people both shoulders are seen; expected at least one; choose a "
+            "smaller --min-confidence, or another file"
+        )
+    return opened
+
+
+def choose_person(found: KeyPoints, who: str) -> KeyPoints:
+    """Choose one person, by the number of `list_people` or by a rule.
+
+    Raises
+    ------
+    InputError
+        Where there is no such rule, or nobody has that number.
+    """
+    numbers = [str(one.person) for one in list_people(found)]
+    if who not in (*RULES, *numbers):
+        there = ", ".join(numbers[:MOST]) + (", …" if len(numbers) > MOST else "")
+        raise InputError(
+            f"--person: {shown(who)}; expected {', '.join(RULES)}, all, or a number of {found.source} "
+            f"({there or 'nobody is in it'}); see who they are with posekit inspect"
+        )
+    return choose(found, who)
+
+
+def _warn_of_sides(one: KeyPoints, source: Source) -> None:
+    """Warn where left and right seem to be exchanged."""
+    for line in check_sides(one).warnings:
+        found, swapped, _ = line.partition("; look at a picture")
+        undone = f"{found}, as --swap-sides has them; leave it out"
+        warnings.warn(undone if swapped and source.swap_sides else line, UserWarning, stacklevel=3)
+
+
+def _who(one: KeyPoints, rule: str, people: int) -> str:
+    """Say who was chosen: of photographs a rule chooses in each."""
+    of = f" of {people} people" if people > 1 else ""
+    by_rule = rule in RULES and not one.sequence and len(one) > 1
+    return (
+        f"the {rule}{of} in each picture"
+        if by_rule
+        else f"person {int(one.person[0]) if len(one) else -1}{of}"
+    )
+
+
+def _mean_confidence(one: KeyPoints) -> str:
+    known = one.confidence[np.isfinite(one.confidence)]
+    return f", mean confidence {float(known.mean()):.2f}" if len(known) else ""
