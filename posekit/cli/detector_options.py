@@ -21,7 +21,7 @@ Skeleton = Annotated[
     typer.Option(
         "--skeleton",
         metavar="NAME|FILE",
-        help="What the points are: a built-in skeleton map, as body_25b, or a posekit.formats.skeleton_maps/1 TOML.",
+        help="What the points are: a built-in skeleton map, as body_25b, or a posekit.skeleton_map/1 TOML.",
     ),
 ]
 SwapSides = Annotated[

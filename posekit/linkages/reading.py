@@ -1,4 +1,4 @@
-"""Linkages by name or from TOML files of schema `posekit.linkages/1`."""
+"""Linkages by name or from TOML files of schema `posekit.linkage/1`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.text_file import read_text
 from posekit.safe_io.toml_file import parse_toml
 
-SCHEMA = "posekit.linkages/1"
+SCHEMA = "posekit.linkage/1"
 MAX_BYTES = 1_000_000
 
 FIELDS = (
@@ -53,7 +53,7 @@ def load_linkage(name: str | Path) -> Linkage:
     Raises
     ------
     InputError
-        Where there is neither, or what is there is not what `posekit.linkages/1` says, or describes no object.
+        Where there is neither, or what is there is not what `posekit.linkage/1` says, or describes no object.
 
     Examples
     --------

@@ -119,7 +119,7 @@ def test_names_of_ones_own_need_a_map(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="any built-in skeleton map; write a skeleton map"):
         read_keypoints(tmp_path / "v.csv")
     own = {"nose": "snout", "left_ear": "ear", "left_wrist": "paw", "pelvis": "tail"}
-    layout = parse_skeleton_map({"schema": "posekit.formats.skeleton_maps/1", "landmarks": own}, "own")
+    layout = parse_skeleton_map({"schema": "posekit.skeleton_map/1", "landmarks": own}, "own")
     assert np.isfinite(read_keypoints(tmp_path / "v.csv", layout=layout).landmarks[0, :, 0]).sum() == 4
 
 

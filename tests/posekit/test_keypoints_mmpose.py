@@ -158,7 +158,7 @@ def test_names_of_ones_own_need_a_map(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'got names as "a", "b", "c", "d"; expected .* --skeleton'):
         read_keypoints(path)
     own = {"left_hip": "A", "right_hip": "b", "left_knee": "c", "right_knee": "d"}
-    layout = parse_skeleton_map({"schema": "posekit.formats.skeleton_maps/1", "landmarks": own}, "own")
+    layout = parse_skeleton_map({"schema": "posekit.skeleton_map/1", "landmarks": own}, "own")
     assert np.isfinite(read_keypoints(path, layout=layout).landmarks[0]).all(axis=-1).sum() == 4
 
 

@@ -115,7 +115,7 @@ def test_an_exchange_is_that_of_the_skeleton_map_and_twice_is_nothing(
 
 def test_sides_of_several_points_are_exchanged_too() -> None:
     table = {
-        "schema": "posekit.formats.skeleton_maps/1",
+        "schema": "posekit.skeleton_map/1",
         "points": ["a1", "a2", "b1", "b2", "c"],
         "landmarks": {"left_wrist": ["a1", "a2"], "right_wrist": ["b1", "b2"], "nose": "c"},
     }

@@ -26,7 +26,7 @@ def make(segments: dict[tuple[str, str], float], **more: object) -> Linkage:
 
 
 def write(points: str, segments: str, more: str = "") -> str:
-    return f'schema = "posekit.linkages/1"\npoints = {points}\n[segments]\n{segments}\n{more}'
+    return f'schema = "posekit.linkage/1"\npoints = {points}\n[segments]\n{segments}\n{more}'
 
 
 def test_points_come_in_the_order_of_the_segments() -> None:
@@ -248,9 +248,9 @@ def test_a_linkage_is_read_from_a_file(tmp_path: Path) -> None:
         (write('["a", "b"]', "a-b = 1", "[constraints]\nplanar = []"), r"constraints\.planar"),
         (write('["a", "b"]', "a-b = 1", '[midpoints]\nm = ["a"]'), r"midpoints\.m: .* a list of two names"),
         (write('["a", "b"]', "a-b = 1", '[midpoints]\nm = ["a", "c"]'), "there is no point c"),
-        ('schema = "posekit.linkages/1"\npoints = ["a", "b"]', "segments: got nothing; expected a table"),
+        ('schema = "posekit.linkage/1"\npoints = ["a", "b"]', "segments: got nothing; expected a table"),
         (
-            'schema = "posekit.linkages/1"\n[segments]\na-b = 1',
+            'schema = "posekit.linkage/1"\n[segments]\na-b = 1',
             "points: got nothing; expected a list of names",
         ),
     ],
@@ -279,7 +279,7 @@ def test_a_large_file_and_a_directory_are_refused(tmp_path: Path) -> None:
 
 @given(st.text(max_size=200))
 def test_no_text_makes_it_fail_in_another_way(text: str) -> None:
-    for content in (text, f'schema = "posekit.linkages/1"\n{text}'):
+    for content in (text, f'schema = "posekit.linkage/1"\n{text}'):
         try:
             parse_linkage(content, "fuzz.toml")
         except InputError as error:

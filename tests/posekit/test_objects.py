@@ -620,7 +620,7 @@ class TestBadInput:
     def test_a_linkage_file_with_a_robot(self, tmp_path):
         path = tmp_path / "forearm.toml"
         lines = [
-            'schema = "posekit.linkages/1"', 'urdf = "panda"', "unit = 1",
+            'schema = "posekit.linkage/1"', 'urdf = "panda"', "unit = 1",
             'points = ["panda_joint3", "panda_joint4", "panda_joint5"]', "[segments]",
             "panda_joint3-panda_joint4 = 0.0825", "panda_joint4-panda_joint5 = 0.4",
         ]  # fmt: skip

@@ -219,7 +219,7 @@ def test_a_number_of_points_finds_all_maps_that_have_so_many() -> None:
 
 
 GOOD = {
-    "schema": "posekit.formats.skeleton_maps/1",
+    "schema": "posekit.skeleton_map/1",
     "points": ["a", "b", "c"],
     "landmarks": {"nose": "a", "left_hip": "b", "right_hip": "c", "mid_hips": ["b", "c"]},
 }
@@ -234,7 +234,7 @@ def test_a_good_table_is_a_map() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"schema": "posekit.formats.skeleton_maps/2"}, "schema"),
+        ({"schema": "posekit.skeleton_map/2"}, "schema"),
         ({"schema": None}, "schema"),
         ({"joints": 3}, "joints"),
         ({"points": "a"}, "points"),
@@ -263,7 +263,7 @@ def test_a_bad_table_is_refused_in_one_line(change: dict, said: str) -> None:
 def test_a_map_of_ones_own_is_loaded_from_its_file(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(
-        'schema = "posekit.formats.skeleton_maps/1"\npoints = ["Nase"]\n[landmarks]\nnose = "Nase"\n',
+        'schema = "posekit.skeleton_map/1"\npoints = ["Nase"]\n[landmarks]\nnose = "Nase"\n',
         encoding="utf-8",
     )
     layout = load_skeleton_map(file)

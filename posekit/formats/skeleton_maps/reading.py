@@ -1,4 +1,4 @@
-"""Skeleton maps by name or from TOML files of schema `posekit.formats.skeleton_maps/1`."""
+"""Skeleton maps by name or from TOML files of schema `posekit.skeleton_map/1`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from posekit.formats.skeleton_maps.skeleton_map import LANDMARKS, SkeletonMap, p
 from posekit.safe_io import nearest, parse_toml, read_toml, refusal, shown
 from posekit.skeleton import other_side
 
-SCHEMA: Final = "posekit.formats.skeleton_maps/1"
+SCHEMA: Final = "posekit.skeleton_map/1"
 MAX_BYTES: Final = 1_000_000
 MAX_POINTS: Final = 1000
 FIELDS: Final = ("schema", "source", "points", "landmarks")
@@ -33,7 +33,7 @@ def load_skeleton_map(name: str | Path) -> SkeletonMap:
     Raises
     ------
     InputError
-        Where there is no such map, or it is not what `posekit.formats.skeleton_maps/1` says.
+        Where there is no such map, or it is not what `posekit.skeleton_map/1` says.
 
     Examples
     --------
@@ -66,7 +66,7 @@ def parse_skeleton_map(table: dict[str, Any], source: str) -> SkeletonMap:
     Raises
     ------
     InputError
-        Where it is not what `posekit.formats.skeleton_maps/1` says.
+        Where it is not what `posekit.skeleton_map/1` says.
     """
     if table.get("schema") != SCHEMA:
         raise refusal(
