@@ -17,7 +17,14 @@ from posekit.compiled import anatomical_kernels, angle_kernels, rigid_kernels
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
 from posekit.compiled.frame_kernels import PRESUMED
-from posekit.compiled.rigid_kernels import distance, placement, unit, unknown
+from posekit.compiled.rigid_kernels import (
+    distance,
+    hips,  # noqa: F401 - to be compiled
+    placement,
+    torso,  # noqa: F401 - to be compiled
+    unit,
+    unknown,
+)
 from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.geometry import Array
 
