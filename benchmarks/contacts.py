@@ -25,7 +25,7 @@ from posekit.body import Figure
 from posekit.body.capsules import Capsule
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.validators import load_ranges
 from posekit.validators.collision import PairCollision
@@ -95,7 +95,7 @@ def of_survivors(clips: Sequence[Clip], scenes: Sequence[Scene]) -> None:
     left = []
     for scene in scenes:
         recovery = recover(
-            view_of(scene), checks=("rigid-parts", "joint-range"), ranges=ranges, tolerance=MEASURED
+            view_of(scene), checks=("rigid-parts", "joint-range"), ranges=ranges, tolerance=MEASURED_TOLERANCE
         )
         for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
             true = [code == true_code(frame, truth) for code in frame.branches]

@@ -21,7 +21,7 @@ from posekit.body import load_figure
 from posekit.papers.taylor_views import Seen, exact_views
 from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
 from posekit.recovery.taylor_figure.human import FLIPS, taylor_human
-from posekit.recovery.tolerance import PHOTOGRAPH
+from posekit.settings import PHOTOGRAPH_TOLERANCE
 from posekit.synthesis import CameraSphere, random_views
 from posekit.tree import Check
 from posekit.validators import load_ranges
@@ -83,8 +83,8 @@ def main() -> None:
     given = parser.parse_args()
     scene = random_views(FIGURE, given.views, np.random.default_rng(0), CameraSphere(distance=(3.0, 6.0)))
     views = list(exact_views(HUMAN, [scene])[0].parts(1))
-    checks = taylor_checks(FIGURE, HUMAN.points, ranges=RANGES, tolerance=PHOTOGRAPH)
-    plain = joint_checks(FIGURE, ranges=RANGES, tolerance=PHOTOGRAPH)
+    checks = taylor_checks(FIGURE, HUMAN.points, ranges=RANGES, tolerance=PHOTOGRAPH_TOLERANCE)
+    plain = joint_checks(FIGURE, ranges=RANGES, tolerance=PHOTOGRAPH_TOLERANCE)
     completion = Completion(figure=FIGURE, points=HUMAN.points)
     grow(views[0], checks)  # coal's models are built at the first call
 

@@ -29,12 +29,13 @@ from posekit.body.lengths import hips_points, torso_points
 from posekit.body.stature import stature_from_lengths
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head.perspective import rotation
-from posekit.cameras.neck import Method, Placement, place
+from posekit.cameras.neck import Placement, place
+from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 
 NOISE = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0)
-ORDER: tuple[Method, ...] = ("search", "torso", "head", "auto")
+ORDER: tuple[RootMethod, ...] = ("search", "torso", "head", "auto")
 HEADER = (
     f"{'':>8} {'px':>4} {'cm':>4} {'inside':>7} {'kept':>6} {'median':>7} {'95 %':>7} {'necks':>6} {'step':>6} "
     f"{'frames/s':>9}"

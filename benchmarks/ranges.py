@@ -27,7 +27,7 @@ from posekit.body.frames import hips_frame
 from posekit.compiled.compiling import path
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import DOFS, JOINT, SIDES
 from posekit.synthesis import Capture, Scene, mocap_scenes, read_capture
 from posekit.synthesis.mocap import clip_lengths
@@ -87,7 +87,7 @@ def accepted(clips: Sequence[Clip], ranges: Ranges) -> float:
     return 1.0 - float(np.concatenate([clip.rejected(ranges)[0] for clip in clips]).mean())
 
 
-def evaluate(scenes: Sequence[Scene], ranges: Ranges, tolerance: Tolerance = MEASURED) -> Tally:
+def evaluate(scenes: Sequence[Scene], ranges: Ranges, tolerance: Tolerance = MEASURED_TOLERANCE) -> Tally:
     tally = Tally()
     for scene in scenes:
         recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=tolerance)
@@ -181,7 +181,7 @@ def tolerances(scenes: Sequence[Scene]) -> None:
     rows = []
     for name in ("table1", "anatomical"):
         for degrees in (0.0, 0.5, 1.0, 2.0, 3.0):
-            tally = evaluate(scenes, load_ranges(name), replace(MEASURED, angle=degrees))
+            tally = evaluate(scenes, load_ranges(name), replace(MEASURED_TOLERANCE, angle=degrees))
             rows.append([name, f"{degrees:g}", *row(tally)])
     print("Tolerance of angles\n")
     head = ["ranges", "angle tolerance, deg", "truth among survivors", "survivors, mean", "median", "95 %"]
@@ -243,7 +243,7 @@ def ranking(scenes: Sequence[Scene]) -> None:
     above: list[float] = []
     first: dict[str, list[float]] = defaultdict(list)
     for scene in scenes:
-        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED)
+        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED_TOLERANCE)
         for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
             code = true_code(frame, truth)
             if code not in frame.branches:
@@ -267,7 +267,7 @@ def speed(clips: Sequence[Clip]) -> None:
     best: dict[str, float] = {}
     for _ in range(5):
         for name in TABLES:
-            checks = joint_range(figure, load_ranges(name), tolerance=MEASURED.angle)
+            checks = joint_range(figure, load_ranges(name), tolerance=MEASURED_TOLERANCE.angle)
             start = time.process_time()
             for check in checks:
                 check.judge(points[:, list(check.points)])
@@ -292,7 +292,7 @@ def tree_speed(scenes: Sequence[Scene]) -> None:
                 for name in TABLES:
                     start = time.process_time()
                     for view in views:
-                        recover(view, checks=CHECKS, ranges=name, tolerance=MEASURED)
+                        recover(view, checks=CHECKS, ranges=name, tolerance=MEASURED_TOLERANCE)
                     best[name] = min(best.get(name, np.inf), time.process_time() - start)
         print(f"Time of recovery, {way} path, urdf = 1: ", end="")
         print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in TABLES))

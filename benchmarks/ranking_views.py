@@ -18,9 +18,8 @@ from posekit.formats.own import View
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance, fit_prior
 from posekit.ranking.fitting import TEMPERATURE
 from posekit.recovery import recover
-from posekit.recovery.rooting import Rooting
-from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.refinement import GIVING, RootPrior, Sight, merge, refine
+from posekit.settings import MEASURED_TOLERANCE, Rooting, Tolerance
 from posekit.synthesis import Capture, Scene, mocap_scenes
 from posekit.validators import load_ranges
 from posekit.validators.anatomical_plausibility import plausibility
@@ -97,7 +96,7 @@ def views_of(
     clips, seconds = [], 0.0
     for index, scene in enumerate(scenes):
         view = view_of(scene.with_noise(noise, rng) if noise else scene)
-        tolerance: Tolerance | None = MEASURED
+        tolerance: Tolerance | None = MEASURED_TOLERANCE
         if placed:
             view, tolerance = replace(view, root=np.full_like(view.root, np.nan)), None
         elif refined:

@@ -20,7 +20,7 @@ import numpy as np
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.recovery.recovery import FrameRecovery
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.tree.bits import path_of
@@ -108,7 +108,7 @@ def main() -> None:
     rows = []
     for ranges in ("table1", "urdf"):
         for centimetres in (0.5, 1, 2, 3, 4, 5):
-            tolerance = replace(MEASURED, rigid=centimetres / 100)
+            tolerance = replace(MEASURED_TOLERANCE, rigid=centimetres / 100)
             rows.append([ranges, f"{centimetres:g}", *evaluate(scenes, ranges, tolerance, CHECKS).row()])
     print("\n".join(table_lines(["ranges", "rigid tolerance, cm", *head], rows)))
 
@@ -116,7 +116,7 @@ def main() -> None:
     rows = []
     for ranges in ("table1", "urdf"):
         for degrees in (1e-3, 1, 2, 3, 5):
-            tolerance = replace(MEASURED, angle=degrees)
+            tolerance = replace(MEASURED_TOLERANCE, angle=degrees)
             rows.append([ranges, f"{degrees:g}", *evaluate(scenes, ranges, tolerance, CHECKS).row()])
     print("\n".join(table_lines(["ranges", "angle tolerance, deg", *head], rows)))
 
@@ -124,11 +124,13 @@ def main() -> None:
     rows = []
     for ranges in ("table1", "urdf"):
         for checks in (("rigid-parts",), ("rigid-parts", "joint-range"), CHECKS):
-            rows.append([ranges, " + ".join(checks), *evaluate(scenes, ranges, MEASURED, checks).row()])
+            rows.append(
+                [ranges, " + ".join(checks), *evaluate(scenes, ranges, MEASURED_TOLERANCE, checks).row()]
+            )
     print("\n".join(table_lines(["ranges", "checks", *head], rows)))
 
     print("By action, all checks, at the default tolerance\n")
-    tallies = {ranges: evaluate(scenes, ranges, MEASURED, CHECKS) for ranges in ("table1", "urdf")}
+    tallies = {ranges: evaluate(scenes, ranges, MEASURED_TOLERANCE, CHECKS) for ranges in ("table1", "urdf")}
     rows = [
         [action, str(len(found)), f"{np.mean(found):.1%}", f"{np.mean(tallies['urdf'].retained[action]):.1%}"]
         for action, found in sorted(tallies["table1"].retained.items())

@@ -29,7 +29,6 @@ from posekit.recovery import recover
 from posekit.recovery.noise import Noise
 from posekit.recovery.refiner import Refiner
 from posekit.recovery.result import result_of
-from posekit.recovery.tolerance import MEASURED, Tolerance
 from posekit.refinement import (
     GIVING,
     RootPrior,
@@ -41,6 +40,7 @@ from posekit.refinement import (
     tolerance_of,
     under_noise,
 )
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
@@ -101,7 +101,7 @@ def grow(sight: Sight, tolerance: Tolerance, contact: float) -> Leaves:
 
 
 def fixed(sight: Sight, _: float) -> Leaves:
-    return grow(sight, MEASURED, 0.0)
+    return grow(sight, MEASURED_TOLERANCE, 0.0)
 
 
 def derived(sight: Sight, pixels: float) -> Leaves:

@@ -32,7 +32,7 @@ from posekit.body import load_figure
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.recovery.body import FigureBody, Judges
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
 from posekit.synthesis import Capture, Scene, mocap_scenes, random_views, read_capture
 from posekit.validators import load_ranges
@@ -42,7 +42,9 @@ from posekit.views.builtin import view_of
 Floats = NDArray[np.float64]
 Kept = NDArray[np.bool_]
 
-UNIFORM = Tolerance(rigid=0.03, tangent=MEASURED.tangent, placement=False, angle=MEASURED.angle)
+UNIFORM = Tolerance(
+    rigid=0.03, tangent=MEASURED_TOLERANCE.tangent, placement=False, angle=MEASURED_TOLERANCE.angle
+)
 """What all four distances were allowed before each had its own tolerance."""
 
 
@@ -152,7 +154,7 @@ def study(title: str, scenes: Sequence[Scene], ranges: str) -> dict[str, list[Sc
     head = ["distance, mm", "least", "0.5 %", "99.5 %", "most", "lifted, 99.5 %", "lifted, most"]
     print("\n".join(table_lines(head, spreads(scenes, torsos))))
     nothing = score("no check of the rigid parts (12 cm)", torsos, np.ones(len(torsos.view), bool), views)
-    now = score("chosen (MEASURED)", torsos, (np.abs(torsos.off) <= CHOSEN).all(axis=1), views)
+    now = score("chosen (MEASURED_TOLERANCE)", torsos, (np.abs(torsos.off) <= CHOSEN).all(axis=1), views)
     curves = {
         name: [score(f"{name}, {label}", torsos, kept, views) for label, kept in rule(torsos)]
         for name, rule in RULES.items()
@@ -242,7 +244,7 @@ def whole(scenes: Sequence[Scene], tables: Sequence[str]) -> list[list[str]]:
     views = [view_of(scene) for scene in scenes]
     for ranges in tables:
         table = load_ranges(ranges)
-        both = {"3 cm for all": UNIFORM, "hips 7.5 mm": MEASURED}
+        both = {"3 cm for all": UNIFORM, "hips 7.5 mm": MEASURED_TOLERANCE}
         for name, tolerance in both.items():
             counts, near = [], []
             recovered = [recover(view, checks=CHECKS, ranges=table, tolerance=tolerance) for view in views]
@@ -267,7 +269,7 @@ def speed(scenes: Sequence[Scene], tables: Sequence[str]) -> str:
     """Time the trees alone, best of nine turns each: what the own tolerances take of what one for all does."""
     told = []
     for ranges in tables:
-        seconds = {UNIFORM: np.inf, MEASURED: np.inf}
+        seconds = {UNIFORM: np.inf, MEASURED_TOLERANCE: np.inf}
         grown = []
         for scene in scenes:
             body = FigureBody(figure=scene.figure, stature=1.7)
@@ -285,7 +287,7 @@ def speed(scenes: Sequence[Scene], tables: Sequence[str]) -> str:
                     tolerance=tolerance.tangent,
                 )
             seconds[tolerance] = min(seconds[tolerance], time.process_time() - start)
-        told.append(f"{ranges} {seconds[MEASURED] / seconds[UNIFORM]:.2f}")
+        told.append(f"{ranges} {seconds[MEASURED_TOLERANCE] / seconds[UNIFORM]:.2f}")
     return "Time of the trees, 3 cm for all = 1: " + ", ".join(told)
 
 
@@ -297,7 +299,7 @@ def unstated_noise(count: int = 400) -> list[list[str]]:
         seen = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
         view = replace(seen, root=scene.joints_cam[:, 0], head_image=np.full(seen.head_image.shape, np.nan))
         found = {}
-        for name, tolerance in (("3 cm for all", UNIFORM), ("hips 7.5 mm", MEASURED)):
+        for name, tolerance in (("3 cm for all", UNIFORM), ("hips 7.5 mm", MEASURED_TOLERANCE)):
             frames = recover(view, checks=CHECKS, tolerance=tolerance).frames
             errors = [
                 np.linalg.norm(frame.joints - truth, axis=-1).mean(axis=-1).min(initial=np.inf)

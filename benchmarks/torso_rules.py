@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torso_views import Torsos, per_spine_length  # type: ignore[import-not-found]  # the script beside this one
 
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import RIGID_SEGMENTS
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ FLOOR = 0.005
 """Metres: least spread of a distance. The shoulders and hips of these recordings are rods; people's are not."""
 
 SWEEP = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)
-CHOSEN = np.array([MEASURED.distances.of(segment) for segment in RIGID_SEGMENTS])
+CHOSEN = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
 
 BENDING = np.array([[1.0, 0, 0, 0], [0, 0.5, 0.5, 0], [0, 0.5, -0.5, 0], [0, 0, 0, 1.0]])
 """Takes the four distances to width, shrug (both sides longer), side bend (one longer, one shorter) and hips."""

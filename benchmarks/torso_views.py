@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.frames import torso_frame
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Capture, Scene
 from posekit.tree import InterpretationTree, Leaves
@@ -90,7 +90,7 @@ def torsos_of(
             ranges=table,
             rigid_tolerance=LOOSE,
             rigid_mode="distances",
-            angle_tolerance=MEASURED.angle,
+            angle_tolerance=MEASURED_TOLERANCE.angle,
         )
         truth = scene.joints_cam
         ends = np.array(SEGMENTS)
@@ -107,7 +107,7 @@ def torsos_of(
             scene.image,
             checks,
             given=scene.head_cam,
-            tolerance=MEASURED.tangent,
+            tolerance=MEASURED_TOLERANCE.tangent,
         )
         split = len(TREE_SEGMENTS)
         parts.append(_torsos(leaves, truth, figure[split:], own[:, split:], clip, seen))

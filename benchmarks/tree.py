@@ -33,7 +33,7 @@ from posekit.cameras import Camera
 from posekit.compiled import compiling as compiled
 from posekit.formats.own import View
 from posekit.geometry import Array
-from posekit.recovery.tolerance import EXACT, MEASURED, Tolerance
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree, Leaves, enumerate_leaves
@@ -278,7 +278,7 @@ def main() -> None:
     parser.add_argument("--cameras", type=int, default=4)
     given = parser.parse_args()
     scene = random_views(load_figure(), max(given.views, given.batch), np.random.default_rng(0))
-    random = Job.of([scene], EXACT)
+    random = Job.of([scene], EXACT_TOLERANCE)
     against_brute_force(random, given.views)
     rates("random legal views, exact", [random])
     recover_rates("random legal views", [view_of(scene)])
@@ -286,7 +286,10 @@ def main() -> None:
         capture = read_capture(given.mocap)
         frames = sum(len(capture.frames_of(k, complete=True)) for k in range(len(capture.names)))
         seen = [mocap_scenes(capture, frames, np.random.default_rng(seed)) for seed in range(given.cameras)]
-        rates("real motion, as measured", [Job.of(scenes, MEASURED) for scenes in zip(*seen, strict=True)])
+        rates(
+            "real motion, as measured",
+            [Job.of(scenes, MEASURED_TOLERANCE) for scenes in zip(*seen, strict=True)],
+        )
         recover_rates(
             "real motion", [view_of(scene) for scenes in zip(*seen, strict=True) for scene in scenes]
         )

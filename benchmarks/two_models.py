@@ -36,8 +36,8 @@ from benchmarks.studies.two_models.labelled import KINDS, Labelled, labelled_pos
 from posekit import Validator, load_figure
 from posekit.body import Figure
 from posekit.formats.markdown import table_lines
-from posekit.recovery.tolerance import MEASURED
 from posekit.robots.scaling import shoulders_are_behind
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Capture, read_capture
 from posekit.synthesis.mocap import clip_lengths
@@ -229,15 +229,15 @@ class Tally:
 def real(figure: Figure, capture: Capture, every: int, held: str) -> None:
     judges = {
         "stick, table1": (None, "table1", STRICT),
-        "stick, table1, 2 deg": (None, "table1", MEASURED.angle),
+        "stick, table1, 2 deg": (None, "table1", MEASURED_TOLERANCE.angle),
         "stick, urdf": (None, "urdf", STRICT),
-        "stick, urdf, 2 deg": (None, "urdf", MEASURED.angle),
+        "stick, urdf, 2 deg": (None, "urdf", MEASURED_TOLERANCE.angle),
         "human, mapped": (HUMAN, str(mapped_ranges()), STRICT),
-        "human, mapped, 2 deg": (HUMAN, str(mapped_ranges()), MEASURED.angle),
+        "human, mapped, 2 deg": (HUMAN, str(mapped_ranges()), MEASURED_TOLERANCE.angle),
         "human, held rigid": (HUMAN, held, STRICT),
-        "human, held rigid, 2 deg": (HUMAN, held, MEASURED.angle),
+        "human, held rigid, 2 deg": (HUMAN, held, MEASURED_TOLERANCE.angle),
         "human, own": (HUMAN, "urdf", STRICT),
-        "human, own, 2 deg": (HUMAN, "urdf", MEASURED.angle),
+        "human, own, 2 deg": (HUMAN, "urdf", MEASURED_TOLERANCE.angle),
     }
     print("All frames, the stick figure\n")
     tallies = {}

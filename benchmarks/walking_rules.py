@@ -23,7 +23,7 @@ from real_motion import CHECKS, true_code  # type: ignore[import-not-found]
 
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.synthesis import Scene, mocap_scenes, read_capture
 from posekit.tree import Findings
 from posekit.validators import load_ranges, walking
@@ -113,7 +113,7 @@ def on_views(scenes: Sequence[Scene]) -> None:
     ranges = load_ranges("anatomical")
     tallies: dict[tuple[str, tuple[int, ...]], list[tuple[bool, int]]] = {}
     for scene in scenes:
-        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED)
+        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED_TOLERANCE)
         for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
             joints = frame.joints
             mine = np.array([code == true_code(frame, truth) for code in frame.branches], dtype=bool)

@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from posekit.recovery import recover as recover
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
-    from posekit.recovery.tolerance import Tolerance as Tolerance
+    from posekit.settings import RecoverSettings as RecoverSettings
+    from posekit.settings import Tolerance as Tolerance
+    from posekit.settings import ValidateSettings as ValidateSettings
     from posekit.validators import Validator as Validator
     from posekit.views.builtin import builtin_view as builtin_view
     from posekit.views.opening import open_views as open_views
@@ -50,7 +52,8 @@ _HOMES = {
     ),
     "posekit.formats.keypoints": ("read_keypoints",),
     "posekit.formats.motion": ("read_motion",),
-    "posekit.recovery": ("Recovery", "Tolerance", "recover", "result_of"),
+    "posekit.recovery": ("Recovery", "recover", "result_of"),
+    "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),
     "posekit.validators": ("Validator",),
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -13,63 +12,13 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
 from posekit.compiled import check_kernels as kernels
-from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
+from posekit.settings import RigidTolerance
+from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Check, Findings, Rule
 from posekit.validators.screening import screened
 
 Mode = Literal["distances", "placement"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class RigidTolerance:
-    """How far each distance inside torso and hips may be off: not all of them give alike.
-
-    See docs, "A torso that gives".
-
-    Parameters
-    ----------
-    shoulders : float
-        From shoulder to shoulder, metres: what clavicles give.
-    sides : float
-        From each shoulder to the pelvis, metres: what the spine gives when it bends, too.
-    hips : float
-        From hip to hip, metres. The pelvis is bone; it is off where its depth is, which the spine's length lifts.
-    """
-
-    shoulders: float
-    sides: float
-    hips: float
-
-    def __post_init__(self) -> None:
-        for name, metres in vars(self).items():
-            if not (math.isfinite(metres) and metres >= 0):
-                raise InputError(
-                    f"the rigid tolerance of {name} is {metres!r} m; expected zero or a positive, finite number"
-                )
-
-    @staticmethod
-    def uniform(metres: float) -> RigidTolerance:
-        """Allow all distances the same."""
-        return RigidTolerance(shoulders=metres, sides=metres, hips=metres)
-
-    @property
-    def widest(self) -> float:
-        """The largest of them, metres: that of whatever is none of the four."""
-        return max(self.shoulders, self.sides, self.hips)
-
-    def of(self, segment: tuple[int, int]) -> float:
-        """Return what a distance between two joints may be off, metres."""
-        if segment not in RIGID_SEGMENTS:
-            return self.widest
-        if not set(segment) - HIP_JOINTS:
-            return self.hips
-        return self.sides if PELVIS in segment else self.shoulders
-
-
-PELVIS = JOINT["pelvis"]
-HIP_JOINTS = {JOINT[name] for name in HIPS}
 
 
 def rigid_parts(

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.settings import RigidTolerance
 from posekit.tree import Check
 from posekit.validators.collision import collision
 from posekit.validators.joint_range import TOLERANCE, joint_range
 from posekit.validators.ranges import Ranges
-from posekit.validators.rigid_parts import Mode, RigidTolerance, rigid_parts
+from posekit.validators.rigid_parts import Mode, rigid_parts
 from posekit.validators.walking import DEFAULT_RULES, WalkingThresholds, walking
 
 CHECKS = ("rigid-parts", "joint-range", "collision", "walking")

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.comparison.measure import Chart, Line, Section, Sizes, least
 from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
 from posekit.body import Figure, load_figure
-from posekit.recovery.tolerance import EXACT, MEASURED
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Scene, random_views
 from posekit.tree import Check
@@ -121,16 +121,16 @@ def _survivors(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
 
 
 def _noise(figure: Figure, scene: Scene) -> Study:
-    checks = physical_checks(figure, MEASURED)
+    checks = physical_checks(figure, MEASURED_TOLERANCE)
     some = scene.select(np.arange(min(len(scene), CHUNK)))
     found: Study = {}
     for sigma in NOISE:
         seen = some.with_noise(sigma, np.random.default_rng(1)) if sigma else some
         found[sigma] = (
-            (lambda seen=seen: grow(figure, seen, checks, tangent=MEASURED.tangent)),  # type: ignore[misc]
+            (lambda seen=seen: grow(figure, seen, checks, tangent=MEASURED_TOLERANCE.tangent)),  # type: ignore[misc]
             len(some),
         )
     return found
 
 
-__all__ = ["EXACT", "section"]
+__all__ = ["EXACT_TOLERANCE", "section"]

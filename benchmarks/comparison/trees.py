@@ -21,7 +21,7 @@ from benchmarks.comparison.lifter import Lifter, make_lifter
 from benchmarks.comparison.measure import Chart, Cost, Section, Sizes, least, microseconds
 from posekit.body import Figure, load_figure
 from posekit.recovery import recover
-from posekit.recovery.tolerance import EXACT, Tolerance
+from posekit.settings import EXACT_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
 from posekit.tree import Check, InterpretationTree, enumerate_leaves
@@ -34,7 +34,7 @@ CHUNK = 250
 Codes = list[NDArray[np.int32]]
 
 
-def physical_checks(figure: Figure, tolerance: Tolerance = EXACT) -> list[Check]:
+def physical_checks(figure: Figure, tolerance: Tolerance = EXACT_TOLERANCE) -> list[Check]:
     """Make rigid parts, joint ranges and collision for exact, or measured, image points."""
     return make_checks(
         figure,
@@ -57,7 +57,7 @@ def grow(
     checks: list[Check],
     *,
     joints: int = len(JOINTS),
-    tangent: float = EXACT.tangent,
+    tangent: float = EXACT_TOLERANCE.tangent,
 ) -> Codes:
     """Grow the trees of all views over the first joints, and return each view's surviving codes."""
     tree = InterpretationTree(
@@ -89,7 +89,7 @@ def brute_force(
         scene.image[k],
         parents=PARENTS,
         lengths=lengths_of(figure),
-        tolerance=EXACT.tangent,
+        tolerance=EXACT_TOLERANCE.tangent,
     )
     head = np.broadcast_to(scene.head_cam[k], (len(leaves), 5, 3))
     points = np.concatenate([leaves, head], axis=1)
@@ -147,7 +147,9 @@ def section(sizes: Sizes) -> Section:
 
     def pipeline() -> object:
         with on(paths()[-1]):
-            return recover(view, checks=("rigid-parts", "joint-range", "collision"), tolerance=EXACT)
+            return recover(
+                view, checks=("rigid-parts", "joint-range", "collision"), tolerance=EXACT_TOLERANCE
+            )
 
     lifters = [make_lifter(batch, scene.image) for batch in (1, 64)]
     known = {path: tree(path) for path in paths()}

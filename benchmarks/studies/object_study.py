@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posekit.objects.articulated import ArticulatedObject
 from posekit.objects.draw import draw_view
 from posekit.objects.recover import recover_object
-from posekit.objects.scale import Scale
+from posekit.settings.scale import Scale
 
 FOUND = 1e-5
 """Metres, of the object's longest segment, within which a survivor is the truth."""

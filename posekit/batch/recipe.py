@@ -13,12 +13,11 @@ from posekit.batch import digests
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats.own import PER_METRE, ScaledOrthographicModel, View
-from posekit.objects.scale import parse_scale
 from posekit.recovery.conductor import recover
 from posekit.recovery.noise import refuse_deviation
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.rooting import Rooting
-from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Rooting, Tolerance
+from posekit.settings.scale import parse_scale
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
 from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 from posekit.views.camera import split_camera
@@ -55,7 +54,7 @@ class Recipe:
     contact_margin : float
         Metres.
     scale : str
-        How the scale of uncalibrated views is found, as `posekit.objects.scale.parse_scale` reads it; empty for the
+        How the scale of uncalibrated views is found, as `posekit.settings.scale.parse_scale` reads it; empty for the
         default.
     proportions : {"figure", "taylor"}
     infer : bool
@@ -124,12 +123,12 @@ class Recipe:
         """Return the tolerances that are given, the rest as usual; None where none is."""
         if self.rigid is None and self.tangent is None and self.angle is None:
             return None
-        usual = PHOTOGRAPH if uncalibrated else MEASURED
+        usual = PHOTOGRAPH_TOLERANCE if uncalibrated else MEASURED_TOLERANCE
         rigid = usual.rigid if self.rigid is None else self.rigid
         return Tolerance(
             rigid=rigid,
             tangent=usual.tangent if self.tangent is None else self.tangent,
-            placement=rigid <= EXACT.rigid,
+            placement=rigid <= EXACT_TOLERANCE.rigid,
             angle=usual.angle if self.angle is None else self.angle,
         )
 

@@ -17,8 +17,8 @@ from posekit.errors import InputError, PosekitError
 if TYPE_CHECKING:
     from posekit.formats.own import View
     from posekit.recovery.recovery import Recovery
-    from posekit.recovery.rooting import Rooting
     from posekit.recovery.scaled_sequences import ScaledFollowing
+    from posekit.settings import Rooting
     from posekit.validators import Ranges
     from posekit.views.opening import Opened
 
@@ -104,7 +104,7 @@ class Asked:
 
     def recover(self, seen: View, path: Path, *, quiet: bool = False) -> Recovery:
         """Recover a view that comes from `path`."""
-        from posekit import objects, recovery
+        from posekit import objects, recovery, settings
         from posekit.formats import own as files
 
         uncalibrated = isinstance(seen.camera, files.ScaledOrthographicModel)
@@ -117,7 +117,9 @@ class Asked:
                 ranges=self.ranges,
                 rules=self.rules,
                 walkers=self.walkers,
-                tolerance=self.tolerances.filled(recovery.PHOTOGRAPH if uncalibrated else recovery.MEASURED),
+                tolerance=self.tolerances.filled(
+                    settings.PHOTOGRAPH_TOLERANCE if uncalibrated else settings.MEASURED_TOLERANCE
+                ),
                 contact_margin=self.contact_margin,
                 group=self.group,
                 scale=objects.parse_scale(self.scale, per_unit=per_unit) if self.scale else None,

@@ -133,7 +133,7 @@ def evaluate(
     from posekit.evaluate.draw import plot_paths, write_plots
     from posekit.evaluate.report import check_evaluation_path, summary
     from posekit.formats.own import View
-    from posekit.recovery.tolerance import MEASURED
+    from posekit.settings import MEASURED_TOLERANCE
     from posekit.viewer.plots.figure import drawing
 
     charts = plot_paths(output[0]) if plots else {}
@@ -162,7 +162,7 @@ def evaluate(
         "ranges": judging.ranges,
         "rules": judging.numbers,
         "walkers": judging.walkers,
-        "tolerance": tolerances.filled(MEASURED),
+        "tolerance": tolerances.filled(MEASURED_TOLERANCE),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,
     }

@@ -10,7 +10,7 @@ import typer
 from posekit.cli.options import PHYSICAL, AngleTolerance, Rules, as_recover, rule_numbers, split
 
 if TYPE_CHECKING:
-    from posekit.recovery.tolerance import Tolerance
+    from posekit.settings import Tolerance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +87,8 @@ class Tolerances:
 
     def filled(self, otherwise: Tolerance) -> Tolerance | None:
         """Make the tolerance of what is given, the rest as it is `otherwise`; None where nothing is given."""
-        from posekit.recovery.tolerance import EXACT
-        from posekit.recovery.tolerance import Tolerance as Made
+        from posekit.settings import EXACT_TOLERANCE
+        from posekit.settings import Tolerance as Made
 
         rigid, tangent, angle = self.rigid, self.tangent, self.angle_tolerance
         if rigid is None and tangent is None and angle is None:
@@ -97,7 +97,7 @@ class Tolerances:
         return Made(
             rigid=metres,
             tangent=otherwise.tangent if tangent is None else tangent,
-            placement=metres <= EXACT.rigid,
+            placement=metres <= EXACT_TOLERANCE.rigid,
             angle=otherwise.angle if angle is None else angle,
         )
 

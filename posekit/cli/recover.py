@@ -139,7 +139,8 @@ def recover(
     from posekit.conversion.conversion import of_person
     from posekit.evaluate.comparison import compare
     from posekit.formats import own as files
-    from posekit.recovery import Rooting, following_line, result_of
+    from posekit.recovery import following_line, result_of
+    from posekit.settings import Rooting
     from posekit.views.given_views import given_views
 
     for read in (view, nearer, truth, who.calibrate, who.lengths):

@@ -18,7 +18,7 @@ from posekit.body import Figure
 from posekit.body.closed_form import with_head
 from posekit.body.frames import unit
 from posekit.geometry import Array
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Tolerance
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.validators import Ranges, judge, make_checks
 

@@ -19,8 +19,7 @@ from posekit.evaluate.sequences import Chooser
 from posekit.formats.own import View
 from posekit.recovery.conductor import person_of, recover
 from posekit.recovery.recovery import FrameRecovery
-from posekit.recovery.rooting import Rooting
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Rooting, Tolerance
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, walking
 from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 

@@ -20,8 +20,8 @@ from posekit.formats.own import ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.recovery.body import FigureBody
 from posekit.recovery.recovery import FrameRecovery
-from posekit.recovery.tolerance import Tolerance
 from posekit.recovery.trees import Batch
+from posekit.settings import Tolerance
 from posekit.skeleton import JOINTS
 
 ROLES: Final = ("best", "first", "random", "path")

@@ -17,9 +17,9 @@ from posekit.objects.certify import Certifier
 from posekit.objects.growth import Grown, grow
 from posekit.objects.nearer import Nearer
 from posekit.objects.plan import Plan
-from posekit.objects.scale import Scale
 from posekit.objects.scales import CLOSED, family_of
 from posekit.objects.tolerance import ObjectTolerance
+from posekit.settings.scale import Scale
 
 NOT_ASKED = "undecided: no configuration was asked for"
 

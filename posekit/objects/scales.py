@@ -12,8 +12,8 @@ from posekit.geometry import Array
 from posekit.linkages import search
 from posekit.linkages.family import Family as Solutions
 from posekit.objects.plan import Plan
-from posekit.objects.scale import Scale, way_of
 from posekit.objects.triangles import Triangles
+from posekit.settings.scale import Scale, way_of
 
 ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""

@@ -11,7 +11,7 @@ from posekit.formats.own import View
 from posekit.papers import lee_chen_printed as printed
 from posekit.recovery.conductor import recover
 from posekit.recovery.recovery import FrameRecovery, Recovery
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Tolerance
 from posekit.synthesis import Scene, Walker, walker_scene
 from posekit.synthesis.walker_scene import FRAME_TIME, SEQ1_CAMERA, SEQ2_CAMERA
 from posekit.validators import CHECKS

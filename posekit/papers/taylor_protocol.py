@@ -16,7 +16,7 @@ from posekit.papers.taylor_survival import AT_ONCE
 from posekit.papers.taylor_views import Seen
 from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
 from posekit.recovery.taylor_figure.human import Human
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.tree import Leaves
 from posekit.validators import Ranges, judge, load_ranges
 
@@ -103,7 +103,11 @@ def accuracy_lines(table: Sequence[Accuracy]) -> list[str]:
 
 
 def accuracy(
-    human: Human, seen: Iterable[Seen], *, tolerance: Tolerance = MEASURED, ranges: Ranges | None = None
+    human: Human,
+    seen: Iterable[Seen],
+    *,
+    tolerance: Tolerance = MEASURED_TOLERANCE,
+    ranges: Ranges | None = None,
 ) -> list[Accuracy]:
     """Measure the reconstruction by §3.2, with flips by hand and with flips that the checks choose.
 

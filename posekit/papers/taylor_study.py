@@ -15,7 +15,7 @@ from posekit.papers.taylor_protocol import Accuracy, accuracy, accuracy_lines
 from posekit.papers.taylor_survival import Survival, survival, survival_lines
 from posekit.papers.taylor_views import Proportions, Scale, Seen, exact_views, photographs
 from posekit.recovery.taylor_figure.human import Human, taylor_human
-from posekit.recovery.tolerance import MEASURED, PHOTOGRAPH, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.synthesis import CameraSphere, Scene, mocap_scenes, random_views, read_capture
 
 SPHERE = CameraSphere(distance=(3.0, 6.0))
@@ -115,7 +115,8 @@ class Study:
             "",
             "## Exact scaled orthographic pictures, the true s, the frame's own lengths",
             "",
-            f"Tolerances: rigid parts {MEASURED.rigid * 100:g} cm, angles {MEASURED.angle:g} degrees.",
+            f"Tolerances: rigid parts {MEASURED_TOLERANCE.rigid * 100:g} cm, angles "
+            f"{MEASURED_TOLERANCE.angle:g} degrees.",
             "",
             *survival_lines(self.exact),
         ]
@@ -125,7 +126,8 @@ class Study:
             f"## Photographs: a perspective camera {SPHERE.distance[0]:g} to {SPHERE.distance[1]:g} m away, "
             f"{NOISE:g} px of noise",
             "",
-            f"Tolerances: rigid parts {PHOTOGRAPH.rigid * 100:g} cm, angles {PHOTOGRAPH.angle:g} degrees.",
+            f"Tolerances: rigid parts {PHOTOGRAPH_TOLERANCE.rigid * 100:g} cm, angles "
+            f"{PHOTOGRAPH_TOLERANCE.angle:g} degrees.",
             "",
         ]
         if self.swept:
@@ -182,8 +184,10 @@ def capture_study(capture: Path, pictures: int = 1000, seed: int = 0) -> Study:
         pictures=pictures,
         exact=tuple(survival(human, exact)),
         photographs=tuple(_photographs(human, scenes, seed, ("urdf", "table1"))),
-        rigid=tuple(_sweep(human, exact, MEASURED, (0.005, 0.01, 0.02, 0.03, 0.04, 0.06), (2.0,))),
-        swept=tuple(_sweep(human, seen, PHOTOGRAPH, (0.03, 0.06, 0.10, 0.15), (2.0, 5.0, 10.0, 15.0))),
+        rigid=tuple(_sweep(human, exact, MEASURED_TOLERANCE, (0.005, 0.01, 0.02, 0.03, 0.04, 0.06), (2.0,))),
+        swept=tuple(
+            _sweep(human, seen, PHOTOGRAPH_TOLERANCE, (0.03, 0.06, 0.10, 0.15), (2.0, 5.0, 10.0, 15.0))
+        ),
     )
 
 
@@ -203,8 +207,8 @@ def _photographs(
             proportions=proportions,
             scale=scale,
             short=float(np.concatenate([pictures.short for pictures in seen]).mean()),
-            survival=tuple(survival(human, seen, tolerance=PHOTOGRAPH, ranges=ranges)),
-            accuracy=tuple(accuracy(human, seen, tolerance=PHOTOGRAPH)),
+            survival=tuple(survival(human, seen, tolerance=PHOTOGRAPH_TOLERANCE, ranges=ranges)),
+            accuracy=tuple(accuracy(human, seen, tolerance=PHOTOGRAPH_TOLERANCE)),
         )
 
 

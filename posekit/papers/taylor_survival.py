@@ -12,7 +12,7 @@ from posekit.formats.markdown import table_lines
 from posekit.papers.taylor_views import Seen
 from posekit.recovery.taylor_figure.completion import taylor_checks
 from posekit.recovery.taylor_figure.human import Human
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.tree import Leaves
 from posekit.validators import Ranges, load_ranges
 
@@ -87,7 +87,11 @@ def survival_lines(table: Sequence[Survival]) -> list[str]:
 
 
 def survival(
-    human: Human, seen: Iterable[Seen], *, tolerance: Tolerance = MEASURED, ranges: Sequence[str] = RANGES
+    human: Human,
+    seen: Iterable[Seen],
+    *,
+    tolerance: Tolerance = MEASURED_TOLERANCE,
+    ranges: Sequence[str] = RANGES,
 ) -> list[Survival]:
     """Count what each check leaves alone, and what all leave together.
 

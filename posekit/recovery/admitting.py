@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.recovery.grower import Grower
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.tree import Leaves
 from posekit.tree.bits import path_of, select
 from posekit.validators import Judgement, judge
@@ -93,7 +93,7 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
     rows = rows[np.isfinite(grower.fit.root[rows]).all(axis=1)]
     if not len(rows):
         return None
-    allowed = tolerance or MEASURED
+    allowed = tolerance or MEASURED_TOLERANCE
     _, checks = grower.suites_of(allowed)
     leaves = grower.body.tree.grow(
         grower.fit.cameras(rows),

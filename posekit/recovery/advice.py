@@ -7,7 +7,7 @@ from typing import Final
 from posekit.recovery.admitting import least_violation
 from posekit.recovery.doubts import doubt_lines
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 
 NAMED: Final = 3
 """Empty frames of which the least violation is told."""
@@ -26,7 +26,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
     lines = []
     for k in empty[:NAMED]:
         frame = recovery.frames[k]
-        allowed = MEASURED if frame.judged in ("exact", "measured") else frame.tolerance
+        allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, frame.number, allowed)
         if found is not None and found.excesses:
             lines.append(f"frame {k + 1}: the least that would admit a posture: {found}")

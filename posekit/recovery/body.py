@@ -12,7 +12,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.linkages import Linkage
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Tolerance
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import Ranges, make_checks

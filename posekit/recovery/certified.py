@@ -16,10 +16,10 @@ from posekit.geometry import Array
 from posekit.recovery.body import Judges
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
-from posekit.recovery.tolerance import Tolerance
 from posekit.refinement import GIVING
 from posekit.refinement.sight import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
+from posekit.settings import Tolerance
 from posekit.tree import Check, Screened
 from posekit.validators import Judgement, judge, make_checks
 from posekit.validators.validator import RIGID_TOLERANCE

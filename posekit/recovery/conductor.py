@@ -16,7 +16,6 @@ from posekit.body import Figure, load_figure, stature_from_lengths
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.objects.nearer import Nearer
-from posekit.objects.scale import Scale
 from posekit.ranking import Up, load_prior
 from posekit.recovery.body import Body, FigureBody, Judges
 from posekit.recovery.camera_record import CameraRecords
@@ -28,10 +27,11 @@ from posekit.recovery.grown import Grown, grown_of
 from posekit.recovery.noise import Noise
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.refiner import Refiner
-from posekit.recovery.rooting import Rooting, tolerance_of
+from posekit.recovery.rooting import tolerance_of
 from posekit.recovery.seen import lost_to, neckless, trunkless, with_reasons
 from posekit.recovery.taylor_figure.body import TaylorBody
-from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Rooting, Tolerance
+from posekit.settings.scale import Scale
 from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
 from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
@@ -151,7 +151,7 @@ def recover(
         rows = part if tolerance is not None else grower.closing(part)
         inexact = part
         if len(rows):
-            batch = grower.grow(rows, tolerance or EXACT)
+            batch = grower.grow(rows, tolerance or EXACT_TOLERANCE)
             grown |= grown_of(batch, fit, rows)
             inexact = part[~np.isin(fit.frame[part], fit.frame[rows[batch.exact]])]
         if tolerance is None:
@@ -189,9 +189,9 @@ def recover(
         "rules": list(rules) if "walking" in names else [],
         "walkers": walkers,
         "tolerance": "exact, else measured" if tolerance is None else asdict(tolerance),
-        "exact": asdict(EXACT),
-        "measured": asdict(MEASURED),
-        "photograph": asdict(PHOTOGRAPH),
+        "exact": asdict(EXACT_TOLERANCE),
+        "measured": asdict(MEASURED_TOLERANCE),
+        "photograph": asdict(PHOTOGRAPH_TOLERANCE),
         "contact_margin": contact_margin,
         "group": group,
         "figure": body.figure.hash,
@@ -309,10 +309,11 @@ def _by_tolerance(fit: CameraFit, rows: NDArray[np.intp]) -> Iterator[tuple[NDAr
     """Yield hypotheses of frames that are not exact with what they are judged with."""
     if fit.families is not None or fit.placements is None:
         if len(rows):
-            yield rows, MEASURED if fit.families is None else PHOTOGRAPH
+            yield rows, MEASURED_TOLERANCE if fit.families is None else PHOTOGRAPH_TOLERANCE
         return
     by_frame = [
-        MEASURED if one is None or not len(one.necks) else tolerance_of(one) for one in fit.placements
+        MEASURED_TOLERANCE if one is None or not len(one.necks) else tolerance_of(one)
+        for one in fit.placements
     ]
     allowed = [by_frame[k] for k in fit.frame[rows].tolist()]
     for one in dict.fromkeys(allowed):

@@ -10,10 +10,10 @@ from posekit.formats.own import PER_METRE, Family, ScaledOrthographicModel, Unit
 from posekit.geometry import Array
 from posekit.linkages import Family as Solutions
 from posekit.linkages import Minima, search
-from posekit.objects.scale import Scale, way_of
 from posekit.recovery.body import Body
 from posekit.recovery.fit_camera import CameraFit
-from posekit.recovery.tolerance import EXACT, PHOTOGRAPH, Tolerance
+from posekit.settings import EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
+from posekit.settings.scale import Scale, way_of
 from posekit.skeleton import HEAD, JOINT
 
 ROUNDING = 1e-9
@@ -120,11 +120,11 @@ def _family(
 
 def _near_enough(found: Minima, tolerance: Tolerance | None) -> Array:
     """Choose among the minima: those without a residual, else those within the tolerance, else the best."""
-    rigid = (PHOTOGRAPH if tolerance is None else tolerance).rigid
+    rigid = (PHOTOGRAPH_TOLERANCE if tolerance is None else tolerance).rigid
     unit = float(found.constraints.family.linkage.lengths.mean())
     residual = found.residual
     best = float(residual[0])
-    limit = EXACT.rigid if best <= (EXACT.rigid / unit) ** 2 else rigid
+    limit = EXACT_TOLERANCE.rigid if best <= (EXACT_TOLERANCE.rigid / unit) ** 2 else rigid
     return np.unique(found.s[residual <= max(best, (limit / unit) ** 2)])
 
 
@@ -132,4 +132,4 @@ def _allowed(how: str, tolerance: Tolerance | None) -> float:
     """Return by how much (m) a segment may be too short: nothing at a scale that was given as exact."""
     if tolerance is not None:
         return tolerance.tangent
-    return EXACT.tangent if how == "value" else PHOTOGRAPH.tangent
+    return EXACT_TOLERANCE.tangent if how == "value" else PHOTOGRAPH_TOLERANCE.tangent

@@ -17,8 +17,8 @@ from posekit.hidden import Completion, complete, reject
 from posekit.objects.nearer import Nearer
 from posekit.recovery.body import Body, FigureBody, Judges
 from posekit.recovery.fit_camera import CameraFit
-from posekit.recovery.tolerance import EXACT, Tolerance
 from posekit.recovery.trees import Batch
+from posekit.settings import EXACT_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, InterpretationTree, Leaves
 
@@ -71,7 +71,7 @@ class Grower:
                 tolerance=tolerance.tangent,
             )
         exact = np.zeros(leaves.n_frames, dtype=np.bool_)
-        if tolerance == EXACT:
+        if tolerance == EXACT_TOLERANCE:
             exact = is_exact(leaves, self.body, fitted=self.fit.closed)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
@@ -108,14 +108,14 @@ class Grower:
         """Say of which hypotheses (H,) some branch closes the torso exactly, or does not show it."""
         tree, n = self.body.tree, JOINT["left_hip"]
         stem = InterpretationTree(joints=tree.joints[:n], parents=tree.parents[:n], lengths=tree.lengths[:n])
-        suite, _ = self.suites_of(EXACT)
+        suite, _ = self.suites_of(EXACT_TOLERANCE)
         with np.errstate(over="ignore"):
             leaves = stem.grow(
                 self.fit.cameras(chosen),
                 self.fit.root[chosen],
                 self.body.image(self.view.image[self.fit.frame[chosen]])[:, :n],
                 [check for check in suite if check.name == "rigid_parts" and max(check.points) < n],
-                tolerance=EXACT.tangent,
+                tolerance=EXACT_TOLERANCE.tangent,
             )
         return np.bincount(leaves.frame, minlength=len(chosen)) > 0
 
@@ -192,7 +192,7 @@ def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.
         ends = leaves.positions(segment, nodes)
         known_length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
         known = np.isfinite(known_length)
-        fits &= ~known | (np.abs(known_length - length) <= EXACT.rigid)
+        fits &= ~known | (np.abs(known_length - length) <= EXACT_TOLERANCE.rigid)
         seen += known
     exact = np.zeros(leaves.n_frames, dtype=bool)
     exact[leaves.frame[nodes[fits & (seen > int(fitted))]]] = True

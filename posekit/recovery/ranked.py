@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.ranking import Ranking, Up, deviation_of_tolerance, rank
-from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
 
 
 class Survivors(Protocol):
@@ -95,15 +95,15 @@ def rigid_of(settings: Mapping[str, Any], count: int) -> Array:
     judged = settings.get("judged")
     kinds = judged if isinstance(judged, list) and len(judged) == count else [None] * count
     known: dict[str | None, float] = {
-        "exact": EXACT.rigid,
-        "measured": MEASURED.rigid,
-        "photograph": PHOTOGRAPH.rigid,
+        "exact": EXACT_TOLERANCE.rigid,
+        "measured": MEASURED_TOLERANCE.rigid,
+        "photograph": PHOTOGRAPH_TOLERANCE.rigid,
     }
     for kind, field in (("noisy", "noisy"), ("refined", "refined"), ("given", "tolerance")):
         said = settings.get(field)
         if isinstance(said, Mapping) and isinstance(said.get("rigid"), int | float):
             known[kind] = float(said["rigid"])
-    return np.array([known.get(str(kind), EXACT.rigid) for kind in kinds])
+    return np.array([known.get(str(kind), EXACT_TOLERANCE.rigid) for kind in kinds])
 
 
 def probabilities(result: Result, lengths: Mapping[str, float]) -> list[Array]:

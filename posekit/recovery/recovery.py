@@ -25,8 +25,8 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.ranked import ranked
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.recovery.rooting import root_of, tolerance_of
-from posekit.recovery.tolerance import Tolerance
 from posekit.recovery.trees import Batch
+from posekit.settings import Tolerance
 from posekit.skeleton import JOINT, JOINTS
 
 

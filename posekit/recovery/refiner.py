@@ -28,13 +28,12 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.grown import Grown
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.recovery.noise import Noise, Seen
-from posekit.recovery.rooting import Rooting
 from posekit.recovery.sifting import Sifted, blocks, drop, sift
-from posekit.recovery.tolerance import Tolerance
 from posekit.recovery.trees import Batch
 from posekit.refinement import Sight, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.refinement.trunk import TRUNK
+from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
 

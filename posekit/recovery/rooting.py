@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Final, get_args
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck import DETECTED_DEVIATION, DETECTED_OFFSET, Method, Placement, place
-from posekit.errors import InputError
+from posekit.cameras.neck import DETECTED_DEVIATION, DETECTED_OFFSET, Placement, place
 from posekit.formats.own import LeeChenModel, Root, View
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Rooting, Tolerance
 
 DEVIATION: Final = 2.0
 """Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
-
-MOST: Final = 1000.0
-"""Pixels: the largest deviation that is taken for one."""
 
 RELATIVE: Final = 1e-3
 """The same on the image plane of a `lee-chen` camera, as a fraction of f: some 2 pixels of most cameras."""
@@ -30,32 +25,6 @@ STEP: Final = 0.02
 
 SHORTEST: Final = 0.24
 """Metres: a forearm. A segment of this length is turned most by what its ends are off."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rooting:
-    """How the neck is to be found in a calibrated view.
-
-    Parameters
-    ----------
-    method : {"auto", "head", "torso", "search"}
-    deviation : float, optional
-        Standard deviation of image points, pixels; the view's own if not given.
-    trust_head : bool
-        Whether six head points tell the neck, without asking how well: right where they are exact.
-    """
-
-    method: Method = "auto"
-    deviation: float | None = None
-    trust_head: bool = True
-
-    def __post_init__(self) -> None:
-        if self.method not in get_args(Method):
-            raise InputError(f"--root: {self.method!r}; expected {', '.join(get_args(Method))}")
-        if self.deviation is not None and not 0 < self.deviation <= MOST:
-            raise InputError(
-                f"--deviation: {self.deviation!r}; expected a positive number of pixels, at most {MOST:g}"
-            )
 
 
 def place_roots(

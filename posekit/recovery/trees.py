@@ -16,7 +16,7 @@ from posekit.hidden import Completion
 from posekit.objects.mirror import mirrored
 from posekit.recovery.body import Body
 from posekit.recovery.refined import RefinedSurvivors
-from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
 from posekit.validators import judge
@@ -25,10 +25,10 @@ LEVEL = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""
 
 JUDGED: Final = {
-    EXACT: "exact",
-    MEASURED: "measured",
-    replace(MEASURED, hips=1.0): "measured",  # where nothing is left with less for the hips
-    PHOTOGRAPH: "photograph",
+    EXACT_TOLERANCE: "exact",
+    MEASURED_TOLERANCE: "measured",
+    replace(MEASURED_TOLERANCE, hips=1.0): "measured",  # where nothing is left with less for the hips
+    PHOTOGRAPH_TOLERANCE: "photograph",
 }
 """What frames are said to be judged as, by their tolerance."""
 

@@ -58,3 +58,23 @@ class CheckSettings:
                 f"{value!r} is no check; expected its name, or an object with name and parameters"
             )
         return CheckSettings(name=value["name"], parameters=value.get("parameters", {}))
+
+
+def check_settings(given: Any) -> CheckSettings:
+    """Record a check that is given by its name, by its settings, as JSON, or as the check itself.
+
+    Raises
+    ------
+    InputError
+        Where it is none of these.
+    """
+    if isinstance(given, CheckSettings):
+        return given
+    if isinstance(given, str | Mapping):
+        return CheckSettings.from_json(given)
+    own = getattr(given, "settings", None)
+    if isinstance(own, CheckSettings):
+        return own
+    raise InputError(
+        f"--checks: {given!r} is no check; expected a name, CheckSettings, or a registered check"
+    )

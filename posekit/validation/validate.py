@@ -15,10 +15,10 @@ from posekit.formats.own import Postures, Report, Result
 from posekit.formats.own.postures_q import Configurations
 from posekit.formats.own.report import PostureReport
 from posekit.formats.own.report_columns import Columns, Place, joined
-from posekit.recovery.tolerance import EXACT
 from posekit.recovery.trees import JUDGED
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
+from posekit.settings import EXACT_TOLERANCE
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
@@ -172,12 +172,12 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
     asked = _number(settings, "contact_margin", 0.0)
     usual = [one for one, kind in JUDGED.items() if kind in kinds]
     rigid = [RIGID_TOLERANCE, *(one.rigid for one in usual)]
-    angles, margins = [EXACT.angle, *(one.angle for one in usual)], [asked]
+    angles, margins = [EXACT_TOLERANCE.angle, *(one.angle for one in usual)], [asked]
     for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
         said = settings.get(field)
         if kind in kinds and isinstance(said, dict):
             rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=f"{field}."))
-            angles.append(_number(said, "angle", EXACT.angle, within=f"{field}."))
+            angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=f"{field}."))
             margins.append(_number(said, "contact", asked, within=f"{field}."))
     walkers = settings.get("walkers", "paper")
     if not (isinstance(walkers, str) and walkers in WALKERS):

@@ -25,10 +25,10 @@ from posekit.formats.keypoints import write_keypoints
 from posekit.formats.motion.survivors import COORDINATES
 from posekit.formats.motion.survivors_files import read_survivors
 from posekit.formats.own import View, parse_length, read_view, write_view
-from posekit.objects.scale import parse_scale
 from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.tolerance import MEASURED, PHOTOGRAPH
+from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
+from posekit.settings.scale import parse_scale
 from posekit.skeleton import JOINTS
 from posekit.synthesis import random_views
 from posekit.views.builtin import builtin_view, forget_camera, view_of
@@ -128,7 +128,7 @@ def test_tolerances_mean_what_they_mean_to_recover(given: tuple, uncalibrated: b
         tangent=parse_length(tangent, name="t") if tangent else None,
         angle=angle,
     )
-    usual = PHOTOGRAPH if uncalibrated else MEASURED
+    usual = PHOTOGRAPH_TOLERANCE if uncalibrated else MEASURED_TOLERANCE
     options = Tolerances(rigid_tolerance=rigid, tangent_tolerance=tangent, angle_tolerance=angle)
     assert recipe.tolerance(uncalibrated=uncalibrated) == options.filled(usual)
 

@@ -16,7 +16,7 @@ from posekit.body import load_figure
 from posekit.formats.own import View
 from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.tolerance import EXACT
+from posekit.settings import EXACT_TOLERANCE
 from posekit.skeleton import DOFS, HEAD, PARENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, Scene, random_postures, random_views
 from posekit.synthesis.observe import observe
@@ -54,7 +54,7 @@ class Chunk(NamedTuple):
     @property
     def exact(self) -> np.ndarray:
         """Which frames were judged as exact (F,)."""
-        return np.array([frame.tolerance == EXACT for frame in self.recovery.frames])
+        return np.array([frame.tolerance == EXACT_TOLERANCE for frame in self.recovery.frames])
 
 
 def recovered(scene: Scene) -> Chunk:
@@ -192,14 +192,14 @@ def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int)
     """All 8192 leaves, each lifted and judged on its own; collision once more by Pinocchio, on q."""
     scene = random_views(FIGURE, count, np.random.default_rng([2000, index]))
     view = view_of(scene)
-    recovery = recover(view, ranges=ranges, tolerance=EXACT)
+    recovery = recover(view, ranges=ranges, tolerance=EXACT_TOLERANCE)
     lengths = np.array([0.0, *(FIGURE.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)])
     checks = make_checks(
         FIGURE,
         ("rigid-parts", "joint-range", "collision"),
         ranges=load_ranges(ranges),
-        rigid_tolerance=EXACT.rigid,
-        angle_tolerance=EXACT.angle,
+        rigid_tolerance=EXACT_TOLERANCE.rigid,
+        angle_tolerance=EXACT_TOLERANCE.angle,
     )
     for k, frame in enumerate(recovery.frames):
         leaves, codes = enumerate_leaves(
@@ -208,7 +208,7 @@ def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int)
             view.image[k],
             parents=PARENTS,
             lengths=lengths,
-            tolerance=EXACT.tangent,
+            tolerance=EXACT_TOLERANCE.tangent,
         )
         head = np.broadcast_to(recovery.fit.head[k], (len(leaves), len(HEAD), 3))
         points = np.concatenate([leaves, head], axis=1)

@@ -29,7 +29,7 @@ from posekit.evaluate.report import csv_lines, document, summary
 from posekit.formats.own import OpenCVModel, View
 from posekit.measures import mpjpe
 from posekit.recovery.recovery import FrameRecovery
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Capture, Walker, random_views, read_capture, seq1
 from posekit.views.builtin import forget_camera, view_of
@@ -458,7 +458,9 @@ def test_reports_hold_the_same_numbers(exact: Any, tmp_path: Path) -> None:
 def test_tolerances_and_ranges_are_used(capture: Capture) -> None:
     wide = Tolerance(rigid=0.1, tangent=0.05, placement=False, angle=10.0)
     loose = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=wide))
-    strict = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=MEASURED))
+    strict = evaluate(
+        capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=MEASURED_TOLERANCE)
+    )
     assert (loose.frames.measured.survivors >= strict.frames.measured.survivors).all()
     assert of(loose)["violations"]["ranges"] == 0
     table = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,), ranges="table1"))

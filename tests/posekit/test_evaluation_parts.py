@@ -14,7 +14,7 @@ from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.measures import mpjpe, pa_mpjpe
 from posekit.recovery import recover
-from posekit.recovery.tolerance import EXACT, MEASURED
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE
 from posekit.skeleton import DOFS, JOINT, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import Walker, random_postures, random_views
 from posekit.synthesis.viewpoints import to_camera
@@ -61,7 +61,7 @@ def test_the_true_branch_is_the_leaf_that_is_the_truth() -> None:
 def test_what_kills_the_truth_is_named() -> None:
     scene = random_views(FIGURE, 40, np.random.default_rng(3)).with_noise(2.0, np.random.default_rng(4))
     view = view_of(scene)
-    frames = recover(view, tolerance=MEASURED).frames
+    frames = recover(view, tolerance=MEASURED_TOLERANCE).frames
     lost = 0
     for k, frame in enumerate(frames):
         if frame.batch is None:
@@ -214,7 +214,7 @@ def test_facing_turns_with_the_body_and_is_known_of_any() -> None:
 
 
 def test_legal_bodies_are_certified() -> None:
-    found = certify(postures(100), FIGURE, URDF, EXACT)
+    found = certify(postures(100), FIGURE, URDF, EXACT_TOLERANCE)
     lengths, ranges = found.violations
     assert not lengths.any() and not ranges.any()
     assert found.turned.max() < 1e-3
@@ -224,9 +224,9 @@ def test_legal_bodies_are_certified() -> None:
 def test_a_wrong_length_is_found(segment: str) -> None:
     longer = FIGURE.scaled({segment: FIGURE.lengths[segment] + 0.05})
     joints = longer.forward_kinematics(random_postures(FIGURE, 20, np.random.default_rng(0)))[:, :14]
-    found = certify(joints, FIGURE, None, MEASURED)
+    found = certify(joints, FIGURE, None, MEASURED_TOLERANCE)
     assert found.violations[0].all()
-    allowed = MEASURED.rigid if segment == "right_hip-left_hip" else MEASURED.tangent
+    allowed = MEASURED_TOLERANCE.rigid if segment == "right_hip-left_hip" else MEASURED_TOLERANCE.tangent
     assert np.allclose(found.length, 0.05 - allowed, atol=1e-9)
     assert np.isnan(found.angle).all()
 
@@ -241,14 +241,14 @@ def test_an_angle_outside_its_range_is_found(dof: str) -> None:
     beyond = np.radians(8)
     q[:, place] = FIGURE.limits.lower[DOFS.index(dof)] - beyond
     joints = FIGURE.forward_kinematics(q)[:, :14]
-    found = certify(joints, FIGURE, URDF, MEASURED)
+    found = certify(joints, FIGURE, URDF, MEASURED_TOLERANCE)
     assert found.violations[1].all()
     assert found.angle[0] > 0
 
 
 def test_projected_ranges_are_judged_again() -> None:
     legal, table = postures(200), load_ranges("table1")
-    ranges = certify(legal, FIGURE, table, MEASURED).violations[1]
+    ranges = certify(legal, FIGURE, table, MEASURED_TOLERANCE).violations[1]
     assert ranges.any() and not ranges.all()  # the figure's limits are wider than the book's
 
 

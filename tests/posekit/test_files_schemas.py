@@ -37,7 +37,7 @@ from posekit.formats.own import (
     write_view,
 )
 from posekit.formats.own.batch_schema import ManifestFile, SettingsFields, SourceFields
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINTS, SEGMENT_NAMES
 from posekit.synthesis import Capture
 from posekit.views.source import Source
@@ -180,7 +180,7 @@ def write_all(folder, rng) -> dict[str, list]:
     (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
     assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]
     write_evaluation(folder / "evaluation.json", evaluation())
-    write_evaluation(folder / "followed.json", evaluation(choose=by_path, tolerance=MEASURED))
+    write_evaluation(folder / "followed.json", evaluation(choose=by_path, tolerance=MEASURED_TOLERANCE))
     write_batch(folder / "batch")
     documents: dict[str, list] = {name: [] for name in SCHEMAS}
     for path in folder.rglob("*.json"):

@@ -23,7 +23,7 @@ from posekit.recovery.advice import advice_lines
 from posekit.recovery.result import result_of
 from posekit.recovery.sequences import follow
 from posekit.recovery.summary import following_line
-from posekit.recovery.tolerance import MEASURED
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
 from posekit.views.builtin import builtin_view, view_of
@@ -170,18 +170,18 @@ def test_the_least_violation_is_what_was_done_to_the_view() -> None:
     view = exact(12)
     focal = float(view.camera.K[0, 0]) if hasattr(view.camera, "K") else 1.0
     shifted = off(view, "right_wrist", 0.6 * focal / 4)
-    recovery = recover(shifted, tolerance=MEASURED, infer=False)
+    recovery = recover(shifted, tolerance=MEASURED_TOLERANCE, infer=False)
     assert recovery.grower is not None
     named = 0
     for k, frame in enumerate(recovery.frames):
         if len(frame):
             continue
-        found = least_violation(recovery.grower, k, MEASURED)
+        found = least_violation(recovery.grower, k, MEASURED_TOLERANCE)
         assert found is not None
         assert len(found.branch) == 13
         worst = found.excesses[0]
         named += worst.reason == "no_solution/right_elbow-right_wrist"
-        wider = replace(MEASURED, tangent=MEASURED.tangent + worst.beyond + 1e-6)
+        wider = replace(MEASURED_TOLERANCE, tangent=MEASURED_TOLERANCE.tangent + worst.beyond + 1e-6)
         if [one.reason for one in found.excesses] == ["no_solution/right_elbow-right_wrist"]:
             again = recover(shifted, tolerance=wider, infer=False).frames[k]
             assert found.branch in again.branches

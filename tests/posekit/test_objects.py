@@ -22,11 +22,11 @@ from posekit.objects import (
 )
 from posekit.objects.certify import Certifier
 from posekit.objects.draw import draw_configurations
-from posekit.objects.scale import Scale
 from posekit.objects.spread import Spread
 from posekit.objects.triangles import Triangles, triangles
 from posekit.robots import load_robot
 from posekit.robots.kinematics import Kinematics, body_points
+from posekit.settings.scale import Scale
 
 SCALE = 320.0
 VALUE = Scale(how="value", value=SCALE)

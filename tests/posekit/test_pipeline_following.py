@@ -10,9 +10,9 @@ import posekit
 from posekit.errors import InputError
 from posekit.following import Follower, best_paths
 from posekit.formats.own import OpenCVModel, View
-from posekit.objects.scale import parse_scale
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.sequences import follow, follow_frames, survivor_frames
+from posekit.settings.scale import parse_scale
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 from posekit.synthesis import Walker, walker_scene
 from posekit.synthesis.camera_sphere import CameraSphere

@@ -12,7 +12,7 @@ from posekit.errors import InputError, PosekitError
 from posekit.following import Paths, ScaleChoice
 from posekit.formats.own import OpenCVModel, View
 from posekit.recovery.scaled_sequences import SURE, follow_scaled
-from posekit.recovery.tolerance import EXACT
+from posekit.settings import EXACT_TOLERANCE
 from posekit.synthesis import Walker
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
@@ -98,9 +98,9 @@ def test_an_uncalibrated_view_tells_no_scale(view):
 
 def test_lengths_that_no_scale_saves_are_refused_as_they_are(view):
     with pytest.raises(PosekitError) as plain:
-        posekit.recover(off_by(view, 0.3), tolerance=EXACT)
+        posekit.recover(off_by(view, 0.3), tolerance=EXACT_TOLERANCE)
     with pytest.raises(PosekitError) as caught:
-        follow_scaled(off_by(view, 0.3), partial(posekit.recover, tolerance=EXACT))
+        follow_scaled(off_by(view, 0.3), partial(posekit.recover, tolerance=EXACT_TOLERANCE))
     assert str(caught.value) == str(plain.value)
 
 

@@ -18,7 +18,7 @@ from posekit.recovery import recover
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.result import result_of
 from posekit.recovery.summary import summary_lines
-from posekit.recovery.tolerance import EXACT, MEASURED, Tolerance
+from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import (
     CameraSphere,
@@ -109,7 +109,7 @@ def test_the_input_is_among_the_survivors_of_the_built_in_views(name: str) -> No
     assert max(truth_at(recovery, SCENES[name]().joints_cam)) < FOUND
     assert {total(frame) for frame in recovery.frames} == {LEAVES}
     assert max(frame.fk_distance.max() for frame in recovery.frames) < 1e-9
-    assert all(frame.tolerance == EXACT for frame in recovery.frames)
+    assert all(frame.tolerance == EXACT_TOLERANCE for frame in recovery.frames)
     assert max(frame.length_residual.max() for frame in recovery.frames) == 0
 
 
@@ -191,7 +191,7 @@ def test_a_root_serves_where_no_head_is_seen() -> None:
 
 def test_a_root_comes_before_the_heads_neck() -> None:
     moved = SEQ1.truth[:, 0] * 1.01
-    recovery = recover(change(SEQ1, root=moved), tolerance=MEASURED)
+    recovery = recover(change(SEQ1, root=moved), tolerance=MEASURED_TOLERANCE)
     for frame, root in zip(recovery.frames, moved, strict=True):
         if len(frame):
             assert np.array_equal(frame.joints[0, 0], root)
@@ -283,7 +283,7 @@ def test_a_distorted_opencv_view_is_recovered() -> None:
     scene = distorted_scene()
     recovery = recover(view_of(scene))
     assert max(truth_at(recovery, scene.joints_cam)) < FOUND
-    assert all(frame.tolerance == EXACT for frame in recovery.frames)
+    assert all(frame.tolerance == EXACT_TOLERANCE for frame in recovery.frames)
     for frame, image in zip(recovery.frames, scene.image, strict=True):
         seen = scene.camera.project(frame.joints)
         np.testing.assert_allclose(seen, np.broadcast_to(image, seen.shape), rtol=0, atol=1e-9)
@@ -390,7 +390,7 @@ def test_a_missing_joint_leaves_the_postures_of_the_others(joint: str) -> None:
         assert np.isnan(frame.joints[:, lost]).all()
         assert np.isfinite(frame.joints[:, kept]).all()
         assert total(frame) == LEAVES
-        assert frame.tolerance == EXACT
+        assert frame.tolerance == EXACT_TOLERANCE
         assert all(f"missing/{name}" in frame.rejected for name in beyond(joint))
         # What was possible with the joint is possible without it, the unseen branches written as 0.
         keep = [k for k in range(1, 14) if k not in lost]
@@ -594,7 +594,7 @@ def test_a_noisy_torso_is_judged_as_measured() -> None:
     scene = noisy(0.5)
     recovery = recover(view_of(scene))
     assert {frame.judged for frame in recovery.frames} == {"measured"}
-    strict = [frame.tolerance == MEASURED for frame in recovery.frames]
+    strict = [frame.tolerance == MEASURED_TOLERANCE for frame in recovery.frames]
     assert any(strict)
     assert {total(frame) for frame in recovery.frames} == {LEAVES}
     assert np.median(truth_at(recovery, scene.joints_cam)) < 0.05
@@ -603,7 +603,7 @@ def test_a_noisy_torso_is_judged_as_measured() -> None:
     text = "\n".join(summary_lines(recovery))
     assert "measured" in text
     assert "exact" not in text
-    given = recover(view_of(scene), tolerance=MEASURED)
+    given = recover(view_of(scene), tolerance=MEASURED_TOLERANCE)
     for own, frame, kept_so in zip(codes(given), recovery.frames, strict, strict=True):
         # Where nothing is left with less for the hips, they are given as much as the rest.
         assert (len(own) > 0) == kept_so
@@ -614,8 +614,14 @@ def test_only_the_noisy_frame_is_judged_as_measured() -> None:
     image = SEQ1.image.copy()
     image[3, 1:] += np.random.default_rng(2).normal(size=(13, 2)) * 5e-6
     recovery = recover(change(SEQ1, image=image))
-    assert [frame.tolerance == EXACT for frame in recovery.frames] == [True, True, True, False, True]
-    assert recovery.frames[3].tolerance == MEASURED
+    assert [frame.tolerance == EXACT_TOLERANCE for frame in recovery.frames] == [
+        True,
+        True,
+        True,
+        False,
+        True,
+    ]
+    assert recovery.frames[3].tolerance == MEASURED_TOLERANCE
     assert len(recovery.frames[3]) > 0
     assert truth_at(recovery, SEQ1.truth)[3] < 0.05
     for k in (0, 1, 2, 4):
@@ -633,7 +639,7 @@ def test_a_segment_a_little_too_short_becomes_a_tangent_with_its_residual() -> N
     }
     view = change(SEQ1, lengths={segment: length}, **arrays)
     with pytest.raises(InputError, match=f"the segment {segment} is at least .* too short"):
-        recover(view, tolerance=EXACT, checks=())
+        recover(view, tolerance=EXACT_TOLERANCE, checks=())
     tolerance = Tolerance(rigid=0.0, tangent=short + 1e-6, placement=False)
     recovery = recover(view, tolerance=tolerance, checks=())
     frame = recovery.frames[0]
@@ -661,9 +667,9 @@ def test_a_looser_tolerance_never_keeps_less() -> None:
 
 
 def test_exact_views_are_kept_by_a_given_tolerance_too() -> None:
-    recovery = recover(SEQ1, tolerance=MEASURED)
+    recovery = recover(SEQ1, tolerance=MEASURED_TOLERANCE)
     assert max(truth_at(recovery, SEQ1.truth)) < FOUND
-    assert {frame.tolerance for frame in recovery.frames} == {MEASURED}
+    assert {frame.tolerance for frame in recovery.frames} == {MEASURED_TOLERANCE}
     assert_fewer(recover(SEQ1), recovery)
 
 

@@ -12,7 +12,8 @@ import posekit
 from posekit.errors import InputError
 from posekit.formats.own import Result, View, read_result, write_result
 from posekit.recovery.result import result_of
-from posekit.recovery.rooting import DEVIATION, Rooting, tolerance_of
+from posekit.recovery.rooting import DEVIATION, tolerance_of
+from posekit.settings import Rooting
 from posekit.synthesis import random_views
 from posekit.views.builtin import forget_camera, view_of
 

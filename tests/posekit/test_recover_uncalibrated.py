@@ -10,13 +10,13 @@ from posekit.body import load_figure, stature_from_lengths
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.formats.own import ScaledOrthographicModel, View, read_result, write_result
-from posekit.objects.scale import Scale, parse_scale
 from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.recovery.summary import summary_lines
 from posekit.recovery.taylor_figure.proportions import figure_of
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Tolerance
+from posekit.settings.scale import Scale, parse_scale
 from posekit.skeleton import JOINT, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_postures
 from posekit.views.builtin import builtin_view

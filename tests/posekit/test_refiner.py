@@ -22,8 +22,8 @@ from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
-from posekit.recovery.tolerance import MEASURED
 from posekit.refinement import GIVING
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
 from posekit.validation.validate import recovered_with
@@ -310,7 +310,7 @@ def test_what_cannot_be_refined_is_refused(scene: Scene) -> None:
     with pytest.raises(InputError, match="--refine: only views of a calibrated camera"):
         recover(forget_camera(view), refine=True)
     with pytest.raises(InputError, match="--refine: the noise says what is tolerated"):
-        recover(replace(view, root=np.full((FRAMES, 3), np.nan)), refine=True, tolerance=MEASURED)
+        recover(replace(view, root=np.full((FRAMES, 3), np.nan)), refine=True, tolerance=MEASURED_TOLERANCE)
     with pytest.raises(InputError, match=r"--length-deviation: 0\.5; expected a fraction"):
         Noise(deviation=1.0, lengths=0.5)
 

@@ -20,7 +20,7 @@ from posekit.papers.taylor_views import exact_views, photographs
 from posekit.recovery.taylor_figure.completion import NEEDS, Completion, joint_checks, taylor_checks
 from posekit.recovery.taylor_figure.human import FLIPS, Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
-from posekit.recovery.tolerance import MEASURED, PHOTOGRAPH
+from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
 from posekit.skeleton import HIPS, JOINT, JOINTS, SEGMENTS, TORSO, segment_name
 from posekit.synthesis import CameraSphere, random_views
 from posekit.validators import PHYSICAL, judge, load_ranges
@@ -31,7 +31,7 @@ URDF = load_ranges("urdf")
 SCENE = random_views(PERSON, 12, np.random.default_rng(3), CameraSphere(distance=(3, 6)))
 EXACT_VIEWS = exact_views(HUMAN, [SCENE])
 SEEN = EXACT_VIEWS[0]
-LOOSE = replace(MEASURED, rigid=0.06, angle=10.0)
+LOOSE = replace(MEASURED_TOLERANCE, rigid=0.06, angle=10.0)
 
 
 def tree_points(joints: np.ndarray) -> np.ndarray:
@@ -275,7 +275,8 @@ def test_distances_cannot_tell_a_posture_from_its_mirror_image():
 
 def test_a_looser_tolerance_never_rejects_more():
     tight, loose = (
-        survival(HUMAN, EXACT_VIEWS, tolerance=t, ranges=("urdf",)) for t in (MEASURED, PHOTOGRAPH)
+        survival(HUMAN, EXACT_VIEWS, tolerance=t, ranges=("urdf",))
+        for t in (MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE)
     )
     for few, many in zip(tight, loose, strict=True):
         assert (few.count <= many.count).all()
@@ -323,7 +324,7 @@ def test_from_far_away_the_protocol_finds_the_truth():
     far = CameraSphere(distance=(1000, 2000), f=1500 * 300)
     scene = random_views(figure_of(1.75), 20, np.random.default_rng(0), far)
     seen = photographs(HUMAN, [scene], noise=0, rng=np.random.default_rng(0), scale="stature")
-    by_hand = accuracy(HUMAN, seen, tolerance=PHOTOGRAPH)[0]
+    by_hand = accuracy(HUMAN, seen, tolerance=PHOTOGRAPH_TOLERANCE)[0]
     near = photographs(
         HUMAN,
         [random_views(figure_of(1.75), 20, np.random.default_rng(0), CameraSphere(distance=(3, 6)))],
@@ -331,7 +332,9 @@ def test_from_far_away_the_protocol_finds_the_truth():
         rng=np.random.default_rng(0),
     )
     assert np.median(by_hand.rms) < 0.002
-    assert np.median(by_hand.rms) < np.median(accuracy(HUMAN, near, tolerance=PHOTOGRAPH)[0].rms) / 5
+    assert (
+        np.median(by_hand.rms) < np.median(accuracy(HUMAN, near, tolerance=PHOTOGRAPH_TOLERANCE)[0].rms) / 5
+    )
 
 
 def test_exact_pictures_and_true_flips_leave_no_error():
@@ -378,7 +381,7 @@ def test_the_synthetic_study_is_the_same_every_time_and_its_tables_are_rectangul
 
 
 def test_tables_of_nothing_chosen_say_so():
-    rigid = replace(MEASURED, rigid=0.0, angle=0.0)
+    rigid = replace(MEASURED_TOLERANCE, rigid=0.0, angle=0.0)
     rows = accuracy(HUMAN, EXACT_VIEWS, tolerance=rigid)
     assert not rows[1].chosen.any()
     assert rows[1].row()[1:] == ["-", "0.0%", "100.0%", "-", "-", "-", "-"]

@@ -11,10 +11,15 @@ import pytest
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.recovery import recover
-from posekit.recovery.tolerance import EXACT, MEASURED, PHOTOGRAPH, Tolerance
+from posekit.settings import (
+    EXACT_TOLERANCE,
+    MEASURED_TOLERANCE,
+    PHOTOGRAPH_TOLERANCE,
+    RigidTolerance,
+    Tolerance,
+)
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 from posekit.synthesis import Scene, random_views
-from posekit.validators.rigid_parts import RigidTolerance
 from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
@@ -42,14 +47,16 @@ def offs(joints: np.ndarray) -> np.ndarray:
 
 
 def test_all_distances_have_the_same_bound_unless_told_otherwise() -> None:
-    for tolerance in (EXACT, PHOTOGRAPH, LOOSE):
+    for tolerance in (EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, LOOSE):
         assert tolerance.distances == RigidTolerance.uniform(tolerance.rigid)
 
 
 def test_the_hips_of_measured_bodies_give_a_quarter() -> None:
-    assert MEASURED.distances == RigidTolerance(shoulders=0.03, sides=0.03, hips=0.0075)
-    assert replace(MEASURED, rigid=0.04).distances == RigidTolerance(shoulders=0.04, sides=0.04, hips=0.01)
-    assert MEASURED.distances.widest == MEASURED.rigid
+    assert MEASURED_TOLERANCE.distances == RigidTolerance(shoulders=0.03, sides=0.03, hips=0.0075)
+    assert replace(MEASURED_TOLERANCE, rigid=0.04).distances == RigidTolerance(
+        shoulders=0.04, sides=0.04, hips=0.01
+    )
+    assert MEASURED_TOLERANCE.distances.widest == MEASURED_TOLERANCE.rigid
 
 
 @pytest.mark.parametrize("part", [np.nan, np.inf, -0.01, 1.001])
@@ -57,11 +64,11 @@ def test_a_part_that_is_none_is_refused(part: float) -> None:
     with pytest.raises(
         InputError, match=f"the hips' part of the rigid tolerance is {part!r}; expected a number"
     ):
-        replace(MEASURED, hips=part)
+        replace(MEASURED_TOLERANCE, hips=part)
 
 
 def test_tolerances_are_keys_and_come_back_from_json() -> None:
-    every = (EXACT, MEASURED, PHOTOGRAPH, LOOSE)
+    every = (EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, LOOSE)
     assert len(set(every)) == 4
     for tolerance in every:
         assert Tolerance(**json.loads(json.dumps(asdict(tolerance)))) == tolerance
@@ -69,10 +76,12 @@ def test_tolerances_are_keys_and_come_back_from_json() -> None:
 
 def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: Scene) -> None:
     loose = recover(view_of(bent), tolerance=LOOSE)
-    measured = recover(view_of(bent), tolerance=replace(MEASURED, tangent=LOOSE.tangent, angle=LOOSE.angle))
-    bounds = np.array([MEASURED.distances.of(segment) for segment in RIGID_SEGMENTS])
+    measured = recover(
+        view_of(bent), tolerance=replace(MEASURED_TOLERANCE, tangent=LOOSE.tangent, angle=LOOSE.angle)
+    )
+    bounds = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
     assert measured.settings["tolerance"]["hips"] == 0.25
-    assert measured.settings["measured"] == asdict(MEASURED)
+    assert measured.settings["measured"] == asdict(MEASURED_TOLERANCE)
     fewer, kept = 0, 0
     for before, after in zip(loose.frames, measured.frames, strict=True):
         inside = (np.abs(offs(before.joints)) <= bounds).all(axis=1)
@@ -83,8 +92,8 @@ def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: Scene
 
 
 def test_margins_are_the_room_left_to_each_distances_own_bound(bent: Scene) -> None:
-    recovery = recover(view_of(bent), tolerance=MEASURED)
-    bounds = np.array([MEASURED.distances.of(segment) for segment in RIGID_SEGMENTS])
+    recovery = recover(view_of(bent), tolerance=MEASURED_TOLERANCE)
+    bounds = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
     survivors = 0
     for frame in recovery.frames:
         room = (bounds - np.abs(offs(frame.joints))).min(axis=1)
@@ -95,7 +104,7 @@ def test_margins_are_the_room_left_to_each_distances_own_bound(bent: Scene) -> N
 
 
 def test_a_torso_that_bends_keeps_its_true_posture(bent: Scene) -> None:
-    recovery = recover(view_of(bent), tolerance=MEASURED)
+    recovery = recover(view_of(bent), tolerance=MEASURED_TOLERANCE)
     for frame, truth in zip(recovery.frames, bent.joints_cam, strict=True):
         error = np.linalg.norm(frame.joints - truth, axis=-1).mean(axis=1)
         assert error.min(initial=np.inf) < 0.002

@@ -17,6 +17,7 @@ from posekit.body import load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.compiled import compiling as compiled
 from posekit.compiled import tree_kernels as kernels
+from posekit.settings import RigidTolerance
 from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, fast, whole
 from posekit.tree.blocks import Block
@@ -25,7 +26,6 @@ from posekit.tree.layout import places_of, programme_of
 from posekit.tree.steps import grow_steps
 from posekit.validators import load_ranges, make_checks
 from posekit.validators.collision import PairCollision
-from posekit.validators.rigid_parts import RigidTolerance
 
 FIGURE = load_figure()
 LENGTHS = np.array([0.0] + [FIGURE.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])

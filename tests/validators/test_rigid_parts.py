@@ -9,10 +9,11 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.errors import InputError
+from posekit.settings import RigidTolerance
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Findings
 from posekit.validators import load_ranges, make_checks, rigid_parts
-from posekit.validators.rigid_parts import Mode, RigidTolerance
+from posekit.validators.rigid_parts import Mode
 
 FIGURE = load_figure()
 NAMES = tuple(segment_name(segment) for segment in RIGID_SEGMENTS)

@@ -2,6 +2,5 @@
 
 from posekit.cameras.neck.place import DETECTED_DEVIATION as DETECTED_DEVIATION
 from posekit.cameras.neck.place import DETECTED_OFFSET as DETECTED_OFFSET
-from posekit.cameras.neck.place import Method as Method
 from posekit.cameras.neck.place import place as place
 from posekit.cameras.neck.placement import Placement as Placement

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -22,9 +22,8 @@ from posekit.cameras.neck.suggestion import SIGMAS, Suggestion
 from posekit.cameras.neck.torso import torso_suggestion
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINTS
-
-Method = Literal["auto", "head", "torso", "search"]
 
 CLOSED = 1e-8
 """Misfit (m) of a minimum at which the image points are exact, so that the depth is too."""
@@ -49,7 +48,7 @@ def place(
     head_image: ArrayLike | None = None,
     *,
     root: ArrayLike | None = None,
-    method: Method = "auto",
+    method: RootMethod = "auto",
     deviation: ArrayLike = 2.0,
     offset: ArrayLike = 0.0,
     tolerance: float | None = None,
@@ -102,8 +101,10 @@ def place(
         Where a shape or a number is impossible.
     """
     given = Given.checked(camera, image, head_image, root, deviation, offset, tolerance, tangent, reach, most)
-    if method not in get_args(Method):
-        raise InputError(f"method {method!r} places no neck; expected one of {', '.join(get_args(Method))}")
+    if method not in get_args(RootMethod):
+        raise InputError(
+            f"method {method!r} places no neck; expected one of {', '.join(get_args(RootMethod))}"
+        )
     allowed = allowances(camera, figure, given)
     seen = sight(camera, figure, given.image, allowed.tangent)
     upper = seen.farthest[:, 0]
@@ -123,7 +124,7 @@ def place(
 
 
 def _suggestions(
-    camera: PinholeCamera, figure: Figure, given: Given, ray: Array, method: Method
+    camera: PinholeCamera, figure: Figure, given: Given, ray: Array, method: RootMethod
 ) -> list[Suggestion]:
     """Ask the rigid parts that the method allows, in the order in which they are believed."""
     n, parts = len(JOINTS), []
@@ -142,7 +143,7 @@ def _choose(
     closure: Closure,
     depths: Depths,
     parts: list[Suggestion],
-    method: Method,
+    method: RootMethod,
     frame: int,
     allowed: Allowance,
 ) -> Placement:

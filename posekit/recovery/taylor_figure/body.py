@@ -15,7 +15,7 @@ from posekit.recovery.body import Judges
 from posekit.recovery.taylor_figure.completion import NEEDS, Completion, taylor_checks
 from posekit.recovery.taylor_figure.human import Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
-from posekit.recovery.tolerance import Tolerance
+from posekit.settings import Tolerance
 from posekit.skeleton import HEAD
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import collision, judge

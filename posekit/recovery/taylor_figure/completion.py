@@ -19,7 +19,7 @@ from posekit.body.frames import hips_frame, into
 from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.recovery.tolerance import MEASURED, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Findings
 from posekit.validators import PHYSICAL, Ranges, make_checks
@@ -151,7 +151,7 @@ def joint_checks(
     names: Iterable[str] = PHYSICAL,
     *,
     ranges: Ranges,
-    tolerance: Tolerance = MEASURED,
+    tolerance: Tolerance = MEASURED_TOLERANCE,
     contact_margin: float = 0.0,
 ) -> list[Check]:
     """Make the checks of a figure that can judge fourteen joints without a head.
@@ -200,7 +200,7 @@ def taylor_checks(
     names: Iterable[str] = PHYSICAL,
     *,
     ranges: Ranges,
-    tolerance: Tolerance = MEASURED,
+    tolerance: Tolerance = MEASURED_TOLERANCE,
     contact_margin: float = 0.0,
 ) -> list[Check]:
     """Make the checks that prune the tree of Taylor's human: `joint_checks`, each behind a `Completed`.

@@ -1,0 +1,120 @@
+"""Everything that is asked of a validation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final, Literal
+
+from numpy.typing import ArrayLike
+
+from posekit.errors import InputError
+from posekit.settings.check import CheckSettings, check_settings
+from posekit.settings.recover import DEFAULT_RULES, RangeTable, check_walkers, checked_rules
+from posekit.settings.tolerance import EXACT_TOLERANCE, MEASURED_TOLERANCE
+
+Bodies = Literal["auto", "urdf", "visual", "capsules"]
+Lengths = Literal["model", "median", "each"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ValidateSettings:
+    """Everything that is asked of a validation, of the stick figure or of a robot.
+
+    Parameters
+    ----------
+    checks : sequence of str, CheckSettings or check, optional
+        Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
+        otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
+        first four.
+    ranges : str or Ranges
+        ``urdf``, ``table1`` and ``anatomical`` (figures alone), the path of a TOML table, or loaded ranges.
+    rules : sequence of int
+        Rules of walking, 1 to 5. By default 1 and 2.
+    walkers : {"paper", "people"}
+        Whose thresholds those have: by the paper's word, or as real walkers keep them.
+    rigid_tolerance : float
+        Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off. By
+        default 0.03.
+    angle_tolerance : float
+        Degrees by which the direction of a segment may be off, or a robot's joint outside its limits. By default 0.001.
+    contact_margin : float
+        Metres that bodies must keep from each other; negative allows penetration. By default 0.
+    lengths : {"model", "median", "each"}, optional
+        Whose segment lengths the model has: its own (figures unless told otherwise), the medians of the postures
+        (robots unless told otherwise), or each posture's own (robots alone, slow).
+    joint_map : str or JointMap, optional
+        Which frames of a robot stand for the joints; found by their names where not given.
+    bodies : {"auto", "urdf", "visual", "capsules"}
+        What collides, of a robot: its collision bodies, its visual bodies, or capsules that are made up; ``auto``
+        makes them up where no two collision bodies can touch.
+    srdf : str or path, optional
+        The robot's SRDF, which says which pairs of bodies are not checked.
+    package_dirs : sequence of path
+        Where the packages of the robot's meshes are.
+    untrusted : bool, optional
+        Whether the URDF is first loaded in a child process with limits; by default what is not built in is.
+    up : array (3,)
+        Against gravity, in the frame of the postures: for ``balance``. By default z.
+
+    Raises
+    ------
+    InputError
+        Where one of them is impossible, whatever is judged.
+    """
+
+    checks: Sequence[CheckSettings] | None = None
+    ranges: str | RangeTable = "urdf"
+    rules: Sequence[int] = DEFAULT_RULES
+    walkers: str = "paper"
+    rigid_tolerance: float = MEASURED_TOLERANCE.rigid
+    angle_tolerance: float = EXACT_TOLERANCE.angle
+    contact_margin: float = 0.0
+    lengths: Lengths | None = None
+    joint_map: Any = None
+    bodies: Bodies = "auto"
+    srdf: str | Path | None = None
+    package_dirs: Sequence[str | Path] = ()
+    untrusted: bool | None = None
+    up: ArrayLike = (0.0, 0.0, 1.0)
+
+    def __post_init__(self) -> None:
+        if self.checks is not None:
+            object.__setattr__(self, "checks", tuple(map(check_settings, self.checks)))
+        object.__setattr__(self, "rules", checked_rules(self.rules))
+        check_walkers(self.walkers)
+        for what, value in (
+            ("rigid tolerance", self.rigid_tolerance),
+            ("angle tolerance", self.angle_tolerance),
+        ):
+            if not (math.isfinite(value) and value >= 0):
+                raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
+        if not math.isfinite(self.contact_margin):
+            raise InputError(f"the contact margin is {self.contact_margin!r} m; expected a finite length")
+
+    @property
+    def check_names(self) -> tuple[str, ...] | None:
+        """The names of the checks; None where those are asked that are usual."""
+        return None if self.checks is None else tuple(check.name for check in self.checks)
+
+    def changed(self, **changes: Any) -> ValidateSettings:
+        """Return the same settings with some of them changed, by the names of the fields."""
+        return replace(self, **changes) if changes else self
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the settings that decide verdicts as values that JSON has."""
+        return {
+            "checks": None if self.checks is None else [check.to_json() for check in self.checks],
+            "ranges": self.ranges if isinstance(self.ranges, str) else self.ranges.name,
+            "rules": list(self.rules),
+            "walkers": self.walkers,
+            "rigid_tolerance": self.rigid_tolerance,
+            "angle_tolerance": self.angle_tolerance,
+            "contact_margin": self.contact_margin,
+        }
+
+
+RIGID_TOLERANCE: Final = MEASURED_TOLERANCE.rigid
+"""Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
