@@ -16,6 +16,7 @@ SECTIONS: Final = (
     ("Errors", "posekit.errors"),
     ("Names of joints", "posekit.skeleton"),
     ("Vectors and rotations", "posekit.geometry"),
+    ("Settings", "posekit.settings"),
     ("Reading and writing files safely", "posekit.safe_io"),
     ("Measures", "posekit.measures"),
     ("Linkages", "posekit.linkages"),

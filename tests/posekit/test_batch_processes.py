@@ -29,7 +29,7 @@ POISON, KILLED = 4, 8
 CRASHING = f"""
 import os, pathlib, signal
 import pinocchio as pin
-from posekit.figure import load_figure
+from posekit.body import load_figure
 from posekit.batch import run_shard
 
 def shard(one):

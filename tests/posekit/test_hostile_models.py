@@ -401,7 +401,7 @@ TRUSTED = """
 import json, sys
 from pathlib import Path
 from posekit.errors import InputError
-from posekit.robot import load_robot
+from posekit.robots import load_robot
 said = {}
 for path in sorted(Path(sys.argv[1]).glob("*.urdf")):
     try:
