@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 LINKED = ("urdf", "validators", "viewer")
 
 # Reports every file opened for writing, socket, process and logging handler between the two marks.
