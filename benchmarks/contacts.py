@@ -26,7 +26,7 @@ from posekit.body.capsules import Capsule
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.settings import MEASURED_TOLERANCE
-from posekit.synthesis import Scene, mocap_scenes, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
 from posekit.validators import load_ranges
 from posekit.validators.collision import PairCollision
 from posekit.views.builtin import view_of
@@ -89,7 +89,7 @@ def statistics(counts: Sequence[int]) -> tuple[str, str, str]:
     return f"{np.mean(counts):.1f}", f"{median:.0f}", f"{high:.0f}"
 
 
-def of_survivors(clips: Sequence[Clip], scenes: Sequence[Scene]) -> None:
+def of_survivors(clips: Sequence[Clip], scenes: Sequence[SyntheticScene]) -> None:
     """Ask the pairs about what the anatomical ranges leave of views."""
     ranges = load_ranges("anatomical")
     left = []

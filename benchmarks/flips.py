@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from posekit.body import load_figure
-from posekit.papers.taylor_views import Seen, exact_views
+from posekit.papers.taylor_views import StudyPictures, exact_views
 from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
 from posekit.recovery.taylor_figure.human import FLIPS, taylor_human
 from posekit.settings import PHOTOGRAPH_TOLERANCE
@@ -33,12 +33,12 @@ RANGES = load_ranges("urdf")
 Flips = tuple[bool, ...]
 
 
-def grow(view: Seen, checks: Sequence[Check]) -> set[Flips]:
+def grow(view: StudyPictures, checks: Sequence[Check]) -> set[Flips]:
     """Grow the tree of one view and say which flips survive."""
     return flips_of(HUMAN.grow(view.image, view.lengths, view.scale, checks).postures())
 
 
-def loop(view: Seen, checks: Sequence[Check], completion: Completion) -> set[Flips]:
+def loop(view: StudyPictures, checks: Sequence[Check], completion: Completion) -> set[Flips]:
     """Ask the checks about one flip after the other, of all 2^11."""
     linkage = HUMAN.linkage
     place = linkage.place_nodes(view.image - view.image.mean(axis=1, keepdims=True))[0] / view.scale[0]

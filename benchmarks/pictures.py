@@ -16,7 +16,7 @@ from posekit.viewer.browser.studio import Studio
 from posekit.viewer.pictures import Shot, write_picture
 from posekit.viewer.scene.compose import Style, compose
 from posekit.viewer.scene.framing import fitted_eye
-from posekit.viewer.scene.subject import Shown, Subject, subject_of
+from posekit.viewer.scene.subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.world import upright_world
 
 SIZE = (640, 480)
@@ -65,7 +65,7 @@ def main() -> None:
             )
 
 
-def morph(subject: Subject, count: int) -> list[Shown]:
+def morph(subject: DrawnSubject, count: int) -> list[Shown]:
     """Go from one survivor of each frame to the next: as many different postures as are asked for."""
     keys = np.stack([frame.points[0] for frame in subject.frames])
     places = np.linspace(0, len(keys) - 1, count)

@@ -32,7 +32,7 @@ from posekit.cameras.head.perspective import rotation
 from posekit.cameras.neck import Placement, place
 from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 
 NOISE = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0)
 ORDER: tuple[RootMethod, ...] = ("search", "torso", "head", "auto")
@@ -67,7 +67,7 @@ def row(
     )
 
 
-def table(scene: Scene, rng: np.random.Generator) -> None:
+def table(scene: SyntheticScene, rng: np.random.Generator) -> None:
     for method in ORDER:
         for noise in NOISE:
             noisy = scene.with_noise(noise, rng)
@@ -78,7 +78,7 @@ def table(scene: Scene, rng: np.random.Generator) -> None:
             row(method, (noise, 0.0), found, scene.joints_cam[:, 0, 2], time.perf_counter() - start)
 
 
-def steps(scene: Scene) -> None:
+def steps(scene: SyntheticScene) -> None:
     """Grow from a neck that is off along its ray, each joint on the branch that is nearer to the truth."""
     lengths = [0.0] + [scene.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS]
     true = scene.joints_cam

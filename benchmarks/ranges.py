@@ -29,7 +29,7 @@ from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import DOFS, JOINT, SIDES
-from posekit.synthesis import Capture, Scene, mocap_scenes, read_capture
+from posekit.synthesis import Capture, SyntheticScene, mocap_scenes, read_capture
 from posekit.synthesis.mocap import clip_lengths
 from posekit.validators import Ranges, joint_range, load_ranges
 from posekit.validators.anatomical import Anatomy, Sinus
@@ -87,7 +87,9 @@ def accepted(clips: Sequence[Clip], ranges: Ranges) -> float:
     return 1.0 - float(np.concatenate([clip.rejected(ranges)[0] for clip in clips]).mean())
 
 
-def evaluate(scenes: Sequence[Scene], ranges: Ranges, tolerance: Tolerance = MEASURED_TOLERANCE) -> Tally:
+def evaluate(
+    scenes: Sequence[SyntheticScene], ranges: Ranges, tolerance: Tolerance = MEASURED_TOLERANCE
+) -> Tally:
     tally = Tally()
     for scene in scenes:
         recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=tolerance)
@@ -177,7 +179,7 @@ def hips_lost(clip: Clip, anatomy: Anatomy, shift: tuple[float, float, float]) -
     return lost
 
 
-def tolerances(scenes: Sequence[Scene]) -> None:
+def tolerances(scenes: Sequence[SyntheticScene]) -> None:
     rows = []
     for name in ("table1", "anatomical"):
         for degrees in (0.0, 0.5, 1.0, 2.0, 3.0):
@@ -188,7 +190,7 @@ def tolerances(scenes: Sequence[Scene]) -> None:
     print("\n".join(table_lines(head, rows)))
 
 
-def curve(clips: Sequence[Clip], scenes: Sequence[Scene]) -> None:
+def curve(clips: Sequence[Clip], scenes: Sequence[SyntheticScene]) -> None:
     rows = []
     for k in (0.0, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0):
         ranges = widened(k)
@@ -214,7 +216,7 @@ def curve(clips: Sequence[Clip], scenes: Sequence[Scene]) -> None:
     print("\n".join(table_lines(head, rows)))
 
 
-def views(scenes: Sequence[Scene]) -> None:
+def views(scenes: Sequence[SyntheticScene]) -> None:
     tallies = {name: evaluate(scenes, load_ranges(name)) for name in TABLES}
     print(f"Survivors of {sum(map(len, scenes))} views, measured tolerance, all physical checks\n")
     head = ["ranges", "truth among survivors", "survivors, mean", "median", "95 %"]
@@ -237,7 +239,7 @@ def views(scenes: Sequence[Scene]) -> None:
     print()
 
 
-def ranking(scenes: Sequence[Scene]) -> None:
+def ranking(scenes: Sequence[SyntheticScene]) -> None:
     """Say how far up plausibility alone puts the truth among the survivors."""
     ranges = load_ranges("anatomical")
     above: list[float] = []
@@ -282,7 +284,7 @@ def speed(clips: Sequence[Clip]) -> None:
     print(f"plausibility {seconds / best['urdf']:.2f}")
 
 
-def tree_speed(scenes: Sequence[Scene]) -> None:
+def tree_speed(scenes: Sequence[SyntheticScene]) -> None:
     """Compare the time of whole recoveries, on the plain and on the compiled path where Numba is installed."""
     views = [view_of(scene) for scene in scenes]
     for way in ("plain", "fast") if find_spec("numba") else ("plain",):

@@ -34,7 +34,7 @@ from posekit.ranking import (
     rank,
     write_prior,
 )
-from posekit.ranking.prior import TERMS, WEIGHTS
+from posekit.ranking.prior import TERM_NAMES, WEIGHT_NAMES
 from posekit.ranking.ranking import softmax
 from posekit.recovery import recover
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
@@ -88,7 +88,7 @@ def cross_validate(
 ) -> tuple[list[list[NDArray[np.float64]]], dict[str, float]]:
     """Return the probabilities of survivors by views and clip, and the mean weights over the groups."""
     left_out = set(without) | ({"chi2"} if "image" in without else set())
-    names = [name for name in (*WEIGHTS, "plausibility") if name not in left_out]
+    names = [name for name in (*WEIGHT_NAMES, "plausibility") if name not in left_out]
     probability: list[list[NDArray[np.float64]]] = [[np.empty(0)] * len(one.clips) for one in reported]
     weights: dict[str, list[float]] = {}
     for held in dict.fromkeys(priors.groups.tolist()):
@@ -221,8 +221,8 @@ def ablation(every: Sequence[Views], capture: Capture) -> None:
     priors = Priors(capture, list(capture.actions))
     fitted = [views for views in every if views.name.startswith("anatomical")]
     cases: list[tuple[str, How, tuple[str, ...]]] = [("all terms", How(), ())]
-    cases += [(f"without {name}", How(), (name,)) for name in TERMS]
-    cases += [(f"{name} alone", How(), tuple(n for n in TERMS if n != name)) for name in TERMS[:-1]]
+    cases += [(f"without {name}", How(), (name,)) for name in TERM_NAMES]
+    cases += [(f"{name} alone", How(), tuple(n for n in TERM_NAMES if n != name)) for name in TERM_NAMES[:-1]]
     cases += [
         ("no up: no gravity, balance, contact", How(up="none"), ()),
         ("camera taken to be level", How(up="level"), ()),
@@ -265,7 +265,7 @@ def fit(every: Sequence[Views], capture: Capture, path: Path) -> None:
         for k, clip in enumerate(views.clips):
             rankings.append(replace_depth(How().rank(clip, priors.without(priors.groups[clip.index]))))
             nearest.append(views.nearest[k])
-    weights = fit_weights(rankings, nearest, names=[name for name in WEIGHTS if name != "depth"])
+    weights = fit_weights(rankings, nearest, names=[name for name in WEIGHT_NAMES if name != "depth"])
     prior = priors.without()
     write_prior(path, replace(prior, weights={**prior.weights, **weights}))
     print(f"written: {path}, weights " + ", ".join(f"{name} {value:.3f}" for name, value in weights.items()))

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.formats.own import View
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance, fit_prior
-from posekit.ranking.fitting import TEMPERATURE
+from posekit.ranking.fitting import DEFAULT_TEMPERATURE
 from posekit.recovery import recover
-from posekit.refinement import GIVING, RootPrior, Sight, merge, refine
+from posekit.refinement import MEASURED_LENGTH_DEVIATIONS, ObservedFrames, RootPrior, merge, refine
 from posekit.settings import MEASURED_TOLERANCE, Rooting, Tolerance
-from posekit.synthesis import Capture, Scene, mocap_scenes
+from posekit.synthesis import Capture, SyntheticScene, mocap_scenes
 from posekit.validators import load_ranges
 from posekit.validators.anatomical_plausibility import plausibility
 from posekit.views.builtin import view_of
@@ -145,7 +145,7 @@ def views_of(
 
 def _refined(
     figure: Figure,
-    scene: Scene,
+    scene: SyntheticScene,
     view: View,
     joints: NDArray[np.float64],
     frame: NDArray[np.intp],
@@ -153,13 +153,13 @@ def _refined(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Refine survivors: their joints, and chi2; NaN for those that noise cannot explain or that became another."""
     root = RootPrior.along_ray(scene.camera, view.root, depth=ROOT_GIVES, lateral=ROOT_GIVES)
-    sight = Sight(
+    sight = ObservedFrames(
         figure=figure,
         camera=scene.camera,
         image=view.image,
         deviation=noise,
         root=root,
-        length_deviation=GIVING,
+        length_deviation=MEASURED_LENGTH_DEVIATIONS,
     )
     found = refine(sight, joints, frame=frame, hopeless=HOPELESS)
     kept = np.zeros(len(found), dtype=np.bool_)
@@ -170,7 +170,9 @@ def _refined(
 class Priors:
     """Priors that do not know some groups of clips; a group is an action, or a clip."""
 
-    def __init__(self, capture: Capture, groups: Sequence[str], temperature: float = TEMPERATURE) -> None:
+    def __init__(
+        self, capture: Capture, groups: Sequence[str], temperature: float = DEFAULT_TEMPERATURE
+    ) -> None:
         known = np.isfinite(capture.points[:, :14]).all(axis=(1, 2))
         self.points, self.clip = capture.points[known, :14], capture.clip[known]
         self.share = 1.0 / np.bincount(self.clip)[self.clip]

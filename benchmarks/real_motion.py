@@ -22,7 +22,7 @@ from posekit.recovery import recover
 from posekit.recovery.recovery import FrameRecovery
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS
-from posekit.synthesis import Scene, mocap_scenes, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
 from posekit.tree.bits import path_of
 from posekit.views.builtin import view_of
 
@@ -83,7 +83,9 @@ def killer(frame: FrameRecovery, code: str) -> str:
     return "merged with its twin"
 
 
-def evaluate(scenes: tuple[Scene, ...], ranges: str, tolerance: Tolerance, checks: tuple[str, ...]) -> Tally:
+def evaluate(
+    scenes: tuple[SyntheticScene, ...], ranges: str, tolerance: Tolerance, checks: tuple[str, ...]
+) -> Tally:
     tally = Tally()
     for scene in scenes:
         recovery = recover(view_of(scene), checks=checks, ranges=ranges, tolerance=tolerance)

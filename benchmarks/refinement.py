@@ -30,9 +30,9 @@ from posekit.recovery.noise import Noise
 from posekit.recovery.refiner import Refiner
 from posekit.recovery.result import result_of
 from posekit.refinement import (
-    GIVING,
+    MEASURED_LENGTH_DEVIATIONS,
+    ObservedFrames,
     RootPrior,
-    Sight,
     Trunks,
     find_trunks,
     merge,
@@ -42,7 +42,7 @@ from posekit.refinement import (
 )
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
 from posekit.validation.validate import recovered_with
 from posekit.validators import PHYSICAL, Validator, load_ranges, make_checks
@@ -62,7 +62,7 @@ CONTACT = -0.03
 """Metres: what bodies may overlap under noise."""
 
 Leaves = tuple[NDArray[np.intp], np.ndarray]
-Way = Callable[[Sight, float], Leaves]
+Way = Callable[[ObservedFrames, float], Leaves]
 
 
 def lengths_of(figure: Figure) -> np.ndarray:
@@ -81,12 +81,12 @@ def checks_of(figure: Figure, tolerance: Tolerance, contact: float) -> list[Chec
     )
 
 
-def depth_of(sight: Sight) -> float:
+def depth_of(sight: ObservedFrames) -> float:
     assert sight.root is not None
     return float(sight.root.mean[:, 2].max())
 
 
-def grow(sight: Sight, tolerance: Tolerance, contact: float) -> Leaves:
+def grow(sight: ObservedFrames, tolerance: Tolerance, contact: float) -> Leaves:
     """Grow trees from the noisy points."""
     assert sight.root is not None
     tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=lengths_of(sight.figure))
@@ -100,11 +100,11 @@ def grow(sight: Sight, tolerance: Tolerance, contact: float) -> Leaves:
     return leaves.frame.astype(np.intp), leaves.postures()
 
 
-def fixed(sight: Sight, _: float) -> Leaves:
+def fixed(sight: ObservedFrames, _: float) -> Leaves:
     return grow(sight, MEASURED_TOLERANCE, 0.0)
 
 
-def derived(sight: Sight, pixels: float) -> Leaves:
+def derived(sight: ObservedFrames, pixels: float) -> Leaves:
     allowed = tolerance_of(
         pixels, sight.camera, sight.figure, depth_of(sight), root_depth_deviation=root_deviation(sight)
     )
@@ -114,7 +114,7 @@ def derived(sight: Sight, pixels: float) -> Leaves:
     return grow(sight, tolerance, CONTACT)
 
 
-def on_trunks(sight: Sight, pixels: float, trunks: Trunks | None = None) -> Leaves:
+def on_trunks(sight: ObservedFrames, pixels: float, trunks: Trunks | None = None) -> Leaves:
     """Grow trees on trunks that were found first, as `Refiner` does, where the neck is known as it cannot say."""
     trunks = find_trunks(sight) if trunks is None else trunks
     allowed = tolerance_of(
@@ -139,7 +139,7 @@ def on_trunks(sight: Sight, pixels: float, trunks: Trunks | None = None) -> Leav
     return trunks.frame[leaves.frame[own]], postures[own]
 
 
-def root_deviation(sight: Sight) -> float:
+def root_deviation(sight: ObservedFrames) -> float:
     assert sight.root is not None
     return float(np.sqrt(np.linalg.eigvalsh(sight.root.covariance).max()))
 
@@ -190,7 +190,7 @@ def best(frame: NDArray[np.intp], joints: np.ndarray, truth: np.ndarray) -> np.n
     return out
 
 
-def outcome(sight: Sight, leaves: Leaves, truth: np.ndarray) -> Outcome:
+def outcome(sight: ObservedFrames, leaves: Leaves, truth: np.ndarray) -> Outcome:
     frame, postures = leaves
     n = len(truth)
     refined = refine(sight, postures, frame=frame, hopeless=HOPELESS)
@@ -209,7 +209,7 @@ def outcome(sight: Sight, leaves: Leaves, truth: np.ndarray) -> Outcome:
     )
 
 
-def by_refiner(scene: Scene, image: np.ndarray, pixels: float, lengths: float | None) -> Outcome:
+def by_refiner(scene: SyntheticScene, image: np.ndarray, pixels: float, lengths: float | None) -> Outcome:
     """Do what `posekit.recover` does with exact necks, and look at each stage; survivors have passed all checks."""
     view = replace(
         view_of(replace(scene, image=image)),
@@ -238,7 +238,7 @@ def by_refiner(scene: Scene, image: np.ndarray, pixels: float, lengths: float | 
     )
 
 
-def legal(ranges: str, views: int) -> Scene:
+def legal(ranges: str, views: int) -> SyntheticScene:
     """Return random views whose true postures are inside some ranges, heads too."""
     scene = random_views(load_figure(), views * OF[ranges], np.random.default_rng(0))
     validator = Validator(ranges=ranges, checks=("joint-range",))
@@ -289,7 +289,7 @@ def certificates(views: int) -> None:
     print("\n".join(table_lines(head, rows)))
 
 
-def root_prior(scene: Scene, depth: float, rng: np.random.Generator) -> RootPrior:
+def root_prior(scene: SyntheticScene, depth: float, rng: np.random.Generator) -> RootPrior:
     neck = scene.joints_cam[:, 0]
     ray = neck / np.linalg.norm(neck, axis=1, keepdims=True)
     mean = neck + depth * rng.standard_normal(len(neck))[:, None] * ray
@@ -304,7 +304,9 @@ def retention(views: int) -> None:
         image = scene.with_noise(pixels, np.random.default_rng(1)).image
         for name, depth in (("exact", 0.0), ("10 cm", ROOT_DEPTH)):
             root = root_prior(scene, depth, np.random.default_rng(2))
-            sight = Sight(figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root)
+            sight = ObservedFrames(
+                figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root
+            )
             for label, way in (("fixed", fixed), ("derived", derived), ("on trunks", on_trunks)):
                 if way is on_trunks and not depth:
                     row = by_refiner(scene, image, pixels, 0.0).row()
@@ -331,7 +333,9 @@ def calibration(truths: int) -> None:
     for pixels in PIXELS:
         seen = scene.with_noise(pixels, np.random.default_rng(4))
         root = root_prior(scene, 0.0, np.random.default_rng(5))
-        sight = Sight(figure=scene.figure, camera=scene.camera, image=seen.image, deviation=pixels, root=root)
+        sight = ObservedFrames(
+            figure=scene.figure, camera=scene.camera, image=seen.image, deviation=pixels, root=root
+        )
         refined = refine(sight, scene.joints_cam)
         off = refined.joints - scene.joints_cam
         covariance = refined.covariance[:, 6:]
@@ -380,7 +384,9 @@ def cost(views: int) -> None:
     for pixels in PIXELS:
         image = scene.with_noise(pixels, np.random.default_rng(7)).image
         root = root_prior(scene, 0.0, np.random.default_rng(8))
-        sight = Sight(figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root)
+        sight = ObservedFrames(
+            figure=scene.figure, camera=scene.camera, image=image, deviation=pixels, root=root
+        )
         base = timed(lambda sight=sight: fixed(sight, 0.0))  # type: ignore[misc]
         wide = timed(lambda sight=sight, pixels=pixels: derived(sight, pixels))  # type: ignore[misc]
         trunks = find_trunks(sight)
@@ -435,13 +441,13 @@ def real(capture: Path, frames: int) -> None:
                 if label == "on trunks":
                     total.append((len(scene), by_refiner(scene, image, pixels, None)))
                     continue
-                sight = Sight(
+                sight = ObservedFrames(
                     figure=scene.figure,
                     camera=scene.camera,
                     image=image,
                     deviation=pixels,
                     root=root_prior(scene, 0.0, np.random.default_rng(2)),
-                    length_deviation=GIVING,
+                    length_deviation=MEASURED_LENGTH_DEVIATIONS,
                 )
                 total.append((len(scene), outcome(sight, fixed(sight, pixels), scene.joints_cam)))
             weight = np.array([count for count, _ in total]) / sum(count for count, _ in total)

@@ -14,9 +14,17 @@ from posekit.following import SurvivorFrame
 from posekit.formats.own import OpenCVModel, View
 from posekit.ranking import Prior, Up, fit_prior, load_prior, rank
 from posekit.recovery import recover
-from posekit.refinement import RootPrior, Sight, find_trunks, merge, refine, tolerance_of, under_noise
+from posekit.refinement import (
+    ObservedFrames,
+    RootPrior,
+    find_trunks,
+    merge,
+    refine,
+    tolerance_of,
+    under_noise,
+)
 from posekit.skeleton import JOINTS, PARENTS, SEGMENT_NAMES, SEGMENTS
-from posekit.synthesis import Capture, Scene, Walker, mocap_scene
+from posekit.synthesis import Capture, SyntheticScene, Walker, mocap_scene
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
@@ -40,7 +48,7 @@ PLACED = 0.06
 """Metres that survivors are off where the neck was placed: so far apart are the places."""
 
 
-def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> Scene:
+def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> SyntheticScene:
     """Let the walker pass a standing camera."""
     walker, sphere = Walker(), CameraSphere()
     at = np.arange(frames) / RATE
@@ -62,7 +70,7 @@ def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> Sce
     )
 
 
-def clip_scene(capture: Capture, clip: str, yaw: float) -> Scene:
+def clip_scene(capture: Capture, clip: str, yaw: float) -> SyntheticScene:
     """See a clip from a side: 0 is from ahead, 90 from its right."""
     index = capture.clip_index(clip)
     first = START.get(clip.rsplit("/", maxsplit=1)[-1], 1)
@@ -94,7 +102,7 @@ def clip_scene(capture: Capture, clip: str, yaw: float) -> Scene:
     raise error
 
 
-def scenes(capture: Capture | None, yaws: int) -> Iterator[tuple[str, str, int, Scene]]:
+def scenes(capture: Capture | None, yaws: int) -> Iterator[tuple[str, str, int, SyntheticScene]]:
     for yaw in range(0, 360, 60):
         yield "synthetic walking", "", yaw, walker_scene(yaw)
     if capture is None:
@@ -108,7 +116,7 @@ def scenes(capture: Capture | None, yaws: int) -> Iterator[tuple[str, str, int, 
                 yield "other", clip, yaw, clip_scene(capture, clip, yaw)
 
 
-def view_of(scene: Scene, figure: Figure, *, rooted: bool = True) -> View:
+def view_of(scene: SyntheticScene, figure: Figure, *, rooted: bool = True) -> View:
     return View(
         camera=OpenCVModel(K=scene.camera.K),
         time=scene.time,
@@ -132,7 +140,7 @@ class Recovered:
         return [replace(frame, cost=each) for frame, each in zip(self.frames, parts, strict=True)]
 
 
-def exact(scene: Scene, *, rooted: bool = True) -> Recovered:
+def exact(scene: SyntheticScene, *, rooted: bool = True) -> Recovered:
     """Recover exact points, with the neck given or placed."""
     found = recover(view_of(scene, scene.figure, rooted=rooted)).frames
     joints = np.concatenate([frame.joints for frame in found])
@@ -161,14 +169,14 @@ def exact(scene: Scene, *, rooted: bool = True) -> Recovered:
     return Recovered(frames=frames, evidence=evidence)
 
 
-def noisy(scene: Scene, pixels: float, *, real: bool) -> Recovered:
+def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     """Recover noisy points: on trunks, refined, merged (docs, "Noise")."""
     figure = scene.figure
     deviation = {
         name: TRUNK_LENGTHS if max(pair) < 6 else LIMB_LENGTHS
         for name, pair in zip(SEGMENT_NAMES, SEGMENTS, strict=True)
     }
-    sight = Sight(
+    sight = ObservedFrames(
         figure=figure,
         camera=scene.camera,
         image=scene.image,

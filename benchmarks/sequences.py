@@ -39,12 +39,21 @@ from sequence_views import (  # type: ignore[import-not-found]  # the script bes
 
 from posekit.cameras.neck import place
 from posekit.compiled.compiling import path as loops
-from posekit.following import Beam, Estimate, Follower, Paths, SurvivorFrame, best_paths, elevations, smooth
+from posekit.following import (
+    Beam,
+    Follower,
+    LiveEstimate,
+    Paths,
+    SurvivorFrame,
+    best_paths,
+    elevations,
+    smooth,
+)
 from posekit.formats.markdown import table_lines
 from posekit.ranking import load_prior
 from posekit.recovery.scaled_sequences import follow_scaled
 from posekit.skeleton import JOINTS, PARENTS
-from posekit.synthesis import Capture, Scene, read_capture
+from posekit.synthesis import Capture, SyntheticScene, read_capture
 
 TOLD_APART = math.radians(15.0)
 LIMBS = ((5, 7), (6, 8), (9, 11), (10, 12))
@@ -117,7 +126,7 @@ def spread_of(frames: list[SurvivorFrame], path: Paths) -> np.ndarray:
     )
 
 
-def follow(frames: list[SurvivorFrame], lag: int, beam: Beam | None = None) -> Iterator[Estimate]:
+def follow(frames: list[SurvivorFrame], lag: int, beam: Beam | None = None) -> Iterator[LiveEstimate]:
     """Follow live; the frames are made anew, as they come."""
     follower = Follower(lag=lag, beam=beam)
     for frame in frames:
@@ -347,7 +356,9 @@ def scale(capture: Capture | None, seed: int) -> None:
     )
 
 
-def of_clips(capture: Capture | None, actions: tuple[str, ...], yaws: tuple[int, ...]) -> list[Scene]:
+def of_clips(
+    capture: Capture | None, actions: tuple[str, ...], yaws: tuple[int, ...]
+) -> list[SyntheticScene]:
     if capture is None:
         return []
     return [

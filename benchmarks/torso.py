@@ -34,9 +34,9 @@ from posekit.recovery import recover
 from posekit.recovery.body import FigureBody, Judges
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
-from posekit.synthesis import Capture, Scene, mocap_scenes, random_views, read_capture
+from posekit.synthesis import Capture, SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.validators import load_ranges
-from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, TRUNK, drawing, save
+from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR, drawing, save
 from posekit.views.builtin import view_of
 
 Floats = NDArray[np.float64]
@@ -92,7 +92,7 @@ def score(label: str, torsos: Torsos, kept: Kept, views: int) -> Score:
     )
 
 
-def oracles(scenes: Sequence[Scene], ranges: str, views: int) -> list[Score]:
+def oracles(scenes: Sequence[SyntheticScene], ranges: str, views: int) -> list[Score]:
     """Joints at their best: torsos lifted with the frame's own lengths, and free in k of the four distances."""
     torsos = torsos_of(scenes, ranges, own_lengths=True)
     off = np.abs(torsos.off_truth)
@@ -106,7 +106,7 @@ def oracles(scenes: Sequence[Scene], ranges: str, views: int) -> list[Score]:
     ]
 
 
-def several_spines(scenes: Sequence[Scene], ranges: str, views: int) -> list[list[str]]:
+def several_spines(scenes: Sequence[SyntheticScene], ranges: str, views: int) -> list[list[str]]:
     """Lift with several lengths from neck to pelvis: the truth in any, every survivor counted."""
     rows = []
     grown = {mm: torsos_of(scenes, ranges, spine=mm / 1000) for mm in (0, -2, -1, 1, -4)}
@@ -124,7 +124,7 @@ def several_spines(scenes: Sequence[Scene], ranges: str, views: int) -> list[lis
     return rows
 
 
-def spreads(scenes: Sequence[Scene], torsos: Torsos) -> list[list[str]]:
+def spreads(scenes: Sequence[SyntheticScene], torsos: Torsos) -> list[list[str]]:
     """Say how far distances are from the clip's medians, in truth and where the true branch lifts them."""
     rows = []
     for segment in SEGMENTS:
@@ -146,7 +146,7 @@ def spreads(scenes: Sequence[Scene], torsos: Torsos) -> list[list[str]]:
     return rows
 
 
-def study(title: str, scenes: Sequence[Scene], ranges: str) -> dict[str, list[Score]]:
+def study(title: str, scenes: Sequence[SyntheticScene], ranges: str) -> dict[str, list[Score]]:
     """Print everything about one set of views; return the curves."""
     views = sum(map(len, scenes))
     torsos = torsos_of(scenes, ranges)
@@ -168,12 +168,12 @@ def study(title: str, scenes: Sequence[Scene], ranges: str) -> dict[str, list[Sc
 def draw(panels: dict[str, dict[str, list[Score]]], path: Path) -> None:
     """Draw what is lost over the mean number of survivors."""
     looks = {
-        "a: one tolerance for all": (MUTED, "o-"),
-        "b: one for each distance": (RIGHT, "o-"),
-        "b: 3 cm, but hips": (RIGHT, "D--"),
-        "c: width, shrug, bend, hips": (LEFT, "s-"),
-        "c: their covariance": (LEFT, "^:"),
-        "d: a spine that gives": (TRUNK, "D--"),
+        "a: one tolerance for all": (MUTED_COLOUR, "o-"),
+        "b: one for each distance": (RIGHT_COLOUR, "o-"),
+        "b: 3 cm, but hips": (RIGHT_COLOUR, "D--"),
+        "c: width, shrug, bend, hips": (LEFT_COLOUR, "s-"),
+        "c: their covariance": (LEFT_COLOUR, "^:"),
+        "d: a spine that gives": (TRUNK_COLOUR, "D--"),
     }
     with drawing() as kind:
         figure = kind(figsize=(7.6, 4.1), layout="constrained")
@@ -190,7 +190,7 @@ def draw(panels: dict[str, dict[str, list[Score]]], path: Path) -> None:
                 [one.counts.mean() for one in best],
                 [3e-4] * len(best),
                 "|",
-                color=TRUNK,
+                color=TRUNK_COLOUR,
                 ms=10,
                 label="d: joints, at their best",
             )
@@ -199,7 +199,7 @@ def draw(panels: dict[str, dict[str, list[Score]]], path: Path) -> None:
                 now.counts.mean(),
                 max(now.lost_branch, 3e-4),
                 "*",
-                color=RIGHT,
+                color=RIGHT_COLOUR,
                 ms=13,
                 zorder=5,
                 label="chosen",
@@ -210,7 +210,7 @@ def draw(panels: dict[str, dict[str, list[Score]]], path: Path) -> None:
             axes.set_xlabel("survivors a view, mean")
             axes.set_title(title)
             axes.grid(visible=True)
-            axes.axhline(0.005, color=MUTED, lw=0.8, ls=":")
+            axes.axhline(0.005, color=MUTED_COLOUR, lw=0.8, ls=":")
         figure.axes[0].set_ylabel("share of true branches lost")
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncol=4, fontsize=7.5)
@@ -238,7 +238,7 @@ def draws(capture: Capture, ranges: str, views: int, seeds: range) -> list[list[
     return rows
 
 
-def whole(scenes: Sequence[Scene], tables: Sequence[str]) -> list[list[str]]:
+def whole(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> list[list[str]]:
     """Run `recover` itself, before and after, with each table of ranges."""
     rows = []
     views = [view_of(scene) for scene in scenes]
@@ -265,7 +265,7 @@ def whole(scenes: Sequence[Scene], tables: Sequence[str]) -> list[list[str]]:
     return rows
 
 
-def speed(scenes: Sequence[Scene], tables: Sequence[str]) -> str:
+def speed(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> str:
     """Time the trees alone, best of nine turns each: what the own tolerances take of what one for all does."""
     told = []
     for ranges in tables:
@@ -331,7 +331,7 @@ def main() -> None:
         return
     capture = read_capture(given.capture)
 
-    def scenes_of(which: Capture) -> tuple[Scene, ...]:
+    def scenes_of(which: Capture) -> tuple[SyntheticScene, ...]:
         return mocap_scenes(which, given.views, np.random.default_rng(given.seed))
 
     recorded = scenes_of(capture)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posekit.body.frames import torso_frame
 from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Capture, Scene
+from posekit.synthesis import Capture, SyntheticScene
 from posekit.tree import InterpretationTree, Leaves
 from posekit.tree.bits import path_of
 from posekit.validators import load_ranges, make_checks
@@ -70,7 +70,7 @@ class Torsos:
 
 
 def torsos_of(
-    scenes: Sequence[Scene], ranges: str, *, own_lengths: bool = False, spine: float = 0.0
+    scenes: Sequence[SyntheticScene], ranges: str, *, own_lengths: bool = False, spine: float = 0.0
 ) -> Torsos:
     """Grow the trees of scenes, one a clip, with hardly any check of the rigid parts.
 

@@ -35,7 +35,7 @@ from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Scene, mocap_scenes, random_views, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree, Leaves, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
 from posekit.views.builtin import view_of
@@ -58,7 +58,7 @@ class Job:
     tolerance: Tolerance
 
     @staticmethod
-    def of(scenes: Sequence[Scene], tolerance: Tolerance) -> Job:
+    def of(scenes: Sequence[SyntheticScene], tolerance: Tolerance) -> Job:
         """Put scenes of one person and one kind of camera together."""
         return Job(
             figure=scenes[0].figure,

@@ -24,7 +24,7 @@ from real_motion import CHECKS, true_code  # type: ignore[import-not-found]
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.settings import MEASURED_TOLERANCE
-from posekit.synthesis import Scene, mocap_scenes, read_capture
+from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
 from posekit.tree import Findings
 from posekit.validators import load_ranges, walking
 from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds
@@ -108,7 +108,7 @@ def cross_validation(walkers: Sequence[Clip]) -> None:
     print("\n".join(table_lines(["walker", ", ".join(needs), *(f"rule {rule}" for rule in RULES)], rows)))
 
 
-def on_views(scenes: Sequence[Scene]) -> None:
+def on_views(scenes: Sequence[SyntheticScene]) -> None:
     """Recover walkers by the anatomical ranges, and then apply each set of rules to the survivors."""
     ranges = load_ranges("anatomical")
     tallies: dict[tuple[str, tuple[int, ...]], list[tuple[bool, int]]] = {}

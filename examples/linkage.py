@@ -6,14 +6,14 @@ python examples/linkage.py
 import numpy as np
 
 from posekit.cameras import ScaledOrthographicCamera
-from posekit.linkages import Family, load_linkage, search, span
+from posekit.linkages import LinkageFamily, load_linkage, search, span
 from posekit.validators.linkage import closure, nearer
 
 # An object of your own is a TOML file like urdf/linkages/four_bar.toml.
 linkage = load_linkage("four_bar")
 image = np.array([[212.0, 388.0], [287.0, 512.0], [541.0, 296.0], [335.0, 239.0]])
 
-family = Family(linkage=linkage, image=image)
+family = LinkageFamily(linkage=linkage, image=image)
 print(f"s is at least {family.minimum_scale:.3f} pixels a millimetre: {family.bounding_segment} needs it")
 
 found = search(family, {"closure": 1.0})

@@ -6,9 +6,9 @@
 
 from posekit.viewer.pictures import Shot as Shot
 from posekit.viewer.pictures import write_picture as write_picture
+from posekit.viewer.scene import DrawnSubject as DrawnSubject
 from posekit.viewer.scene import Eye as Eye
 from posekit.viewer.scene import ParallelEye as ParallelEye
 from posekit.viewer.scene import Style as Style
-from posekit.viewer.scene import Subject as Subject
 from posekit.viewer.scene import ViewEye as ViewEye
 from posekit.viewer.scene import subject_of as subject_of

@@ -8,7 +8,7 @@ from pathlib import Path
 from posekit.errors import ViewerError
 from posekit.formats.own import Result, View
 
-PANELS = 16
+MAX_PANELS = 16
 """Survivors of the first frame that are drawn one by one."""
 
 SCENE_GROUPS = 8
@@ -79,7 +79,7 @@ def _plots(
     first = next(frame for frame in result.frames if len(frame.joints))
     save(plot_image(view, list(few), result=result), folder / f"{name}.image.png")
     save(plot_levels(chosen, printed=printed), folder / f"{name}.levels.png")
-    save(plot_projections(first.joints[:PANELS]), folder / f"{name}.projections.png")
+    save(plot_projections(first.joints[:MAX_PANELS]), folder / f"{name}.projections.png")
     if first.pruned is not None:
         save(plot_tree(first), folder / f"{name}.tree.png")
 

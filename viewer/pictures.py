@@ -14,7 +14,7 @@ from PIL import Image
 from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.safe_io.writing import replacing, write_text
-from posekit.viewer.browser.browser import TIMEOUT
+from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS
 from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
 from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
@@ -22,14 +22,14 @@ from posekit.viewer.scene.compose import Composition, Style, compose, row_count
 from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.subject import Shown, Subject, check_one_scale
+from posekit.viewer.scene.subject import DrawnSubject, Shown, check_one_scale
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
 
-MOVING: Final = (".gif", ".mp4")
-FORMATS: Final = (".png", ".html", *MOVING)
-AZIMUTH_WITH_CAMERA, AZIMUTH = 55.0, 35.0
-ELEVATION, ELEVATION_OF_ROWS = 14.0, 30.0
+MOVING_SUFFIXES: Final = (".gif", ".mp4")
+PICTURE_SUFFIXES: Final = (".png", ".html", *MOVING_SUFFIXES)
+AZIMUTH_WITH_CAMERA, DEFAULT_AZIMUTH = 55.0, 35.0
+DEFAULT_ELEVATION, ELEVATION_OF_ROWS = 14.0, 30.0
 """Degrees: from where one looks when nothing is said."""
 
 
@@ -68,7 +68,7 @@ class Shot:
     through_view: bool = False
     turntable: int = 0
     fps: float = 10.0
-    timeout: float = TIMEOUT
+    timeout: float = STEP_TIMEOUT_SECONDS
 
 
 def check_picture(path: str | Path, shot: Shot) -> bool:
@@ -81,23 +81,25 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
         picture's size or speed is none.
     """
     suffix = Path(path).suffix.lower()
-    if suffix not in FORMATS:
-        raise ViewerError(f"{path}: the format is {suffix or 'none'}; expected one of {', '.join(FORMATS)}")
+    if suffix not in PICTURE_SUFFIXES:
+        raise ViewerError(
+            f"{path}: the format is {suffix or 'none'}; expected one of {', '.join(PICTURE_SUFFIXES)}"
+        )
     check_size(shot.size, shot.supersample)
     if suffix == ".mp4":
         find_ffmpeg()
-    if shot.turntable and suffix not in MOVING:
-        raise ViewerError(f"{path}: a turntable moves; expected {' or '.join(MOVING)}")
-    if suffix in MOVING:
+    if shot.turntable and suffix not in MOVING_SUFFIXES:
+        raise ViewerError(f"{path}: a turntable moves; expected {' or '.join(MOVING_SUFFIXES)}")
+    if suffix in MOVING_SUFFIXES:
         check_speed(shot.fps)
     if suffix != ".html":
         find_browser()
-    return suffix in MOVING
+    return suffix in MOVING_SUFFIXES
 
 
 def write_picture(
     path: str | Path,
-    subject: Subject,
+    subject: DrawnSubject,
     frames: Sequence[Shown] | None = None,
     *,
     style: Style | None = None,
@@ -112,7 +114,7 @@ def write_picture(
     path : path
         ``.png`` and ``.html``: the first of the frames; ``.gif`` and ``.mp4``: all of them one after another, or
         a turn around the first.
-    subject : Subject
+    subject : DrawnSubject
         Whose figure, and which world.
     frames : sequence of Shown, optional
         Those of the subject, or some of them, with some of their postures, or rejected branches.
@@ -166,7 +168,7 @@ def png(pixels: Pixels) -> bytes:
 class _Film:
     """Scenes one after another, in one world, and from where they are looked at."""
 
-    def __init__(self, subject: Subject, frames: Sequence[Shown], style: Style, shot: Shot) -> None:
+    def __init__(self, subject: DrawnSubject, frames: Sequence[Shown], style: Style, shot: Shot) -> None:
         self.shot = shot
         alone = style.layout == "superposed" or all(len(frame) == 1 for frame in frames)
         self.with_camera = style.camera and alone and not shot.through_view and frames[0].sight is not None
@@ -209,7 +211,7 @@ class _Film:
             else:
                 yield composition.scene, eye
 
-    def _compose(self, frame: Shown, subject: Subject, style: Style, stage: Array | None) -> Composition:
+    def _compose(self, frame: Shown, subject: DrawnSubject, style: Style, stage: Array | None) -> Composition:
         return compose(frame, figure=subject.figure, world=self.world, style=style, stage=stage)
 
     @staticmethod
@@ -218,9 +220,9 @@ class _Film:
 
     def _angles(self) -> dict[str, float]:
         shot = self.shot
-        azimuth = AZIMUTH_WITH_CAMERA if self.with_camera else AZIMUTH
+        azimuth = AZIMUTH_WITH_CAMERA if self.with_camera else DEFAULT_AZIMUTH
         azimuth = azimuth if shot.azimuth is None else shot.azimuth
-        elevation = ELEVATION_OF_ROWS if self.rows > 1 else ELEVATION
+        elevation = ELEVATION_OF_ROWS if self.rows > 1 else DEFAULT_ELEVATION
         elevation = elevation if shot.elevation is None else shot.elevation
         return {
             "azimuth": azimuth,

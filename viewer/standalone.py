@@ -13,13 +13,13 @@ import meshcat
 from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.scene import Json, Scene
 
-POLICY = (
+CONTENT_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; "
     "connect-src data: blob:"
 )
 """The browser itself refuses to load anything from outside."""
 
-PAGE = """<!DOCTYPE html>
+PAGE_TEMPLATE = """<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
@@ -86,8 +86,8 @@ def standalone_page(
     str
         The page, about 0.9 MB and the scene.
     """
-    return PAGE.format(
-        policy=POLICY,
+    return PAGE_TEMPLATE.format(
+        policy=CONTENT_POLICY,
         title=html.escape(title),
         style=style,
         body=body,

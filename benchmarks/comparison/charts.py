@@ -9,9 +9,9 @@ import numpy as np
 
 from benchmarks.comparison.measure import Chart
 from posekit.viewer.plots import save
-from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
+from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 
-COLOURS = (LEFT, RIGHT, MUTED)
+COLOURS = (LEFT_COLOUR, RIGHT_COLOUR, MUTED_COLOUR)
 MARKS = ("o", "s", "^")
 
 
@@ -31,7 +31,7 @@ def draw(chart: Chart, folder: Path, suffix: str = ".svg") -> str:
 def _bars(axes: Any, chart: Chart) -> None:
     names, values = list(chart.bars), list(chart.bars.values())
     at = np.arange(len(names))[::-1]
-    axes.barh(at, values, height=0.62, color=LEFT)
+    axes.barh(at, values, height=0.62, color=LEFT_COLOUR)
     axes.set_yticks(at, names)
     axes.set_xlabel(chart.y)
     if chart.log:

@@ -11,7 +11,7 @@ from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
 from posekit.body import Figure, load_figure
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE
 from posekit.skeleton import JOINTS
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.tree import Check
 
 Way = Callable[[], list[np.ndarray]]
@@ -85,7 +85,7 @@ def _measured(study: Study, path: str, repeats: int) -> tuple[list[float], list[
     return list(study), times, counts
 
 
-def _frames(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
+def _frames(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
     some = min(len(scene), CHUNK)
 
     def ways(size: int) -> Way:
@@ -100,7 +100,7 @@ def _frames(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
     return found
 
 
-def _joints(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
+def _joints(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
     some = scene.select(np.arange(min(len(scene), 2 * CHUNK)))
 
     def way(joints: int) -> Way:
@@ -110,7 +110,7 @@ def _joints(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
     return {float(joints): (way(joints), len(some)) for joints in JOINT_COUNTS}
 
 
-def _survivors(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
+def _survivors(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
     counts = np.array([len(codes) for codes in grow(figure, scene, checks)])
     found: Study = {}
     for rows in np.array_split(np.argsort(counts, kind="stable"), GROUPS):
@@ -120,7 +120,7 @@ def _survivors(figure: Figure, scene: Scene, checks: list[Check]) -> Study:
     return found
 
 
-def _noise(figure: Figure, scene: Scene) -> Study:
+def _noise(figure: Figure, scene: SyntheticScene) -> Study:
     checks = physical_checks(figure, MEASURED_TOLERANCE)
     some = scene.select(np.arange(min(len(scene), CHUNK)))
     found: Study = {}

@@ -23,7 +23,7 @@ from posekit.body import Figure, load_figure
 from posekit.recovery import recover
 from posekit.settings import EXACT_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.tree import Check, InterpretationTree, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
 from posekit.views.builtin import view_of
@@ -53,7 +53,7 @@ def lengths_of(figure: Figure) -> NDArray[np.float64]:
 
 def grow(
     figure: Figure,
-    scene: Scene,
+    scene: SyntheticScene,
     checks: list[Check],
     *,
     joints: int = len(JOINTS),
@@ -80,7 +80,7 @@ def grow(
 
 
 def brute_force(
-    figure: Figure, scene: Scene, k: int, checks: list[Check], pool: pin.GeometryPool
+    figure: Figure, scene: SyntheticScene, k: int, checks: list[Check], pool: pin.GeometryPool
 ) -> NDArray[np.int32]:
     """Judge all leaves of one view, collisions as whole configurations."""
     leaves, codes = enumerate_leaves(

@@ -150,7 +150,7 @@ def evaluate(
         f=f,
         size=pixels(size),
     )
-    sampling = evaluation.Sampling(
+    sampling = evaluation.FrameSampling(
         frames_per_clip=(60 if sequences else 10) if frames_per_clip is None else frames_per_clip,
         clips=split(clips),
         actions=split(actions),

@@ -47,11 +47,11 @@ app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
 app.command("inspect", epilog=inspect.EXAMPLES)(inspect.inspect)
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.add_typer(synth.app, name="synth")
-app.command("reproduce", epilog=reproduce.EXAMPLES)(reproduce.reproduce)
+app.command("reproduce", epilog=reproduce.REPRODUCE_EXAMPLES)(reproduce.reproduce)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("render", epilog=render.EXAMPLES)(render.render)
 app.command("view", epilog=view.EXAMPLES)(view.view)
-app.command("demo", epilog=demo.EXAMPLES)(demo.demo)
+app.command("demo", epilog=demo.DEMO_EXAMPLES)(demo.demo)
 
 
 def _print_version(asked: bool) -> None:

@@ -15,7 +15,7 @@ from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
     from posekit.formats.own import Postures, Result, View
-    from posekit.viewer.scene.subject import Shown, Subject
+    from posekit.viewer.scene.subject import DrawnSubject, Shown
 
 EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
@@ -195,7 +195,7 @@ def _write_page(
 
 def _shown(
     content: Result | Postures, view: View | None, frame: str, posture: str, rejected: bool, *, moving: bool
-) -> tuple[Subject, list[Shown]]:
+) -> tuple[DrawnSubject, list[Shown]]:
     """Choose what is drawn of a file."""
     from posekit.formats.own import Result
     from posekit.viewer.scene.branch import one_a_reason, rejected_of

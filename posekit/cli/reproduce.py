@@ -10,8 +10,8 @@ import typer
 from posekit.cli.options import Pictures, examples
 from posekit.errors import InputError
 
-PAPERS = ("lee-chen", "taylor")
-EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
+PAPER_NAMES = ("lee-chen", "taylor")
+REPRODUCE_EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
 
 
 def reproduce(
@@ -23,8 +23,10 @@ def reproduce(
     from posekit import papers
     from posekit.safe_io.writing import make_folder
 
-    if paper not in PAPERS:
-        raise InputError(f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPERS)}")
+    if paper not in PAPER_NAMES:
+        raise InputError(
+            f"{paper!r} is not a paper that can be reproduced; expected {', '.join(PAPER_NAMES)}"
+        )
     make_folder(output)
     make = papers.reproduce_lee_chen if paper == "lee-chen" else papers.reproduce_taylor
     for line in make(output, pictures=pictures):

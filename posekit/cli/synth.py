@@ -11,7 +11,7 @@ from posekit.cli.options import Noise, OutputView, Seed, examples, numbers
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
-    from posekit.synthesis import Scene
+    from posekit.synthesis import SyntheticScene
 
 app = typer.Typer(
     help="Make synthetic views with truth: a walker, random legal postures, motion capture, or a robot.",
@@ -171,7 +171,9 @@ def _check_name(output: Path) -> None:
         raise InputError(f"-o {output}: a view is JSON; expected a name that ends in .json")
 
 
-def _write(output: Path, scene: Scene, noise: float, seed: int, *, uncalibrated: bool = False) -> None:
+def _write(
+    output: Path, scene: SyntheticScene, noise: float, seed: int, *, uncalibrated: bool = False
+) -> None:
     """Add noise, write the view, say so."""
     from dataclasses import replace
 

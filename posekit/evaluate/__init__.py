@@ -6,10 +6,10 @@ from posekit.evaluate.evaluation import Evaluation as Evaluation
 from posekit.evaluate.evaluation import evaluate as evaluate
 from posekit.evaluate.method import Method as Method
 from posekit.evaluate.ranking import Ranker as Ranker
-from posekit.evaluate.ranking import Ranking as Ranking
+from posekit.evaluate.ranking import SurvivorOrder as SurvivorOrder
 from posekit.evaluate.ranking import by_probability as by_probability
 from posekit.evaluate.report import write_evaluation as write_evaluation
-from posekit.evaluate.sampling import Sampling as Sampling
+from posekit.evaluate.sampling import FrameSampling as FrameSampling
 from posekit.evaluate.sequences import Choice as Choice
 from posekit.evaluate.sequences import Chooser as Chooser
 from posekit.evaluate.sequences import by_path as by_path

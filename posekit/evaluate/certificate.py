@@ -22,13 +22,13 @@ from posekit.settings import Tolerance
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.validators import Ranges, judge, make_checks
 
-ROUNDING: Final = 1e-6
+ROUNDING_ALLOWANCE: Final = 1e-6
 """Metres, and degrees, that rounding may add to what is allowed."""
 
-TURNED: Final = 1e-3
+MAX_TURN_DEGREES: Final = 1e-3
 """Degrees by which a witness's limb may differ: 5 um at a wrist. Limbs that are nearly straight are made straight."""
 
-UNSEEN: Final = 45.0
+UNSEEN_DEGREES: Final = 45.0
 """Degrees that an axial rotation may be off before it is not seen: as the ranges are defined (docs, "Real motion")."""
 
 LIMB_SEGMENTS: Final = np.array(
@@ -40,7 +40,7 @@ LIMB_SEGMENTS: Final = np.array(
 )
 
 
-class Certificate(NamedTuple):
+class SurvivorCertificate(NamedTuple):
     """What was found of N survivors.
 
     Attributes
@@ -60,11 +60,13 @@ class Certificate(NamedTuple):
     @property
     def violations(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Survivors that break lengths, and ranges (N,) each."""
-        ranges = (self.angle > ROUNDING) | (self.turned > TURNED)
-        return self.length > ROUNDING, np.asarray(ranges)
+        ranges = (self.angle > ROUNDING_ALLOWANCE) | (self.turned > MAX_TURN_DEGREES)
+        return self.length > ROUNDING_ALLOWANCE, np.asarray(ranges)
 
 
-def certify(joints: Array, figure: Figure, ranges: Ranges | None, tolerance: Tolerance) -> Certificate:
+def certify(
+    joints: Array, figure: Figure, ranges: Ranges | None, tolerance: Tolerance
+) -> SurvivorCertificate:
     """Measure survivors against the person.
 
     Parameters
@@ -80,10 +82,10 @@ def certify(joints: Array, figure: Figure, ranges: Ranges | None, tolerance: Tol
     nothing = np.full(len(joints), np.nan)
     length = _lengths(joints, figure, tolerance)
     if ranges is None or not len(joints):
-        return Certificate(length, nothing, nothing)
+        return SurvivorCertificate(length, nothing, nothing)
     if ranges.kind == "configuration" and ranges.anatomy is None:
         angle, turned = _witnessed(joints, _limited(figure, ranges), tolerance.angle)
-        return Certificate(length, angle, turned)
+        return SurvivorCertificate(length, angle, turned)
     # Projected angles and couplings are no limits of a model: whole postures are judged again.
     checks = make_checks(
         figure,
@@ -94,7 +96,7 @@ def certify(joints: Array, figure: Figure, ranges: Ranges | None, tolerance: Tol
     )
     (judgement,) = judge(checks, with_head(joints))
     beyond = np.where(judgement.violated, -judgement.margin, np.minimum(-judgement.margin, 0.0))
-    return Certificate(length, np.fmax.reduce(beyond, axis=1), nothing)
+    return SurvivorCertificate(length, np.fmax.reduce(beyond, axis=1), nothing)
 
 
 def _lengths(joints: Array, figure: Figure, tolerance: Tolerance) -> Array:
@@ -121,7 +123,7 @@ def _witnessed(joints: Array, figure: Figure, tolerance: float) -> tuple[Array, 
             rotation = DOFS.index(f"{side}_{joint}.rotation")
             allowed[:, rotation] /= np.maximum(bend, 1e-12)
     beyond = np.maximum(lower - angles, angles - upper) - allowed
-    beyond[allowed > UNSEEN] = np.nan
+    beyond[allowed > UNSEEN_DEGREES] = np.nan
     turned = np.full(len(joints), np.nan)
     placed = np.isfinite(q).all(axis=1)
     if placed.any():

@@ -12,7 +12,7 @@ from posekit.geometry import Array
 from posekit.measures import mpjpe, pa_mpjpe
 from posekit.recovery.recovery import Recovery
 
-MEASURES: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
+MEASURE_LABELS: Final = ("where it is", "moved to the true middle", "turned and scaled onto it")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,7 +42,7 @@ class Comparison:
         if not known.any():
             return ["no frame has both survivors and a truth"]
         rows = []
-        for k, name in enumerate(MEASURES):
+        for k, name in enumerate(MEASURE_LABELS):
             row = [name]
             for values in (self.best, self.first, self.middle):
                 median, most = np.quantile(values[known, k] * 1000, (0.5, 0.95))

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.evaluate.frames import Frames
+from posekit.evaluate.frames import EvaluatedFrames
 from posekit.evaluate.scores import correct_poses, correct_poses_score, reliability
 from posekit.evaluate.work import ROLES
 from posekit.geometry import Array
@@ -23,13 +23,13 @@ NEAR_NOISY: Final = 0.035
 TOLD: Final = ("mpjpe", "centred", "pa")
 
 
-def roles_of(frames: Frames) -> tuple[str, ...]:
+def roles_of(frames: EvaluatedFrames) -> tuple[str, ...]:
     """Return whose errors there are: without a choice through sequences there is no path."""
     followed = np.isfinite(frames.error("path", "mpjpe")).any()
     return ROLES if followed else ROLES[:-1]
 
 
-def numbers(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
+def numbers(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
     """Return the numbers of some frames, plain: shares of 1, millimetres, degrees; None where there is nothing to tell.
 
     Shares are of all frames, those without survivors included; errors are means, medians and 95 % over frames that
@@ -72,7 +72,7 @@ def numbers(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
     }
 
 
-def curves(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
+def curves(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
     """Return the curves of some frames: correct poses at each millimetre from 0 to 300, and the reliability table."""
     return {
         "correct_poses": {
@@ -86,7 +86,7 @@ def curves(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
     }
 
 
-def lost_to(frames: Frames, rows: NDArray[np.intp]) -> dict[str, int]:
+def lost_to(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, int]:
     """Count what pruned the true branch, most first."""
     return dict(
         Counter(frames.measured.killer[k] for k in rows.tolist() if frames.measured.killer[k]).most_common()
@@ -103,7 +103,7 @@ def plains(values: Array) -> list[float | None]:
     return [plain(value) for value in values.tolist()]
 
 
-def _errors(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
+def _errors(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
     told: dict[str, Any] = {measure: {} for measure in TOLD}
     for role in roles_of(frames):
         values = np.stack([frames.error(role, measure)[rows] for measure in TOLD], axis=1) * 1000
@@ -119,7 +119,7 @@ def _errors(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any]:
     return told
 
 
-def events(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Array]:
+def events(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Array]:
     """Return what the first-ranked survivor's probability may be of, 1 or 0 a frame.
 
     That its branch code is the truth's, and that its mean joint error is below 35 mm.
@@ -131,7 +131,7 @@ def events(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Array]:
     }
 
 
-def _calibration(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any] | None:
+def _calibration(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any] | None:
     stated = frames.measured.probability[rows]
     found = {name: reliability(stated, event) for name, event in events(frames, rows).items()}
     told = {
@@ -142,7 +142,7 @@ def _calibration(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any] | Non
     return told or None
 
 
-def _tables(frames: Frames, rows: NDArray[np.intp]) -> dict[str, Any] | None:
+def _tables(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any] | None:
     stated = frames.measured.probability[rows]
     found = {name: reliability(stated, event) for name, event in events(frames, rows).items()}
     told = {

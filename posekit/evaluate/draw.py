@@ -8,8 +8,8 @@ import numpy as np
 
 from posekit.evaluate.condition import numbers, roles_of
 from posekit.evaluate.evaluation import Evaluation
-from posekit.evaluate.frames import Frames
-from posekit.evaluate.scores import THRESHOLDS, correct_poses, reliability
+from posekit.evaluate.frames import EvaluatedFrames
+from posekit.evaluate.scores import THRESHOLDS_METRES, correct_poses, reliability
 from posekit.geometry import Array
 
 
@@ -48,7 +48,7 @@ def write_plots(report: Path, evaluation: Evaluation) -> list[Path]:
         np.array([one["frames_without_survivor"] / one["frames"] for _, one in told]),
     )
     drawn["correct-poses"] = plots.plot_correct_poses(
-        THRESHOLDS * 1000,
+        THRESHOLDS_METRES * 1000,
         {
             key["noise"]: {
                 role: correct_poses(frames.error(role, "worst_pa")[rows]) for role in roles_of(frames)
@@ -66,7 +66,7 @@ def write_plots(report: Path, evaluation: Evaluation) -> list[Path]:
     return [paths[name] for name in drawn]
 
 
-def _over_yaw(frames: Frames) -> tuple[Array, dict[float, dict[str, Array]]]:
+def _over_yaw(frames: EvaluatedFrames) -> tuple[Array, dict[float, dict[str, Array]]]:
     yaws = np.unique(frames.keys["yaw"])
     found: dict[float, dict[str, Array]] = {}
     for key, rows in frames.conditions(("noise", "yaw")):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.measures import align
 
-MEASURES: Final = ("mpjpe", "centred", "pa", "worst", "worst_pa")
+ERROR_NAMES: Final = ("mpjpe", "centred", "pa", "worst", "worst_pa")
 """Mean error of the joints where they are; after moving the middle of the joints onto the truth's; after the similarity
 of `posekit.measures.align`; and the error of the worst joint, where it is and after the similarity."""
 
@@ -19,7 +19,7 @@ AT_ONCE: Final = 50_000
 
 
 def survivor_errors(joints: Array, truth: Array) -> Array:
-    """Return the five `MEASURES` of survivors (N, 5), metres; NaN where nothing is known in both.
+    """Return the five `ERROR_NAMES` of survivors (N, 5), metres; NaN where nothing is known in both.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def survivor_errors(joints: Array, truth: Array) -> Array:
     """
     parts = range(0, len(joints), AT_ONCE)
     found = [_errors(joints[k : k + AT_ONCE], truth[k : k + AT_ONCE]) for k in parts]
-    return np.concatenate(found) if found else np.empty((0, len(MEASURES)))
+    return np.concatenate(found) if found else np.empty((0, len(ERROR_NAMES)))
 
 
 def _errors(joints: Array, truth: Array) -> Array:

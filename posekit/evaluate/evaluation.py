@@ -13,10 +13,10 @@ from multiprocessing import get_context
 from typing import Any
 
 from posekit.errors import InputError
-from posekit.evaluate.frames import Frames
+from posekit.evaluate.frames import EvaluatedFrames
 from posekit.evaluate.material import Material, of_capture, of_view
 from posekit.evaluate.method import Method
-from posekit.evaluate.sampling import Sampling
+from posekit.evaluate.sampling import FrameSampling
 from posekit.evaluate.sweep import Sweep
 from posekit.evaluate.work import Measured, Work, measure
 from posekit.formats.own import View
@@ -32,14 +32,14 @@ class Evaluation:
 
     Parameters
     ----------
-    frames : Frames
+    frames : EvaluatedFrames
         Every frame at every level of noise.
     material : Material
     settings : mapping
         Everything that decided the numbers, of plain values.
     """
 
-    frames: Frames
+    frames: EvaluatedFrames
     material: Material
     settings: dict[str, Any]
 
@@ -47,7 +47,7 @@ class Evaluation:
 def evaluate(
     given: Capture | View,
     *,
-    sampling: Sampling | None = None,
+    sampling: FrameSampling | None = None,
     sweep: Sweep | None = None,
     method: Method | None = None,
     jobs: int = 1,
@@ -60,7 +60,7 @@ def evaluate(
     ----------
     given : Capture or View
         Motion, seen through virtual cameras; or a view with truth, as it is.
-    sampling : Sampling, optional
+    sampling : FrameSampling, optional
         Which frames of a motion.
     sweep : Sweep, optional
         The cameras of a motion.
@@ -81,7 +81,7 @@ def evaluate(
     """
     if jobs < 1:
         raise InputError(f"--jobs: {jobs}; expected one or more processes")
-    sampling, sweep, method = sampling or Sampling(), sweep or Sweep(), method or Method()
+    sampling, sweep, method = sampling or FrameSampling(), sweep or Sweep(), method or Method()
     if isinstance(given, View):
         material = of_view(given, method, source or "view")
         settings = {"source": source or "view", **method.settings()}
@@ -101,7 +101,7 @@ def evaluate(
         for k, measured in _measured(material.works, method, jobs):
             found[k] = measured
             done(len(material.works[k]))
-    frames = Frames.of(material.works, [one for one in found if one is not None], material.actions)
+    frames = EvaluatedFrames.of(material.works, [one for one in found if one is not None], material.actions)
     if not frames.measured.survivors.any() and all(frames.measured.reason):
         raise InputError(f"{settings['source']}: no frame can be recovered: {frames.measured.reason[0]}")
     return Evaluation(frames=frames, material=material, settings=settings)

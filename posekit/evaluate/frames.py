@@ -9,11 +9,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.evaluate.errors import MEASURES
+from posekit.evaluate.errors import ERROR_NAMES
 from posekit.evaluate.work import Measured, Work
 from posekit.geometry import Array
 
-KEYS: Final = ("action", "yaw", "height", "noise")
+CONDITION_KEYS: Final = ("action", "yaw", "height", "noise")
 """What a condition is."""
 
 
@@ -23,7 +23,7 @@ class Condition(NamedTuple):
     Attributes
     ----------
     key : mapping
-        Some of `KEYS`, with their values; None where there is none.
+        Some of `CONDITION_KEYS`, with their values; None where there is none.
     rows : int array
         Its frames.
     """
@@ -33,7 +33,7 @@ class Condition(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frames:
+class EvaluatedFrames:
     """What was found of all frames, a column each.
 
     Parameters
@@ -48,7 +48,7 @@ class Frames:
     measured: Measured
 
     @classmethod
-    def of(cls, works: Sequence[Work], found: Sequence[Measured], actions: Sequence[str]) -> Frames:
+    def of(cls, works: Sequence[Work], found: Sequence[Measured], actions: Sequence[str]) -> EvaluatedFrames:
         """Put the pieces together, in their order."""
         keys = {
             name: np.concatenate([getattr(work, name) for work in works])
@@ -68,10 +68,10 @@ class Frames:
 
     def error(self, role: str, measure: str) -> Array:
         """Return one measure of one role (F,), metres."""
-        return self.measured.errors[role][:, MEASURES.index(measure)]
+        return self.measured.errors[role][:, ERROR_NAMES.index(measure)]
 
     def conditions(self, names: Sequence[str]) -> Iterator[Condition]:
-        """Yield the rows that share some of `KEYS`, ordered by them; all rows where none is named."""
+        """Yield the rows that share some of `CONDITION_KEYS`, ordered by them; all rows where none is named."""
         found: dict[tuple[Any, ...], list[int]] = {}
         columns = [self.keys[name].tolist() for name in names]
         for row in range(len(self)):

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import FigureError, InputError
 from posekit.evaluate.method import Method, of_frames, scaled
-from posekit.evaluate.sampling import Sampling, action_names
+from posekit.evaluate.sampling import FrameSampling, action_names
 from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.work import Work
 from posekit.formats.own import LeeChenModel, OpenCVModel, View
@@ -68,7 +68,7 @@ class _Shots:
     time: Array
 
 
-def of_capture(capture: Capture, sampling: Sampling, sweep: Sweep, method: Method) -> Material:
+def of_capture(capture: Capture, sampling: FrameSampling, sweep: Sweep, method: Method) -> Material:
     """See motion through virtual cameras.
 
     Each clip's lengths are its medians over all its frames; the head is not seen. A frame's noise is one draw, as

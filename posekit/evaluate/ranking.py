@@ -17,7 +17,7 @@ from posekit.recovery.recovery import FrameRecovery
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ranking:
+class SurvivorOrder:
     """The order of one frame's N survivors.
 
     Parameters
@@ -36,21 +36,23 @@ class Ranking:
 class Ranker(Protocol):
     """Orders the survivors of frames of one person."""
 
-    def __call__(self, frames: Sequence[FrameRecovery], figure: Figure) -> Sequence[Ranking]:
+    def __call__(self, frames: Sequence[FrameRecovery], figure: Figure) -> Sequence[SurvivorOrder]:
         """Return one ranking a frame; of a frame without survivors an empty one."""
         ...
 
 
-def by_probability(frames: Sequence[FrameRecovery], figure: Figure) -> list[Ranking]:
+def by_probability(frames: Sequence[FrameRecovery], figure: Figure) -> list[SurvivorOrder]:
     """Rank by probability, of a camera held level (`posekit.ranking.rank`)."""
     if not frames:
         return []
     ranking = ranked(frames, figure.lengths, [frame.spread for frame in frames])
     parts = [ranking.of(k) for k in range(len(frames))]
-    return [Ranking(order=part.order, probability=part.probability) for part in parts]
+    return [SurvivorOrder(order=part.order, probability=part.probability) for part in parts]
 
 
-def first_ranked(rankings: Sequence[Ranking], counts: NDArray[np.intp]) -> tuple[NDArray[np.intp], Array]:
+def first_ranked(
+    rankings: Sequence[SurvivorOrder], counts: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Array]:
     """Return the first survivor of each frame (-1 where there is none), and its probability (NaN where none is given).
 
     Raises

@@ -11,18 +11,18 @@ from typing import Any, Final
 
 from posekit.evaluate.condition import curves, lost_to, numbers
 from posekit.evaluate.evaluation import Evaluation
-from posekit.evaluate.frames import KEYS
+from posekit.evaluate.frames import CONDITION_KEYS
 from posekit.formats.markdown import table_lines
 from posekit.formats.own.npz import suffix
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
 
-SCHEMA: Final = "posekit.evaluation/1"
-SUFFIXES: Final = (".json", ".csv", ".md")
+EVALUATION_SCHEMA: Final = "posekit.evaluation/1"
+REPORT_SUFFIXES: Final = (".json", ".csv", ".md")
 
-FOLLOWED: Final = ("MPJPE path", "PA path", "limbs right: path", "best", "first", "random", "bridged")
+FOLLOWED_COLUMNS: Final = ("MPJPE path", "PA path", "limbs right: path", "best", "first", "random", "bridged")
 """Columns of the tables where sequences are followed."""
 
-GROUPS: Final = {
+CONDITION_GROUPS: Final = {
     "all": (),
     "by_noise": ("noise",),
     "by_action": ("action", "noise"),
@@ -34,7 +34,7 @@ GROUPS: Final = {
 
 def check_evaluation_path(path: str | Path) -> None:
     """Refuse a report's name before the work that it is for is done."""
-    suffix(path, *SUFFIXES)
+    suffix(path, *REPORT_SUFFIXES)
     check_target(path)
 
 
@@ -46,7 +46,7 @@ def write_evaluation(path: str | Path, evaluation: Evaluation) -> None:
     InputError
         Where the name ends otherwise or the file cannot be written.
     """
-    kind = suffix(path, *SUFFIXES)
+    kind = suffix(path, *REPORT_SUFFIXES)
     if kind == ".json":
         head, conditions = document(evaluation)
         write_text(path, json_pieces(head, "conditions", conditions))
@@ -58,7 +58,7 @@ def document(evaluation: Evaluation) -> tuple[dict[str, Any], Iterator[dict[str,
     """Return the JSON's head, and its conditions one by one: action, yaw, height and noise each."""
     frames, material = evaluation.frames, evaluation.material
     head: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": EVALUATION_SCHEMA,
         "settings": {
             **evaluation.settings,
             "versions": {name: version(name) for name in ("posekit", "pin", "coal", "numpy")},
@@ -67,20 +67,20 @@ def document(evaluation: Evaluation) -> tuple[dict[str, Any], Iterator[dict[str,
         "out_of_picture": material.out_of_picture,
         "left_out": list(material.left_out),
     }
-    for name, keys in GROUPS.items():
+    for name, keys in CONDITION_GROUPS.items():
         told = [{**key, **numbers(frames, rows)} for key, rows in frames.conditions(keys)]
         head[name] = told if keys else told[0]
     head["curves"] = [{**key, **curves(frames, rows)} for key, rows in frames.conditions(("noise",))]
     head["truth_lost_to"] = [
         {**key, "by": lost_to(frames, rows)} for key, rows in frames.conditions(("noise",))
     ]
-    return head, ({**key, **numbers(frames, rows)} for key, rows in frames.conditions(KEYS))
+    return head, ({**key, **numbers(frames, rows)} for key, rows in frames.conditions(CONDITION_KEYS))
 
 
 def csv_lines(evaluation: Evaluation) -> Iterator[str]:
     """Yield the lines (RFC 4180): a head, then every condition; what there is none of is empty."""
     head: list[str] = []
-    for key, rows in evaluation.frames.conditions(KEYS):
+    for key, rows in evaluation.frames.conditions(CONDITION_KEYS):
         row = _flat({**key, **numbers(evaluation.frames, rows)})
         if not head:
             head = list(row)
@@ -162,7 +162,7 @@ def _table(name: str, told: list[tuple[str, dict[str, Any]]]) -> list[str]:
                 *(_followed(one) if path else ()),
             ]
         )
-    return table_lines([*head, *(FOLLOWED if path else ())], rows)
+    return table_lines([*head, *(FOLLOWED_COLUMNS if path else ())], rows)
 
 
 def _followed(one: Mapping[str, Any]) -> list[str]:

@@ -13,7 +13,7 @@ from posekit.synthesis import Capture
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampling:
+class FrameSampling:
     """Clips, and frames of each.
 
     Parameters

@@ -12,15 +12,15 @@ from posekit.geometry import Array
 CPS_RANGE: Final = 0.3
 """Metres up to which thresholds go."""
 
-THRESHOLDS: Final = np.arange(301) / 1000.0
+THRESHOLDS_METRES: Final = np.arange(301) / 1000.0
 """Metres at which the curve is told: every millimetre."""
 
-BINS: Final = 10
+N_BINS: Final = 10
 """Bins of probability."""
 
 
 def correct_poses(worst: Array) -> Array:
-    """Return the share of postures all of whose joints are nearer than each of `THRESHOLDS` (301,).
+    """Return the share of postures all of whose joints are nearer than each of `THRESHOLDS_METRES` (301,).
 
     Wandt, Rudolph, Zell, Rhodin & Rosenhahn 2021, "CanonPose: Self-Supervised Monocular 3D Human Pose Estimation in the
     Wild", CVPR, section 4.1: a posture is correct at a threshold if every joint is, after alignment.
@@ -32,9 +32,9 @@ def correct_poses(worst: Array) -> Array:
         correct.
     """
     if not len(worst):
-        return np.full(len(THRESHOLDS), np.nan)
+        return np.full(len(THRESHOLDS_METRES), np.nan)
     known = np.sort(np.where(np.isnan(worst), np.inf, worst))
-    return np.searchsorted(known, THRESHOLDS, side="left") / len(worst)
+    return np.searchsorted(known, THRESHOLDS_METRES, side="left") / len(worst)
 
 
 def correct_poses_score(worst: Array) -> float:
@@ -85,9 +85,9 @@ def reliability(probability: Array, event: Array) -> Reliability | None:
     p, y = probability[stated], event[stated]
     if not len(p):
         return None
-    which = np.minimum((p * BINS).astype(np.intp), BINS - 1)
-    count = np.asarray(np.bincount(which, minlength=BINS), dtype=np.intp)
-    sums = [np.bincount(which, weights=values, minlength=BINS) for values in (p, y)]
+    which = np.minimum((p * N_BINS).astype(np.intp), N_BINS - 1)
+    count = np.asarray(np.bincount(which, minlength=N_BINS), dtype=np.intp)
+    sums = [np.bincount(which, weights=values, minlength=N_BINS) for values in (p, y)]
     mean, share = (np.where(count > 0, each / np.maximum(count, 1), np.nan) for each in sums)
     error = float(np.nansum(count * np.abs(mean - share)) / len(p))
-    return Reliability(error, float(((p - y) ** 2).mean()), np.arange(BINS) / BINS, count, mean, share)
+    return Reliability(error, float(((p - y) ** 2).mean()), np.arange(N_BINS) / N_BINS, count, mean, share)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.evaluate.ranking import Ranking
+from posekit.evaluate.ranking import SurvivorOrder
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery
 from posekit.recovery.sequences import follow_frames
@@ -37,12 +37,12 @@ class Choice:
 class Chooser(Protocol):
     """Follows one person through the frames of one camera that stands still."""
 
-    def __call__(self, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Choice:
+    def __call__(self, frames: Sequence[FrameRecovery], rankings: Sequence[SurvivorOrder]) -> Choice:
         """Choose a posture for each frame; the frames are in order, each with the ranking of its survivors."""
         ...
 
 
-def by_path(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Choice:
+def by_path(frames: Sequence[FrameRecovery], rankings: Sequence[SurvivorOrder]) -> Choice:
     """Choose the cheapest path (`posekit.recovery.sequences.follow`), smoothed where the camera is known.
 
     Probabilities count where the ranking states them.
@@ -60,7 +60,7 @@ def by_path(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Cho
 
 
 def chosen_by(
-    chooser: Chooser, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]
+    chooser: Chooser, frames: Sequence[FrameRecovery], rankings: Sequence[SurvivorOrder]
 ) -> tuple[NDArray[np.intp], Array]:
     """Return what a chooser chooses, checked: survivors (F,), and joints (F, 14, 3) of its own, NaN without.
 

@@ -17,19 +17,19 @@ from posekit.skeleton import JOINT
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.viewpoints import look_at
 
-STEP: Final = 15.0
+CAMERA_STEP_DEGREES: Final = 15.0
 """Degrees between cameras. Wang et al. (2014) do not print theirs; the axis of their Fig. 6 is marked every 20."""
 
-HEIGHTS: Final = (0.5, 1.5, 2.5)
+CAMERA_HEIGHTS_METRES: Final = (0.5, 1.5, 2.5)
 """Metres over the ground: below the hips, at the eyes, above the head."""
 
-SLANTED: Final = 0.3
+MIN_SINE_TO_VERTICAL: Final = 0.3
 """Sine to the vertical below which a line of the body does not tell where it faces."""
 
 MOST_CAMERAS: Final = 10_000
 
 
-class Placed(NamedTuple):
+class SweepCameras(NamedTuple):
     """Where C cameras stand for each of F frames.
 
     Attributes
@@ -71,8 +71,8 @@ class Sweep:
         Where one of them is impossible.
     """
 
-    yaws: tuple[float, ...] = tuple(float(yaw) for yaw in np.arange(0.0, 181.0, STEP))
-    heights: tuple[float, ...] = HEIGHTS
+    yaws: tuple[float, ...] = tuple(float(yaw) for yaw in np.arange(0.0, 181.0, CAMERA_STEP_DEGREES))
+    heights: tuple[float, ...] = CAMERA_HEIGHTS_METRES
     distance: float = 4.0
     f: float = 1500.0
     size: tuple[int, int] = (1920, 1080)
@@ -111,7 +111,7 @@ class Sweep:
         """Yaw (degrees) and height (metres) of each camera (C, 2)."""
         return np.array([(yaw, height) for yaw in self.yaws for height in self.heights])
 
-    def place(self, middle: Array, forward: Array, up: Array, ground: float) -> Placed:
+    def place(self, middle: Array, forward: Array, up: Array, ground: float) -> SweepCameras:
         """Place all cameras around each frame, looking at the middle of the body.
 
         Parameters
@@ -139,7 +139,7 @@ class Sweep:
         beside = np.cos(yaw)[:, None, None] * forward + np.sin(yaw)[:, None, None] * left
         away = np.sqrt(self.distance**2 - above**2)
         position = middle + away[..., None] * beside + above[..., None] * up
-        return Placed(look_at(position, np.broadcast_to(middle, position.shape), up), position)
+        return SweepCameras(look_at(position, np.broadcast_to(middle, position.shape), up), position)
 
 
 def facing(joints: Array, up: Array) -> Array:
@@ -158,7 +158,7 @@ def facing(joints: Array, up: Array) -> Array:
     flat: NDArray[np.bool_] = np.zeros(len(joints), dtype=np.bool_)
     for way in (cross(unit(hips), upward), cross(unit(shoulders), upward), unit(spine), spare):
         level = way - (way @ up)[:, None] * up
-        take = ~flat & (np.linalg.norm(level, axis=1) > SLANTED)
+        take = ~flat & (np.linalg.norm(level, axis=1) > MIN_SINE_TO_VERTICAL)
         found[take] = unit(level[take])
         flat |= take
     return found

@@ -11,9 +11,9 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES
 from posekit.tree import Leaves
 
-DEPTH: Final = len(JOINTS) - 1
+TREE_DEPTH: Final = len(JOINTS) - 1
 
-LIMBS: Final = tuple(
+LIMB_CHOICES: Final = tuple(
     tuple(JOINT[f"{side}_{joint}"] for joint in limb)
     for limb in (("elbow", "wrist"), ("knee", "ankle"))
     for side in SIDES
@@ -62,7 +62,7 @@ def true_branch(leaves: Leaves, truth: Array) -> TrueBranch:
         lost_at[(lost_at == 0) & ~reached] = joint
         bits[:, joint] = np.argmin(np.where(np.isnan(away), np.inf, away), axis=1)
         path[:, joint] = both[:, 0] + bits[:, joint]
-    code = (bits[:, 1:] << np.arange(DEPTH - 1, -1, -1)).sum(axis=1).astype(np.int32)
+    code = (bits[:, 1:] << np.arange(TREE_DEPTH - 1, -1, -1)).sum(axis=1).astype(np.int32)
     return TrueBranch(np.where(lost_at > 0, -1, code).astype(np.int32), known, lost_at)
 
 
@@ -76,10 +76,10 @@ def limbs_right(code: NDArray[np.int32], true: NDArray[np.int32]) -> Array:
     """
     differs = np.asarray(code) ^ np.asarray(true)
     right = np.zeros(len(differs))
-    for limb in LIMBS:
-        bits = sum(1 << (DEPTH - joint) for joint in limb)
+    for limb in LIMB_CHOICES:
+        bits = sum(1 << (TREE_DEPTH - joint) for joint in limb)
         right += (differs & bits) == 0
-    return np.where(true < 0, np.nan, right / len(LIMBS))
+    return np.where(true < 0, np.nan, right / len(LIMB_CHOICES))
 
 
 def killers(leaves: Leaves, true: TrueBranch) -> list[str]:
@@ -89,7 +89,7 @@ def killers(leaves: Leaves, true: TrueBranch) -> list[str]:
         found[hypothesis] = f"lengths/{JOINTS[true.lost_at[hypothesis]]}"
     for group in leaves.pruned:
         code = true.code[group.frame]
-        hit = np.flatnonzero((code >= 0) & (code >> (DEPTH - group.level) == group.code))
+        hit = np.flatnonzero((code >= 0) & (code >> (TREE_DEPTH - group.level) == group.code))
         for k in hit.tolist():
             found[int(group.frame[k])] = f"{group.check}/{group.where[group.place[k]]}"
     return [one if known else "" for one, known in zip(found, true.known.tolist(), strict=True)]

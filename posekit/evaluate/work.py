@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
-from posekit.evaluate.certificate import Certificate, certify
+from posekit.evaluate.certificate import SurvivorCertificate, certify
 from posekit.evaluate.errors import best_of_frames, best_rows, of_chosen, survivor_errors
 from posekit.evaluate.method import Method, figure_of
-from posekit.evaluate.ranking import Ranking, first_ranked
+from posekit.evaluate.ranking import SurvivorOrder, first_ranked
 from posekit.evaluate.sequences import chosen_by
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.formats.own import ScaledOrthographicModel, View
@@ -75,7 +75,7 @@ class Measured:
     ----------
     survivors : int array (F,)
     errors : mapping of str to array (F, 5)
-        By `ROLES`: `posekit.evaluate.errors.MEASURES`, metres.
+        By `ROLES`: `posekit.evaluate.errors.ERROR_NAMES`, metres.
     branch : array (F,)
         1 where a survivor has the truth's branch code, 0 where none has, NaN where the truth has none to be known.
     limbs : mapping of str to array (F,)
@@ -90,7 +90,7 @@ class Measured:
         How many survivors were certified (``all``), and how many of them break the person's ``lengths``, and the
         ``ranges``.
     excess : mapping of str to array (F,)
-        The worst of them (`Certificate`): ``length``, metres; ``angle`` and ``turned``, degrees.
+        The worst of them (`SurvivorCertificate`): ``length``, metres; ``angle`` and ``turned``, degrees.
     killer : list of str
         What pruned the true branch.
     reason : list of str
@@ -184,7 +184,7 @@ def _drawn(counts: NDArray[np.intp], rng: np.random.Generator) -> NDArray[np.int
 
 
 def _followed(
-    work: Work, method: Method, frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]
+    work: Work, method: Method, frames: Sequence[FrameRecovery], rankings: Sequence[SurvivorOrder]
 ) -> tuple[NDArray[np.intp], Array]:
     """Let each camera's frames be followed in order: survivors (F,), and where the person is then (F, 14, 3)."""
     chosen = np.full(len(frames), -1, dtype=np.intp)
@@ -248,7 +248,7 @@ def _certified(
     """Certify some survivors of every frame."""
     ranges = method.table if "joint-range" in method.checks else None
     count = {name: np.zeros(len(frames), dtype=np.intp) for name in ("all", "lengths", "ranges")}
-    worst = {name: np.full(len(frames), np.nan) for name in Certificate._fields}
+    worst = {name: np.full(len(frames), np.nan) for name in SurvivorCertificate._fields}
     by_tolerance: dict[Tolerance, list[int]] = {}
     for k, frame in enumerate(frames):
         if frame.tolerance is not None and len(frame):

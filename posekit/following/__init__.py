@@ -5,11 +5,11 @@ tells lengths by how the sequence moves, `smooth` smooths the distances of a pat
 """
 
 from posekit.following.beam import Beam as Beam
-from posekit.following.best_paths import APART as APART
+from posekit.following.best_paths import PATH_SEPARATION_METRES as PATH_SEPARATION_METRES
 from posekit.following.best_paths import best_paths as best_paths
 from posekit.following.bridging import bridge as bridge
-from posekit.following.follower import Estimate as Estimate
 from posekit.following.follower import Follower as Follower
+from posekit.following.follower import LiveEstimate as LiveEstimate
 from posekit.following.following import Following as Following
 from posekit.following.frame import SurvivorFrame as SurvivorFrame
 from posekit.following.motion_model import MotionModel as MotionModel

@@ -11,12 +11,12 @@ from posekit.compiled.compiling import is_fast
 from posekit.following import fast, plain
 from posekit.following.beam import Beam
 from posekit.following.channels import Channels
-from posekit.following.floors import Floors, Found
+from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
 from posekit.geometry import Array
 
-WORTH: Final = 2500
+PAIRS_PER_TREE_GROWN: Final = 2500
 """Pairs of an end and a survivor that take as long, without compiled loops, as growing a frame's tree does."""
 
 
@@ -29,7 +29,7 @@ def arrivals(
     *,
     model: MotionModel,
     beam: Beam,
-) -> Found:
+) -> Arrivals:
     """Find the cheapest way from each last survivor to each new one.
 
     Those that cost less than all ways that are left out, and as many as the beam is wide, are always among them.
@@ -51,11 +51,11 @@ def arrivals(
     """
     floors = Floors.of(states, channels, time, own, model)
     least = 0 if floors.moving else len(own)
-    find = fast.find if is_fast(len(states) * len(own) // WORTH) else plain.find
+    find = fast.find if is_fast(len(states) * len(own) // PAIRS_PER_TREE_GROWN) else plain.find
     width = max(beam.width, least)
     found = find(states, channels, time, own, new, floors, model=model, beam=beam, width=width)
     came, went, cost, dropped = found
     order = np.lexsort((went, came))
     came, went, cost = came[order], went[order], cost[order]
     kept, lost = beam.keep(cost, states.fresh[came] | new[went], least=least)
-    return Found(came[kept], went[kept], cost[kept], min(dropped, lost))
+    return Arrivals(came[kept], went[kept], cost[kept], min(dropped, lost))

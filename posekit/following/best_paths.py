@@ -13,11 +13,11 @@ from posekit.following.beam import Beam
 from posekit.following.frame import SurvivorFrame, check_frames
 from posekit.following.motion_model import MotionModel
 from posekit.following.paths import Paths, joints_of
-from posekit.following.search import Step, advance, trace
+from posekit.following.search import PathStep, advance, trace
 from posekit.following.states import States
 from posekit.geometry import Array
 
-APART = 0.25
+PATH_SEPARATION_METRES = 0.25
 """Metres by which a joint must differ for a path to be another one, unless told otherwise."""
 
 
@@ -27,7 +27,7 @@ def best_paths(
     k: int = 1,
     model: MotionModel | None = None,
     beam: Beam | None = None,
-    apart: float = APART,
+    apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> Paths:
     """Find the cheapest paths through the survivors of a sequence.
@@ -117,7 +117,7 @@ def _cheapest(
     tell: Callable[[int], None],
 ) -> tuple[float, NDArray[np.intp], float] | None:
     """Find the cheapest path, of fresh ones where it is said what is new: cost, survivors, cheapest end dropped."""
-    states, steps = States.start(), list[Step]()
+    states, steps = States.start(), list[PathStep]()
     for k, frame in enumerate(frames):
         states, step = advance(states, frame, model, beam, fresh=None if new is None else new[k])
         steps.append(step)

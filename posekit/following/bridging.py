@@ -17,7 +17,7 @@ from posekit.following.channels import directions
 from posekit.geometry import Array
 from posekit.skeleton import TREE_SEGMENTS
 
-COASTING: Final = 0.2
+COASTING_SECONDS: Final = 0.2
 """Seconds for which the neck keeps its velocity where nothing is known any more; then it stands."""
 
 
@@ -79,11 +79,11 @@ def _moving(time: Array, points: Array) -> Array:
     filled = points.copy()
     filled[rows] = points[before] + part[:, None] * (points[after] - points[before])
     for edge, outside in ((known[0], rows < known[0]), (known[-1], rows > known[-1])):
-        near = known[np.abs(time[known] - time[edge]) <= COASTING]
+        near = known[np.abs(time[known] - time[edge]) <= COASTING_SECONDS]
         if len(near) > 1 and outside.any():
             first, last = near[0], near[-1]
             velocity = (points[last] - points[first]) / (time[last] - time[first])
-            away = np.clip(time[rows[outside]] - time[edge], -COASTING, COASTING)
+            away = np.clip(time[rows[outside]] - time[edge], -COASTING_SECONDS, COASTING_SECONDS)
             filled[rows[outside]] = points[edge] + away[:, None] * velocity
     return filled
 

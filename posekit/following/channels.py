@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 
-START: Final = np.array([start for start, _ in TREE_SEGMENTS])
-END: Final = np.array([end for _, end in TREE_SEGMENTS])
+SEGMENT_STARTS: Final = np.array([start for start, _ in TREE_SEGMENTS])
+SEGMENT_ENDS: Final = np.array([end for _, end in TREE_SEGMENTS])
 N_JOINTS: Final = len(JOINTS)
 N_SEGMENTS: Final = len(TREE_SEGMENTS)
 N_CHANNELS: Final = N_JOINTS + N_SEGMENTS
@@ -51,7 +51,7 @@ class Channels:
 
 def directions(joints: Array) -> tuple[Array, Array]:
     """Return the unit vectors (..., 13, 3) along the tree's segments and their lengths (..., 13); NaN if not known."""
-    along = joints[..., END, :] - joints[..., START, :]
+    along = joints[..., SEGMENT_ENDS, :] - joints[..., SEGMENT_STARTS, :]
     length = np.linalg.norm(along, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         unit = along / length[..., None]
@@ -63,7 +63,7 @@ def channels_of(joints: Array, deviation: Array) -> Channels:
     unit, length = directions(joints)
     variance = deviation**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        turned = (variance[:, START] + variance[:, END]) / length**2
+        turned = (variance[:, SEGMENT_STARTS] + variance[:, SEGMENT_ENDS]) / length**2
     value = np.concatenate([joints, unit], axis=1).transpose(1, 0, 2)
     known = np.isfinite(value).all(axis=-1)
     spread = np.concatenate([variance, turned], axis=1).T

@@ -11,18 +11,18 @@ from posekit.compiled import path_kernels as kernels
 from posekit.compiled.compiling import compiled
 from posekit.following.beam import Beam
 from posekit.following.channels import Channels
-from posekit.following.floors import Floors, Found
+from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
 from posekit.following.transitions import RESTING_NU
 from posekit.geometry import Array
 
-ORDER: Final = np.array(
+CHANNEL_ORDER: Final = np.array(
     [0, 3, 12, 13, 8, 9, 10, 11, 6, 7, 1, 2, 4, 5, 25, 26, 23, 24, 21, 22, 19, 20, 14, 15, 16, 17, 18]
 )
 """Channels as they are asked: first those that most often tell that a survivor is too far off."""
 
-PLACE: Final = np.argsort(ORDER)
+CHANNEL_RANKS: Final = np.argsort(CHANNEL_ORDER)
 """Where each channel is then."""
 
 
@@ -37,7 +37,7 @@ def find(
     model: MotionModel,
     beam: Beam,
     width: int,
-) -> Found:
+) -> Arrivals:
     """Find the cheapest way from each last survivor to each new one; see `posekit.following.plain.find`."""
     loops: Any = compiled(kernels)
     order = np.lexsort((states.cost + floors.turns, states.group))
@@ -51,7 +51,7 @@ def find(
     ends = _laid(
         loops,
         order,
-        ORDER,
+        CHANNEL_ORDER,
         states.position,
         channels.centre,
         since**-2.0,
@@ -60,7 +60,9 @@ def find(
         give[0],
     )
     known = channels.known.astype(np.float64)
-    survivors = _laid(loops, ahead, ORDER, channels.value, channels.centre, channels.variance, give[1], known)
+    survivors = _laid(
+        loops, ahead, CHANNEL_ORDER, channels.value, channels.centre, channels.variance, give[1], known
+    )
     joints = np.flatnonzero(np.isfinite(np.asarray(model.acceleration)) & floors.moving)
     weight = floors.heading.weight / np.asarray(model.acceleration)[:, None] ** 2
     noise = weight * floors.heading.variance
@@ -82,7 +84,7 @@ def find(
         floors.to[ahead],
         floors.to_turns[ahead],
         new[ahead],
-        PLACE[joints],
+        CHANNEL_RANKS[joints],
         _narrowness(model.usual),
         _narrowness(model.at_rest),
         model.nu,
@@ -93,7 +95,7 @@ def find(
         went,
     )
     kinds = [slice(None, n) for n in count.tolist()]
-    return Found(
+    return Arrivals(
         order[np.concatenate([came[k, some] for k, some in enumerate(kinds)])],
         ahead[np.concatenate([went[k, some] for k, some in enumerate(kinds)])],
         np.concatenate([cost[k, some] for k, some in enumerate(kinds)]),
@@ -104,7 +106,7 @@ def find(
 def _narrowness(scale: Array) -> Array:
     """Return one over the squares of scales (27,), in the order in which channels are asked."""
     with np.errstate(divide="ignore"):
-        return np.asarray(scale[ORDER] ** -2.0)
+        return np.asarray(scale[CHANNEL_ORDER] ** -2.0)
 
 
 def _laid(

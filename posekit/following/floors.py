@@ -22,7 +22,7 @@ from posekit.following.states import Heading, States
 from posekit.geometry import Array
 
 
-class Found(NamedTuple):
+class Arrivals(NamedTuple):
     """Paths that go on to a survivor, one for each pair of a last survivor and a new one.
 
     Attributes

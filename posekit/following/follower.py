@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.following.beam import Beam
-from posekit.following.bridging import COASTING, bridge
+from posekit.following.bridging import COASTING_SECONDS, bridge
 from posekit.following.frame import SurvivorFrame, check_order
 from posekit.following.motion_model import MotionModel
-from posekit.following.search import Step, advance
+from posekit.following.search import PathStep, advance
 from posekit.following.states import States
 from posekit.geometry import Array
 
-LIVE = Beam(width=128, survivors=1024)
+LIVE_BEAM = Beam(width=128, survivors=1024)
 """Which paths are followed live, unless told otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Estimate:
+class LiveEstimate:
     """One frame of the path, as far as it was known `lag` frames later.
 
     Parameters
@@ -68,7 +68,7 @@ class Follower:
         Frames, zero or more.
     model : MotionModel, optional
     beam : Beam, optional
-        Which paths are followed: `LIVE` unless told otherwise.
+        Which paths are followed: `LIVE_BEAM` unless told otherwise.
 
     Raises
     ------
@@ -92,15 +92,15 @@ class Follower:
             raise InputError(f"lag is {lag!r}; expected a number of frames, zero or more")
         self.lag = lag
         self.model = model or MotionModel()
-        self.beam = beam or LIVE
+        self.beam = beam or LIVE_BEAM
         self._states = States.start()
         self._frames: deque[SurvivorFrame] = deque()
-        self._steps: deque[Step] = deque()
+        self._steps: deque[PathStep] = deque()
         self._known: list[tuple[float, Array]] = []
         self._last = -np.inf
         self._first = 0
 
-    def push(self, frame: SurvivorFrame) -> Estimate | None:
+    def push(self, frame: SurvivorFrame) -> LiveEstimate | None:
         """Take the next frame; return the estimate of the one `lag` before, or None while there is none.
 
         Raises
@@ -115,11 +115,11 @@ class Follower:
         self._steps.append(step)
         return self._tell()[0] if len(self._frames) > self.lag else None
 
-    def finish(self) -> list[Estimate]:
+    def finish(self) -> list[LiveEstimate]:
         """Return the estimates of the frames that are left. More frames may follow, after these."""
         return self._tell(every=True) if self._frames else []
 
-    def _tell(self, *, every: bool = False) -> list[Estimate]:
+    def _tell(self, *, every: bool = False) -> list[LiveEstimate]:
         """Estimate the oldest frame that was not told yet, or all."""
         survivors, leads = self._trace()
         count = len(survivors) if every else 1
@@ -139,7 +139,7 @@ class Follower:
             joints, unseen = whole[k].copy(), missing[k].copy()
             joints.flags.writeable = unseen.flags.writeable = False
             estimates.append(
-                Estimate(
+                LiveEstimate(
                     frame=self._first,
                     time=frame.time,
                     survivor=int(survivors[k]),
@@ -169,7 +169,7 @@ class Follower:
         lacking = np.ones(len(joints), dtype=np.bool_)
         for at, place in reversed(self._known):
             found = ~np.isnan(place[:, 0])
-            if at >= time - COASTING or (found & lacking).any():
+            if at >= time - COASTING_SECONDS or (found & lacking).any():
                 needed.append((at, place))
             lacking &= ~found
         self._known = needed[::-1]

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.following.best_paths import APART
+from posekit.following.best_paths import PATH_SEPARATION_METRES
 from posekit.following.smoothing import smooth
 from posekit.following.switches import Switch, switches_of
 from posekit.geometry import Array
@@ -59,7 +59,7 @@ class Following:
     branches: tuple[tuple[str, ...], ...]
     scale: Array | None
     exact: bool
-    apart: float = APART
+    apart: float = PATH_SEPARATION_METRES
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

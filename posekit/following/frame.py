@@ -12,10 +12,10 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 
-FARTHEST = 1e6
+MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a joint is taken for a mistake."""
 
-VAGUEST = 1e3
+MAX_DEVIATION_METRES = 1e3
 """Metres beyond which a deviation is."""
 
 
@@ -68,9 +68,11 @@ class SurvivorFrame:
                 f"{where}: joints have shape {joints.shape}; expected (N, {len(JOINTS)}, 3), metres"
             )
         partly = np.asarray(np.isnan(joints).any(axis=2))
-        if (np.abs(np.where(partly[..., None], 0.0, joints)) > FARTHEST).any() or np.isinf(joints).any():
+        if (np.abs(np.where(partly[..., None], 0.0, joints)) > MAX_COORDINATE_METRES).any() or np.isinf(
+            joints
+        ).any():
             raise InputError(
-                f"{where}: a joint is farther than {FARTHEST:g} m; expected metres, NaN where not known"
+                f"{where}: a joint is farther than {MAX_COORDINATE_METRES:g} m; expected metres, NaN where not known"
             )
         joints[partly] = np.nan
         n = len(joints)
@@ -81,8 +83,10 @@ class SurvivorFrame:
             )
         deviation = _filled("deviation", self.deviation, (n, len(JOINTS)), where)
         deviation[partly] = 0.0
-        if not ((deviation >= 0) & (deviation <= VAGUEST)).all():
-            raise InputError(f"{where}: a deviation is negative, NaN or above {VAGUEST:g} m; expected metres")
+        if not ((deviation >= 0) & (deviation <= MAX_DEVIATION_METRES)).all():
+            raise InputError(
+                f"{where}: a deviation is negative, NaN or above {MAX_DEVIATION_METRES:g} m; expected metres"
+            )
         branches = tuple(self.branches)
         if branches and len(branches) != n:
             raise InputError(

@@ -14,7 +14,7 @@ from posekit.errors import InputError
 from posekit.following.channels import N_JOINTS, N_SEGMENTS
 from posekit.geometry import Array
 
-ACCELERATION: Final = (5.0,) * 6 + (7.0, 7.0, 10.0, 10.0, 8.0, 8.0, 11.0, 11.0)
+USUAL_ACCELERATION: Final = (5.0,) * 6 + (7.0, 7.0, 10.0, 10.0, 8.0, 8.0, 11.0, 11.0)
 """Metres a second squared, by joint: about the 75th to 90th percentile over basketball, soccer, jumping and signals in
 the CMU Graphics Lab Motion Capture Database at 30 Hz."""
 
@@ -80,7 +80,7 @@ class MotionModel:
 
     speed: ArrayLike = 6.0
     swing: ArrayLike = 6.0
-    acceleration: ArrayLike = ACCELERATION
+    acceleration: ArrayLike = USUAL_ACCELERATION
     resting: ArrayLike = field(default_factory=_ankles)
     max_speed: ArrayLike = MAX_SPEED
     max_swing: ArrayLike = MAX_SWING

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from posekit.compiled.path_kernels import TIGHT
 from posekit.following.beam import Beam
 from posekit.following.channels import N_CHANNELS, Channels
-from posekit.following.floors import Floors, Found
+from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
 from posekit.following.transitions import Target, step_costs, turn_costs
 from posekit.geometry import Array
 
-BLOCK: Final = 1 << 21
+MAX_BLOCK_NUMBERS: Final = 1 << 21
 """Numbers of one matrix held at once: 16 MB."""
 
-PROBES: Final = 8
+N_PROBED_ENDS: Final = 8
 """Ends of paths whose turns are charged first: the cheapest of them bounds what is worth looking at."""
 
 
@@ -34,24 +34,24 @@ def find(
     model: MotionModel,
     beam: Beam,
     width: int,
-) -> Found:
+) -> Arrivals:
     """Find the cheapest way from each last survivor to each new one.
 
     Parameters are those of `posekit.following.arrivals.arrivals`; of paths of either kind, fresh or not, at least the
     `width` cheapest are among those found, if they are within the beam's slack.
     """
     target = Target.of(channels, time)
-    search = _Search(target, own, new, floors, model, beam, width)
+    search = _ArrivalSearch(target, own, new, floors, model, beam, width)
     groups = _groups(states, floors)
     sizes = np.cumsum([0, *(len(group) for group in groups)])
-    for start, end in _blocks(sizes, max(1, BLOCK // (N_CHANNELS * len(own)))):
+    for start, end in _blocks(sizes, max(1, MAX_BLOCK_NUMBERS // (N_CHANNELS * len(own)))):
         rows = np.concatenate(groups[start:end])
         begins = sizes[start:end] - sizes[start]
         search.add(states.take(rows), rows, begins)
     return search.found()
 
 
-class _Search:
+class _ArrivalSearch:
     """What was found, and what a path may cost at most to be wanted."""
 
     def __init__(
@@ -108,7 +108,7 @@ class _Search:
         total += low
         for kind in np.unique(fresh).astype(int).tolist():
             lowest = np.where(fresh == kind, total, np.inf).min(axis=1)
-            probes = np.argsort(lowest)[:PROBES]
+            probes = np.argsort(lowest)[:N_PROBED_ENDS]
             probed = total[probes] - low[probes] + turn_costs(part.take(probes), target, self.model)
             cheapest = probed[fresh[probes] == kind].min(initial=np.inf)
             self.most[kind] = min(self.most[kind], cheapest + self.slack)
@@ -129,10 +129,10 @@ class _Search:
                 self.most[kind] = min(self.most[kind], float(costs.min()) + self.slack)
             self.cheapest[kind] = costs
 
-    def found(self) -> Found:
+    def found(self) -> Arrivals:
         """Return what was found."""
         came, went, cost = (np.concatenate(each) for each in zip(*self.parts, strict=True))
-        return Found(came, went, cost, self.dropped)
+        return Arrivals(came, went, cost, self.dropped)
 
 
 def _groups(states: States, floors: Floors) -> list[NDArray[np.intp]]:

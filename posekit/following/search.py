@@ -23,12 +23,12 @@ from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
 from posekit.geometry import Array
 
-ABSENT: Final = 5.0
+MISSING_JOINT_COST: Final = 5.0
 """Cost of each joint that a survivor does not know and another of its frame does."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Step:
+class PathStep:
     """How the ends of paths after a frame came about.
 
     Parameters
@@ -53,7 +53,7 @@ def advance(
     beam: Beam,
     *,
     fresh: NDArray[np.bool_] | None = None,
-) -> tuple[States, Step]:
+) -> tuple[States, PathStep]:
     """Go on by one frame.
 
     Parameters
@@ -74,7 +74,7 @@ def advance(
         least = 0 if np.isfinite(states.interval).any() else len(frame) + 1
         rows, lost = beam.keep(skipped, states.fresh, least=least)
         passed = replace(states, cost=skipped).take(rows)
-        return passed, Step(parent=rows, survivor=np.full(len(rows), -1), dropped=min(dropped, lost))
+        return passed, PathStep(parent=rows, survivor=np.full(len(rows), -1), dropped=min(dropped, lost))
     if len(usable) < len(frame):
         channels = channels.take(usable)
     new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
@@ -95,14 +95,14 @@ def advance(
     after = replace(after, group=states.group.max() + 1 + 2 * went + after.fresh)
     if len(stayed):
         after = States.join(after, replace(states, cost=skipped).take(stayed))
-    return after, Step(
+    return after, PathStep(
         parent=np.concatenate([came, stayed]),
         survivor=np.concatenate([usable[went], np.full(len(stayed), -1)]),
         dropped=min(dropped, left_out, lost),
     )
 
 
-def trace(steps: Sequence[Step], end: int) -> NDArray[np.intp]:
+def trace(steps: Sequence[PathStep], end: int) -> NDArray[np.intp]:
     """Return the survivors of the path that ends in a state, the first frame's first; -1 for frames passed over."""
     path = np.empty(len(steps), dtype=np.intp)
     for k in range(len(steps) - 1, -1, -1):
@@ -114,7 +114,7 @@ def trace(steps: Sequence[Step], end: int) -> NDArray[np.intp]:
 def _absence(channels: Channels) -> Array:
     """Charge survivors (N,) for what others of their frame know."""
     known = channels.known
-    return np.asarray(ABSENT * (known.any(axis=1, keepdims=True) & ~known).sum(axis=0))
+    return np.asarray(MISSING_JOINT_COST * (known.any(axis=1, keepdims=True) & ~known).sum(axis=0))
 
 
 def _move(old: States, to: Channels, cost: Array, time: float, new: NDArray[np.bool_]) -> States:

@@ -16,14 +16,14 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
 from posekit.following.channels import directions
-from posekit.following.motion_model import ACCELERATION
+from posekit.following.motion_model import USUAL_ACCELERATION
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 
-CORRELATION: Final = 0.05
+ACCELERATION_CORRELATION_SECONDS: Final = 0.05
 """Seconds over which an acceleration lasts: q is its square times this."""
 
-LEAST: Final = 1e-4
+MIN_DEVIATION_METRES: Final = 1e-4
 """Metres: least deviation."""
 
 
@@ -32,7 +32,7 @@ def smooth(
     joints: ArrayLike,
     deviation: ArrayLike,
     *,
-    acceleration: ArrayLike = ACCELERATION,
+    acceleration: ArrayLike = USUAL_ACCELERATION,
     root_alone: bool = False,
 ) -> tuple[Array, Array]:
     """Smooth a path's distances from the camera, keeping every segment's length in every frame.
@@ -81,12 +81,12 @@ def smooth(
     count = 1 if root_alone else len(JOINTS)
     distance = np.linalg.norm(path, axis=2)
     known = np.isfinite(distance) & (distance > 0)
-    variance = np.where(known, np.maximum(given, LEAST) ** 2, np.inf)
+    variance = np.where(known, np.maximum(given, MIN_DEVIATION_METRES) ** 2, np.inf)
     smoothed, spread = rts(
         times,
         np.where(known, distance, 0.0)[:, :count],
         variance[:, :count],
-        CORRELATION * sudden[:count] ** 2,
+        ACCELERATION_CORRELATION_SECONDS * sudden[:count] ** 2,
     )
     ratio = np.where(known[:, :count], smoothed / np.where(known[:, :count], distance[:, :count], 1.0), 1.0)
     moved = path.copy()

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posekit.following.channels import END, directions
+from posekit.following.channels import SEGMENT_ENDS, directions
 from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES
 
@@ -59,7 +59,7 @@ def elevations(joints: Array, *, perspective: bool = True) -> Array:
     unit, _ = directions(joints)
     if not perspective:
         return np.asarray(np.arcsin(np.clip(unit[..., 2], -1, 1)))
-    end = joints[..., END, :]
+    end = joints[..., SEGMENT_ENDS, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         ray = end / np.linalg.norm(end, axis=-1, keepdims=True)
     return np.asarray(np.arcsin(np.clip((unit * ray).sum(axis=-1), -1, 1)))

@@ -5,9 +5,9 @@ joints beyond it and the checks leave a part of it: a point, an arc, a region of
 """
 
 from posekit.hidden.complete import complete as complete
-from posekit.hidden.completion import Completion as Completion
-from posekit.hidden.completion import Kind as Kind
-from posekit.hidden.completion import Outcome as Outcome
+from posekit.hidden.completion import CompletedSurvivors as CompletedSurvivors
+from posekit.hidden.completion import CompletionOutcome as CompletionOutcome
+from posekit.hidden.completion import PositionKind as PositionKind
 from posekit.hidden.completion import Region as Region
 from posekit.hidden.rejecting import reject as reject
-from posekit.hidden.settings import Sampling as Sampling
+from posekit.hidden.settings import OcclusionSampling as OcclusionSampling

@@ -14,12 +14,12 @@ from posekit.tree import Check, Findings
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-ARM = 0.3
+METRES_PER_RADIAN = 0.3
 """Metres for a radian: what makes violations in metres and in degrees comparable."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rows:
+class PostureRows:
     """N postures, each point of which stands in a table of its own.
 
     Parameters
@@ -33,14 +33,14 @@ class Rows:
     columns: Mapping[int, tuple[Array, Index | None]]
 
     @staticmethod
-    def of(points: Array, index: Index | None = None) -> Rows:
+    def of(points: Array, index: Index | None = None) -> PostureRows:
         """Take all points of postures (k, P, 3), or of some of them."""
         count = len(points) if index is None else len(index)
-        return Rows(count=count, columns={p: (points[:, p], index) for p in range(points.shape[1])})
+        return PostureRows(count=count, columns={p: (points[:, p], index) for p in range(points.shape[1])})
 
-    def with_(self, columns: Mapping[int, tuple[Array, Index | None]]) -> Rows:
+    def with_(self, columns: Mapping[int, tuple[Array, Index | None]]) -> PostureRows:
         """Replace some points."""
-        return Rows(count=self.count, columns={**self.columns, **columns})
+        return PostureRows(count=self.count, columns={**self.columns, **columns})
 
     def take(self, points: Sequence[int], rows: Index) -> Array:
         """Place some points in some rows (len(rows), len(points), 3)."""
@@ -51,7 +51,7 @@ class Rows:
         return placed
 
 
-def ask(checks: Sequence[Check], rows: Rows) -> tuple[Mask, Array]:
+def ask(checks: Sequence[Check], rows: PostureRows) -> tuple[Mask, Array]:
     """Ask checks one after the other, each about the rows that passed so far.
 
     Returns
@@ -59,8 +59,8 @@ def ask(checks: Sequence[Check], rows: Rows) -> tuple[Mask, Array]:
     alive : bool array (N,)
         The rows that no check rejects.
     violation : array (N,)
-        How far, in radians, a row is outside the first bound that rejected it, metres counted as `ARM`; 0 where
-        none did. A hint where to look closer, never a proof.
+        How far, in radians, a row is outside the first bound that rejected it, metres counted as `METRES_PER_RADIAN`;
+        0 where none did. A hint where to look closer, never a proof.
     """
     violation = np.zeros(rows.count)
     left: Index = np.arange(rows.count)
@@ -79,5 +79,5 @@ def ask(checks: Sequence[Check], rows: Rows) -> tuple[Mask, Array]:
 
 def _violation(findings: Findings, unit: str) -> Array:
     outside = np.fmax.reduce(np.where(findings.violated, -findings.margin, 0.0), axis=1)
-    scale = {"deg": np.pi / 180.0, "m": 1.0 / ARM}.get(unit, 1.0)
+    scale = {"deg": np.pi / 180.0, "m": 1.0 / METRES_PER_RADIAN}.get(unit, 1.0)
     return np.asarray(np.maximum(outside * scale, np.finfo(np.float64).tiny))

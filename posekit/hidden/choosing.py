@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Mask, Rows, ask
+from posekit.hidden.asking import Mask, PostureRows, ask
 from posekit.hidden.groups import mean
 from posekit.hidden.party import Party, Way
 from posekit.hidden.together import choose
@@ -49,7 +49,7 @@ def representatives(party: Party) -> tuple[Array, Mask]:
         for way, here, row in zip(party.sets, rows, chosen, strict=True):
             for joint in party.plan.free(way.limb):
                 base[ok, joint] = way.position(joint)[here[row[ok]]]
-        passed, _ = ask(party.plan.asked, Rows.of(base[ok]))
+        passed, _ = ask(party.plan.asked, PostureRows.of(base[ok]))
         good = np.flatnonzero(ok)[passed]
         postures[left[good]] = base[good]
         found[left[good]] = True

@@ -14,8 +14,8 @@ from posekit.hidden.lattices import circle
 from posekit.hidden.rays import Rays
 from posekit.skeleton import HIPS, JOINT, segment_name
 
-PELVIS, RIGHT, LEFT = (JOINT[name] for name in HIPS)
-HALVINGS = 50
+PELVIS_JOINT, RIGHT_HIP, LEFT_HIP = (JOINT[name] for name in HIPS)
+N_BISECTIONS = 50
 """Of the angle between two samples: to rounding."""
 
 
@@ -44,8 +44,8 @@ def closing_angles(
     angle : array (K,)
         Radians.
     """
-    reach = [figure.lengths[segment_name((PELVIS, hip))] for hip in (RIGHT, LEFT)]
-    apart = figure.lengths[segment_name((RIGHT, LEFT))]
+    reach = [figure.lengths[segment_name((PELVIS_JOINT, hip))] for hip in (RIGHT_HIP, LEFT_HIP)]
+    apart = figure.lengths[segment_name((RIGHT_HIP, LEFT_HIP))]
 
     def pelvis(which: Index, angle: Array) -> Array:
         a, o = axis[which], offset[which]
@@ -58,7 +58,7 @@ def closing_angles(
         start = pelvis(which, angle)
         lifts = [
             rays.lift(hip, frame[which], start, length, 0.0)
-            for hip, length in zip((RIGHT, LEFT), reach, strict=True)
+            for hip, length in zip((RIGHT_HIP, LEFT_HIP), reach, strict=True)
         ]
         right, left = (lift.points for lift in lifts)
         distance = np.linalg.norm(right[:, :, None] - left[:, None], axis=-1).reshape(-1, 4)
@@ -90,7 +90,7 @@ def closing_angles(
     row, choice = np.nonzero((g_low <= 0.0) != (g_high <= 0.0))
     which, low, high = which[row], low[row], (low + width)[row]
     sign = g_low[row, choice] <= 0.0
-    for _ in range(HALVINGS):
+    for _ in range(N_BISECTIONS):
         half = (low + high) / 2.0
         same = (gap(which, half)[0][np.arange(len(half)), choice] <= 0.0) == sign
         low, high = np.where(same, half, low), np.where(same, high, half)
@@ -100,7 +100,7 @@ def closing_angles(
 def _edge(inside: Callable[[Array], Mask], good: Array, bad: Array, wanted: Mask) -> Array:
     """Move ends that are out of reach to the last angle within, in all rows where that is wanted."""
     good, end = good.copy(), bad.copy()
-    for _ in range(HALVINGS):
+    for _ in range(N_BISECTIONS):
         half = (good + end) / 2.0
         ok = inside(half)
         good, end = np.where(ok, half, good), np.where(ok, end, half)

@@ -12,12 +12,12 @@ from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.hidden.asking import Index
-from posekit.hidden.completion import Completion
+from posekit.hidden.completion import CompletedSurvivors
 from posekit.hidden.describing import write
 from posekit.hidden.party import Party
-from posekit.hidden.plan import Plan, State
+from posekit.hidden.plan import JointState, OcclusionPattern
 from posekit.hidden.rays import find_rays
-from posekit.hidden.settings import Sampling
+from posekit.hidden.settings import OcclusionSampling
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree import Check, Leaves
 
@@ -33,8 +33,8 @@ def complete(
     checks: Sequence[Check],
     *,
     tolerance: float = 0.0,
-    sampling: Sampling | None = None,
-) -> Completion:
+    sampling: OcclusionSampling | None = None,
+) -> CompletedSurvivors:
     """Fill in the joints of survivors that have no position: hidden ones, and seen ones beyond them.
 
     Parameters
@@ -52,12 +52,12 @@ def complete(
     tolerance : float
         Metres by which a segment may be too short for its image, as for the tree. Above 1e-6 the points were
         measured: what follows from the rigid parts is then no proof, and a torso without its pelvis may spin.
-    sampling : Sampling, optional
+    sampling : OcclusionSampling, optional
         How finely sets are sampled.
 
     Returns
     -------
-    Completion
+    CompletedSurvivors
         One row a survivor. Known joints are unchanged; with nothing hidden, nothing is changed.
 
     Raises
@@ -65,12 +65,12 @@ def complete(
     InputError
         Where a shape is wrong, or a survivor's neck is not known: nothing hangs on anything then.
     """
-    sampling = sampling or Sampling()
+    sampling = sampling or OcclusionSampling()
     expected = (leaves.n_frames, len(JOINTS), 2)
     if image.shape != expected:
         raise InputError(f"image has shape {image.shape}; expected {expected}, one row a frame of the leaves")
     postures = leaves.postures()
-    done = Completion.of_exact(postures)
+    done = CompletedSurvivors.of_exact(postures)
     unknown = np.asarray(np.isnan(postures).any(axis=-1))
     open_ = np.flatnonzero(unknown.any(axis=1))
     if not len(open_):
@@ -88,10 +88,10 @@ def complete(
     root[leaves.frame] = postures[:, 0]
     rays = find_rays(camera, root, image, reach=sum(figure.lengths.values()))
     seen = np.asarray(np.isfinite(image).all(axis=-1))[leaves.frame]
-    states = np.where(unknown, np.where(seen, State.SEEN, State.HIDDEN), State.EXACT)
+    states = np.where(unknown, np.where(seen, JointState.SEEN, JointState.HIDDEN), JointState.EXACT)
     patterns, which = np.unique(states[open_], axis=0, return_inverse=True)
     for k, pattern in enumerate(patterns):
-        plan = Plan(states=tuple(State(int(state)) for state in pattern), checks=checks)
+        plan = OcclusionPattern(states=tuple(JointState(int(state)) for state in pattern), checks=checks)
         party = partial(Party.of, plan=plan, figure=figure, rays=rays, tolerance=tolerance, sampling=sampling)
         rows = open_[which.reshape(-1) == k]
         for part in _parts(rows, plan, sampling):
@@ -100,9 +100,9 @@ def complete(
     return done.frozen()
 
 
-def _parts(rows: Index, plan: Plan, sampling: Sampling) -> list[Index]:
+def _parts(rows: Index, plan: OcclusionPattern, sampling: OcclusionSampling) -> list[Index]:
     """Split survivors, in order, so that what is judged together fits into the memory."""
-    both = any(all(plan.states[joint] == State.HIDDEN for joint in limb.free) for limb in plan.limbs)
+    both = any(all(plan.states[joint] == JointState.HIDDEN for joint in limb.free) for limb in plan.limbs)
     each = sampling.sphere * (sampling.ends // 2 if both else 2) * (4 if plan.trunk else 1)
     size = max(ROWS_AT_ONCE // each, 8)
     return [rows[first : first + size] for first in range(0, len(rows), size)]

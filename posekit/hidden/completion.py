@@ -13,7 +13,7 @@ from posekit.hidden.asking import Index, Mask
 from posekit.skeleton import JOINTS
 
 
-class Kind(IntEnum):
+class PositionKind(IntEnum):
     """What a joint's positions are."""
 
     EXACT = 0
@@ -29,7 +29,7 @@ class Kind(IntEnum):
         return self.name.lower().replace("_", " ")
 
 
-class Outcome(IntEnum):
+class CompletionOutcome(IntEnum):
     """What became of a survivor."""
 
     EXACT = 0
@@ -45,7 +45,7 @@ class Region:
     Parameters
     ----------
     joint : str
-    kind : Kind
+    kind : PositionKind
         ``POINT``: one position. ``CIRCLE``: part of a circle about two known points. ``SPHERE_REGION``: part of
         the sphere about its parent. ``DEPTH_INTERVAL``: the joint is seen, its depth is not known.
         ``REGION``: part of space, its parent's position being open itself.
@@ -67,7 +67,7 @@ class Region:
     """
 
     joint: str
-    kind: Kind
+    kind: PositionKind
     representative: Array
     lower: Array
     upper: Array
@@ -79,23 +79,23 @@ class Region:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Completion:
+class CompletedSurvivors:
     """Survivors with their unknown joints filled in; camera frame, metres, radians.
 
     Parameters
     ----------
     postures : array (N, 14, 3)
         Known joints are unchanged to the bit. The others are representatives that satisfy all checks together;
-        NaN where the outcome is not `Outcome.COMPLETED`.
+        NaN where the outcome is not `CompletionOutcome.COMPLETED`.
     outcome : int array (N,)
-        `Outcome`.
+        `CompletionOutcome`.
     blamed : int array (N,)
         The joint for which no position was found; -1 where none is to blame.
     miss : array (N,)
         Where no place of the trunk was found: how far the nearest one that was looked at breaks a check, radians (a
         metre counts as 1 / 0.3); NaN where some pass but for limbs that are known. Else 0.
     kind : int array (N, 14)
-        `Kind`, as the pattern of seen and hidden joints gives it.
+        `PositionKind`, as the pattern of seen and hidden joints gives it.
     lower, upper : array (N, 14, 3)
     radius, fraction, spacing, accuracy : array (N, 14)
     samples : int array (N, 14)
@@ -116,10 +116,10 @@ class Completion:
     accuracy: Array
 
     @staticmethod
-    def of_exact(postures: Array) -> Completion:
+    def of_exact(postures: Array) -> CompletedSurvivors:
         """Start from survivors (N, 14, 3) of which nothing is unknown yet."""
         n, joints = postures.shape[:2]
-        return Completion(
+        return CompletedSurvivors(
             postures=postures.copy(),
             outcome=np.zeros(n, dtype=np.int8),
             blamed=np.full(n, -1, dtype=np.int8),
@@ -138,19 +138,21 @@ class Completion:
         """Count the survivors."""
         return len(self.outcome)
 
-    def frozen(self) -> Completion:
+    def frozen(self) -> CompletedSurvivors:
         """Set all arrays read-only."""
         for field in fields(self):
             getattr(self, field.name).flags.writeable = False
         return self
 
-    def take(self, rows: Index | Mask) -> Completion:
+    def take(self, rows: Index | Mask) -> CompletedSurvivors:
         """Take some survivors."""
-        return Completion(**{field.name: getattr(self, field.name)[rows] for field in fields(self)}).frozen()
+        return CompletedSurvivors(
+            **{field.name: getattr(self, field.name)[rows] for field in fields(self)}
+        ).frozen()
 
-    def among(self, postures: Array, rows: Mask) -> Completion:
+    def among(self, postures: Array, rows: Mask) -> CompletedSurvivors:
         """Put the completions of some survivors among all of them (N, 14, 3), of which the others stay as they are."""
-        whole = Completion.of_exact(postures)
+        whole = CompletedSurvivors.of_exact(postures)
         for field in fields(self):
             getattr(whole, field.name)[rows] = getattr(self, field.name)
         return whole.frozen()
@@ -158,12 +160,12 @@ class Completion:
     @property
     def inferred(self) -> Mask:
         """Which joints (N, 14) were not placed by the image."""
-        return np.asarray(self.kind != Kind.EXACT)
+        return np.asarray(self.kind != PositionKind.EXACT)
 
     @property
     def impossible(self) -> Mask:
         """Which survivors (N,) are proven to have no completion."""
-        return np.asarray(self.outcome == Outcome.IMPOSSIBLE)
+        return np.asarray(self.outcome == CompletionOutcome.IMPOSSIBLE)
 
     def reason(self, k: int | np.integer) -> str:
         """Return why survivor k is not completed, ``occluded/right_elbow``; empty where it is."""
@@ -171,12 +173,12 @@ class Completion:
 
     def regions(self, k: int | np.integer) -> list[Region]:
         """Describe the inferred joints of survivor k, in tree order; empty where nothing was found."""
-        if self.outcome[k] != Outcome.COMPLETED:
+        if self.outcome[k] != CompletionOutcome.COMPLETED:
             return []
         return [
             Region(
                 joint=JOINTS[joint],
-                kind=Kind(int(self.kind[k, joint])),
+                kind=PositionKind(int(self.kind[k, joint])),
                 representative=self.postures[k, joint],
                 lower=self.lower[k, joint],
                 upper=self.upper[k, joint],

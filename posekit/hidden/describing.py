@@ -7,27 +7,27 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.hidden.asking import Index, Mask
 from posekit.hidden.choosing import representatives
-from posekit.hidden.completion import Completion, Kind, Outcome
+from posekit.hidden.completion import CompletedSurvivors, CompletionOutcome, PositionKind
 from posekit.hidden.groups import box, distinct, largest
 from posekit.hidden.party import Party, Way
-from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, State
-from posekit.hidden.refine import GOALS, reaches, seek_ends
+from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, JointState
+from posekit.hidden.refine import N_WALK_GOALS, reaches, seek_ends
 from posekit.skeleton import PARENTS, segment_name
 
-SAME = 1e-6
+SAME_END_METRES = 1e-6
 """Metres between two ends that count as one."""
 
-ATTAINED, ATTAINED_IN_FOUR, ATTAINED_IN_CROWD = 0.125, 0.02, 0.1
+BOX_END_STEPS, ATTAINED_IN_FOUR, ATTAINED_IN_CROWD = 0.125, 0.02, 0.1
 """Of a step on the lattice: how near the ends of a box are found, with two angles free, with four, and on many hosts.
 
 Measured against rejection sampling: see the documentation.
 """
 
 
-def write(party: Party, done: Completion, part: Index) -> None:
+def write(party: Party, done: CompletedSurvivors, part: Index) -> None:
     """Complete the survivors and write them into rows `part` of a completion."""
     postures, found = representatives(party)
-    done.outcome[part] = np.where(found, Outcome.COMPLETED, Outcome.UNDECIDED)
+    done.outcome[part] = np.where(found, CompletionOutcome.COMPLETED, CompletionOutcome.UNDECIDED)
     _blame(party, done, part, found)
     for joint in party.plan.unknown:
         done.kind[part, joint] = party.kind(joint)
@@ -39,12 +39,14 @@ def write(party: Party, done: Completion, part: Index) -> None:
         ends = _ends(party, way, middle)
         for joint in party.plan.free(way.limb):
             _describe_limb(party, done, part, way, joint, ends[int(joint == way.limb.end)])
-    lone = (done.kind[part] == Kind.DEPTH_INTERVAL) & (done.lower[part] == done.upper[part]).all(axis=-1)
-    done.kind[part] = np.where(lone, Kind.POINT, done.kind[part])
+    lone = (done.kind[part] == PositionKind.DEPTH_INTERVAL) & (done.lower[part] == done.upper[part]).all(
+        axis=-1
+    )
+    done.kind[part] = np.where(lone, PositionKind.POINT, done.kind[part])
     done.fraction[part] = np.where(lone, 1.0, done.fraction[part])
 
 
-def _blame(party: Party, done: Completion, part: Index, found: Mask) -> None:
+def _blame(party: Party, done: CompletedSurvivors, part: Index, found: Mask) -> None:
     """Name the joint without a position, and tell where that is proven."""
     without = ~party.allowed.any(axis=1)
     sure = without & party.hosts.sure[party.core]
@@ -65,10 +67,10 @@ def _blame(party: Party, done: Completion, part: Index, found: Mask) -> None:
     miss = party.hosts.miss[party.core]
     done.miss[part] = np.where(without, np.where(miss > 0.0, miss, np.nan), 0.0)
     done.blamed[part] = np.where(found, -1, blamed)
-    done.outcome[part[sure & ~found]] = Outcome.IMPOSSIBLE
+    done.outcome[part[sure & ~found]] = CompletionOutcome.IMPOSSIBLE
 
 
-def _describe_trunk(party: Party, done: Completion, part: Index, joint: int, middle: Array) -> None:
+def _describe_trunk(party: Party, done: CompletedSurvivors, part: Index, joint: int, middle: Array) -> None:
     """Describe where a joint of the trunk can be."""
     who, host = np.nonzero(party.allowed)
     position = party.hosts.points[host, joint]
@@ -85,10 +87,10 @@ def _describe_trunk(party: Party, done: Completion, part: Index, joint: int, mid
     reach = done.upper[part, joint] - done.lower[part, joint]
     fraction = (
         np.linalg.norm(reach, axis=1) / _depths(party, joint, length)
-        if party.plan.states[joint] == State.SEEN
+        if party.plan.states[joint] == JointState.SEEN
         else even / tried
     )
-    lone = np.asarray((spacing == 0.0) | (party.kind(joint) == Kind.POINT))
+    lone = np.asarray((spacing == 0.0) | (party.kind(joint) == PositionKind.POINT))
     done.samples[part, joint] = count
     done.fraction[part, joint] = np.where(lone, 1.0, np.minimum(fraction, 1.0))
     done.spacing[part, joint] = np.where(lone, 0.0, spacing)
@@ -99,14 +101,14 @@ def _ends(party: Party, way: Way, middle: Array) -> Array:
     """Return the ends of the boxes and the radii (2, N, 7) of a limb's joints; NaN where a set is empty."""
     representatives = np.stack([middle[:, joint] for joint in way.limb.free])
     table = reaches(way.placer, way.rows, way.survivor, representatives)
-    reach = np.full((2, len(party), GOALS), -np.inf)
-    for joint, goal in np.ndindex(2, GOALS):
+    reach = np.full((2, len(party), N_WALK_GOALS), -np.inf)
+    for joint, goal in np.ndindex(2, N_WALK_GOALS):
         reach[joint, :, goal] = largest(
             way.survivor, len(party), np.nan_to_num(table[joint, goal], nan=-np.inf)
         )[1]
     if party.plan.hidden(way.limb):
         # Where an end of the core's set is not among them, a known limb or the trunk cut it off: it is sought anew.
-        wanted = reach < way.reach[:, party.core] - SAME
+        wanted = reach < way.reach[:, party.core] - SAME_END_METRES
         wanted[:, :, -1] = True
         wanted &= np.array([joint in party.plan.free(way.limb) for joint in way.limb.free])[:, None, None]
         ends = seek_ends(
@@ -121,7 +123,9 @@ def _ends(party: Party, way: Way, middle: Array) -> Array:
     return np.where(np.isfinite(reach), reach, np.nan)
 
 
-def _describe_limb(party: Party, done: Completion, part: Index, way: Way, joint: int, ends: Array) -> None:
+def _describe_limb(
+    party: Party, done: CompletedSurvivors, part: Index, way: Way, joint: int, ends: Array
+) -> None:
     """Describe where a joint of a limb can be."""
     n, placer, rows, who = len(party), way.placer, way.rows, way.survivor
     done.lower[part, joint], done.upper[part, joint] = -ends[:, :3], ends[:, 3:6]
@@ -135,7 +139,9 @@ def _describe_limb(party: Party, done: Completion, part: Index, way: Way, joint:
     done.spacing[part, joint] = spacing + trunk
     lever = party.length(way.limb.middle) + (party.length(way.limb.end) if joint == way.limb.end else 0.0)
     crowd = np.bincount(party.hosts.core, minlength=len(party.core_frame))[party.core] > 1
-    attained = np.where(crowd, ATTAINED_IN_CROWD, ATTAINED_IN_FOUR if way.placer.both_hidden else ATTAINED)
+    attained = np.where(
+        crowd, ATTAINED_IN_CROWD, ATTAINED_IN_FOUR if way.placer.both_hidden else BOX_END_STEPS
+    )
     done.accuracy[part, joint] = spacing * attained * lever + _unsettled(party) * (
         lever + party.length(way.limb.base)
     )
@@ -147,9 +153,9 @@ def _unsettled(party: Party) -> Array:
     return party.hosts.spacing[party.core] * (2.0 if turn is None or turn.about is None else 1.0)
 
 
-def _fraction(party: Party, done: Completion, part: Index, way: Way, joint: int) -> Array:
+def _fraction(party: Party, done: CompletedSurvivors, part: Index, way: Way, joint: int) -> Array:
     n, who, rows = len(party), way.survivor, way.rows
-    if party.plan.states[joint] == State.SEEN:
+    if party.plan.states[joint] == JointState.SEEN:
         length = np.linalg.norm(done.upper[part, joint] - done.lower[part, joint], axis=1)
         reach = party.length(way.limb.middle) + (party.length(way.limb.end) if joint == way.limb.end else 0.0)
         base = way.limb.base
@@ -158,9 +164,9 @@ def _fraction(party: Party, done: Completion, part: Index, way: Way, joint: int)
     hosts = np.maximum((party.allowed & party.even).sum(axis=1), 1)
     even = (rows.seed >= 0) & party.even[rows.host]
     label = np.where(even, rows.host * (n_middle * max(n_end, 1) * 2) + rows.seed, -1)
-    if joint == way.limb.middle or party.plan.states[way.limb.middle] != State.HIDDEN:
+    if joint == way.limb.middle or party.plan.states[way.limb.middle] != JointState.HIDDEN:
         tried = n_middle if joint == way.limb.middle else n_end
-        lattices = 1 if party.plan.states[way.limb.middle] != State.SEEN else 2
+        lattices = 1 if party.plan.states[way.limb.middle] != JointState.SEEN else 2
         part_of = np.zeros(n)
         part_of[who] = way.placer.part()[rows.host]
         return np.asarray(distinct(who, n, label) / (tried * hosts * lattices) * part_of)

@@ -11,13 +11,13 @@ from posekit.geometry import Array
 from posekit.hidden.asking import Index, Mask
 from posekit.hidden.lattices import turned
 
-CHILDREN = 8
+N_SUBSAMPLES = 8
 """Parts into which the neighbourhood of a sample is split: eight arcs, or a cube's eight corners."""
 
 EXACT_WITHIN = 1e-6
 """Metres of tolerance, and of misfit, up to which points are exact: what a rigid part then forbids is proven."""
 
-CORNERS = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+CUBE_CORNERS = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -44,7 +44,7 @@ class Turn:
     @property
     def finer(self) -> float:
         """How much nearer the children of neighbouring samples are to each other than the samples."""
-        return 1.0 / CHILDREN if self.about is not None else 0.5
+        return 1.0 / N_SUBSAMPLES if self.about is not None else 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -144,13 +144,13 @@ class Hosts:
         """
         if self.turn is None:
             return self.take(rows[:0]), rows[:0]
-        parent = np.repeat(np.arange(len(rows)), CHILDREN)
+        parent = np.repeat(np.arange(len(rows)), N_SUBSAMPLES)
         each = self.take(rows[parent])
         if self.turn.about is not None:
             axis = unit(each.points[:, self.turn.about] - each.points[:, self.turn.pivot])
-            part = (np.arange(CHILDREN) + 0.5) / CHILDREN - 0.5
+            part = (np.arange(N_SUBSAMPLES) + 0.5) / N_SUBSAMPLES - 0.5
             angle = np.tile(part, len(rows)) * width[parent]
         else:
-            vector = np.tile(CORNERS, (len(rows), 1)) * width[parent, None]
+            vector = np.tile(CUBE_CORNERS, (len(rows), 1)) * width[parent, None]
             axis, angle = unit(vector), np.linalg.norm(vector, axis=1)
         return each.filled(turned(axis, angle) @ each.R, self.turn), parent

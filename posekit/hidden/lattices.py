@@ -12,7 +12,7 @@ from posekit.geometry import Array
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 """Radians from one point of a Fibonacci lattice to the next."""
 
-PSI = 1.533751168755204288118041
+SPIRAL_PSI = 1.533751168755204288118041
 """The root of x^4 = x + 4: it turns the second plane of the spiral of `rotations` (Alexa 2022)."""
 
 
@@ -51,7 +51,7 @@ def rotations(n: int) -> Array:
     """Spread n rotations evenly over all there are (n, 3, 3): super-Fibonacci spirals (Alexa 2022)."""
     s = np.arange(n) + 0.5
     near, far = np.sqrt(s / n), np.sqrt(1.0 - s / n)
-    alpha, beta = 2.0 * np.pi * s / math.sqrt(2.0), 2.0 * np.pi * s / PSI
+    alpha, beta = 2.0 * np.pi * s / math.sqrt(2.0), 2.0 * np.pi * s / SPIRAL_PSI
     x, y, z, w = near * np.sin(alpha), near * np.cos(alpha), far * np.sin(beta), far * np.cos(beta)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],

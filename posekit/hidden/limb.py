@@ -9,31 +9,31 @@ import numpy as np
 
 from posekit.body.frames import unit
 from posekit.geometry import Array
-from posekit.hidden.asking import ARM, Index, Mask, Rows, ask
+from posekit.hidden.asking import METRES_PER_RADIAN, Index, Mask, PostureRows, ask
 from posekit.hidden.hosts import Hosts
 from posekit.hidden.lattices import GOLDEN_ANGLE, basis, sphere_spacing, zone
-from posekit.hidden.placed import Placed
-from posekit.hidden.plan import Limb, Plan, State
+from posekit.hidden.placed import LimbPlacements
+from posekit.hidden.plan import JointState, LimbChain, OcclusionPattern
 from posekit.hidden.rays import Rays
-from posekit.hidden.settings import Sampling
+from posekit.hidden.settings import OcclusionSampling
 from posekit.tree import Check
 
-BANDS, SECTORS = 8, 12
+N_BANDS, N_SECTORS = 8, 12
 """Cells of a lattice, in each of which the nearest miss is looked at more closely."""
 
 NEAR_MISS = 3.0
 """Spacings outside a bound that count as a near miss."""
 
-DESCENTS = 3
+N_DESCENTS = 3
 """Steps of that closer look, each half as wide as the last."""
 
-AROUND = 6
+N_STEP_DIRECTIONS = 6
 """Directions of each step."""
 
 ONTO_RAY = 1e-9
 """Metres beside its ray at which a point counts as on it."""
 
-PLASTIC = 0.7548776662466927
+INVERSE_PLASTIC_NUMBER = 0.7548776662466927
 """1 / the plastic number: turns each lattice of ends against the last (Roberts 2018)."""
 
 
@@ -43,8 +43,8 @@ class LimbPlacer:
 
     Parameters
     ----------
-    plan : Plan
-    limb : Limb
+    plan : OcclusionPattern
+    limb : LimbChain
     hosts : Hosts
     frame : int array (H,)
         The frame of each host: which row of the rays.
@@ -53,20 +53,20 @@ class LimbPlacer:
         Of the upper and the lower segment, metres.
     tolerance : float
         Metres by which a segment may be too short for its image.
-    sampling : Sampling
+    sampling : OcclusionSampling
     """
 
-    plan: Plan
-    limb: Limb
+    plan: OcclusionPattern
+    limb: LimbChain
     hosts: Hosts
     frame: Index
     rays: Rays
     lengths: tuple[float, float]
     tolerance: float
-    sampling: Sampling
+    sampling: OcclusionSampling
 
     @property
-    def states(self) -> tuple[State, State]:
+    def states(self) -> tuple[JointState, JointState]:
         """What is known of middle and end."""
         return self.plan.states[self.limb.middle], self.plan.states[self.limb.end]
 
@@ -83,7 +83,7 @@ class LimbPlacer:
         n_middle, n_end = self.per_host()
         _, lower, upper = self._zones()
         middle = sphere_spacing(n_middle, np.clip((upper - lower) / 2.0, 0.0, 1.0))
-        hidden = [state == State.HIDDEN for state in self.states]
+        hidden = [state == JointState.HIDDEN for state in self.states]
         return np.asarray(
             np.where(hidden[0], middle, np.zeros(len(self.hosts)))
             + np.where(hidden[1], sphere_spacing(n_end), 0.0)
@@ -94,7 +94,7 @@ class LimbPlacer:
         base = self.hosts.points[:, self.limb.base]
         short = np.full(len(base), -np.inf)
         for joint, reach in zip(self.limb.free, np.cumsum(self.lengths), strict=True):
-            if self.plan.states[joint] == State.SEEN:
+            if self.plan.states[joint] == JointState.SEEN:
                 _, height = self.rays.foot(joint, self.frame, base)
                 height = np.where(np.isfinite(height), height, np.inf)
                 short = np.maximum(short, height - reach - max(self.tolerance, 0.0))
@@ -105,7 +105,7 @@ class LimbPlacer:
 
         With hidden joints only its reach is looked at; with seen ones every lift and check is.
         """
-        short = np.maximum(self.too_short() / ARM, 0.0)
+        short = np.maximum(self.too_short() / METRES_PER_RADIAN, 0.0)
         if self.plan.hidden(self.limb):
             return short
         rows = self._middles(1)
@@ -117,7 +117,7 @@ class LimbPlacer:
         np.minimum.at(nearest, rows.host[~alive], middle_miss[~alive])
         # Without any lift that reaches, at least one segment is too short: by more than the limb is.
         reached = np.isfinite(nearest)
-        nearest[~reached] = np.maximum(short, self._gap() / ARM)[~reached]
+        nearest[~reached] = np.maximum(short, self._gap() / METRES_PER_RADIAN)[~reached]
         return np.asarray(np.maximum(short, nearest))
 
     def part(self) -> Array:
@@ -125,7 +125,7 @@ class LimbPlacer:
         _, lower, upper = self._zones()
         return np.asarray(np.clip((upper - lower) / 2.0, 0.0, 1.0))
 
-    def place(self) -> Placed:
+    def place(self) -> LimbPlacements:
         """Place the limb on every host in all the ways that its own checks allow, hosts in order."""
         n_middle, n_end = self.per_host()
         rows = self._middles(n_middle)
@@ -134,7 +134,7 @@ class LimbPlacer:
         ends, parent = self._ends(every, n_end)
         passed, end_miss = self._ask(ends, self.plan.end_own[self.limb])
         placed = ends.take(passed)
-        if self.states == (State.HIDDEN, State.SEEN):
+        if self.states == (JointState.HIDDEN, JointState.SEEN):
             # Near and far are two sets: each middle is looked at twice, also where it has no end.
             twice = np.tile(np.arange(len(rows.host)), 2)
             both = rows.take(twice)
@@ -142,7 +142,7 @@ class LimbPlacer:
             least = np.tile(np.where(alive, self._beyond(rows), miss), 2)
             least[ends.branch[:, 1] * len(rows.host) + np.flatnonzero(alive)[parent]] = end_miss
             found = self._closer(both.with_seed(both.seed + n_middle * both.branch[:, 1]), least, n_middle)
-        elif self.states[1] == State.HIDDEN and self.states[0] != State.HIDDEN:
+        elif self.states[1] == JointState.HIDDEN and self.states[0] != JointState.HIDDEN:
             found = self._closer(ends, end_miss, n_end)
         else:
             return placed
@@ -151,9 +151,9 @@ class LimbPlacer:
     @property
     def both_hidden(self) -> bool:
         """Whether middle and end are both hidden: four angles are free."""
-        return self.states == (State.HIDDEN, State.HIDDEN)
+        return self.states == (JointState.HIDDEN, JointState.HIDDEN)
 
-    def moved(self, rows: Placed, by: Array) -> Placed:
+    def moved(self, rows: LimbPlacements, by: Array) -> LimbPlacements:
         """Swing hidden joints: (S, 4) radians, two for the middle about its base, two for the end about it.
 
         Joints that are seen are lifted anew, on their branch; rows that are out of reach then are NaN.
@@ -162,25 +162,25 @@ class LimbPlacer:
         base = self.hosts.points[rows.host, self.limb.base]
         excess = rows.excess
         lower = unit(end - middle)
-        if self.states[0] == State.HIDDEN:
+        if self.states[0] == JointState.HIDDEN:
             middle = base + self.lengths[0] * _swung(unit(middle - base), by[:, :2])
-        if self.states[1] == State.HIDDEN:
+        if self.states[1] == JointState.HIDDEN:
             end = middle + self.lengths[1] * _swung(lower, by[:, 2:])
-        elif self.states[1] == State.SEEN:
+        elif self.states[1] == JointState.SEEN:
             lift = self.rays.lift(
                 self.limb.end, self.frame[rows.host], middle, self.lengths[1], self.tolerance
             )
             pick = np.arange(len(middle)), rows.branch[:, 1]
             end = np.where(lift.valid[pick][:, None], lift.points[pick], np.nan)
             excess = np.maximum(lift.excess, 0.0)
-        return Placed(
+        return LimbPlacements(
             host=rows.host, middle=middle, end=end, branch=rows.branch, excess=excess, seed=rows.seed
         )
 
-    def _beyond(self, rows: Placed) -> Array:
+    def _beyond(self, rows: LimbPlacements) -> Array:
         """Return how far the middles of rows are from reaching the end's ray (S,), radians; above 0."""
         _, height = self.rays.foot(self.limb.end, self.frame[rows.host], rows.middle)
-        beyond = np.where(height > self.lengths[1], (height - self.lengths[1]) / ARM, np.inf)
+        beyond = np.where(height > self.lengths[1], (height - self.lengths[1]) / METRES_PER_RADIAN, np.inf)
         return np.asarray(beyond)
 
     def _gap(self) -> Array:
@@ -194,11 +194,11 @@ class LimbPlacer:
         gap = np.where(lift.valid.any(axis=1), gap, np.nan_to_num(lift.excess, nan=np.inf))
         return np.asarray(np.maximum(gap, np.finfo(np.float64).tiny))
 
-    def _middles(self, n: int) -> Placed:
+    def _middles(self, n: int) -> LimbPlacements:
         """Return every middle that is tried; ends NaN."""
         base = self.hosts.points[:, self.limb.base]
         state = self.states[0]
-        if state == State.HIDDEN:
+        if state == JointState.HIDDEN:
             axis, lower, upper = self._zones()
             reached = np.flatnonzero(lower <= upper)
             local = zone(n, lower[reached], upper[reached])
@@ -206,7 +206,7 @@ class LimbPlacer:
             host, seed = np.repeat(reached, n), np.tile(np.arange(n), len(reached))
             middle, excess = base[host] + self.lengths[0] * d, np.zeros(len(host))
             near = np.zeros(len(host), dtype=np.intp)
-        elif state == State.SEEN:
+        elif state == JointState.SEEN:
             lift = self.rays.lift(self.limb.middle, self.frame, base, self.lengths[0], self.tolerance)
             host, branch = np.nonzero(lift.valid)
             middle, excess = lift.points[host, branch], np.maximum(lift.excess[host], 0.0)
@@ -215,7 +215,7 @@ class LimbPlacer:
             host = np.arange(len(base))
             middle, excess = self.hosts.points[:, self.limb.middle], np.zeros(len(base))
             seed, near = np.zeros(len(base), dtype=np.intp), np.zeros(len(base), dtype=np.intp)
-        return Placed(
+        return LimbPlacements(
             host=host,
             middle=middle,
             end=np.full_like(middle, np.nan),
@@ -224,9 +224,9 @@ class LimbPlacer:
             seed=seed,
         )
 
-    def _ends(self, rows: Placed, n: int) -> tuple[Placed, Index]:
+    def _ends(self, rows: LimbPlacements, n: int) -> tuple[LimbPlacements, Index]:
         """Return every end that is tried for each middle, and which row's it is."""
-        if self.states[1] == State.SEEN:
+        if self.states[1] == JointState.SEEN:
             lift = self.rays.lift(
                 self.limb.end, self.frame[rows.host], rows.middle, self.lengths[1], self.tolerance
             )
@@ -236,15 +236,15 @@ class LimbPlacer:
         else:
             axis = unit(rows.middle - self.hosts.points[rows.host, self.limb.base])
             whole = np.ones(len(axis))
-            turn = 2.0 * np.pi * np.mod(rows.seed * PLASTIC, 1.0)
+            turn = 2.0 * np.pi * np.mod(rows.seed * INVERSE_PLASTIC_NUMBER, 1.0)
             local = zone(n, -whole, whole, turn)
             f = np.einsum("sij,snj->sni", basis(axis), local).reshape(-1, 3)
             parent, k = np.repeat(np.arange(len(axis)), n), np.tile(np.arange(n), len(axis))
             end, far = rows.middle[parent] + self.lengths[1] * f, np.zeros(len(parent), dtype=np.intp)
-            seed = rows.seed[parent] if self.states[0] == State.HIDDEN else rows.seed[parent] * n + k
+            seed = rows.seed[parent] if self.states[0] == JointState.HIDDEN else rows.seed[parent] * n + k
             excess = rows.excess[parent]
         branch = np.stack([rows.branch[parent, 0], far], axis=1)
-        placed = Placed(
+        placed = LimbPlacements(
             host=rows.host[parent],
             middle=rows.middle[parent],
             end=end,
@@ -254,15 +254,15 @@ class LimbPlacer:
         )
         return placed, parent
 
-    def _closer(self, rows: Placed, miss: Array, n: int) -> Placed:
+    def _closer(self, rows: LimbPlacements, miss: Array, n: int) -> LimbPlacements:
         """Look between the samples for what a thin feasible part may hide there.
 
         In each cell of the lattice without a feasible sample the nearest miss goes downhill by its violation.
         """
         spacing = self.spacing()[rows.host]
         k, lattice = rows.seed % n, rows.seed // n
-        sector = np.mod(k * GOLDEN_ANGLE / (2.0 * np.pi), 1.0) * SECTORS
-        cell = (lattice * BANDS + k * BANDS // n) * SECTORS + sector.astype(np.intp)
+        sector = np.mod(k * GOLDEN_ANGLE / (2.0 * np.pi), 1.0) * N_SECTORS
+        cell = (lattice * N_BANDS + k * N_BANDS // n) * N_SECTORS + sector.astype(np.intp)
         order = np.lexsort((miss, cell, rows.host))
         first = np.ones(len(order), dtype=bool)
         first[1:] = (np.diff(rows.host[order]) != 0) | (np.diff(cell[order]) != 0)
@@ -271,9 +271,14 @@ class LimbPlacer:
         here, least, step = rows.take(best), miss[best], spacing[best] / 2.0
         checks = [*self.plan.middle_own[self.limb], *self.plan.end_own[self.limb]]
         found = [rows.take(np.zeros(0, dtype=np.intp))]
-        for descent in range(DESCENTS):
-            each = np.repeat(np.arange(len(here.host)), AROUND)
-            angle = 2.0 * np.pi * (np.tile(np.arange(AROUND), len(here.host)) + descent / DESCENTS) / AROUND
+        for descent in range(N_DESCENTS):
+            each = np.repeat(np.arange(len(here.host)), N_STEP_DIRECTIONS)
+            angle = (
+                2.0
+                * np.pi
+                * (np.tile(np.arange(N_STEP_DIRECTIONS), len(here.host)) + descent / N_DESCENTS)
+                / N_STEP_DIRECTIONS
+            )
             by = step[each, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
             swung = self.moved(here.take(each), np.tile(by, 2))
             alive, violation = self._ask(swung, checks)
@@ -293,16 +298,16 @@ class LimbPlacer:
             together = together.and_(more)
         return together.with_seed(np.full(len(together.host), -1))
 
-    def _ask(self, rows: Placed, checks: Sequence[Check]) -> tuple[Mask, Array]:
+    def _ask(self, rows: LimbPlacements, checks: Sequence[Check]) -> tuple[Mask, Array]:
         return ask(checks, self.columns(rows))
 
-    def columns(self, rows: Placed) -> Rows:
+    def columns(self, rows: LimbPlacements) -> PostureRows:
         """Return the postures of rows: the limb's own joints on the hosts' points."""
         own: dict[int, tuple[Array, Index | None]] = {
             self.limb.middle: (rows.middle, None),
             self.limb.end: (rows.end, None),
         }
-        return Rows.of(self.hosts.points, rows.host).with_(own)
+        return PostureRows.of(self.hosts.points, rows.host).with_(own)
 
     def _zones(self) -> tuple[Array, Array, Array]:
         r"""Return for each host the zone of the sphere in which its hidden middle can be.
@@ -318,7 +323,7 @@ class LimbPlacer:
         """
         count = len(self.hosts)
         z = np.broadcast_to([0.0, 0.0, 1.0], (count, 3))
-        if self.states != (State.HIDDEN, State.SEEN):
+        if self.states != (JointState.HIDDEN, JointState.SEEN):
             return z, np.full(count, -1.0), np.full(count, 1.0)
         base = self.hosts.points[:, self.limb.base]
         foot, height = self.rays.foot(self.limb.end, self.frame, base)

@@ -8,33 +8,33 @@ from dataclasses import replace
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask, Rows, ask
-from posekit.hidden.hosts import CHILDREN, EXACT_WITHIN, Hosts
+from posekit.hidden.asking import Index, Mask, PostureRows, ask
+from posekit.hidden.hosts import EXACT_WITHIN, N_SUBSAMPLES, Hosts
 from posekit.hidden.limb import NEAR_MISS, LimbPlacer
-from posekit.hidden.plan import Limb, Plan
+from posekit.hidden.plan import LimbChain, OcclusionPattern
 
-BEST = 6
+N_BEST_MISSES = 6
 """Near misses of a core that are looked into once more while nothing feasible is found."""
 
-DEEPER = 3
+N_SUBDIVISIONS = 3
 """How often; and how often the neighbourhoods of the ends of an arc are split."""
 
-MOST = 240
+MAX_CORE_SAMPLES = 240
 """Samples of a core that are looked into at all."""
 
-MakePlacer = Callable[[Limb, Hosts], LimbPlacer]
+MakePlacer = Callable[[LimbChain, Hosts], LimbPlacer]
 
 
-def survey(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Array:
+def survey(plan: OcclusionPattern, hosts: Hosts, placer: MakePlacer) -> Array:
     """Return how far each host (H,) is from being feasible, radians: 0 where its own checks and lifted limbs pass."""
-    _, miss = ask([*plan.torso_own, *plan.hips_own], Rows.of(hosts.points))
+    _, miss = ask([*plan.torso_own, *plan.hips_own], PostureRows.of(hosts.points))
     for limb in plan.limbs:
         left = np.flatnonzero(np.isfinite(miss))
         miss[left] = np.maximum(miss[left], placer(limb, hosts.take(left)).miss())
     return miss
 
 
-def narrowed(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Hosts:
+def narrowed(plan: OcclusionPattern, hosts: Hosts, placer: MakePlacer) -> Hosts:
     """Keep what is feasible, with the neighbourhoods of feasible samples and of near misses split more finely."""
     miss = survey(plan, hosts, placer)
     cores = len(hosts.tried)
@@ -46,12 +46,12 @@ def narrowed(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Hosts:
     proven[hosts.core[~_proven(plan, hosts, placer)]] = False
     spacing = hosts.spacing[hosts.core]
     near = (miss < NEAR_MISS * spacing) | _edges_and_dips(hosts, miss)[0]
-    at = _nearest(hosts.core, np.where(near, np.minimum(miss, np.pi), np.inf), MOST)
+    at = _nearest(hosts.core, np.where(near, np.minimum(miss, np.pi), np.inf), MAX_CORE_SAMPLES)
     looked, parent = hosts.children(at, spacing[at])
     miss, width = survey(plan, looked, placer), spacing[at][parent] * hosts.turn.finer
     np.minimum.at(least, looked.core, miss)
     found = looked.take(miss == 0.0)
-    for _ in range(DEEPER):
+    for _ in range(N_SUBDIVISIONS):
         edge, dip = _edges_and_dips(looked, miss)
         empty = np.bincount(found.core, minlength=cores) == 0
         dip |= empty[looked.core] & (miss > 0.0)
@@ -59,9 +59,9 @@ def narrowed(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Hosts:
             _nearest(
                 looked.core,
                 np.where(dip & (miss < NEAR_MISS * hosts.spacing[looked.core]), miss, np.inf),
-                BEST,
+                N_BEST_MISSES,
             ),
-            _nearest(looked.core, np.where(edge, 0.0, np.inf), MOST),
+            _nearest(looked.core, np.where(edge, 0.0, np.inf), MAX_CORE_SAMPLES),
         )
         if not len(at):
             break
@@ -71,7 +71,7 @@ def narrowed(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Hosts:
         found = found.and_(looked.take(miss == 0.0))
     return replace(
         found,
-        tried=hosts.tried * CHILDREN,
+        tried=hosts.tried * N_SUBSAMPLES,
         spacing=hosts.spacing * hosts.turn.finer,
         sure=proven,
         miss=least,
@@ -115,7 +115,7 @@ def _nearest(core: Index, miss: Array, most: int) -> Index:
     return np.sort(order[rank < most])
 
 
-def _proven(plan: Plan, hosts: Hosts, placer: MakePlacer) -> Mask:
+def _proven(plan: OcclusionPattern, hosts: Hosts, placer: MakePlacer) -> Mask:
     """Tell which samples of a circle prove their whole arc impossible: a limb is too short by more than it turns."""
     proven = np.zeros(len(hosts), dtype=bool)
     turn = hosts.turn

@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask, Rows, ask
+from posekit.hidden.asking import Index, Mask, PostureRows, ask
 from posekit.hidden.groups import pairs
 from posekit.hidden.hosts import Hosts
 from posekit.hidden.kinds import kinds
 from posekit.hidden.limb import LimbPlacer
 from posekit.hidden.narrow import narrowed, thinned
-from posekit.hidden.placed import Placed
-from posekit.hidden.plan import Limb, Plan
+from posekit.hidden.placed import LimbPlacements
+from posekit.hidden.plan import LimbChain, OcclusionPattern
 from posekit.hidden.rays import Rays
-from posekit.hidden.refine import GOALS, seek_ends
-from posekit.hidden.settings import Sampling
+from posekit.hidden.refine import N_WALK_GOALS, seek_ends
+from posekit.hidden.settings import OcclusionSampling
 from posekit.hidden.trunk import TrunkPlacer
 from posekit.skeleton import PARENTS, segment_name
 
@@ -35,18 +35,18 @@ class Way:
     placer : LimbPlacer
     survivor : int array (S,)
         In order.
-    rows : Placed
+    rows : LimbPlacements
     reach : array (2, C, 7)
         How far the sets of the cores reach, known limbs apart.
     """
 
     placer: LimbPlacer
     survivor: Index
-    rows: Placed
+    rows: LimbPlacements
     reach: Array
 
     @property
-    def limb(self) -> Limb:
+    def limb(self) -> LimbChain:
         """The limb."""
         return self.placer.limb
 
@@ -65,10 +65,10 @@ class Party:
 
     Parameters
     ----------
-    plan : Plan
+    plan : OcclusionPattern
     figure : Figure
     rays : Rays
-    sampling : Sampling
+    sampling : OcclusionSampling
     points : array (N, P, 3)
         NaN where unknown.
     frame : int array (N,)
@@ -81,10 +81,10 @@ class Party:
         One for each open limb, on all hosts.
     """
 
-    plan: Plan
+    plan: OcclusionPattern
     figure: Figure
     rays: Rays
-    sampling: Sampling
+    sampling: OcclusionSampling
     points: Array
     frame: Index
     core: Index
@@ -95,11 +95,11 @@ class Party:
     @staticmethod
     def of(
         *,
-        plan: Plan,
+        plan: OcclusionPattern,
         figure: Figure,
         rays: Rays,
         tolerance: float,
-        sampling: Sampling,
+        sampling: OcclusionSampling,
         points: Array,
         frame: Index,
     ) -> Party:
@@ -108,7 +108,7 @@ class Party:
         _, first, core = np.unique(key, axis=0, return_index=True, return_inverse=True)
         core_frame = frame[first]
 
-        def placer(limb: Limb, hosts: Hosts) -> LimbPlacer:
+        def placer(limb: LimbChain, hosts: Hosts) -> LimbPlacer:
             return LimbPlacer(
                 plan=plan,
                 limb=limb,
@@ -189,13 +189,13 @@ class Party:
     def _way(self, placer: LimbPlacer) -> Way:
         placed = placer.place()
         cores = len(self.core_frame)
-        reach = np.full((2, cores, GOALS), -np.inf)
+        reach = np.full((2, cores, N_WALK_GOALS), -np.inf)
         if self.plan.hidden(placer.limb):
             # Most of the ends of a survivor's sets are those of its core's: they are sought once.
             wanted = np.zeros(reach.shape, dtype=bool)
-            wanted[[joint in self.plan.free(placer.limb) for joint in placer.limb.free], :, : GOALS - 1] = (
-                True
-            )
+            wanted[
+                [joint in self.plan.free(placer.limb) for joint in placer.limb.free], :, : N_WALK_GOALS - 1
+            ] = True
             ends = seek_ends(
                 placer,
                 self.hosts.core[placed.host],
@@ -213,12 +213,12 @@ class Party:
         passed, _ = ask(checks, self._limb_columns(placer, survivor, way.rows))
         return way.keep(passed)
 
-    def _columns(self, survivor: Index, host: Index) -> Rows:
+    def _columns(self, survivor: Index, host: Index) -> PostureRows:
         """Return postures of survivors on hosts."""
         trunk = {joint: (self.hosts.points[:, joint], host) for joint in self.plan.trunk}
-        return Rows.of(self.points, survivor).with_(trunk)
+        return PostureRows.of(self.points, survivor).with_(trunk)
 
-    def _limb_columns(self, placer: LimbPlacer, survivor: Index, rows: Placed) -> Rows:
+    def _limb_columns(self, placer: LimbPlacer, survivor: Index, rows: LimbPlacements) -> PostureRows:
         own: dict[int, tuple[Array, Index | None]] = {
             placer.limb.middle: (rows.middle, None),
             placer.limb.end: (rows.end, None),
@@ -229,7 +229,7 @@ class Party:
         """Return the length (m) of the segment that ends at a joint."""
         return _length(self.figure, joint)
 
-    def passes(self, placer: LimbPlacer, survivor: Index, rows: Placed) -> Mask:
+    def passes(self, placer: LimbPlacer, survivor: Index, rows: LimbPlacements) -> Mask:
         """Judge placements by all checks of their limb."""
         passed = self._passes_own(placer, rows)
         own = np.flatnonzero(passed)
@@ -237,7 +237,7 @@ class Party:
         passed[own], _ = ask(checks, self._limb_columns(placer, survivor[own], rows.take(own)))
         return passed
 
-    def _passes_own(self, placer: LimbPlacer, rows: Placed) -> Mask:
+    def _passes_own(self, placer: LimbPlacer, rows: LimbPlacements) -> Mask:
         """Judge placements by the checks that read nothing but the core; what is out of reach does not pass."""
         passed = np.asarray(np.isfinite(rows.end).all(axis=1)).copy()
         reached = np.flatnonzero(passed)

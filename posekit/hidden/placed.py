@@ -11,7 +11,7 @@ from posekit.hidden.asking import Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Placed:
+class LimbPlacements:
     """S ways to place a limb's free joints on hosts.
 
     Parameters
@@ -35,27 +35,29 @@ class Placed:
     excess: Array
     seed: Index
 
-    def take(self, rows: Index | Mask) -> Placed:
+    def take(self, rows: Index | Mask) -> LimbPlacements:
         """Take some of them."""
-        return Placed(**{name: getattr(self, name)[rows] for name in FIELDS})
+        return LimbPlacements(**{name: getattr(self, name)[rows] for name in PLACEMENT_FIELDS})
 
-    def and_(self, other: Placed) -> Placed:
+    def and_(self, other: LimbPlacements) -> LimbPlacements:
         """Put two tables together, by host."""
-        both = Placed(
-            **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in FIELDS}
+        both = LimbPlacements(
+            **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in PLACEMENT_FIELDS}
         )
         return both.take(np.argsort(both.host, kind="stable"))
 
-    def replaced(self, rows: Index, by: Placed) -> Placed:
+    def replaced(self, rows: Index, by: LimbPlacements) -> LimbPlacements:
         """Put others in the place of some."""
-        merged = {name: getattr(self, name).copy() for name in FIELDS}
+        merged = {name: getattr(self, name).copy() for name in PLACEMENT_FIELDS}
         for name, values in merged.items():
             values[rows] = getattr(by, name)
-        return Placed(**merged)
+        return LimbPlacements(**merged)
 
-    def with_seed(self, seed: Index) -> Placed:
+    def with_seed(self, seed: Index) -> LimbPlacements:
         """Name other samples that they belong to."""
-        return Placed(**{name: getattr(self, name) for name in FIELDS if name != "seed"}, seed=seed)
+        return LimbPlacements(
+            **{name: getattr(self, name) for name in PLACEMENT_FIELDS if name != "seed"}, seed=seed
+        )
 
 
-FIELDS = ("host", "middle", "end", "branch", "excess", "seed")
+PLACEMENT_FIELDS = ("host", "middle", "end", "branch", "excess", "seed")

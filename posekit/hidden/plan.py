@@ -11,7 +11,7 @@ from posekit.skeleton import HIPS, JOINT, JOINTS, SIDES, TORSO
 from posekit.tree import Check
 
 
-class State(IntEnum):
+class JointState(IntEnum):
     """What is known of a joint in a survivor."""
 
     EXACT = 0
@@ -20,7 +20,7 @@ class State(IntEnum):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limb:
+class LimbChain:
     """Three joints in a row: the first on a rigid part, the others free."""
 
     base: int
@@ -33,8 +33,8 @@ class Limb:
         return self.middle, self.end
 
 
-LIMBS = tuple(
-    Limb(
+LIMB_CHAINS = tuple(
+    LimbChain(
         **{
             role: JOINT[f"{side}_{joint}"]
             for role, joint in zip(("base", "middle", "end"), names, strict=True)
@@ -45,11 +45,11 @@ LIMBS = tuple(
 )
 TORSO_JOINTS = tuple(JOINT[name] for name in TORSO)
 HIP_JOINTS = tuple(JOINT[name] for name in HIPS)
-TRUNK = (*TORSO_JOINTS, *HIP_JOINTS[1:])
+TRUNK_JOINTS = (*TORSO_JOINTS, *HIP_JOINTS[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plan:
+class OcclusionPattern:
     """One pattern of seen and hidden joints.
 
     Checks fall into classes by the unknown joints that they read: those of the trunk (torso and hips), or of one
@@ -58,42 +58,42 @@ class Plan:
 
     Parameters
     ----------
-    states : tuple of State (14,)
+    states : tuple of JointState (14,)
     checks : sequence of Check
         All that the survivors passed so far as they were decided.
     """
 
-    states: tuple[State, ...]
+    states: tuple[JointState, ...]
     checks: Sequence[Check]
 
     @cached_property
     def unknown(self) -> tuple[int, ...]:
         """Joints without a position, in tree order."""
-        return tuple(joint for joint, state in enumerate(self.states) if state != State.EXACT)
+        return tuple(joint for joint, state in enumerate(self.states) if state != JointState.EXACT)
 
     @cached_property
     def trunk(self) -> tuple[int, ...]:
         """Unknown joints of torso and hips."""
-        return tuple(joint for joint in self.unknown if joint in TRUNK)
+        return tuple(joint for joint in self.unknown if joint in TRUNK_JOINTS)
 
     @cached_property
-    def limbs(self) -> tuple[Limb, ...]:
+    def limbs(self) -> tuple[LimbChain, ...]:
         """The limbs with unknown joints."""
-        return tuple(limb for limb in LIMBS if self.free(limb))
+        return tuple(limb for limb in LIMB_CHAINS if self.free(limb))
 
-    def free(self, limb: Limb) -> tuple[int, ...]:
+    def free(self, limb: LimbChain) -> tuple[int, ...]:
         """Return the unknown joints of a limb, those of its rigid part not among them."""
-        return tuple(joint for joint in limb.free if self.states[joint] != State.EXACT)
+        return tuple(joint for joint in limb.free if self.states[joint] != JointState.EXACT)
 
-    def hidden(self, limb: Limb) -> bool:
+    def hidden(self, limb: LimbChain) -> bool:
         """Whether a joint of the limb is hidden: else its positions are a few, each by a lift."""
-        return any(self.states[joint] == State.HIDDEN for joint in limb.free)
+        return any(self.states[joint] == JointState.HIDDEN for joint in limb.free)
 
     @cached_property
     def core(self) -> tuple[int, ...]:
         """The joints that decide what the hidden ones can do by themselves: known ones of trunk and open limbs."""
-        wanted = (*TRUNK, *(joint for limb in self.limbs for joint in limb.free))
-        return tuple(joint for joint in wanted if self.states[joint] == State.EXACT)
+        wanted = (*TRUNK_JOINTS, *(joint for limb in self.limbs for joint in limb.free))
+        return tuple(joint for joint in wanted if self.states[joint] == JointState.EXACT)
 
     @cached_property
     def asked(self) -> tuple[Check, ...]:
@@ -116,7 +116,7 @@ class Plan:
         return self._of((), cross=True)
 
     @cached_property
-    def middle_own(self) -> dict[Limb, list[Check]]:
+    def middle_own(self) -> dict[LimbChain, list[Check]]:
         """By limb: checks of its middle joint that can be asked before its end is placed."""
         return {
             limb: [c for c in self._of((limb,), cross=False) if limb.end not in self._reads(c)]
@@ -124,7 +124,7 @@ class Plan:
         }
 
     @cached_property
-    def end_own(self) -> dict[Limb, list[Check]]:
+    def end_own(self) -> dict[LimbChain, list[Check]]:
         """By limb: checks that wait for its end."""
         return {
             limb: [c for c in self._of((limb,), cross=False) if limb.end in self._reads(c)]
@@ -132,7 +132,7 @@ class Plan:
         }
 
     @cached_property
-    def limb_cross(self) -> dict[Limb, list[Check]]:
+    def limb_cross(self) -> dict[LimbChain, list[Check]]:
         """By limb: checks of its unknown joints against limbs that are known."""
         return {limb: self._of((limb,), cross=True) for limb in self.limbs}
 
@@ -147,15 +147,17 @@ class Plan:
         return tuple(k for k, limb in enumerate(self.limbs) if limb in read)
 
     def _reads(self, check: Check) -> set[int]:
-        return {joint for joint in check.points if joint < len(JOINTS) and self.states[joint] != State.EXACT}
+        return {
+            joint for joint in check.points if joint < len(JOINTS) and self.states[joint] != JointState.EXACT
+        }
 
-    def _limbs_read(self, check: Check) -> tuple[Limb, ...]:
+    def _limbs_read(self, check: Check) -> tuple[LimbChain, ...]:
         unknown = self._reads(check)
         return tuple(limb for limb in self.limbs if unknown & set(self.free(limb)))
 
-    def _of(self, limbs: tuple[Limb, ...], *, cross: bool) -> list[Check]:
+    def _of(self, limbs: tuple[LimbChain, ...], *, cross: bool) -> list[Check]:
         """Return the checks whose unknown joints are the trunk's and exactly some limbs'."""
-        known = {joint for limb in LIMBS if limb not in self.limbs for joint in limb.free}
+        known = {joint for limb in LIMB_CHAINS if limb not in self.limbs for joint in limb.free}
         return [
             check
             for check in self.asked

@@ -13,11 +13,11 @@ from posekit.geometry import Array
 
 Index = NDArray[np.intp]
 
-BACK = 1e7
+RAY_START_BEHIND_METRES = 1e7
 """Metres behind the body at which a ray is looked for that has no start: a parallel camera's."""
 
-HALVINGS = 70
-"""Of `BACK`: to 1e-14 m."""
+N_RAY_BISECTIONS = 70
+"""Of `RAY_START_BEHIND_METRES`: to 1e-14 m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,9 +76,9 @@ def find_rays(camera: Camera, root: Array, image: Array, reach: float) -> Rays:
         middle = points.mean(axis=-2)
         direction = points[..., 1, :] - points[..., 0, :]
         direction = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
-        low, high = np.full(image.shape[:2], -BACK), np.full(image.shape[:2], 4.0 * reach)
+        low, high = np.full(image.shape[:2], -RAY_START_BEHIND_METRES), np.full(image.shape[:2], 4.0 * reach)
         endless = _in_front(camera, middle + low[..., None] * direction)
-        for _ in range(HALVINGS):
+        for _ in range(N_RAY_BISECTIONS):
             half = (low + high) / 2.0
             front = _in_front(camera, middle + half[..., None] * direction)
             low, high = np.where(front, low, half), np.where(front, half, high)

@@ -12,27 +12,27 @@ from posekit.hidden.asking import Index, Mask
 from posekit.hidden.groups import largest
 from posekit.hidden.lattices import GOLDEN_ANGLE
 from posekit.hidden.limb import LimbPlacer
-from posekit.hidden.placed import Placed
+from posekit.hidden.placed import LimbPlacements
 
-PROPOSALS = 6
+N_STEP_PROPOSALS = 6
 """Steps tried at once from each place, evenly around; and one more the way the last one went."""
 
-STARTS, STARTS_IN_FOUR = 4, 8
+N_WALK_STARTS, STARTS_IN_FOUR = 4, 8
 """Places from which each end is sought, each far from those before it; with four free angles."""
 
-APART, APART_IN_FOUR = 1.6, 0.8
+START_SPACINGS, APART_IN_FOUR = 1.6, 0.8
 """Spacings between them."""
 
-LONGER, SHORTER = 1.3, 0.55
+STEP_GROWTH, STEP_SHRINKAGE = 1.3, 0.55
 """What a step is multiplied with after it succeeded, and after none did."""
 
-SETTLED = 0.004
+MIN_STEP_RATIO = 0.004
 """Of the first step: where a walk ends."""
 
-AXES = np.concatenate([-np.eye(3), np.eye(3)])
+BOX_DIRECTIONS = np.concatenate([-np.eye(3), np.eye(3)])
 """Directions whose ends make the bounding box: lower, then upper."""
 
-GOALS = len(AXES) + 1
+N_WALK_GOALS = len(BOX_DIRECTIONS) + 1
 """The ends of the box, and the distance from the representative."""
 
 
@@ -47,19 +47,19 @@ class Ends:
         representative; -inf where a set is empty or was not asked about.
     group : int array (K,)
         The set of each placement.
-    rows : Placed
+    rows : LimbPlacements
     """
 
     reach: Array
     group: Index
-    rows: Placed
+    rows: LimbPlacements
 
 
-def reaches(placer: LimbPlacer, rows: Placed, group: Index, representatives: Array) -> Array:
+def reaches(placer: LimbPlacer, rows: LimbPlacements, group: Index, representatives: Array) -> Array:
     """Return how far each of S placements reaches towards every goal (2, 7, S); NaN without a representative."""
-    table = np.empty((2, GOALS, len(group)))
+    table = np.empty((2, N_WALK_GOALS, len(group)))
     for joint, position in enumerate((rows.middle, rows.end)):
-        table[joint, : len(AXES)] = AXES @ position.T
+        table[joint, : len(BOX_DIRECTIONS)] = BOX_DIRECTIONS @ position.T
         table[joint, -1] = np.linalg.norm(position - representatives[joint, group], axis=1)
     return table
 
@@ -67,9 +67,9 @@ def reaches(placer: LimbPlacer, rows: Placed, group: Index, representatives: Arr
 def seek_ends(
     placer: LimbPlacer,
     group: Index,
-    rows: Placed,
+    rows: LimbPlacements,
     representatives: Array,
-    passes: Callable[[Index, Placed], Mask],
+    passes: Callable[[Index, LimbPlacements], Mask],
     wanted: Mask,
 ) -> Ends:
     """Walk from the outermost samples of each set further out while all checks pass.
@@ -78,7 +78,7 @@ def seek_ends(
     ----------
     group : int array (S,)
         Which of n sets each feasible row belongs to, in order.
-    rows : Placed
+    rows : LimbPlacements
     representatives : array (2, n, 3)
         Of the limb's middle and end: from which radii are measured; NaN where there is none.
     passes : callable
@@ -87,31 +87,31 @@ def seek_ends(
         Which ends to seek.
     """
     n = wanted.shape[1]
-    reach = np.full((2, n, GOALS), -np.inf)
+    reach = np.full((2, n, N_WALK_GOALS), -np.inf)
     if not (len(group) and wanted.any()):
         return Ends(reach=reach, group=group[:0], rows=rows.take(group[:0]))
     spacing = placer.spacing()[rows.host]
     levers = np.cumsum(placer.lengths)
     table = reaches(placer, rows, group, representatives)
-    many, apart = (STARTS_IN_FOUR, APART_IN_FOUR) if placer.both_hidden else (STARTS, APART)
+    many, apart = (STARTS_IN_FOUR, APART_IN_FOUR) if placer.both_hidden else (N_WALK_STARTS, START_SPACINGS)
     columns: list[tuple[Index, Index, Index]] = []
     mode = rows.branch @ np.array([2, 1])  # near and far are sets of their own
     for joint, goal in zip(*np.nonzero(wanted.any(axis=1)), strict=True):
         position = rows.end if joint else rows.middle
         for one in np.unique(mode):
             left = np.where((mode == one) & wanted[joint, group, goal], table[joint, goal], -np.inf)
-            for _ in range(many if goal < len(AXES) else 2):
+            for _ in range(many if goal < len(BOX_DIRECTIONS) else 2):
                 start, most = largest(group, n, left)
                 some = np.flatnonzero((start >= 0) & np.isfinite(most))
-                columns.append((some, start[some], np.full(len(some), joint * GOALS + goal)))
+                columns.append((some, start[some], np.full(len(some), joint * N_WALK_GOALS + goal)))
                 near = np.linalg.norm(position - position[np.maximum(start, 0)][group], axis=1)
                 left = np.where(near < apart * spacing * levers[joint], -np.inf, left)
     who, start, goal = (np.concatenate(column) for column in zip(*columns, strict=True))
     here = rows.take(start)
-    best = table.reshape(2 * GOALS, -1)[goal, start]
+    best = table.reshape(2 * N_WALK_GOALS, -1)[goal, start]
     step, last = spacing[start].copy(), np.zeros((len(who), 4))
     for round_ in range(placer.sampling.rounds):
-        walking = np.flatnonzero(step > SETTLED * spacing[start])
+        walking = np.flatnonzero(step > MIN_STEP_RATIO * spacing[start])
         by = _around(len(walking), round_, both=placer.both_hidden)
         by = np.concatenate([by, last[walking, None]], axis=1)
         each = np.repeat(walking, by.shape[1])
@@ -133,29 +133,29 @@ def seek_ends(
         chosen = passed[first[moved]]
         here = here.replaced(moved, tried.take(chosen))
         best[moved], last[moved] = furthest[moved], by[chosen]
-        step[walking] *= SHORTER
-        step[moved] *= LONGER / SHORTER
-    np.maximum.at(reach, (goal // GOALS, who, goal % GOALS), best)
+        step[walking] *= STEP_SHRINKAGE
+        step[moved] *= STEP_GROWTH / STEP_SHRINKAGE
+    np.maximum.at(reach, (goal // N_WALK_GOALS, who, goal % N_WALK_GOALS), best)
     order = np.argsort(who, kind="stable")
     return Ends(reach=reach, group=who[order], rows=here.take(order).with_seed(np.full(len(who), -1)))
 
 
 def _around(n: int, round_: int, *, both: bool) -> Array:
-    """Return unit steps (n, PROPOSALS, 4): evenly around, turned from round to round; or scattered in 4-space."""
+    """Return unit steps (n, N_STEP_PROPOSALS, 4): evenly around, turned by the round; or scattered in 4-space."""
     if both:
-        steps = np.random.default_rng(round_).standard_normal((PROPOSALS, 4))
+        steps = np.random.default_rng(round_).standard_normal((N_STEP_PROPOSALS, 4))
         steps /= np.linalg.norm(steps, axis=-1, keepdims=True)
     else:
-        turn = round_ * GOLDEN_ANGLE + np.arange(PROPOSALS) * 2.0 * np.pi / PROPOSALS
+        turn = round_ * GOLDEN_ANGLE + np.arange(N_STEP_PROPOSALS) * 2.0 * np.pi / N_STEP_PROPOSALS
         steps = np.tile(np.stack([np.cos(turn), np.sin(turn)], axis=-1), 2)
-    return np.broadcast_to(steps, (n, PROPOSALS, 4))
+    return np.broadcast_to(steps, (n, N_STEP_PROPOSALS, 4))
 
 
-def _value(rows: Placed, goal: Index, representatives: Array, who: Index) -> Array:
+def _value(rows: LimbPlacements, goal: Index, representatives: Array, who: Index) -> Array:
     """Return how far rows have come towards their goals."""
-    end = (goal >= GOALS).astype(np.intp)
+    end = (goal >= N_WALK_GOALS).astype(np.intp)
     position = np.where(end[:, None] > 0, rows.end, rows.middle)
-    axis = goal % GOALS
-    along = np.einsum("si,si->s", position, AXES[np.minimum(axis, len(AXES) - 1)])
+    axis = goal % N_WALK_GOALS
+    along = np.einsum("si,si->s", position, BOX_DIRECTIONS[np.minimum(axis, len(BOX_DIRECTIONS) - 1)])
     away = np.linalg.norm(position - representatives[end, who], axis=1)
-    return np.asarray(np.where(axis < len(AXES), along, away))
+    return np.asarray(np.where(axis < len(BOX_DIRECTIONS), along, away))

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.hidden.completion import Completion
+from posekit.hidden.completion import CompletedSurvivors
 from posekit.tree import Leaves
 from posekit.tree.leaves import Pruned
 
-NAME = "occluded"
+OCCLUDED_REASON = "occluded"
 """How the reason is named, before the joint's name."""
 
 
-def reject(leaves: Leaves, completion: Completion) -> tuple[Leaves, Completion]:
+def reject(leaves: Leaves, completion: CompletedSurvivors) -> tuple[Leaves, CompletedSurvivors]:
     """Prune the survivors that are impossible, each with the joint that has no position: ``occluded/right_elbow``.
 
     Parameters
     ----------
     leaves : Leaves
-    completion : Completion
+    completion : CompletedSurvivors
         Of all their survivors.
 
     Returns
@@ -34,7 +34,7 @@ def reject(leaves: Leaves, completion: Completion) -> tuple[Leaves, Completion]:
         level=leaves.level,
         frame=leaves.frame[gone],
         code=leaves.code[gone],
-        check=NAME,
+        check=OCCLUDED_REASON,
         where=leaves.joints,
         unit="m",
         place=completion.blamed[gone],

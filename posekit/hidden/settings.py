@@ -8,7 +8,7 @@ from posekit.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sampling:
+class OcclusionSampling:
     """Numbers of samples; more are finer and slower.
 
     Parameters

@@ -7,19 +7,19 @@ from collections.abc import Sequence
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask, Rows, ask
+from posekit.hidden.asking import Index, Mask, PostureRows, ask
 from posekit.hidden.groups import offsets
-from posekit.hidden.placed import Placed
-from posekit.hidden.plan import Plan
+from posekit.hidden.placed import LimbPlacements
+from posekit.hidden.plan import OcclusionPattern
 
-TRIED: dict[int, tuple[int, ...]] = {1: (1, 48), 2: (1, 6, 48), 3: (1, 5, 16), 4: (1, 4, 9)}
+N_WAYS_TRIED: dict[int, tuple[int, ...]] = {1: (1, 48), 2: (1, 6, 48), 3: (1, 5, 16), 4: (1, 4, 9)}
 """Ways tried of each limb, by how many limbs there are: the middle one first, more where it fails."""
 
 
 def choose(
-    plan: Plan,
+    plan: OcclusionPattern,
     base: Array,
-    limbs: Sequence[tuple[Index, Placed, Array]],
+    limbs: Sequence[tuple[Index, LimbPlacements, Array]],
 ) -> tuple[list[Index], Mask]:
     """Choose a way for each open limb of n survivors.
 
@@ -29,7 +29,7 @@ def choose(
     ----------
     base : array (n, P, 3)
         Their points, known ones and those of the chosen trunk.
-    limbs : sequence of (survivor (S,), Placed of S rows, cost (S,))
+    limbs : sequence of (survivor (S,), LimbPlacements of S rows, cost (S,))
         By limb of the plan: each row's survivor, in order, and how far it is from the middle of its set.
 
     Returns
@@ -48,7 +48,7 @@ def choose(
         ranked.append((order, start))
         left &= np.diff(start) > 0
     chosen = [np.full(n, -1) for _ in limbs]
-    for tried in TRIED.get(m, (1,)):
+    for tried in N_WAYS_TRIED.get(m, (1,)):
         open_ = np.flatnonzero(left)
         if not len(open_):
             break
@@ -70,7 +70,7 @@ def choose(
                 for joint, table in zip(plan.limbs[limb].free, (placed.middle, placed.end), strict=True):
                     if joint in plan.free(plan.limbs[limb]):
                         columns[joint] = (table, row)
-            passed, _ = ask([check], Rows.of(base, open_[grid[0]]).with_(columns))
+            passed, _ = ask([check], PostureRows.of(base, open_[grid[0]]).with_(columns))
             spread = [len(open_), *(tried if limb in which else 1 for limb in range(m))]
             allowed &= passed.reshape(spread)
         rank = np.indices((tried,) * m)

@@ -9,19 +9,19 @@ import numpy as np
 from posekit.body import Figure
 from posekit.body.frames import fit_rotation, unit
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Rows, ask
+from posekit.hidden.asking import Index, PostureRows, ask
 from posekit.hidden.closure import closing_angles
 from posekit.hidden.hosts import EXACT_WITHIN, Hosts, Turn
 from posekit.hidden.lattices import circle, onto, rotation_spacing, rotations, turned
-from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, Plan, State
+from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
 from posekit.hidden.rays import Rays
-from posekit.hidden.settings import Sampling
+from posekit.hidden.settings import OcclusionSampling
 from posekit.skeleton import JOINT
 
-RINGS = 24
+N_PELVIS_RINGS = 24
 """Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""
 
-FEWER = 6
+HIP_COARSENING = 6
 """By how much the hips are turned in coarser steps where the torso turns as well."""
 
 
@@ -31,22 +31,22 @@ class TrunkPlacer:
 
     Parameters
     ----------
-    plan : Plan
+    plan : OcclusionPattern
     figure : Figure
     rays : Rays
     frame : int array (C,)
         The frame of each core: which row of the rays.
     tolerance : float
         Metres by which a segment may be too short for its image.
-    sampling : Sampling
+    sampling : OcclusionSampling
     """
 
-    plan: Plan
+    plan: OcclusionPattern
     figure: Figure
     rays: Rays
     frame: Index
     tolerance: float
-    sampling: Sampling
+    sampling: OcclusionSampling
 
     def place(self, points: Array) -> Hosts:
         """Place them in every way that the rigid parts allow, on cores (C, P, 3); evenly where they turn."""
@@ -54,25 +54,25 @@ class TrunkPlacer:
         pelvis, *hips = HIP_JOINTS
         if any(self.plan.states[joint] for joint in TORSO_JOINTS):
             hosts = self._turned(hosts, TORSO_JOINTS)
-            alive, _ = ask(self.plan.torso_own, Rows.of(hosts.points))
+            alive, _ = ask(self.plan.torso_own, PostureRows.of(hosts.points))
             # Where only the torso turns, a near miss may be looked at more closely; otherwise it is gone.
             hosts = hosts if self._torso_alone() else hosts.take(alive)
         for joint in hips:
-            if self.plan.states[joint] == State.SEEN:
+            if self.plan.states[joint] == JointState.SEEN:
                 hosts = self._lifted(hosts, pelvis, joint)
-        if any(self.plan.states[joint] == State.HIDDEN for joint in hips):
+        if any(self.plan.states[joint] == JointState.HIDDEN for joint in hips):
             hosts = self._turned(hosts, HIP_JOINTS)
         return hosts
 
     def _torso_alone(self) -> bool:
-        return all(self.plan.states[joint] == State.EXACT for joint in HIP_JOINTS)
+        return all(self.plan.states[joint] == JointState.EXACT for joint in HIP_JOINTS)
 
     def _turned(self, hosts: Hosts, joints: tuple[int, ...]) -> Hosts:
         """Lay a rigid part on: nothing is free with two points beside the pivot, an angle with one, else all."""
         pivot = joints[0]
         states = self.plan.states
-        known = [k for k, joint in enumerate(joints) if k and states[joint] != State.HIDDEN]
-        free = [k for k, joint in enumerate(joints) if k and states[joint] == State.HIDDEN]
+        known = [k for k, joint in enumerate(joints) if k and states[joint] != JointState.HIDDEN]
+        free = [k for k, joint in enumerate(joints) if k and states[joint] == JointState.HIDDEN]
         body = self.figure.neutral_points[list(joints)] - self.figure.neutral_points[pivot]
         turn = Turn(
             pivot=pivot,
@@ -91,14 +91,14 @@ class TrunkPlacer:
             return self._spun(placed, spun, body[joints.index(HIP_JOINTS[0])]) if len(spun) else placed
         loose = bool((hosts.spacing > 0.0).any())
         if known:
-            n = self.sampling.circle // FEWER if loose else self.sampling.circle
+            n = self.sampling.circle // HIP_COARSENING if loose else self.sampling.circle
             axis = unit(seen[:, 0])
             first = onto(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
             row = np.repeat(np.arange(len(hosts)), n)
             R = turned(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
             spacing = 2.0 * np.pi / n
         else:
-            every = rotations(self.sampling.rotations // FEWER if loose else self.sampling.rotations)
+            every = rotations(self.sampling.rotations // HIP_COARSENING if loose else self.sampling.rotations)
             row = np.repeat(np.arange(len(hosts)), len(every))
             R = np.tile(every, (len(hosts), 1, 1))
             spacing = float(rotation_spacing(len(every)))
@@ -140,7 +140,7 @@ class TrunkPlacer:
         return replace(both, tried=tried, spacing=spacing, spins=spins)
 
     def _hips_seen(self) -> bool:
-        return all(self.plan.states[joint] == State.SEEN for joint in HIP_JOINTS[1:])
+        return all(self.plan.states[joint] == JointState.SEEN for joint in HIP_JOINTS[1:])
 
     def _closing(
         self, hosts: Hosts, pivot: int, offset: Array, row: Index, axis: Array, first: Array
@@ -177,19 +177,19 @@ class TrunkPlacer:
     def _closing_rings(self, hosts: Hosts, pivot: int, offset: Array) -> tuple[Index, Array]:
         """Do the same where only the neck is known: on rings of pelvis positions, spun about each root."""
         z = np.array([0.0, 0.0, 1.0])
-        tilt = np.pi * (np.arange(RINGS) + 0.5) / RINGS
-        towards = np.stack([np.sin(tilt), np.zeros(RINGS), np.cos(tilt)], axis=1)
+        tilt = np.pi * (np.arange(N_PELVIS_RINGS) + 0.5) / N_PELVIS_RINGS
+        towards = np.stack([np.sin(tilt), np.zeros(N_PELVIS_RINGS), np.cos(tilt)], axis=1)
         ring = onto(np.broadcast_to(unit(offset), towards.shape), towards)
         row, R = self._closing(
             hosts,
             pivot,
             offset,
-            np.repeat(np.arange(len(hosts)), RINGS),
-            np.broadcast_to(z, (len(hosts) * RINGS, 3)),
+            np.repeat(np.arange(len(hosts)), N_PELVIS_RINGS),
+            np.broadcast_to(z, (len(hosts) * N_PELVIS_RINGS, 3)),
             np.tile(ring, (len(hosts), 1, 1)),
         )
-        spin = np.tile(circle(RINGS), len(row))
-        row, R = np.repeat(row, RINGS), np.repeat(R, RINGS, axis=0)
+        spin = np.tile(circle(N_PELVIS_RINGS), len(row))
+        row, R = np.repeat(row, N_PELVIS_RINGS), np.repeat(R, N_PELVIS_RINGS, axis=0)
         return row, turned(np.einsum("nij,j->ni", R, unit(offset)), spin) @ R
 
     def _last(self, joints: tuple[int, ...]) -> bool:

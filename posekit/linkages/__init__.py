@@ -1,6 +1,6 @@
 """Any articulated object from a single uncalibrated picture (Taylor 2000): linkages, and their family of postures."""
 
-from posekit.linkages.family import Family as Family
+from posekit.linkages.family import LinkageFamily as LinkageFamily
 from posekit.linkages.family import name_nearer as name_nearer
 from posekit.linkages.family import read_nearer as read_nearer
 from posekit.linkages.linkage import Linkage as Linkage

@@ -13,10 +13,10 @@ import numpy as np
 
 from posekit.geometry import Array
 
-LAST = 1e-3
+NEAREST_TO_RIGHT_ANGLE = 1e-3
 """How near (rad) the search goes to the right angle: a thousand times the bound."""
 
-UNIFORM = 160
+N_UNIFORM_POINTS = 160
 """Points of the grid that are evenly spaced."""
 NEAR_BOUND = np.geomspace(1e-5, 0.03, 36)
 """Points that resolve the corners of segments that are almost at the bound themselves."""
@@ -60,5 +60,5 @@ class BoundAngle:
 
 def grid() -> Array:
     """Return the angles (G,) at which curves are sampled, from the bound to a thousand times it."""
-    even = np.linspace(0.0, np.pi / 2 - LAST, UNIFORM)
+    even = np.linspace(0.0, np.pi / 2 - NEAREST_TO_RIGHT_ANGLE, N_UNIFORM_POINTS)
     return np.unique(np.concatenate([even, NEAR_BOUND]))

@@ -21,10 +21,10 @@ MAX_NODES = 500
 MAX_SEGMENTS = 2000
 """The most segments of one object."""
 
-LENGTHS = (1e-12, 1e12)
+LENGTH_RANGE = (1e-12, 1e12)
 """Lengths that double precision can square and compare."""
 
-ROUNDING = 1e-9
+RELATIVE_ROUNDING = 1e-9
 """Of a length: how far rounded lengths may miss the triangle inequality and still make a flat loop."""
 
 
@@ -86,10 +86,10 @@ def check_segments(
             raise InputError(
                 f"{where}: segment {name} has length {length:g}; expected a finite length above zero"
             )
-        if not LENGTHS[0] <= length <= LENGTHS[1]:
+        if not LENGTH_RANGE[0] <= length <= LENGTH_RANGE[1]:
             raise InputError(
-                f"{where}: segment {name} has length {length:g}; expected one from {LENGTHS[0]:g} to "
-                f"{LENGTHS[1]:g}: choose another unit"
+                f"{where}: segment {name} has length {length:g}; expected one from {LENGTH_RANGE[0]:g} to "
+                f"{LENGTH_RANGE[1]:g}: choose another unit"
             )
         if frozenset((a, b)) in seen:
             raise InputError(f"{where}: segment {name} is given twice; keep one of the two")
@@ -143,7 +143,7 @@ def check_loops(where: str, nodes: Sequence[str], segments: Segments, lengths: A
     for node in range(len(nodes)):  # Floyd 1962, Warshall 1962
         nearest = np.minimum(nearest, nearest[:, node, None] + nearest[node])
     for number, (a, b, length) in enumerate(edges):
-        if length > nearest[a, b] * (1 + ROUNDING):
+        if length > nearest[a, b] * (1 + RELATIVE_ROUNDING):
             others, path = _shortest(len(nodes), edges, number)
             loop = "-".join(nodes[node] for node in [*path, a])
             raise InputError(

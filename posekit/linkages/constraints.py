@@ -16,12 +16,12 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages.bound_angle import BoundAngle
 from posekit.linkages.consistency import components
-from posekit.linkages.family import AT_BOUND, Family, read_nearer
+from posekit.linkages.family import AT_BOUND, LinkageFamily, read_nearer
 from posekit.linkages.flips import FlipCodes, number_flips
-from posekit.linkages.residuals import Closure, Flatness, Perpendicularity, Residual, Slice
+from posekit.linkages.residuals import Flatness, LoopClosure, Perpendicularity, Residual, Slice
 
-KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
-LEAST: Final = {"coplanar": 4, "collinear": 3}
+CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
+MIN_CONSTRAINT_POINTS: Final = {"coplanar": 4, "collinear": 3}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,7 +30,7 @@ class Constraints:
 
     Parameters
     ----------
-    family : Family
+    family : LinkageFamily
     segments : int array (k,)
         The segments that matter: the residuals depend on no other.
     angle : BoundAngle
@@ -43,7 +43,7 @@ class Constraints:
         Which of the k set the bound.
     """
 
-    family: Family
+    family: LinkageFamily
     segments: NDArray[np.intp]
     angle: BoundAngle
     residuals: tuple[tuple[float, Residual], ...]
@@ -77,17 +77,17 @@ class Constraints:
         if len(self.residuals) > 1:
             return None
         weight, only = self.residuals[0]
-        return math.sqrt(weight) * only.loop if isinstance(only, Closure) else None
+        return math.sqrt(weight) * only.loop if isinstance(only, LoopClosure) else None
 
 
 def put_together(
-    family: Family, weights: Mapping[str, float], nearer: Mapping[str, str] | None = None
+    family: LinkageFamily, weights: Mapping[str, float], nearer: Mapping[str, str] | None = None
 ) -> Constraints:
     """Collect the constraints of a linkage that an image lets judge.
 
     Parameters
     ----------
-    family : Family
+    family : LinkageFamily
     weights : mapping
         ``"closure"``, ``"coplanar"``, ``"perpendicular"``, ``"collinear"`` to a weight above zero.
     nearer : mapping, optional
@@ -102,7 +102,9 @@ def put_together(
     linkage = family.linkage
     where = f"linkage {linkage.name}"
     if not weights:
-        raise InputError(f"{where}: no constraint to search by; expected some of {', '.join(KINDS)}")
+        raise InputError(
+            f"{where}: no constraint to search by; expected some of {', '.join(CONSTRAINT_KINDS)}"
+        )
     if family.minimum_scale == 0:
         raise InputError(f"{where}: all its segments are seen end on, at one pixel; the image fixes no scale")
     given = read_nearer(linkage, nearer or {})
@@ -110,8 +112,10 @@ def put_together(
     minimum = family.minimum_scale * unit  # pixels a mean segment
     found: list[tuple[float, NDArray[np.intp], Residual]] = []
     for kind, weight in weights.items():
-        if kind not in KINDS:
-            raise InputError(f"{where}: constraint {kind!r} is not known; expected {', '.join(KINDS)}")
+        if kind not in CONSTRAINT_KINDS:
+            raise InputError(
+                f"{where}: constraint {kind!r} is not known; expected {', '.join(CONSTRAINT_KINDS)}"
+            )
         if not (math.isfinite(weight) and weight > 0):
             raise InputError(f"{where}: weight of {kind} is {weight:g}; expected a finite number above zero")
         terms = _terms(family, kind, minimum, unit)
@@ -146,12 +150,14 @@ def put_together(
     )
 
 
-def _terms(family: Family, kind: str, minimum: float, unit: float) -> list[tuple[NDArray[np.intp], Residual]]:
+def _terms(
+    family: LinkageFamily, kind: str, minimum: float, unit: float
+) -> list[tuple[NDArray[np.intp], Residual]]:
     """Make the residuals of one kind over all S segments, each with the segments that it depends on."""
     linkage, place = family.linkage, family.place / minimum
     terms: list[tuple[NDArray[np.intp], Residual]] = []
     if kind == "closure":
-        return [(np.flatnonzero(row), Closure(loop=row)) for row in family.incidence.loops]
+        return [(np.flatnonzero(row), LoopClosure(loop=row)) for row in family.incidence.loops]
     if kind == "perpendicular":
         for pair in linkage.perpendicular:
             if family.seen[list(pair)].all():
@@ -170,7 +176,7 @@ def _terms(family: Family, kind: str, minimum: float, unit: float) -> list[tuple
     groups: Sequence[Sequence[int]] = linkage.coplanar if kind == "coplanar" else linkage.collinear
     for group in groups:
         nodes = _together(family, group)
-        if len(nodes) >= LEAST[kind]:
+        if len(nodes) >= MIN_CONSTRAINT_POINTS[kind]:
             spread = family.incidence.spread(nodes)
             terms.append(
                 (
@@ -185,7 +191,7 @@ def _terms(family: Family, kind: str, minimum: float, unit: float) -> list[tuple
     return terms
 
 
-def _together(family: Family, group: Sequence[int]) -> list[int]:
+def _together(family: LinkageFamily, group: Sequence[int]) -> list[int]:
     """Return the nodes of a group that are seen, of the piece that most of them belong to."""
     seen = [node for node in group if np.isfinite(family.place[node]).all()]
     if not seen:
@@ -194,7 +200,7 @@ def _together(family: Family, group: Sequence[int]) -> list[int]:
     return [node for node in seen if family.incidence.part[node] == part]
 
 
-def _nothing(family: Family, kind: str) -> str:
+def _nothing(family: LinkageFamily, kind: str) -> str:
     """Say why there is nothing of a kind to judge."""
     linkage = family.linkage
     thing = {
@@ -217,8 +223,8 @@ def _nothing(family: Family, kind: str) -> str:
 def _narrow(term: Residual, segments: NDArray[np.intp], column: Mapping[int, int]) -> Residual:
     """Let a residual over all S segments read the k that matter."""
     kept = list(column)
-    if isinstance(term, Closure):
-        return Closure(loop=term.loop[kept])
+    if isinstance(term, LoopClosure):
+        return LoopClosure(loop=term.loop[kept])
     if isinstance(term, Flatness):
         return Flatness(spread=np.ascontiguousarray(term.spread[:, kept]), place=term.place, rank=term.rank)
     if isinstance(term, Perpendicularity):

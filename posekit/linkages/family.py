@@ -16,7 +16,7 @@ from posekit.linkages.linkage import Linkage
 
 Flips = NDArray[np.int8]
 
-FARTHEST = 1e9
+MAX_COORDINATE_PIXELS = 1e9
 """Pixels; no picture is larger."""
 
 AT_BOUND = 1e-12
@@ -24,7 +24,7 @@ AT_BOUND = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Family:
+class LinkageFamily:
     r"""All postures of a linkage that give one image under a scaled orthographic camera.
 
     For a scale s each segment is foreshortened by
@@ -61,10 +61,10 @@ class Family:
                 f"{where}: image points of shape {image.shape}; expected ({len(linkage.points)}, 2), one for each point"
             )
         for point, place in zip(linkage.points, image, strict=True):
-            if (np.abs(place) > FARTHEST).any() or np.isnan(place).sum() == 1:
+            if (np.abs(place) > MAX_COORDINATE_PIXELS).any() or np.isnan(place).sum() == 1:
                 raise InputError(
                     f"{where}: image point {point} is ({place[0]:g}, {place[1]:g}); expected two finite numbers of "
-                    f"at most {FARTHEST:g} pixels, or leave it out"
+                    f"at most {MAX_COORDINATE_PIXELS:g} pixels, or leave it out"
                 )
         if not (np.isfinite(self.aspect) and self.aspect > 0):
             raise CameraError(f"aspect must be finite and positive; got {self.aspect:g}")

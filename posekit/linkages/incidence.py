@@ -12,7 +12,7 @@ from posekit.geometry import Array
 from posekit.linkages.consistency import components
 from posekit.linkages.linkage import Linkage
 
-NOTHING = 1e-9
+ZERO_COEFFICIENT = 1e-9
 """Below it a coefficient of these matrices is rounding: all are small fractions."""
 
 
@@ -51,7 +51,7 @@ class Incidence:
         """Return the rows of B for some nodes of one piece, less their mean: what their flatness depends on."""
         rows = self.depth[list(nodes)]
         centred: Array = rows - rows.mean(axis=0)
-        centred[np.abs(centred) < NOTHING] = 0.0
+        centred[np.abs(centred) < ZERO_COEFFICIENT] = 0.0
         return centred
 
 
@@ -84,7 +84,7 @@ def incidence(linkage: Linkage, seen: Sequence[bool]) -> Incidence:
     depth = weights @ B
     for piece in pieces:
         depth[piece] -= depth[piece[0]]
-    depth[np.abs(depth) < NOTHING] = 0.0
+    depth[np.abs(depth) < ZERO_COEFFICIENT] = 0.0
     return Incidence(depth=depth, loops=_loops(A, kept), part=tuple(part), root=root)
 
 
@@ -97,7 +97,7 @@ def _loops(A: Array, kept: NDArray[np.intp]) -> Array:
         rest = A[number] - (A[number] @ orthonormal.T) @ orthonormal
         rest -= (rest @ orthonormal.T) @ orthonormal  # once more, against rounding
         size = float(np.linalg.norm(rest))
-        if size > NOTHING:
+        if size > ZERO_COEFFICIENT:
             basis.append(number)
             orthonormal = np.concatenate([orthonormal, rest[None] / size])
         else:

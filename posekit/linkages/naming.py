@@ -6,9 +6,9 @@ import difflib
 from collections.abc import Sequence
 
 from posekit.errors import InputError
-from posekit.safe_io.refusal import LONGEST, cut, one_line
+from posekit.safe_io.refusal import MAX_SHOWN_CHARACTERS, cut, one_line
 
-LISTED = 20
+MAX_NAMES_LISTED = 20
 """Valid names that are listed before the list is cut."""
 
 
@@ -19,11 +19,11 @@ def shown(name: str) -> str:
 
 def meant(name: str, names: Sequence[str]) -> str:
     """Suggest what a name was meant to be: the nearest valid names, or the valid names where none is near."""
-    near = difflib.get_close_matches(name[:LONGEST], names)
+    near = difflib.get_close_matches(name[:MAX_SHOWN_CHARACTERS], names)
     if near:
         return f"did you mean {' or '.join(near)}?"
-    listed = [shown(valid) for valid in names[:LISTED]]
-    return f"expected {', '.join(listed)}{', …' if len(names) > LISTED else ''}"
+    listed = [shown(valid) for valid in names[:MAX_NAMES_LISTED]]
+    return f"expected {', '.join(listed)}{', …' if len(names) > MAX_NAMES_LISTED else ''}"
 
 
 def find(where: str, name: str, nodes: Sequence[str]) -> int:

@@ -12,10 +12,10 @@ from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.text_file import read_text
 from posekit.safe_io.toml_file import parse_toml
 
-SCHEMA = "posekit.linkage/1"
+LINKAGES_SCHEMA = "posekit.linkage/1"
 MAX_BYTES = 1_000_000
 
-FIELDS = (
+LINKAGE_FIELDS = (
     "schema",
     "name",
     "source",
@@ -27,7 +27,7 @@ FIELDS = (
     "segments",
     "constraints",
 )
-CONSTRAINTS = ("coplanar", "perpendicular", "collinear")
+WRITTEN_CONSTRAINTS = ("coplanar", "perpendicular", "collinear")
 
 
 def linkage_names() -> tuple[str, ...]:
@@ -81,22 +81,28 @@ def parse_linkage(text: str, source: str | Path) -> Linkage:
     """Parse the TOML of a linkage that came from `source`; its name is the file's, where it gives none."""
     table = parse_toml(text, source)
     schema = table.get("schema")
-    if schema != SCHEMA:
+    if schema != LINKAGES_SCHEMA:
         raise refusal(
-            source, "schema", shown(schema), f'"{SCHEMA}"', f'write schema = "{SCHEMA}" in the first line'
+            source,
+            "schema",
+            shown(schema),
+            f'"{LINKAGES_SCHEMA}"',
+            f'write schema = "{LINKAGES_SCHEMA}" in the first line',
         )
     for field in table:
-        if field not in FIELDS:
-            raise refusal(source, field, "a field that is not known", "one that is", nearest(field, FIELDS))
+        if field not in LINKAGE_FIELDS:
+            raise refusal(
+                source, field, "a field that is not known", "one that is", nearest(field, LINKAGE_FIELDS)
+            )
     constraints = _table(source, "constraints", table.get("constraints", {}))
     for field in constraints:
-        if field not in CONSTRAINTS:
+        if field not in WRITTEN_CONSTRAINTS:
             raise refusal(
                 source,
                 f"constraints.{field}",
                 "a kind that is not known",
-                ", ".join(CONSTRAINTS),
-                nearest(field, CONSTRAINTS),
+                ", ".join(WRITTEN_CONSTRAINTS),
+                nearest(field, WRITTEN_CONSTRAINTS),
             )
     try:
         return Linkage.from_names(

@@ -41,7 +41,7 @@ class Residual(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Closure:
+class LoopClosure:
     """Squared distance between the two ends of a loop that was cut open.
 
     Parameters

@@ -22,7 +22,7 @@ from posekit.safe_io import nearest, shown
 ON_AXIS = 1e-9
 """Metres from a joint's axis up to which a point lies on it, and stays where it is when the joint turns."""
 
-AWAY = 5e-3
+MIN_POINT_DISTANCE_METRES = 5e-3
 """Metres by which the end of a limb, or the base, must lie away from the joints to be a point of its own."""
 
 
@@ -218,7 +218,7 @@ def _points_of(robot: Robot) -> tuple[str, ...]:
     def add_link(link: str, bodies: set[int]) -> None:
         frame = model.frames[frames[link]]
         if frame.parentJoint in bodies:
-            add(link, frame.parentJoint, frame.placement.translation, apart=AWAY)
+            add(link, frame.parentJoint, frame.placement.translation, apart=MIN_POINT_DISTANCE_METRES)
 
     for joint in sorted(within - {base}):
         add(model.names[joint], joint, np.zeros(3), apart=ON_AXIS)

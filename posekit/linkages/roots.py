@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 
-STEPS = 240
+MAX_ITERATIONS = 240
 """Of which every fourth halves the bracket: enough for any, where ten are usual."""
 
 Function = Callable[[Array, NDArray[np.intp]], Array]
@@ -37,7 +37,7 @@ def find_roots(function: Function, a: Array, b: Array) -> Array:
     active = (f1 != 0) & (f2 != 0) & (np.sign(f1) != np.sign(f2))
     rows = rows[active]
     x1, x2, x3, f1, f2, f3, t = (values[active] for values in (x1, x2, x3, f1, f2, f3, t))
-    for step in range(STEPS):
+    for step in range(MAX_ITERATIONS):
         if len(rows) == 0:
             break
         x = x1 + t * (x2 - x1)

@@ -16,17 +16,17 @@ from posekit.geometry import Array
 from posekit.linkages.constraints import Constraints
 from posekit.linkages.flips import Codes
 
-CHUNK = 1 << 20
+CHUNK_RESIDUALS = 1 << 20
 """Residuals that are evaluated at once."""
 
-FLAT = 1e-23
+ZERO_RESIDUAL = 1e-23
 """A residual that is nowhere above it is zero but for rounding.
 
 It is weighed by the squared sine and cosine of the angle: near the bound what rounding leaves of a foreshortening grows
 as one over the sine, and far from it points on a line of sight hardly tell their plane.
 """
 
-FINER = 16
+N_SUBCELLS = 16
 """Into how many cells one is cut in which a minimum may be hidden."""
 
 
@@ -92,11 +92,11 @@ def no_brackets() -> Brackets:
 def _any(constraints: Constraints, psi: Array) -> Iterator[Scan]:
     """Sample flips in chunks: minima are where the derivative turns from negative to positive."""
     n = constraints.flips.n
-    step = max(1, CHUNK // (len(psi) * max(1, len(constraints.residuals))))
+    step = max(1, CHUNK_RESIDUALS // (len(psi) * max(1, len(constraints.residuals))))
     for start in range(0, n, step):
         codes = np.arange(start, min(start + step, n), dtype=np.int64)
         value, slope = constraints.evaluate(constraints.flips.signs(codes)[:, None, :], psi)
-        flat = (value * (np.sin(psi) * np.cos(psi)) ** 2).max(axis=1) <= FLAT
+        flat = (value * (np.sin(psi) * np.cos(psi)) ** 2).max(axis=1) <= ZERO_RESIDUAL
         row, cell = np.nonzero((slope[:, :-1] < 0) & (slope[:, 1:] >= 0) & ~flat[:, None])
         turning = Brackets(codes[row], psi[cell], psi[cell + 1])
         row, cell = np.nonzero(_suspicious(value, slope, psi) & ~flat[:, None])
@@ -119,9 +119,9 @@ def _suspicious(value: Array, slope: Array, psi: Array) -> NDArray[np.bool_]:
 def _look_closer(constraints: Constraints, codes: Codes, low: Array, high: Array) -> Brackets:
     """Sample some cells again, finer."""
     found = [no_brackets()]
-    for start in range(0, len(codes), CHUNK // 64):
-        part = slice(start, start + CHUNK // 64)
-        psi = low[part, None] + (high - low)[part, None] * np.linspace(0, 1, FINER + 1)
+    for start in range(0, len(codes), CHUNK_RESIDUALS // 64):
+        part = slice(start, start + CHUNK_RESIDUALS // 64)
+        psi = low[part, None] + (high - low)[part, None] * np.linspace(0, 1, N_SUBCELLS + 1)
         _, slope = constraints.evaluate(constraints.flips.signs(codes[part])[:, None, :], psi)
         row, cell = np.nonzero((slope[:, :-1] < 0) & (slope[:, 1:] >= 0))
         found.append(Brackets(codes[part][row], psi[row, cell], psi[row, cell + 1]))
@@ -141,7 +141,7 @@ def _single_loop(constraints: Constraints, loop: Array, psi: Array) -> Iterator[
     high, high_slope = (
         _sums(values, high_bits) + values[:, fixed] @ flips.base[fixed] for values in (terms, term_slopes)
     )
-    step = max(1, CHUNK // (len(psi) * len(low)))
+    step = max(1, CHUNK_RESIDUALS // (len(psi) * len(low)))
     for start in range(0, len(high), step):
         part = slice(start, start + step)
         gap = (high[part, None] + low).reshape(-1, len(psi))
@@ -161,7 +161,7 @@ def _sums(terms: Array, bits: list[int]) -> Array:
 def _crossings(codes: Codes, gap: Array, change: Array, psi: Array) -> Scan:
     """Find where gaps (K, G) change sign, and where they come nearest to zero without."""
     size = np.abs(gap)
-    flat = (size * np.sin(psi) * np.cos(psi)).max(axis=1) <= FLAT**0.5
+    flat = (size * np.sin(psi) * np.cos(psi)).max(axis=1) <= ZERO_RESIDUAL**0.5
     positive, rising = gap > 0, change > 0
     crossing = positive[:, :-1] != positive[:, 1:]
     crossing[flat] = False

@@ -11,7 +11,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages.bound_angle import grid
 from posekit.linkages.constraints import Constraints, put_together
-from posekit.linkages.family import Family
+from posekit.linkages.family import LinkageFamily
 from posekit.linkages.flips import Codes
 from posekit.linkages.minima import Minima
 from posekit.linkages.roots import find_roots
@@ -23,26 +23,26 @@ MAX_LOOP_FLIPS = 1 << 20
 MAX_FLIPS = 1 << 15
 """The most that are tried for other constraints."""
 
-VANISHED = 2e-6
+VANISHED_ANGLE_RADIANS = 2e-6
 """Angle from the bound below which the segment that sets it is foreshortened to nothing."""
 
-SAME = 1e-9
+SAME_MINIMUM_RADIANS = 1e-9
 """Angle between two minima of one assignment that are one."""
 
-LEVEL = 1e-12
+ZERO_DERIVATIVE = 1e-12
 """A derivative at the bound that is zero but for rounding."""
 
-EXACT = 1e-24
+ZERO_RESIDUAL = 1e-24
 """A residual that is zero but for rounding; such minima are ordered by s."""
 
 Rows = NDArray[np.intp]
 
-PART = 1 << 16
+CHUNK_MINIMA = 1 << 16
 """Minima that are refined at once."""
 
 
 def search(
-    family: Family,
+    family: LinkageFamily,
     weights: Mapping[str, float],
     *,
     nearer: Mapping[str, str] | None = None,
@@ -57,7 +57,7 @@ def search(
 
     Parameters
     ----------
-    family : Family
+    family : LinkageFamily
     weights : mapping
         ``"closure"`` (squared distance of the ends of each loop, cut open), ``"coplanar"`` (sum of squared
         distances to the best plane), ``"perpendicular"`` (squared cosine), ``"collinear"`` (sum of squared distances
@@ -129,13 +129,13 @@ def _at_bound(constraints: Constraints, first: float, flat: Codes) -> tuple[Code
     flips = constraints.flips
     codes = np.arange(flips.n, dtype=np.int64)
     grows = np.zeros(flips.n, dtype=bool)
-    for start in range(0, flips.n, PART):
-        part = codes[start : start + PART]
+    for start in range(0, flips.n, CHUNK_MINIMA):
+        part = codes[start : start + CHUNK_MINIMA]
         signs = flips.signs(part)
         value, slope = constraints.evaluate(signs, np.array(0.0))
         later, later_slope = constraints.evaluate(signs, np.array(first))
-        level = np.abs(slope) <= LEVEL
-        grows[part] = (slope > LEVEL) | (level & (later_slope > 0) & (later > value))
+        level = np.abs(slope) <= ZERO_DERIVATIVE
+        grows[part] = (slope > ZERO_DERIVATIVE) | (level & (later_slope > 0) & (later > value))
     grows[flat] = False
     for mask in {flips.masks[column] for column in constraints.bounding}:
         grows &= grows[codes ^ mask]
@@ -147,8 +147,8 @@ def _at_bound(constraints: Constraints, first: float, flat: Codes) -> tuple[Code
 def _refine(constraints: Constraints, turning: Brackets) -> tuple[Codes, Array]:
     """Find where the derivative is zero in each bracket."""
     angles = np.empty(len(turning.code))
-    for start in range(0, len(angles), PART):
-        part = slice(start, start + PART)
+    for start in range(0, len(angles), CHUNK_MINIMA):
+        part = slice(start, start + CHUNK_MINIMA)
         signs = constraints.flips.signs(turning.code[part])
 
         def slope(psi: Array, rows: Rows, signs: Array = signs) -> Array:
@@ -175,8 +175,8 @@ def _refine_loop(
 def _roots(constraints: Constraints, loop: Array, brackets: Brackets, derivative: int) -> Array:
     """Find the roots of a loop's gap, or of its derivative."""
     angles = np.empty(len(brackets.code))
-    for start in range(0, len(angles), PART):
-        part = slice(start, start + PART)
+    for start in range(0, len(angles), CHUNK_MINIMA):
+        part = slice(start, start + CHUNK_MINIMA)
         codes = brackets.code[part]
 
         def gap(psi: Array, rows: Rows, codes: Codes = codes) -> Array:
@@ -200,10 +200,10 @@ def _collect(
     family = constraints.family
     signs = constraints.flips.signs(codes)
     residual = np.empty(len(codes))
-    for start in range(0, len(codes), PART):
-        part = slice(start, start + PART)
+    for start in range(0, len(codes), CHUNK_MINIMA):
+        part = slice(start, start + CHUNK_MINIMA)
         residual[part], _ = constraints.evaluate(signs[part], psi[part])
-    at_bound = psi <= VANISHED
+    at_bound = psi <= VANISHED_ANGLE_RADIANS
     flips = np.zeros((len(codes), len(family.linkage.segments)), dtype=np.int8)
     flips[:, constraints.segments] = signs
     vanished = constraints.segments[list(constraints.bounding)]
@@ -211,7 +211,7 @@ def _collect(
     s = family.minimum_scale / np.cos(np.where(at_bound, 0.0, psi))
     one = np.where(at_bound, constraints.flips.regardless(codes, constraints.bounding), codes)
     kept = _distinct(one, psi, at_bound)
-    exact = np.where(residual <= EXACT, 0.0, residual)
+    exact = np.where(residual <= ZERO_RESIDUAL, 0.0, residual)
     order = kept[np.lexsort((s[kept], exact[kept]))]
     flat_flips = np.zeros((len(flat), len(family.linkage.segments)), dtype=np.int8)
     flat_flips[:, constraints.segments] = constraints.flips.signs(flat)
@@ -234,5 +234,9 @@ def _distinct(codes: Codes, psi: Array, at_bound: NDArray[np.bool_]) -> Rows:
     place = np.where(at_bound, 0.0, psi)
     order = np.lexsort((place, at_bound, codes))
     new = np.ones(len(order), dtype=bool)
-    new[1:] = (np.diff(codes[order]) != 0) | (np.diff(at_bound[order]) != 0) | (np.diff(place[order]) > SAME)
+    new[1:] = (
+        (np.diff(codes[order]) != 0)
+        | (np.diff(at_bound[order]) != 0)
+        | (np.diff(place[order]) > SAME_MINIMUM_RADIANS)
+    )
     return order[new]

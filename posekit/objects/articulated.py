@@ -19,7 +19,7 @@ from posekit.validators.robot_limits import RobotLimits
 SAME_LENGTH = 1e-3
 """Of the longest: how far a linkage's rounded lengths may be from those of its robot, which are taken then."""
 
-URDF = (".urdf", ".xml")
+URDF_SUFFIXES = (".urdf", ".xml")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,7 +98,7 @@ def load_object(name: str | Path) -> ArticulatedObject:
         if linkage.urdf is None:
             return ArticulatedObject(linkage=linkage)
         return ArticulatedObject(linkage=linkage, robot=load_robot(linkage.urdf, geometry=False))
-    if text.lower().endswith(URDF) or text in robot_names():
+    if text.lower().endswith(URDF_SUFFIXES) or text in robot_names():
         robot = load_robot(name, geometry=False)
         return ArticulatedObject(linkage=linkage_of(robot), robot=robot)
     known = (*linkage_names(), *robot_names())

@@ -17,21 +17,21 @@ from posekit.robots.ik import PULL, InverseKinematics, Reach, Solution
 from posekit.robots.kinematics import Kinematics, body_points
 from posekit.robots.starts import lay, quaternions
 
-MOST = 256
+MAX_POSTURES_CERTIFIED = 256
 """Postures of one frame whose configurations are looked for: some milliseconds each."""
 
 
-ROUGH = 1e-3
+SEARCH_TOLERANCE_METRES = 1e-3
 """Metres that the solver's own search must come near to; what it found is then refined."""
 
-UNDECIDED = 32
+MAX_UNDECIDED_RETRIED = 32
 """How many of those that are still undecided are tried once more."""
 
-SHAPES, NEAR, AGAIN = 2048, 48, 12
+N_RANDOM_SHAPES, N_SHAPES_ALIGNED, N_RESTARTS = 2048, 48, 12
 """Random configurations that are compared with a posture by its distances, then laid on it, then started from."""
 
 
-class Certificate(NamedTuple):
+class ObjectCertificate(NamedTuple):
     """Configurations of N postures.
 
     Attributes
@@ -68,29 +68,31 @@ class Certifier:
         self.kinematics = Kinematics(model=robot.model, points=body_points(names))
         self._solvers: dict[float, InverseKinematics] = {}
 
-    def certify(self, points: Array, *, tolerance: float) -> Certificate:
+    def certify(self, points: Array, *, tolerance: float) -> ObjectCertificate:
         """Find configurations that place points (N, P, 3), metres, NaN unknown, within a tolerance in metres."""
-        rough = max(tolerance, ROUGH)
+        rough = max(tolerance, SEARCH_TOLERANCE_METRES)
         if rough not in self._solvers:
             self._solvers[rough] = InverseKinematics(kinematics=self.kinematics, tolerance=rough)
         n, nq = len(points), self.robot.model.nq
         q, distance = np.full((n, nq), np.nan), np.full(n, np.nan)
-        reasons = [f"undecided: configurations of the first {MOST} postures alone were looked for"] * n
+        reasons = [
+            f"undecided: configurations of the first {MAX_POSTURES_CERTIFIED} postures alone were looked for"
+        ] * n
         if n:
             with np.errstate(over="ignore"):  # the damping after a step that made things far worse
-                solution = self._solvers[rough].solve(points[:MOST])
-            q[:MOST] = solution.q
-            distance[:MOST] = np.nanmax(solution.residual, axis=1)
+                solution = self._solvers[rough].solve(points[:MAX_POSTURES_CERTIFIED])
+            q[:MAX_POSTURES_CERTIFIED] = solution.q
+            distance[:MAX_POSTURES_CERTIFIED] = np.nanmax(solution.residual, axis=1)
             rows = np.flatnonzero(distance > tolerance)
             if rows.size:
                 self._descend(points, q, distance, rows, q[rows][:, None])
-            rows = np.flatnonzero(distance > tolerance)[:UNDECIDED]
+            rows = np.flatnonzero(distance > tolerance)[:MAX_UNDECIDED_RETRIED]
             if rows.size:
                 self._descend(points, q, distance, rows, self._starts(points[rows]))
-            reasons[:MOST] = [self._reason(solution, k) for k in range(len(solution.q))]
+            reasons[:MAX_POSTURES_CERTIFIED] = [self._reason(solution, k) for k in range(len(solution.q))]
         certified = (distance <= tolerance).tolist()
         reasons = ["" if sure else reason for sure, reason in zip(certified, reasons, strict=True)]
-        return Certificate(q, distance, certified, reasons)
+        return ObjectCertificate(q, distance, certified, reasons)
 
     def _descend(
         self, points: Array, q: Array, distance: Array, rows: NDArray[np.intp], starts: Array
@@ -118,25 +120,25 @@ class Certifier:
         distance[rows[closer]] = worst[best][closer]
 
     def _starts(self, points: Array) -> Array:
-        """Find configurations (N, AGAIN, nq) whose points lie best on postures (N, P, 3), the base laid."""
+        """Find configurations (N, N_RESTARTS, nq) whose points lie best on postures (N, P, 3), the base laid."""
         q, shapes, lengths = self._shapes
         first, second = np.triu_indices(points.shape[1], 1)
         gap = np.linalg.norm(points[:, first] - points[:, second], axis=2)
         known = np.isfinite(gap).astype(np.float64)
         gap = np.nan_to_num(gap)
         misfit = known @ (lengths**2).T - 2 * gap @ lengths.T
-        near = np.argpartition(misfit, NEAR, axis=1)[:, :NEAR].reshape(-1)
-        weights = np.isfinite(points[..., 0]).astype(np.float64).repeat(NEAR, axis=0)
-        R, t, left = lay(shapes[near], np.nan_to_num(points).repeat(NEAR, axis=0), weights)
+        near = np.argpartition(misfit, N_SHAPES_ALIGNED, axis=1)[:, :N_SHAPES_ALIGNED].reshape(-1)
+        weights = np.isfinite(points[..., 0]).astype(np.float64).repeat(N_SHAPES_ALIGNED, axis=0)
+        R, t, left = lay(shapes[near], np.nan_to_num(points).repeat(N_SHAPES_ALIGNED, axis=0), weights)
         laid = q[near]
         laid[:, :3], laid[:, 3:7] = t, quaternions(R)
-        best = np.argsort(left.reshape(-1, NEAR), axis=1, kind="stable")[:, :AGAIN]
-        return np.take_along_axis(laid.reshape(len(points), NEAR, -1), best[..., None], axis=1)
+        best = np.argsort(left.reshape(-1, N_SHAPES_ALIGNED), axis=1, kind="stable")[:, :N_RESTARTS]
+        return np.take_along_axis(laid.reshape(len(points), N_SHAPES_ALIGNED, -1), best[..., None], axis=1)
 
     @cached_property
     def _shapes(self) -> tuple[Array, Array, Array]:
         """Random configurations (M, nq) with the base at rest, their points and the distances of these."""
-        q = draw_configurations(self.robot, SHAPES, np.random.default_rng(0))
+        q = draw_configurations(self.robot, N_RANDOM_SHAPES, np.random.default_rng(0))
         q[:, :7] = pin.neutral(self.robot.model)[:7]
         shapes = self.kinematics.positions(q)
         first, second = np.triu_indices(shapes.shape[1], 1)

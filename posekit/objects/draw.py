@@ -14,7 +14,7 @@ from posekit.objects.articulated import ArticulatedObject
 from posekit.robots import Kinematics, Robot, body_points
 from posekit.robots.configuration_space import ConfigurationSpace
 
-PIXELS = 500.0
+PIXELS_PER_METRE = 500.0
 """Pixels a metre in the pictures."""
 
 
@@ -75,10 +75,10 @@ def draw_view(
         )
     q = draw_configurations(thing.robot, count, rng)
     truth = Kinematics(model=thing.robot.model, points=body_points(thing.linkage.points)).positions(q)
-    image = truth[..., :2] * PIXELS
+    image = truth[..., :2] * PIXELS_PER_METRE
     return ObjectView(
         points=thing.linkage.points,
-        camera=ScaledOrthographicModel(scale=PIXELS if scale_known else None),
+        camera=ScaledOrthographicModel(scale=PIXELS_PER_METRE if scale_known else None),
         time=np.arange(count, dtype=np.float64),
         image=image + noise * rng.normal(size=image.shape) if noise else image,
         truth=truth,

@@ -14,28 +14,28 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.objects.mirror import mirrored
-from posekit.objects.plan import Plan
-from posekit.objects.spread import Spread
+from posekit.objects.plan import ObjectPlan
+from posekit.objects.spread import ImageSpread
 from posekit.objects.tolerance import ObjectTolerance
 from posekit.tree import Check, Leaves
 
 AT_ONCE = 1 << 20
 """Leaves before pruning that are grown together."""
 
-MOST = 1 << 14
+MAX_POSTURES = 1 << 14
 """The most postures of one frame: fourteen segments that nothing decides."""
 
-LEVEL = 1e-7
+LEVEL_DEPTH = 1e-7
 """Working units of depth below which neither end of a segment is nearer."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Grown:
+class GrownObject:
     """What survived of one frame.
 
     Parameters
     ----------
-    plan : Plan
+    plan : ObjectPlan
     parts : tuple of (Leaves, int)
         Trees grown together, each with the number of its first scale.
     checks : list of Check
@@ -44,7 +44,7 @@ class Grown:
     judged : str
     """
 
-    plan: Plan
+    plan: ObjectPlan
     parts: tuple[tuple[Leaves, int], ...]
     checks: list[Check]
     tolerance: ObjectTolerance
@@ -77,7 +77,7 @@ class Grown:
         nodes = linkage.place_nodes(self.points)
         ends = np.array(linkage.segments)
         apart = nodes[:, ends[:, 1], 2] - nodes[:, ends[:, 0], 2]
-        return np.where(np.abs(apart) <= LEVEL, 0, np.sign(apart)).astype(np.int8)
+        return np.where(np.abs(apart) <= LEVEL_DEPTH, 0, np.sign(apart)).astype(np.int8)
 
     @property
     def levels(self) -> tuple[tuple[str, int], ...]:
@@ -108,7 +108,9 @@ class Grown:
     @property
     def mirrored(self) -> NDArray[np.bool_]:
         """Survivors (N,) whose mirror image, near and far exchanged throughout, survives too."""
-        return mirrored(self.postures[..., 2], self.plan.spanned.tree.parents, self.hypothesis, level=LEVEL)
+        return mirrored(
+            self.postures[..., 2], self.plan.spanned.tree.parents, self.hypothesis, level=LEVEL_DEPTH
+        )
 
     def exact(self, *, fitted: Collection[str]) -> bool:
         """Tell whether there is evidence that the image is exact: loops closed that need not have.
@@ -142,13 +144,13 @@ class Grown:
 
 
 def grow(
-    plan: Plan, image: Array, aspect: float, scales: Array, tolerance: ObjectTolerance, judged: str
-) -> Grown:
+    plan: ObjectPlan, image: Array, aspect: float, scales: Array, tolerance: ObjectTolerance, judged: str
+) -> GrownObject:
     """Grow the trees of one frame.
 
     Parameters
     ----------
-    plan : Plan
+    plan : ObjectPlan
     image : array (P, 2)
         Of all points of the object.
     aspect : float
@@ -178,14 +180,14 @@ def grow(
         root = np.zeros((n, 3))
         root[:, :2] = camera.unproject(seen[:, 0])
         if not exact:
-            spread = Spread.of(spanned, camera.unproject(seen)[0], tolerance.point)
+            spread = ImageSpread.of(spanned, camera.unproject(seen)[0], tolerance.point)
             checks = plan.checks(tolerance, spread)
         leaves = spanned.tree.grow(camera, root, seen, checks, tolerance=tolerance.tangent)
         count += len(leaves.code)
-        if count > MOST:
+        if count > MAX_POSTURES:
             raise InputError(
-                f"linkage {plan.linkage.name}: more than {MOST:,} postures at {len(scales)} scales; say which end is "
-                "nearer of some segments (--nearer), or recover a part of the object"
+                f"linkage {plan.linkage.name}: more than {MAX_POSTURES:,} postures at {len(scales)} scales; say which "
+                "end is nearer of some segments (--nearer), or recover a part of the object"
             )
         parts.append((leaves, first))
-    return Grown(plan=plan, parts=tuple(parts), checks=checks, tolerance=tolerance, judged=judged)
+    return GrownObject(plan=plan, parts=tuple(parts), checks=checks, tolerance=tolerance, judged=judged)

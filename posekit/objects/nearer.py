@@ -13,12 +13,12 @@ from posekit.geometry import Array
 from posekit.linkages import Linkage
 from posekit.tree import Leaves, Pruned
 
-LEVEL = 1e-6
+LEVEL_DEPTH = 1e-6
 """Metres (or units of length) below which neither end is nearer."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Nearer:
+class NearerEnds:
     """Which end of which segment is nearer, frame by frame.
 
     Parameters
@@ -36,7 +36,7 @@ class Nearer:
     first: Array
 
     @staticmethod
-    def of(given: Sequence[Mapping[str, str]], linkage: Linkage, frames: int) -> Nearer:
+    def of(given: Sequence[Mapping[str, str]], linkage: Linkage, frames: int) -> NearerEnds:
         """Read what was given: one mapping of segment to nearer end for all frames, or one a frame.
 
         Raises
@@ -58,7 +58,7 @@ class Nearer:
                         f"--nearer: {name}: {end!r} is not one of its ends; expected {' or '.join(names)}"
                     )
                 first[k, segment] = 1.0 if end == names[0] else -1.0
-        return Nearer(
+        return NearerEnds(
             segments=linkage.segment_names,
             ends=tuple((linkage.nodes[a], linkage.nodes[b]) for a, b in linkage.segments),
             first=np.broadcast_to(first, (frames, first.shape[1])),
@@ -80,7 +80,7 @@ class Nearer:
             joints = [leaves.joints.index(end) for end in ends]
             depths = leaves.positions(joints, np.arange(len(leaves.code)))[..., 2]
             ahead = (depths[:, 1] - depths[:, 0]) * wanted
-            dead = ahead < -LEVEL
+            dead = ahead < -LEVEL_DEPTH
             if not dead.any():
                 continue
             n = int(dead.sum())

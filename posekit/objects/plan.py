@@ -15,14 +15,14 @@ from posekit.linkages import Linkage, Midpoint, SpanningTree, span
 from posekit.linkages.consistency import components
 from posekit.objects.articulated import ArticulatedObject
 from posekit.objects.shape import shape_checks
-from posekit.objects.spread import Loose, Spread
+from posekit.objects.spread import ImageSpread, Loose
 from posekit.objects.tolerance import ObjectTolerance
 from posekit.tree import Check
 from posekit.validators import linkage as validators
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Plan:
+class ObjectPlan:
     """The tree over the points that are seen.
 
     Parameters
@@ -45,7 +45,7 @@ class Plan:
     nearer: Mapping[str, str]
 
     @staticmethod
-    def of(thing: ArticulatedObject, seen: NDArray[np.bool_], nearer: Mapping[str, str]) -> Plan:
+    def of(thing: ArticulatedObject, seen: NDArray[np.bool_], nearer: Mapping[str, str]) -> ObjectPlan:
         """Make the plan for frames that show some points (P,).
 
         Raises
@@ -60,7 +60,7 @@ class Plan:
             number = thing.linkage.segment(name)
             if thing.linkage.segment_names[number] in kept:
                 choices[thing.linkage.segment_names[number]] = end
-        plan = Plan(thing=thing, linkage=linkage, columns=columns, segments=segments, nearer=choices)
+        plan = ObjectPlan(thing=thing, linkage=linkage, columns=columns, segments=segments, nearer=choices)
         _ = plan.spanned
         return plan
 
@@ -95,13 +95,13 @@ class Plan:
         shape = [check for check in shape_checks(self.spanned, tolerance=0.0) if check.name not in fitted]
         return max((max(check.points) for check in [*closing, *shape]), default=None)
 
-    def checks(self, tolerance: ObjectTolerance, spread: Spread | None = None) -> list[Check]:
+    def checks(self, tolerance: ObjectTolerance, spread: ImageSpread | None = None) -> list[Check]:
         """Make the checks: loops, shape, flips given by hand, limits of the robot.
 
         Parameters
         ----------
         tolerance : ObjectTolerance
-        spread : Spread, optional
+        spread : ImageSpread, optional
             How far depths may be off; absent where the image is exact.
         """
         spanned = self.spanned

@@ -14,10 +14,10 @@ from posekit.formats.own.object_result import ObjectFrame, ObjectResult
 from posekit.formats.own.object_view import ObjectView
 from posekit.objects.articulated import ArticulatedObject
 from posekit.objects.certify import Certifier
-from posekit.objects.growth import Grown, grow
-from posekit.objects.nearer import Nearer
-from posekit.objects.plan import Plan
-from posekit.objects.scales import CLOSED, family_of
+from posekit.objects.growth import GrownObject, grow
+from posekit.objects.nearer import NearerEnds
+from posekit.objects.plan import ObjectPlan
+from posekit.objects.scales import CLOSED_RESIDUAL, family_of
 from posekit.objects.tolerance import ObjectTolerance
 from posekit.settings.scale import Scale
 
@@ -89,7 +89,7 @@ def recover_object(
     certifier = None
     if thing.robot is not None:
         certifier = Certifier(thing.robot, thing.linkage.points)
-    plans: dict[tuple[bytes, tuple[tuple[str, str], ...]], Plan] = {}
+    plans: dict[tuple[bytes, tuple[tuple[str, str], ...]], ObjectPlan] = {}
     frames: list[ObjectFrame] = []
     for k in range(len(view)):
         seen = np.isfinite(view.image[k, :, 0])
@@ -97,7 +97,7 @@ def recover_object(
         key = (seen.tobytes(), tuple(sorted(choices.items())))
         try:
             if key not in plans:
-                plans[key] = Plan.of(thing, seen, choices)
+                plans[key] = ObjectPlan.of(thing, seen, choices)
             plan = plans[key]
             family = family_of(
                 plan,
@@ -142,7 +142,7 @@ def _by_hand(
     """Check flips that were given by hand; one mapping a frame."""
     if nearer is None:
         return [{} for _ in range(frames)]
-    Nearer.of(nearer, thing.linkage, frames)
+    NearerEnds.of(nearer, thing.linkage, frames)
     return [dict(nearer[0 if len(nearer) == 1 else k]) for k in range(frames)]
 
 
@@ -156,14 +156,14 @@ def _allowed(
 
 
 def _grow(
-    plan: Plan,
+    plan: ObjectPlan,
     view: ObjectView,
     k: int,
     family: Family,
     given: ObjectTolerance | None,
     exact: ObjectTolerance,
     measured: ObjectTolerance,
-) -> Grown:
+) -> GrownObject:
     """Grow the trees of one frame: exactly, and as measured where nothing shows that it is exact."""
     image, aspect = view.image[k], view.camera.aspect
     scales = family.chosen / plan.thing.back
@@ -173,13 +173,18 @@ def _grow(
     fitted = family.how.split("+")
     if grown.exact(fitted=fitted):
         return grown
-    if (family.minima_residual[:1] <= CLOSED).any() and len(grown.postures):
+    if (family.minima_residual[:1] <= CLOSED_RESIDUAL).any() and len(grown.postures):
         return replace(grown, judged="closed")  # the scale was found so that they close, exact image or not
     return grow(plan, image, aspect, scales, measured, "measured")
 
 
 def _frame(
-    view: ObjectView, k: int, plan: Plan, family: Family, grown: Grown, certifier: Certifier | None
+    view: ObjectView,
+    k: int,
+    plan: ObjectPlan,
+    family: Family,
+    grown: GrownObject,
+    certifier: Certifier | None,
 ) -> ObjectFrame:
     """Gather what became of one frame, in the result's unit."""
     thing = plan.thing

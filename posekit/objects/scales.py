@@ -10,21 +10,21 @@ from posekit.errors import InputError
 from posekit.formats.own import PER_METRE, Family, ScaledOrthographicModel, Unit
 from posekit.geometry import Array
 from posekit.linkages import search
-from posekit.linkages.family import Family as Solutions
-from posekit.objects.plan import Plan
+from posekit.linkages.family import LinkageFamily as Solutions
+from posekit.objects.plan import ObjectPlan
 from posekit.objects.triangles import Triangles
 from posekit.settings.scale import Scale, way_of
 
-ROUNDING = 1e-9
+BOUND_ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""
 
-SAME = 1e-9
+SAME_SCALE_RATIO = 1e-9
 """Of a scale: two minima so near each other are one hypothesis."""
 
 MOST_SEGMENTS = 15
 """Segments of loops whose flips are all tried; of more, the scale comes from the rigid triangles alone."""
 
-CLOSED = 1e-16
+CLOSED_RESIDUAL = 1e-16
 """Residual (dimensionless) of a minimum that leaves nothing: these alone are taken where there are any."""
 
 MOST_SCALES = 128
@@ -32,7 +32,7 @@ MOST_SCALES = 128
 
 
 def family_of(
-    plan: Plan,
+    plan: ObjectPlan,
     image: Array,
     *,
     camera: ScaledOrthographicModel,
@@ -44,7 +44,7 @@ def family_of(
 
     Parameters
     ----------
-    plan : Plan
+    plan : ObjectPlan
     image : array (P, 2)
         Of all points of the object.
     camera : ScaledOrthographicModel
@@ -78,7 +78,7 @@ def family_of(
     minima, curve_s, curve = np.empty((0, 2)), np.empty(0), np.empty(0)
     if way.how == "constraints":
         minima, curve_s, curve = _constrained(plan, solutions, way.weights)
-        closed = minima[:, 1] <= CLOSED
+        closed = minima[:, 1] <= CLOSED_RESIDUAL
         chosen = _distinct(minima[closed if closed.any() else slice(None), 0])[:MOST_SCALES]
         if not len(chosen):
             how, chosen = f"min: {how} fixes no scale here", np.array([bound])
@@ -95,14 +95,14 @@ def family_of(
             s = float(way.value or 0.0) / height
         length = float(plan.linkage.lengths[solutions.bounding])
         lost = length * (bound / s - 1)
-        if lost > allowed + ROUNDING * length:
+        if lost > allowed + BOUND_ROUNDING * length:
             name = "a unit of length" if unit is None else f"a {unit}"
             given, least = s * back / per, bound * back / per
             raise InputError(
                 f"--scale: {given:.6g} pixels {name} is below {least:.6g}, which {segment} needs: it is "
                 f"{100 * lost / length:.3g} % too short for its image; give at least {least:.6g}, or --scale min"
             )
-        chosen = np.array([max(s, bound) if lost <= ROUNDING * length else s])
+        chosen = np.array([max(s, bound) if lost <= BOUND_ROUNDING * length else s])
     return Family(
         how=how,
         bound=bound * back,
@@ -116,7 +116,7 @@ def family_of(
 
 
 def _constrained(
-    plan: Plan, solutions: Solutions, weights: Mapping[str, float]
+    plan: ObjectPlan, solutions: Solutions, weights: Mapping[str, float]
 ) -> tuple[Array, Array, Array]:
     """Search by constraints: over all flips, or where these are too many over the rigid triangles."""
     looped = int((np.abs(solutions.incidence.loops) > 0).any(axis=0).sum())
@@ -131,7 +131,7 @@ def _constrained(
 def _distinct(scales: Array) -> Array:
     """Leave out scales that differ from one before by rounding; the order stays."""
     order = np.argsort(scales, kind="stable")
-    new = np.diff(scales[order], prepend=-np.inf) > SAME * scales[order]
+    new = np.diff(scales[order], prepend=-np.inf) > SAME_SCALE_RATIO * scales[order]
     group = np.cumsum(new)
     first = np.full(group.max(initial=0) + 1, len(scales))
     np.minimum.at(first, group, order)

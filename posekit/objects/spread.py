@@ -18,7 +18,7 @@ from posekit.tree import Check, Findings
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spread:
+class ImageSpread:
     """What image points that are not exact do to a tree at one scale.
 
     Parameters
@@ -35,7 +35,7 @@ class Spread:
     beside: float
 
     @staticmethod
-    def of(spanned: SpanningTree, place: Array, beside: float) -> Spread:
+    def of(spanned: SpanningTree, place: Array, beside: float) -> ImageSpread:
         """Make it of image points in the tree's order (J, 2), working units."""
         tree = spanned.tree
         parents = np.array(tree.parents[1:], dtype=np.intp)
@@ -46,7 +46,7 @@ class Spread:
             for off in (2 * beside, 0.0, -2 * beside)
         )
         edges = np.concatenate([[0.0], np.maximum(most - depth, depth - least)])
-        return Spread(parents=tree.parents, edges=edges, beside=beside)
+        return ImageSpread(parents=tree.parents, edges=edges, beside=beside)
 
     def between(self, a: int, b: int) -> float:
         """Return by how much the depth between two joints may be off."""
@@ -74,11 +74,11 @@ class Loose:
     ----------
     check : Check
         Of the distance of two points, of a flip, or of a shape (`posekit.objects.shape`).
-    spread : Spread
+    spread : ImageSpread
     """
 
     check: Check
-    spread: Spread
+    spread: ImageSpread
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.formats.own.object_result import ObjectFrame, ObjectResult
 
-SHOWN = 4
+MAX_SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""
 
 
@@ -16,10 +16,10 @@ def object_lines(result: ObjectResult) -> list[str]:
     """Describe each frame's survivors and losses, the scales, and which mirror images survive."""
     lines = [f"{'frame':>5} {'time':>8} {'postures':>8} {'certified':>9} {'judged as':>9}  rejected most by"]
     frames = result.frames
-    cut = len(frames) - 2 * SHOWN
+    cut = len(frames) - 2 * MAX_SHOWN
     for k, frame in enumerate(frames):
-        if cut > 1 and SHOWN <= k < len(frames) - SHOWN:
-            if k == SHOWN:
+        if cut > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
+            if k == MAX_SHOWN:
                 lines.append(f"{'…':>5} {cut} frames between")
             continue
         lines.append(_frame_line(k, frame))
@@ -39,7 +39,7 @@ def object_lines(result: ObjectResult) -> list[str]:
 def _frame_line(k: int, frame: ObjectFrame) -> str:
     certified = [verdict for verdict in frame.certified if verdict is not None]
     sure = str(sum(certified)) if certified else "-"
-    most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(SHOWN))
+    most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(MAX_SHOWN))
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {sure:>9} {frame.judged or '-':>9}  {frame.reason or most}"
 
 

@@ -19,16 +19,16 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.linkages import Linkage
-from posekit.linkages.family import Family
+from posekit.linkages.family import LinkageFamily
 
-LAST = 1e-3
+NEAREST_TO_RIGHT_ANGLE = 1e-3
 """How near (rad) the search goes to the right angle: a thousand times the bound."""
-GRID = 4000
-STEPS = 80
+N_GRID_POINTS = 4000
+N_GOLDEN_SECTIONS = 80
 """Golden sections of a bracket: more than its last digits."""
-CLOSE = 1e-4
+OWN_SCALE_RATIO = 1e-4
 """Of the scale: a minimum is moved to a triangle's own scale that is so near and fits better."""
-GOLDEN = (np.sqrt(5) - 1) / 2
+GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,7 +47,7 @@ class Triangles:
     seen: Array
 
     @staticmethod
-    def of(family: Family) -> Triangles:
+    def of(family: LinkageFamily) -> Triangles:
         """Collect the triangles whose corners are seen."""
         linkage = family.linkage
         corners = triangles(linkage)
@@ -98,22 +98,22 @@ class Triangles:
             Scale and residual, best first.
         curve_s, curve_residual : array (G,)
         """
-        psi = np.linspace(0.0, np.pi / 2 - LAST, GRID)
+        psi = np.linspace(0.0, np.pi / 2 - NEAREST_TO_RIGHT_ANGLE, N_GRID_POINTS)
         curve = self.residual(bound / np.cos(psi))
         before, after = np.append(np.inf, curve[:-1]), np.append(curve[1:], -np.inf)
         lowest = np.flatnonzero((curve <= before) & (curve < after))
         low, high = psi[np.maximum(lowest - 1, 0)], psi[lowest + 1]
-        for _ in range(STEPS):
-            width = GOLDEN * (high - low)
+        for _ in range(N_GOLDEN_SECTIONS):
+            width = GOLDEN_RATIO * (high - low)
             first, second = high - width, low + width
             left = self.residual(bound / np.cos(first)) <= self.residual(bound / np.cos(second))
             low, high = np.where(left, low, first), np.where(left, second, high)
         s = bound / np.cos((low + high) / 2)
         # Near its minimum the sum is flat: where the image is exact, the triangles' own scales have more digits.
         own = self.scales()
-        own = np.maximum(own[np.isfinite(own) & (own >= bound * (1 - CLOSE))], bound)
+        own = np.maximum(own[np.isfinite(own) & (own >= bound * (1 - OWN_SCALE_RATIO))], bound)
         for k, scale in enumerate(s):
-            near = np.append(own[np.abs(own - scale) <= CLOSE * scale], scale)
+            near = np.append(own[np.abs(own - scale) <= OWN_SCALE_RATIO * scale], scale)
             s[k] = near[np.argmin(self.residual(near))]
         residual = self.residual(s)
         order = np.argsort(residual, kind="stable")

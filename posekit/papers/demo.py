@@ -29,7 +29,7 @@ from posekit.validators import PHYSICAL, Validator
 from posekit.viewer.illustrate import illustrate
 from posekit.views.builtin import builtin_view, view_of
 
-SEED = 1985
+DEMO_SEED = 1985
 RANDOM_VIEWS = 20
 
 
@@ -43,7 +43,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     pictures : bool
         Whether to draw the results too.
     """
-    random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(SEED)))
+    random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(DEMO_SEED)))
     jobs = (
         ("seq1", builtin_view("seq1"), PHYSICAL),
         ("seq2", builtin_view("seq2"), PHYSICAL),

@@ -12,14 +12,21 @@ import numpy as np
 from posekit.formats.markdown import table_lines
 from posekit.papers import lee_chen_printed as printed
 from posekit.papers.lee_chen_table2 import CameraEstimate, camera_estimates, exact_tables
-from posekit.papers.lee_chen_tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, recover_sequence
+from posekit.papers.lee_chen_tables34 import (
+    GROUPING_METRES,
+    N_PHASES,
+    PAPER_TOLERANCE,
+    Sequence1985,
+    closest,
+    recover_sequence,
+)
 from posekit.recovery.result import result_of
 from posekit.safe_io.writing import write_json, write_lines
 from posekit.skeleton import JOINTS
 from posekit.synthesis.walker_scene import SEQ_VELOCITY
 from posekit.viewer.illustrate import illustrate
 
-FIGURES = (
+FIGURES_TEXT = (
     "## The figures",
     "",
     "For SEQ1 and SEQ2 each, beside this file: `lee-chen.SEQ.image.png` (as Fig. A.1), `.projections.png` (as Figs. 6 "
@@ -27,7 +34,7 @@ FIGURES = (
     "`.page.html`.",
     "",
 )
-TABLE = {"seq1": "Table 3 (SEQ1)", "seq2": "Table 4 (SEQ2)"}
+TABLE_TITLES = {"seq1": "Table 3 (SEQ1)", "seq2": "Table 4 (SEQ2)"}
 
 
 def reproduce_lee_chen(folder: Path, *, pictures: bool = True) -> list[str]:
@@ -53,7 +60,7 @@ def reproduce_lee_chen(folder: Path, *, pictures: bool = True) -> list[str]:
         *_table2_lines(estimates, tables),
         *(line for sequence in found for line in _levels_lines(sequence)),
         *_frame1_lines(found),
-        *(FIGURES if pictures else ()),
+        *(FIGURES_TEXT if pictures else ()),
         *_differences_lines(found),
     ]
     document = {
@@ -80,8 +87,11 @@ def _illustrate(folder: Path, sequence: Sequence1985) -> list[str]:
             f"lee-chen.{sequence.name}",
             result_of(recovery, unit=view.unit, explain=True),
             view,
-            printed={"physical": printed.PHYSICAL[sequence.name], "motion": printed.MOTION[sequence.name]},
-            printed_frames=[frame - 1 for frame in printed.FRAMES],
+            printed={
+                "physical": printed.PRINTED_PHYSICAL[sequence.name],
+                "motion": printed.PRINTED_MOTION[sequence.name],
+            },
+            printed_frames=[frame - 1 for frame in printed.PRINTED_FRAMES],
         )
     )
 
@@ -92,12 +102,12 @@ def _plain(sequence: Sequence1985) -> dict[str, Any]:
         "velocity": sequence.velocity,
         "phase": sequence.phase,
         "distance": sequence.distance,
-        "frames": list(printed.FRAMES),
+        "frames": list(printed.PRINTED_FRAMES),
         "joint": list(JOINTS),
         "physical": sequence.physical.tolist(),
         "motion": sequence.motion.tolist(),
-        "printed_physical": printed.PHYSICAL[sequence.name],
-        "printed_motion": printed.MOTION[sequence.name],
+        "printed_physical": printed.PRINTED_PHYSICAL[sequence.name],
+        "printed_motion": printed.PRINTED_MOTION[sequence.name],
         "groups_after_rules_1_2": sequence.groups_after_rules_1_2,
         "survivors_after_rules_1_5": sequence.final[0],
         "groups_after_rules_1_5": sequence.final[1],
@@ -107,7 +117,7 @@ def _plain(sequence: Sequence1985) -> dict[str, Any]:
 
 def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -> list[str]:
     rows = [
-        ("the paper prints (Table 2c)", "5.000", _vector(printed.POSITION), "0.016", ""),
+        ("the paper prints (Table 2c)", "5.000", _vector(printed.PRINTED_POSITION), "0.016", ""),
         *(
             (one.way, f"{one.f:.3f}", _vector(one.position), f"{one.off:.3g}", one.misfit or "")
             for one in estimates
@@ -118,8 +128,8 @@ def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -
         for name, key, print_ in (
             ("(a) transformation matrix [T]", "T", printed.T),
             ("(b) rotation matrix [R]", "R", printed.R),
-            ("(c) camera position", "position", printed.POSITION),
-            ("(d) head points, camera frame", "head", printed.HEAD),
+            ("(c) camera position", "position", printed.PRINTED_POSITION),
+            ("(d) head points, camera frame", "head", printed.PRINTED_HEAD),
         )
     ]
     return [
@@ -138,21 +148,21 @@ def _table2_lines(estimates: Sequence[CameraEstimate], tables: dict[str, Any]) -
 def _levels_lines(sequence: Sequence1985) -> list[str]:
     head = ["level", "joint"]
     for column in ("physical", "with Rules 1-2"):
-        head += [f"{column}, frame {frame}: print / here" for frame in printed.FRAMES]
+        head += [f"{column}, frame {frame}: print / here" for frame in printed.PRINTED_FRAMES]
     rows = []
     for level, joint in enumerate(JOINTS):
         row: list[object] = [level, joint]
         for theirs, ours in (
-            (printed.PHYSICAL[sequence.name], sequence.physical),
-            (printed.MOTION[sequence.name], sequence.motion),
+            (printed.PRINTED_PHYSICAL[sequence.name], sequence.physical),
+            (printed.PRINTED_MOTION[sequence.name], sequence.motion),
         ):
-            row += [f"{theirs[k][level]} / {ours[k, level]}" for k in range(len(printed.FRAMES))]
+            row += [f"{theirs[k][level]} / {ours[k, level]}" for k in range(len(printed.PRINTED_FRAMES))]
         rows.append(row)
     return [
-        f"## {TABLE[sequence.name]}: survivors per level",
+        f"## {TABLE_TITLES[sequence.name]}: survivors per level",
         "",
-        f"Walker at {sequence.velocity:g} leg lengths/s; of {PHASES} phases of frame 1 searched, {sequence.phase:.2f} "
-        "of a cycle comes closest to the print among those at which §4.2 comes out as printed.",
+        f"Walker at {sequence.velocity:g} leg lengths/s; of {N_PHASES} phases of frame 1 searched, "
+        f"{sequence.phase:.2f} of a cycle comes closest to the print among those at which §4.2 comes out as printed.",
         "",
         *table_lines(head, rows),
     ]
@@ -161,7 +171,7 @@ def _levels_lines(sequence: Sequence1985) -> list[str]:
 def _frame1_lines(found: Sequence[Sequence1985]) -> list[str]:
     rows = []
     for sequence in found:
-        rules_12, grouped, final = printed.FINAL[sequence.name]
+        rules_12, grouped, final = printed.PRINTED_FINAL[sequence.name]
         rows.append(
             (
                 sequence.name.upper(),
@@ -181,8 +191,8 @@ def _frame1_lines(found: Sequence[Sequence1985]) -> list[str]:
     return [
         "## Frame 1 after grouping and Rules 3-5 (§4.2)",
         "",
-        f"Groups are of postures with every joint within {GROUP * 100:g} cm of the group's representative. The "
-        "phases were chosen among those at which Rules 3-5 leave as many groups as the paper says, so that column "
+        f"Groups are of postures with every joint within {GROUPING_METRES * 100:g} cm of the group's representative. "
+        "The phases were chosen among those at which Rules 3-5 leave as many groups as the paper says, so that column "
         "agrees by construction; the groups before it do not agree, because the paper's are finer.",
         "",
         *table_lines(head, rows),
@@ -198,7 +208,7 @@ def _differences_lines(found: Sequence[Sequence1985]) -> list[str]:
         "given either. So the counts can be compared in size, not digit for digit.",
         "- The torso of Table A.1 is not flat, and its shoulders are put in front of the line from neck to pelvis; the "
         "pelvis is therefore not always square to its ray, as it seems to have been in the paper.",
-        f"- The paper gives no tolerance for its distances; here it is {TOLERANCE.rigid * 100:g} cm. It gives no "
+        f"- The paper gives no tolerance for its distances; here it is {PAPER_TOLERANCE.rigid * 100:g} cm. It gives no "
         "thresholds for its rules and no size for its groups: see `WalkingThresholds` and `--group`.",
         "- Collision bodies are capsules of posekit's own figure; the paper's are not described.",
         *(

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-FRAMES: Final = (1, 3, 5)
+PRINTED_FRAMES: Final = (1, 3, 5)
 
 IMAGE_A2: Final = np.array(
     [
@@ -35,10 +35,10 @@ R: Final = np.array(
 )
 """Table 2(b)."""
 
-POSITION: Final = np.array([400.00116, -0.01535, 0.00595])
+PRINTED_POSITION: Final = np.array([400.00116, -0.01535, 0.00595])
 """Table 2(c), centimetres."""
 
-HEAD: Final = np.array(
+PRINTED_HEAD: Final = np.array(
     [
         [-0.00499, 52.12662, 434.17551],
         [-0.00485, 61.62641, 429.17581],
@@ -50,7 +50,7 @@ HEAD: Final = np.array(
 )
 """Table 2(d), centimetres, the paper's camera frame."""
 
-PHYSICAL: Final = {
+PRINTED_PHYSICAL: Final = {
     "seq1": (
         (1, 2, 4, 4, 4, 8, 16, 32, 48, 48, 48, 96, 192, 192),
         (1, 2, 2, 2, 2, 4, 8, 16, 24, 24, 24, 48, 96, 96),
@@ -64,7 +64,7 @@ PHYSICAL: Final = {
 }
 """Tables 3 and 4, after the physical constraints: by frame 1, 3, 5, then by level."""
 
-MOTION: Final = {
+PRINTED_MOTION: Final = {
     "seq1": (
         (1, 2, 4, 4, 4, 8, 8, 8, 16, 16, 16, 16, 32, 32),
         (1, 2, 2, 2, 2, 4, 6, 6, 10, 10, 10, 10, 20, 20),
@@ -78,5 +78,5 @@ MOTION: Final = {
 }
 """Tables 3 and 4, after Rules 1 and 2 too."""
 
-FINAL: Final = {"seq1": (32, 16, 2), "seq2": (6, 6, 1)}
+PRINTED_FINAL: Final = {"seq1": (32, 16, 2), "seq2": (6, 6, 1)}
 """Frame 1 after Rules 1-2, after grouping, after Rules 3-5 (§4.2)."""

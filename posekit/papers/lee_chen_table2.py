@@ -13,7 +13,7 @@ from posekit.geometry import Array
 from posekit.papers import lee_chen_printed as printed
 
 F = 0.05
-MISPRINT = -32.168
+MISPRINTED_EYE_X = -32.168
 """Table A.2(a)'s x of the right eye, centimetres; it does not give its own image point."""
 
 
@@ -49,7 +49,7 @@ def exact_image(head: HeadPoints = TABLE_A2) -> Array:
 def camera_estimates() -> list[CameraEstimate]:
     """Estimate the camera of frame 1 of SEQ1 in each way that the report sets side by side."""
     rounded = lee_chen.image_from_paper(printed.IMAGE_A2 / 100)
-    eye = TABLE_A2.points[TABLE_A2.index("right_eye")] * [0, 1, 1] + [MISPRINT / 100, 0, 0]
+    eye = TABLE_A2.points[TABLE_A2.index("right_eye")] * [0, 1, 1] + [MISPRINTED_EYE_X / 100, 0, 0]
     misprinted = TABLE_A2.with_points({"right_eye": eye})
     return [
         _refined("exact projections, f free", TABLE_A2, exact_image(), None),

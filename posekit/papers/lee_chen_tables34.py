@@ -12,18 +12,18 @@ from posekit.papers import lee_chen_printed as printed
 from posekit.recovery.conductor import recover
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.settings import Tolerance
-from posekit.synthesis import Scene, Walker, walker_scene
+from posekit.synthesis import SyntheticScene, Walker, walker_scene
 from posekit.synthesis.walker_scene import FRAME_TIME, SEQ1_CAMERA, SEQ2_CAMERA
 from posekit.validators import CHECKS
 from posekit.views.builtin import view_of
 
-CAMERAS = {"seq1": SEQ1_CAMERA, "seq2": SEQ2_CAMERA}
-TOLERANCE = Tolerance(rigid=0.01, tangent=0.001, placement=False)
+SEQUENCE_CAMERAS = {"seq1": SEQ1_CAMERA, "seq2": SEQ2_CAMERA}
+PAPER_TOLERANCE = Tolerance(rigid=0.01, tangent=0.001, placement=False)
 """The paper compares distances and gives no number; 1 cm lets near-frontal torsos stay ambiguous, as its do."""
 
-GROUP = 0.05
-PHASES = 100
-FOUND = 1e-6
+GROUPING_METRES = 0.05
+N_PHASES = 100
+SAME_POSTURE_METRES = 1e-6
 """Metres within which all joints of a survivor must lie to be the input."""
 
 
@@ -61,11 +61,13 @@ class Sequence1985:
     def distance(self) -> float:
         """How far the counts are from the print: the sum over all cells of how many octaves they are apart."""
         ours = np.maximum(np.stack([self.physical, self.motion]), 0.5)
-        print_ = np.array([printed.PHYSICAL[self.name], printed.MOTION[self.name]], dtype=np.float64)
+        print_ = np.array(
+            [printed.PRINTED_PHYSICAL[self.name], printed.PRINTED_MOTION[self.name]], dtype=np.float64
+        )
         return float(np.abs(np.log2(ours / print_)).sum())
 
 
-def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = PHASES) -> list[Sequence1985]:
+def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = N_PHASES) -> list[Sequence1985]:
     """Count one sequence at phases of frame 1 that are a hundredth of a cycle apart.
 
     Parameters
@@ -81,9 +83,11 @@ def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = PHAS
     walker = Walker(velocity=velocity)
     cycle = walker.gait.cycle_duration
     by_frame = []
-    for frame in printed.FRAMES:
+    for frame in printed.PRINTED_FRAMES:
         phase = phase0 + (frame - 1) * FRAME_TIME / cycle
-        scene = walker_scene(walker, camera=CAMERAS[name], frames=count, dt=cycle / PHASES, phase0=phase)
+        scene = walker_scene(
+            walker, camera=SEQUENCE_CAMERAS[name], frames=count, dt=cycle / N_PHASES, phase0=phase
+        )
         by_frame.append((scene, _recover(scene, (1, 2))))
     first, after_rules_12 = by_frame[0]
     after_rules_15 = _recover(first, (1, 2, 3, 4, 5))
@@ -96,12 +100,12 @@ def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = PHAS
             Sequence1985(
                 name=name,
                 velocity=velocity,
-                phase=phase0 + k / PHASES,
+                phase=phase0 + k / N_PHASES,
                 physical=np.stack([counts["physical"] for counts in levels]),
                 motion=np.stack([counts["motion"] for counts in levels]),
                 groups_after_rules_1_2=_groups(after_rules_12.frames[k]),
                 final=(len(last), _groups(last)),
-                truth_survives=bool((error < FOUND).any()),
+                truth_survives=bool((error < SAME_POSTURE_METRES).any()),
             )
         )
     return found
@@ -113,20 +117,24 @@ def closest(name: str, velocity: float) -> Sequence1985:
     Among phases at which the input survives frame 1 in at most as many groups as the paper is left with.
     """
     candidates = sequences(name, velocity)
-    allowed = [one for one in candidates if one.truth_survives and one.final[1] <= printed.FINAL[name][2]]
+    allowed = [
+        one for one in candidates if one.truth_survives and one.final[1] <= printed.PRINTED_FINAL[name][2]
+    ]
     return min(allowed or candidates, key=lambda one: one.distance)
 
 
 def recover_sequence(found: Sequence1985) -> tuple[View, Recovery]:
     """Recover the five frames of a sequence as the paper does, with Rules 1 and 2."""
     walker = Walker(velocity=found.velocity)
-    scene = walker_scene(walker, camera=CAMERAS[found.name], dt=FRAME_TIME, phase0=found.phase)
+    scene = walker_scene(walker, camera=SEQUENCE_CAMERAS[found.name], dt=FRAME_TIME, phase0=found.phase)
     return view_of(scene), _recover(scene, (1, 2))
 
 
-def _recover(scene: Scene, rules: tuple[int, ...]) -> Recovery:
+def _recover(scene: SyntheticScene, rules: tuple[int, ...]) -> Recovery:
     view = view_of(scene)
-    return recover(view, checks=CHECKS, ranges="table1", rules=rules, tolerance=TOLERANCE, group=GROUP)
+    return recover(
+        view, checks=CHECKS, ranges="table1", rules=rules, tolerance=PAPER_TOLERANCE, group=GROUPING_METRES
+    )
 
 
 def _groups(frame: FrameRecovery) -> int:

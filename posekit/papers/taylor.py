@@ -13,7 +13,7 @@ from posekit.papers.taylor_study import Study, synthetic_study
 from posekit.recovery.taylor_figure.proportions import TABLE_1
 from posekit.safe_io.writing import write_json, write_lines
 
-PICTURES = 100
+N_PICTURES = 100
 """Synthetic photographs: enough for a table in half a minute."""
 
 
@@ -33,7 +33,7 @@ def reproduce_taylor(folder: Path, *, pictures: bool = True) -> list[str]:
         The lines of the report.
     """
     objects = constrained()
-    study = synthetic_study(PICTURES)
+    study = synthetic_study(N_PICTURES)
     lines = [
         "# Taylor 2000, reproduced",
         "",

@@ -10,19 +10,19 @@ import numpy as np
 
 from posekit.formats.markdown import table_lines
 from posekit.geometry import Array
-from posekit.linkages import Family, Linkage, Minima, load_linkage, name_nearer, search
+from posekit.linkages import Linkage, LinkageFamily, Minima, load_linkage, name_nearer, search
 from posekit.measures import joint_angles
 
-SIZE = 600.0
+OBJECT_SIZE_PIXELS = 600.0
 """Pixels: how large an object is in its picture."""
 
-NOISE = 1.0
+NOISE_PIXELS = 1.0
 """Pixels, standard deviation of each coordinate."""
 
-DIAGONAL = 140.0
+DIAGONAL_MILLIMETRES = 140.0
 """Millimetres between a and c, over which the four bars are folded."""
 
-TURNS = (50.0, 110.0, 110.0, 80.0)
+TURN_DEGREES = (50.0, 110.0, 110.0, 80.0)
 """Degrees by which the flat chain turns at its points of articulation."""
 
 
@@ -102,7 +102,8 @@ def constrained_lines(objects: Sequence[Constrained]) -> list[str]:
     ]
     return [
         f"The largest difference between the angles at the joints, recovered and true, in {len(objects[0].worst)} "
-        f"synthetic pictures, {SIZE:g} pixels large, with {NOISE:g} pixel of noise; the last column without noise.",
+        f"synthetic pictures, {OBJECT_SIZE_PIXELS:g} pixels large, with {NOISE_PIXELS:g} pixel of noise; "
+        "the last column without noise.",
         "",
         *table_lines(head, rows),
         *minima,
@@ -119,8 +120,8 @@ def _measure(
     pictures: int,
     seed: int,
 ) -> Constrained:
-    s = SIZE / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
-    exact = Family(linkage=linkage, image=points[:, :2] * s)
+    s = OBJECT_SIZE_PIXELS / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
+    exact = LinkageFamily(linkage=linkage, image=points[:, :2] * s)
     flips = exact.flips_of(points)
     nearer = name_nearer(linkage, flips)
     triples = _triples(len(points), closed=constraint == "closure")
@@ -128,7 +129,9 @@ def _measure(
     rng = np.random.default_rng(seed)
     worst = np.full(pictures, np.inf)
     for k in range(pictures):
-        family = Family(linkage=linkage, image=points[:, :2] * s + NOISE * rng.normal(size=(len(points), 2)))
+        family = LinkageFamily(
+            linkage=linkage, image=points[:, :2] * s + NOISE_PIXELS * rng.normal(size=(len(points), 2))
+        )
         found = search(family, {constraint: 1.0}, nearer=nearer)
         if len(found):
             recovered = family.points(found.s[0], flips * ~family.vanished(found.s[0]))
@@ -154,16 +157,21 @@ def _triples(n: int, *, closed: bool) -> list[tuple[int, int, int]]:
 def _folded(lengths: Array) -> Array:
     """Lay the four bars into a plane (4, 3), folded over their diagonal."""
     ab, bc, cd, da = lengths
-    b = (ab**2 - bc**2 + DIAGONAL**2) / (2 * DIAGONAL)
-    d = (da**2 - cd**2 + DIAGONAL**2) / (2 * DIAGONAL)
+    b = (ab**2 - bc**2 + DIAGONAL_MILLIMETRES**2) / (2 * DIAGONAL_MILLIMETRES)
+    d = (da**2 - cd**2 + DIAGONAL_MILLIMETRES**2) / (2 * DIAGONAL_MILLIMETRES)
     return np.array(
-        [[0, 0, 0], [b, np.sqrt(ab**2 - b**2), 0], [DIAGONAL, 0, 0], [d, np.sqrt(da**2 - d**2), 0]]
+        [
+            [0, 0, 0],
+            [b, np.sqrt(ab**2 - b**2), 0],
+            [DIAGONAL_MILLIMETRES, 0, 0],
+            [d, np.sqrt(da**2 - d**2), 0],
+        ]
     )
 
 
 def _laid(lengths: Array) -> Array:
     """Lay the chain into a plane (6, 3), turning at each point of articulation."""
-    heading = np.radians(np.concatenate([[0.0], np.cumsum(TURNS)]))
+    heading = np.radians(np.concatenate([[0.0], np.cumsum(TURN_DEGREES)]))
     steps = lengths[:, None] * np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1)
     return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
 

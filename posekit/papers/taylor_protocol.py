@@ -13,19 +13,19 @@ from posekit.formats.markdown import table_lines
 from posekit.geometry import Array
 from posekit.measures import adjacent_segments, angle_disparity, best_of, rms_distance
 from posekit.papers.taylor_survival import AT_ONCE
-from posekit.papers.taylor_views import Seen
+from posekit.papers.taylor_views import StudyPictures
 from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
 from posekit.recovery.taylor_figure.human import Human
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.tree import Leaves
 from posekit.validators import Ranges, judge, load_ranges
 
-SIX = ("right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow", "left_wrist")
+MARKED_JOINTS = ("right_wrist", "right_elbow", "right_shoulder", "left_shoulder", "left_elbow", "left_wrist")
 """Where the actor of §3.2 wore markers: a chain of five segments, with four angles between them."""
 
-ANGLES = adjacent_segments([(k, k + 1) for k in range(5)])
+MARKED_ANGLES = adjacent_segments([(k, k + 1) for k in range(5)])
 
-PRINTED = {"rms": (3.76, 3.31), "angle": (5.27, 3.81)}
+PRINTED_ERRORS = {"rms": (3.76, 3.31), "angle": (5.27, 3.81)}
 """Mean and median over 11 photographs of one actor: cm after the best similarity, and degrees (§3.2)."""
 
 
@@ -77,7 +77,7 @@ class Accuracy:
         ]
 
 
-HEAD = (
+TABLE_HEAD = (
     "flips",
     "N, median (mean)",
     "all flips true",
@@ -88,23 +88,23 @@ HEAD = (
     "median",
 )
 
-PAPER = (
+PAPER_ROW = (
     "Taylor 2000, by hand (printed: 11 photographs, OptoTrak)",
     "1",
     "",
     "",
-    *(f"{value:g}" for key in ("rms", "angle") for value in PRINTED[key]),
+    *(f"{value:g}" for key in ("rms", "angle") for value in PRINTED_ERRORS[key]),
 )
 
 
 def accuracy_lines(table: Sequence[Accuracy]) -> list[str]:
     """Lay the table out in Markdown, the paper's own figures first."""
-    return table_lines(HEAD, [PAPER, *(one.row() for one in table)])
+    return table_lines(TABLE_HEAD, [PAPER_ROW, *(one.row() for one in table)])
 
 
 def accuracy(
     human: Human,
-    seen: Iterable[Seen],
+    seen: Iterable[StudyPictures],
     *,
     tolerance: Tolerance = MEASURED_TOLERANCE,
     ranges: Ranges | None = None,
@@ -114,7 +114,7 @@ def accuracy(
     Parameters
     ----------
     human : Human
-    seen : iterable of Seen
+    seen : iterable of StudyPictures
     tolerance : Tolerance
     ranges : Ranges, optional
         The figure's own unless told otherwise.
@@ -176,8 +176,8 @@ class _Measured:
     angles: Array
 
 
-def _measure(human: Human, leaves: Leaves, part: Seen, rows: NDArray[np.intp]) -> _Measured:
-    six = [human.linkage.points.index(name) for name in SIX]
+def _measure(human: Human, leaves: Leaves, part: StudyPictures, rows: NDArray[np.intp]) -> _Measured:
+    six = [human.linkage.points.index(name) for name in MARKED_JOINTS]
     frame = leaves.frame[rows]
     ours = human.twelve(leaves.positions(range(len(human.points)), rows))[:, six]
     theirs = part.truth[frame][:, six]
@@ -186,13 +186,13 @@ def _measure(human: Human, leaves: Leaves, part: Seen, rows: NDArray[np.intp]) -
         frame=frame,
         code=leaves.code[rows],
         rms=rms_distance(ours, theirs).value,
-        angles=angle_disparity(ours, theirs, ANGLES).degrees,
+        angles=angle_disparity(ours, theirs, MARKED_ANGLES).degrees,
     )
 
 
 def _choose(measured: _Measured, true: NDArray[np.int32], cost: Array) -> _Answer:
     """Choose in each picture the answer of least cost."""
-    rms, angles = np.full(measured.count, np.nan), np.full((measured.count, len(ANGLES)), np.nan)
+    rms, angles = np.full(measured.count, np.nan), np.full((measured.count, len(MARKED_ANGLES)), np.nan)
     n, right = np.zeros(measured.count, dtype=np.int64), np.zeros(measured.count)
     for frame in range(measured.count):
         rows = np.flatnonzero(measured.frame == frame)
@@ -222,7 +222,7 @@ def _average(measured: _Measured, true: NDArray[np.int32]) -> _Answer:
     )
 
 
-def _margins(human: Human, left: Leaves, part: Seen, ranges: Ranges, tolerance: Tolerance) -> Array:
+def _margins(human: Human, left: Leaves, part: StudyPictures, ranges: Ranges, tolerance: Tolerance) -> Array:
     """Return the worst joint-range margin (N,) of each survivor, degrees; NaN where nothing was decided."""
     if not len(left.code):
         return np.empty(0)

@@ -13,22 +13,25 @@ from posekit.body import load_figure
 from posekit.formats.markdown import table_lines
 from posekit.papers.taylor_protocol import Accuracy, accuracy, accuracy_lines
 from posekit.papers.taylor_survival import Survival, survival, survival_lines
-from posekit.papers.taylor_views import Proportions, Scale, Seen, exact_views, photographs
+from posekit.papers.taylor_views import Proportions, Scale, StudyPictures, exact_views, photographs
 from posekit.recovery.taylor_figure.human import Human, taylor_human
 from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
-from posekit.synthesis import CameraSphere, Scene, mocap_scenes, random_views, read_capture
+from posekit.synthesis import CameraSphere, SyntheticScene, mocap_scenes, random_views, read_capture
 
-SPHERE = CameraSphere(distance=(3.0, 6.0))
+CAMERA_SPHERE = CameraSphere(distance=(3.0, 6.0))
 """Where the cameras stand: anywhere around the person, 3 to 6 m away."""
 
-NOISE = 2.0
+NOISE_PIXELS = 2.0
 """Pixels, standard deviation of each coordinate."""
 
-STATURE = 1.75
+STATURE_METRES = 1.75
 """Metres: the synthetic person's."""
 
-PEOPLE: dict[Proportions, str] = {"figure": "the person's own lengths", "taylor": "Table 1's proportions"}
-SCALES: dict[Scale, str] = {
+LENGTH_SOURCES: dict[Proportions, str] = {
+    "figure": "the person's own lengths",
+    "taylor": "Table 1's proportions",
+}
+SCALE_SOURCES: dict[Scale, str] = {
     "stature": "s from the stature in pixels, raised to the bound where it is below",
     "flat": "s from the stature in pixels, too short segments flat",
     "min": "s at its lower bound",
@@ -57,7 +60,7 @@ class Photographed:
 
     def lines(self) -> list[str]:
         """Lay both tables out in Markdown."""
-        title = f"{PEOPLE[self.proportions]}, {SCALES[self.scale]}"
+        title = f"{LENGTH_SOURCES[self.proportions]}, {SCALE_SOURCES[self.scale]}"
         below = "" if self.scale == "min" else f"; below its bound in {self.short:.1%} of the pictures"
         return [
             f"### {title[0].upper()}{title[1:]}",
@@ -123,8 +126,8 @@ class Study:
         if self.rigid:
             lines += ["The tolerance of rigid parts:", "", *_swept_lines(self.rigid)]
         lines += [
-            f"## Photographs: a perspective camera {SPHERE.distance[0]:g} to {SPHERE.distance[1]:g} m away, "
-            f"{NOISE:g} px of noise",
+            f"## Photographs: a perspective camera {CAMERA_SPHERE.distance[0]:g} to {CAMERA_SPHERE.distance[1]:g} m "
+            f"away, {NOISE_PIXELS:g} px of noise",
             "",
             f"Tolerances: rigid parts {PHOTOGRAPH_TOLERANCE.rigid * 100:g} cm, angles "
             f"{PHOTOGRAPH_TOLERANCE.angle:g} degrees.",
@@ -149,8 +152,8 @@ def synthetic_study(pictures: int = 300, seed: int = 0) -> Study:
     pictures : int
     seed : int
     """
-    person = load_figure().from_stature(STATURE)
-    scenes = (random_views(person, pictures, np.random.default_rng(seed), SPHERE),)
+    person = load_figure().from_stature(STATURE_METRES)
+    scenes = (random_views(person, pictures, np.random.default_rng(seed), CAMERA_SPHERE),)
     human = taylor_human()
     return Study(
         title="Synthetic: random legal postures",
@@ -175,10 +178,10 @@ def capture_study(capture: Path, pictures: int = 1000, seed: int = 0) -> Study:
     InputError
         Where the file is not a capture or has too few frames with all joints.
     """
-    scenes = mocap_scenes(read_capture(capture), pictures, np.random.default_rng(seed), sphere=SPHERE)
+    scenes = mocap_scenes(read_capture(capture), pictures, np.random.default_rng(seed), sphere=CAMERA_SPHERE)
     human = taylor_human()
     exact = exact_views(human, scenes)
-    seen = photographs(human, scenes, noise=NOISE, rng=np.random.default_rng(seed))
+    seen = photographs(human, scenes, noise=NOISE_PIXELS, rng=np.random.default_rng(seed))
     return Study(
         title="Real motion capture",
         pictures=pictures,
@@ -192,13 +195,13 @@ def capture_study(capture: Path, pictures: int = 1000, seed: int = 0) -> Study:
 
 
 def _photographs(
-    human: Human, scenes: Sequence[Scene], seed: int, ranges: Sequence[str]
+    human: Human, scenes: Sequence[SyntheticScene], seed: int, ranges: Sequence[str]
 ) -> Iterator[Photographed]:
-    for proportions, scale in product(PEOPLE, SCALES):
+    for proportions, scale in product(LENGTH_SOURCES, SCALE_SOURCES):
         seen = photographs(
             human,
             scenes,
-            noise=NOISE,
+            noise=NOISE_PIXELS,
             rng=np.random.default_rng(seed),
             proportions=proportions,
             scale=scale,
@@ -213,7 +216,11 @@ def _photographs(
 
 
 def _sweep(
-    human: Human, seen: Sequence[Seen], base: Tolerance, rigid: Sequence[float], angle: Sequence[float]
+    human: Human,
+    seen: Sequence[StudyPictures],
+    base: Tolerance,
+    rigid: Sequence[float],
+    angle: Sequence[float],
 ) -> Iterator[Swept]:
     for metres, degrees in product(rigid, angle):
         tolerance = replace(base, rigid=metres, angle=degrees)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.markdown import table_lines
-from posekit.papers.taylor_views import Seen
+from posekit.papers.taylor_views import StudyPictures
 from posekit.recovery.taylor_figure.completion import taylor_checks
 from posekit.recovery.taylor_figure.human import Human
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
@@ -19,7 +19,7 @@ from posekit.validators import Ranges, load_ranges
 AT_ONCE = 50
 """Pictures whose 2048 leaves are held at once."""
 
-RANGES = ("urdf", "table1")
+RANGE_NAMES = ("urdf", "table1")
 
 Keys = NDArray[np.int64]
 
@@ -69,7 +69,7 @@ class Survival:
         ]
 
 
-HEAD = (
+TABLE_HEAD = (
     "checks",
     "survivors, mean",
     "median",
@@ -83,22 +83,22 @@ HEAD = (
 
 def survival_lines(table: Sequence[Survival]) -> list[str]:
     """Lay the table out in Markdown."""
-    return table_lines(HEAD, [one.row() for one in table])
+    return table_lines(TABLE_HEAD, [one.row() for one in table])
 
 
 def survival(
     human: Human,
-    seen: Iterable[Seen],
+    seen: Iterable[StudyPictures],
     *,
     tolerance: Tolerance = MEASURED_TOLERANCE,
-    ranges: Sequence[str] = RANGES,
+    ranges: Sequence[str] = RANGE_NAMES,
 ) -> list[Survival]:
     """Count what each check leaves alone, and what all leave together.
 
     Parameters
     ----------
     human : Human
-    seen : iterable of Seen
+    seen : iterable of StudyPictures
         All pictures count alike.
     tolerance : Tolerance
     ranges : sequence of str
@@ -131,7 +131,7 @@ def survival(
 
 
 def _living(
-    human: Human, leaves: Leaves, part: Seen, tables: Mapping[str, Ranges], tolerance: Tolerance
+    human: Human, leaves: Leaves, part: StudyPictures, tables: Mapping[str, Ranges], tolerance: Tolerance
 ) -> dict[str, Keys]:
     """Return the keys of what each check leaves alone of the same leaves."""
     living = {"none": _keys(leaves.frame, leaves.code)}

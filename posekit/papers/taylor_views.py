@@ -14,17 +14,17 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.recovery.taylor_figure.human import Human
 from posekit.recovery.taylor_figure.proportions import figure_of
-from posekit.synthesis import Scene
+from posekit.synthesis import SyntheticScene
 
 Proportions = Literal["figure", "taylor"]
 Scale = Literal["stature", "flat", "min"]
 
-SCALE = 300.0
+PIXELS_PER_METRE = 300.0
 """Pixels a metre of the exact views: any number would do, the flips do not know it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
+class StudyPictures:
     """F pictures of one person, with the truth.
 
     Parameters
@@ -60,7 +60,7 @@ class Seen:
         """Return the number of pictures."""
         return len(self.image)
 
-    def parts(self, size: int) -> Iterator[Seen]:
+    def parts(self, size: int) -> Iterator[StudyPictures]:
         """Cut the pictures into parts of at most `size`."""
         for first in range(0, len(self), size):
             rows = slice(first, first + size)
@@ -69,13 +69,13 @@ class Seen:
             yield replace(self, lengths=lengths, **per_picture)
 
 
-def exact_views(human: Human, scenes: Iterable[Scene]) -> list[Seen]:
+def exact_views(human: Human, scenes: Iterable[SyntheticScene]) -> list[StudyPictures]:
     """See every frame by a scaled orthographic camera, with its own lengths and the true s.
 
     Parameters
     ----------
     human : Human
-    scenes : iterable of Scene
+    scenes : iterable of SyntheticScene
         Their cameras' axes are the directions of view; their figures are judged by.
     """
     seen = []
@@ -83,11 +83,11 @@ def exact_views(human: Human, scenes: Iterable[Scene]) -> list[Seen]:
         truth = np.asarray(scene.joints_cam[:, human.joints])
         n = len(truth)
         seen.append(
-            Seen(
+            StudyPictures(
                 figure=scene.figure,
                 lengths=human.measure(truth),
-                image=truth[..., :2] * SCALE,
-                scale=np.full(n, SCALE),
+                image=truth[..., :2] * PIXELS_PER_METRE,
+                scale=np.full(n, PIXELS_PER_METRE),
                 truth=truth,
                 short=np.zeros(n, dtype=bool),
             )
@@ -97,19 +97,19 @@ def exact_views(human: Human, scenes: Iterable[Scene]) -> list[Seen]:
 
 def photographs(
     human: Human,
-    scenes: Iterable[Scene],
+    scenes: Iterable[SyntheticScene],
     *,
     noise: float,
     rng: np.random.Generator,
     proportions: Proportions = "figure",
     scale: Scale = "stature",
-) -> list[Seen]:
+) -> list[StudyPictures]:
     """See every frame by its scene's perspective camera, with noise, and find s as Taylor does.
 
     Parameters
     ----------
     human : Human
-    scenes : iterable of Scene
+    scenes : iterable of SyntheticScene
         Their figures are the people; the stature follows from the limbs (`posekit.body.stature_from_lengths`).
     noise : float
         Standard deviation of each image coordinate, pixels.
@@ -145,7 +145,7 @@ def photographs(
         pixels = pixels + noise * np.sqrt(2.0) * rng.standard_normal(len(truth))
         told, bound = pixels / stature, human.bound(image, lengths)
         seen.append(
-            Seen(
+            StudyPictures(
                 figure=figure,
                 lengths=lengths,
                 image=image,

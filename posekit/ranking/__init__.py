@@ -9,7 +9,7 @@ from posekit.ranking.depth import Depth as Depth
 from posekit.ranking.deviation import deviation_of_noise as deviation_of_noise
 from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
 from posekit.ranking.fitting import fit_prior as fit_prior
-from posekit.ranking.prior import TERMS as TERMS
+from posekit.ranking.prior import TERM_NAMES as TERM_NAMES
 from posekit.ranking.prior import Prior as Prior
 from posekit.ranking.prior_file import load_prior as load_prior
 from posekit.ranking.prior_file import write_prior as write_prior

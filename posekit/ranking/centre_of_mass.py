@@ -16,13 +16,13 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, SIDES
 
-HEAD: Final = 0.0681
+HEAD_MASS: Final = 0.0681
 HEAD_ABOVE_NECK: Final = 0.203
 """In lengths of the trunk."""
-TRUNK: Final = 0.43015
+TRUNK_MASS: Final = 0.43015
 TRUNK_BELOW_NECK: Final = 0.5051
 
-LIMBS: Final = (
+LIMB_MASSES: Final = (
     ("shoulder", "elbow", 0.0263, 0.5763),
     ("elbow", "wrist", 0.0150, 0.4567),
     ("elbow", "wrist", 0.00585, 1.237),
@@ -48,11 +48,13 @@ def centre_of_mass(joints: Array) -> Array:
     """
     neck = joints[JOINT["neck"]]
     down = (joints[JOINT["right_hip"]] + joints[JOINT["left_hip"]]) / 2 - neck
-    total = (HEAD + TRUNK) * neck + (TRUNK * TRUNK_BELOW_NECK - HEAD * HEAD_ABOVE_NECK) * down
+    total = (HEAD_MASS + TRUNK_MASS) * neck + (
+        TRUNK_MASS * TRUNK_BELOW_NECK - HEAD_MASS * HEAD_ABOVE_NECK
+    ) * down
     known = np.isfinite(joints).all()
-    mass: Array | float = HEAD + TRUNK
+    mass: Array | float = HEAD_MASS + TRUNK_MASS
     for side in SIDES:
-        for upper, lower, share, along in LIMBS:
+        for upper, lower, share, along in LIMB_MASSES:
             start, end = joints[JOINT[f"{side}_{upper}"]], joints[JOINT[f"{side}_{lower}"]]
             part = share * ((1 - along) * start + along * end)
             if known:

@@ -12,10 +12,10 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.student import excess
 
-DOF: Final = 4.0
+DEPTH_DEGREES_OF_FREEDOM: Final = 4.0
 """Degrees of freedom of the depth's t distribution: one estimate in some is plain wrong."""
 
-LEAST: Final = 0.01
+MIN_DEVIATION_METRES: Final = 0.01
 """Metres: least standard deviation of a depth."""
 
 
@@ -59,5 +59,5 @@ class Depth:
 
     def judge(self, depth: Array, frame: NDArray[np.intp]) -> Array:
         """Return the log-density of the necks' depths (N,), above its average; 0 where nothing is known."""
-        away = (depth - self.estimate[frame]) / np.maximum(self.deviation[frame], LEAST)
-        return np.nan_to_num(excess(away**2, 1, DOF))
+        away = (depth - self.estimate[frame]) / np.maximum(self.deviation[frame], MIN_DEVIATION_METRES)
+        return np.nan_to_num(excess(away**2, 1, DEPTH_DEGREES_OF_FREEDOM))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.image import LEAST
+from posekit.ranking.image import MIN_DEVIATION_METRES
 
 PER_TOLERANCE: Final = 2.2
 """Deviations in the tolerance of rigid distances: as fitted weights have it (docs, "Ranking")."""
@@ -39,7 +39,7 @@ def deviation_of_noise(pixels: ArrayLike, metres_per_pixel: ArrayLike) -> Array:
     for name, values in (("pixels", noise), ("metres a pixel", size)):
         if not (np.isfinite(values) & (values >= 0)).all():
             raise InputError(f"the noise needs {name} that are finite and not negative")
-    return np.asarray(np.hypot(LEAST, 2 * noise * size))
+    return np.asarray(np.hypot(MIN_DEVIATION_METRES, 2 * noise * size))
 
 
 def deviation_of_tolerance(rigid: ArrayLike) -> Array:
@@ -53,4 +53,4 @@ def deviation_of_tolerance(rigid: ArrayLike) -> Array:
     values = np.asarray(rigid, dtype=np.float64)
     if not (np.isfinite(values) & (values >= 0)).all():
         raise InputError("the tolerance of rigid distances must be finite metres, not negative")
-    return np.asarray(np.maximum(values / PER_TOLERANCE, LEAST))
+    return np.asarray(np.maximum(values / PER_TOLERANCE, MIN_DEVIATION_METRES))

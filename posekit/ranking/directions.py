@@ -15,17 +15,17 @@ from posekit.geometry import Array
 from posekit.ranking.vectors import across, cross, dot, unit
 from posekit.skeleton import JOINT, SIDES, segment_name
 
-LIMBS: Final = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
+LIMB_SEGMENT_ENDS: Final = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
 
-SEGMENTS: Final = tuple(
-    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{end}"]) for side in SIDES for start, end in LIMBS
+LIMB_SEGMENTS: Final = tuple(
+    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{end}"]) for side in SIDES for start, end in LIMB_SEGMENT_ENDS
 )
 """The segments of the limbs: upper arm, forearm, thigh and shank, the right ones first."""
 
-DIRECTIONS: Final = ("hips.left", "hips.down", *map(segment_name, SEGMENTS), "up")
+DIRECTION_NAMES: Final = ("hips.left", "hips.down", *map(segment_name, LIMB_SEGMENTS), "up")
 """The eleven directions; `up` is the last, so that what is known without it comes first."""
 
-UP: Final = len(DIRECTIONS) - 1
+UP_INDEX: Final = len(DIRECTION_NAMES) - 1
 
 
 def directions(joints: Array, up: Array | None = None) -> Array:
@@ -41,16 +41,16 @@ def directions(joints: Array, up: Array | None = None) -> Array:
     Returns
     -------
     array (11, 3, N), or (10, 3, N) without `up`
-        Unit vectors in the torso's frame, in the order of `DIRECTIONS`; NaN where one of their joints is not known, all
-        of them where neck, a shoulder or the pelvis is not.
+        Unit vectors in the torso's frame, in the order of `DIRECTION_NAMES`; NaN where one of their joints is not
+        known, all of them where neck, a shoulder or the pelvis is not.
     """
     neck, right, left, pelvis = joints[:4]
     down = unit(pelvis - neck)
     left_axis = unit(across(left - right, down))
     axes = np.stack([cross(down, left_axis), left_axis, -down])
     hips_left, hips_down = _hips(joints)
-    found = np.empty((UP + (up is not None), 3, joints.shape[2]))
-    vectors = [hips_left, hips_down, *(unit(joints[end] - joints[start]) for start, end in SEGMENTS)]
+    found = np.empty((UP_INDEX + (up is not None), 3, joints.shape[2]))
+    vectors = [hips_left, hips_down, *(unit(joints[end] - joints[start]) for start, end in LIMB_SEGMENTS)]
     if up is not None:
         vectors.append(up)
     for k, vector in enumerate(vectors):
@@ -72,7 +72,7 @@ def mirrored(found: Array) -> Array:
 
 def rows_of(names: tuple[str, ...]) -> NDArray[np.intp]:
     """Return where the components of some directions stand among all (3 a direction)."""
-    first = 3 * np.array([DIRECTIONS.index(name) for name in names], dtype=np.intp)
+    first = 3 * np.array([DIRECTION_NAMES.index(name) for name in names], dtype=np.intp)
     return np.asarray((first[:, None] + np.arange(3)).ravel())
 
 

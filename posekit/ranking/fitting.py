@@ -9,22 +9,25 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.directions import DIRECTIONS, directions, mirrored, rows_of
+from posekit.ranking.directions import DIRECTION_NAMES, directions, mirrored, rows_of
 from posekit.ranking.ground import standing
-from posekit.ranking.prior import WEIGHTS, Block, Prior, Spread
+from posekit.ranking.prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
 from posekit.ranking.student import Student
 from posekit.skeleton import JOINTS
 
-BLOCKS: Final = (DIRECTIONS[2:4] + DIRECTIONS[6:8], DIRECTIONS[:2] + DIRECTIONS[4:6] + DIRECTIONS[8:])
+BLOCK_DIRECTIONS: Final = (
+    DIRECTION_NAMES[2:4] + DIRECTION_NAMES[6:8],
+    DIRECTION_NAMES[:2] + DIRECTION_NAMES[4:6] + DIRECTION_NAMES[8:],
+)
 """Both arms; hips, both legs and up."""
 
-BLUR: Final = 0.1
+BLUR_RADIANS: Final = 0.1
 """Added to the deviation of each component, radians: other people, and other ways to place their joints."""
 
-DOF: Final = 4.0
-TEMPERATURE: Final = 0.008
-BALANCE, CONTACT = 0.10, 0.06
-"""Metres: see `posekit.ranking.prior.Spread`."""
+PRIOR_DEGREES_OF_FREEDOM: Final = 4.0
+DEFAULT_TEMPERATURE: Final = 0.008
+BALANCE_SCALE_METRES, CONTACT_SCALE_METRES = 0.10, 0.06
+"""Metres: see `posekit.ranking.prior.SmallDistancePrior`."""
 
 
 def fit_prior(
@@ -32,10 +35,10 @@ def fit_prior(
     up: Array,
     weight: Array | None = None,
     *,
-    blocks: Sequence[Sequence[str]] = BLOCKS,
-    blur: float = BLUR,
-    dof: float = DOF,
-    temperature: float = TEMPERATURE,
+    blocks: Sequence[Sequence[str]] = BLOCK_DIRECTIONS,
+    blur: float = BLUR_RADIANS,
+    dof: float = PRIOR_DEGREES_OF_FREEDOM,
+    temperature: float = DEFAULT_TEMPERATURE,
     source: str = "",
 ) -> Prior:
     """Fit a prior to postures; left and right are exchanged to make it symmetric. All terms have the weight one.
@@ -77,28 +80,30 @@ def fit_prior(
     if not whole.any():
         raise InputError("no posture has all joints; expected motion capture of whole bodies")
     flat = np.concatenate([found[..., whole], mirrored(found[..., whole])], axis=2).reshape(
-        3 * len(DIRECTIONS), -1
+        3 * len(DIRECTION_NAMES), -1
     )
     twice = np.tile(share[whole], 2) / (2 * share[whole].sum())
     fitted = []
     for names in blocks:
-        ordered = tuple(sorted(names, key=DIRECTIONS.index))
+        ordered = tuple(sorted(names, key=DIRECTION_NAMES.index))
         x = flat[rows_of(ordered)]
         mean = x @ twice
         away = x - mean[:, None]
         scale = (away * twice) @ away.T + blur**2 * np.eye(len(x))
-        fitted.append(Block(names=ordered, student=Student(mean=mean, scale=(scale + scale.T) / 2, dof=dof)))
+        fitted.append(
+            DirectionBlock(names=ordered, student=Student(mean=mean, scale=(scale + scale.T) / 2, dof=dof))
+        )
     off, apart = standing(columns[..., whole], upward[whole].T)
     spreads = [
-        Spread(scale, float(np.log1p((distance / scale) ** 2) @ twice[: len(distance)] * 2))
-        for scale, distance in ((BALANCE, off), (CONTACT, apart))
+        SmallDistancePrior(scale, float(np.log1p((distance / scale) ** 2) @ twice[: len(distance)] * 2))
+        for scale, distance in ((BALANCE_SCALE_METRES, off), (CONTACT_SCALE_METRES, apart))
     ]
     return Prior(
         name="fitted",
         source=source,
         blocks=tuple(fitted),
         temperature=temperature,
-        weights=dict.fromkeys(WEIGHTS, 1.0),
+        weights=dict.fromkeys(WEIGHT_NAMES, 1.0),
         balance=spreads[0],
         contact=spreads[1],
     )

@@ -13,16 +13,16 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.depth import Depth
 from posekit.ranking.image import rigid_lengths
-from posekit.ranking.prior import TERMS
+from posekit.ranking.prior import TERM_NAMES
 from posekit.ranking.upright import Up
 from posekit.skeleton import JOINTS
 
-FARTHEST: Final = 1e6
+MAX_COORDINATE_METRES: Final = 1e6
 """Metres."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Given:
+class RankingEvidence:
     """Survivors and the evidence on them.
 
     Parameters
@@ -57,7 +57,7 @@ class Given:
         deviation: ArrayLike,
         up: Up | None,
         depth: Depth | None,
-    ) -> Given:
+    ) -> RankingEvidence:
         """Check everything against everything else.
 
         Raises
@@ -66,9 +66,10 @@ class Given:
             Where a shape is wrong, a joint is out of the world or something is given for too few frames.
         """
         positions = numbers("joints", joints, (None, len(JOINTS), 3))
-        if (np.abs(positions) > FARTHEST).any():
+        if (np.abs(positions) > MAX_COORDINATE_METRES).any():
             raise InputError(
-                f"joints: a coordinate beyond {FARTHEST:g} m; expected metres, NaN where a joint is not known"
+                f"joints: a coordinate beyond {MAX_COORDINATE_METRES:g} m; expected metres, "
+                "NaN where a joint is not known"
             )
         count = len(positions)
         frames = _frames(frame, count)
@@ -86,7 +87,7 @@ class Given:
             raise InputError(
                 "chi2: a negative sum of squares; expected zero or more, NaN where there is none"
             )
-        return Given(
+        return RankingEvidence(
             joints=positions,
             frame=frames,
             deviation=_deviation(deviation, highest),
@@ -110,7 +111,7 @@ class Given:
             "contact": upright,
             "depth": self.depth is not None,
         }
-        return [name for name in TERMS if there.get(name, True)]
+        return [name for name in TERM_NAMES if there.get(name, True)]
 
 
 def numbers(name: str, given: ArrayLike, shape: tuple[int | None, ...]) -> Array:

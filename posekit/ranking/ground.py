@@ -17,7 +17,7 @@ from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.ranking.vectors import across, dot
 from posekit.skeleton import JOINT
 
-LOW: Final = 0.10
+SUPPORT_HEIGHT_METRES: Final = 0.10
 """Metres above the lower ankle at which the other carries little any more."""
 
 
@@ -42,7 +42,9 @@ def standing(joints: Array, up: Array) -> tuple[Array, Array]:
     rise = dot(left - right, up)
     apart = np.abs(rise)
     lower = np.where(rise >= 0, right, left)
-    support = across(np.where(rise >= 0, left - right, right - left), up) * np.exp(-0.5 * (apart / LOW) ** 2)
+    support = across(np.where(rise >= 0, left - right, right - left), up) * np.exp(
+        -0.5 * (apart / SUPPORT_HEIGHT_METRES) ** 2
+    )
     centre = across(centre_of_mass(joints) - lower, up)
     along = dot(centre, support) / np.maximum(dot(support, support), 1e-12)
     beside = centre - np.clip(along, 0.0, 1.0) * support

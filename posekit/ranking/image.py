@@ -14,13 +14,13 @@ from posekit.ranking.vectors import dot
 from posekit.safe_io import nearest
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 
-DOF: Final = 4.0
+MISFIT_DEGREES_OF_FREEDOM: Final = 4.0
 """Degrees of freedom of a misfit's t distribution: torsos give now and then by more than they mostly do."""
 
-LEAST: Final = 0.006
+MIN_DEVIATION_METRES: Final = 0.006
 """Metres: least deviation of a distance inside torso and hips. A real torso is no more rigid (docs, "Ranking")."""
 
-NAMES: Final = tuple(map(segment_name, RIGID_SEGMENTS))
+RIGID_SEGMENT_NAMES: Final = tuple(map(segment_name, RIGID_SEGMENTS))
 
 
 def rigid_lengths(lengths: Mapping[str, float]) -> Array:
@@ -31,14 +31,14 @@ def rigid_lengths(lengths: Mapping[str, float]) -> Array:
     InputError
         Where one is missing or not positive.
     """
-    for name in NAMES:
+    for name in RIGID_SEGMENT_NAMES:
         if name not in lengths:
             raise InputError(
                 f"lengths: {name} is missing; expected the four of torso and hips; {nearest(name, lengths)}"
             )
         if not 0 < lengths[name] < np.inf:
             raise InputError(f"lengths: {name} is {lengths[name]!r} m; expected a positive length")
-    return np.array([lengths[name] for name in NAMES], dtype=np.float64)
+    return np.array([lengths[name] for name in RIGID_SEGMENT_NAMES], dtype=np.float64)
 
 
 def misfit(joints: Array, lengths: Array, length_residual: Array | None, deviation: Array) -> Array:
@@ -56,15 +56,17 @@ def misfit(joints: Array, lengths: Array, length_residual: Array | None, deviati
     length_residual : array (N,), optional
         Metres.
     deviation : array (N,)
-        Of each distance, metres; taken to be at least `LEAST`.
+        Of each distance, metres; taken to be at least `MIN_DEVIATION_METRES`.
     """
-    inverse = 1.0 / np.maximum(deviation, LEAST)
+    inverse = 1.0 / np.maximum(deviation, MIN_DEVIATION_METRES)
     total = np.zeros(joints.shape[2])
     for (start, end), length in zip(RIGID_SEGMENTS, lengths, strict=True):
         apart = joints[end] - joints[start]
-        total += _known(excess(((np.sqrt(dot(apart, apart)) - length) * inverse) ** 2, 1, DOF))
+        total += _known(
+            excess(((np.sqrt(dot(apart, apart)) - length) * inverse) ** 2, 1, MISFIT_DEGREES_OF_FREEDOM)
+        )
     if length_residual is not None:
-        total += _known(excess((length_residual * inverse) ** 2, 1, DOF))
+        total += _known(excess((length_residual * inverse) ** 2, 1, MISFIT_DEGREES_OF_FREEDOM))
     return total
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from posekit.geometry import Array
 from posekit.ranking.directions import directions
-from posekit.ranking.given import Given
+from posekit.ranking.given import RankingEvidence
 from posekit.ranking.ground import standing
 from posekit.ranking.image import misfit
 from posekit.ranking.prior import Prior
@@ -18,11 +18,11 @@ from posekit.skeleton import JOINT
 AT_ONCE: Final = 4096
 """Survivors whose terms are computed together: few enough to stay in the cache."""
 
-HEIGHT, STANCE = 0.9, 0.4
+CENTRE_OF_MASS_HEIGHT_METRES, STANCE_WIDTH_METRES = 0.9, 0.4
 """Metres from ankles to centre of mass, and between ankles: how far a wrong `up` moves one beside the other."""
 
 
-def judge(given: Given, wanted: Collection[str], prior: Prior) -> dict[str, Array]:
+def judge(given: RankingEvidence, wanted: Collection[str], prior: Prior) -> dict[str, Array]:
     """Return the log terms of all survivors (N,), by name: of those wanted for which there is something to go by."""
     count = len(given.joints)
     terms = {name: np.empty(count) for name in given.possible if name in wanted}
@@ -33,7 +33,9 @@ def judge(given: Given, wanted: Collection[str], prior: Prior) -> dict[str, Arra
     return terms
 
 
-def _judge(given: Given, part: slice, wanted: Collection[str], prior: Prior) -> Iterator[tuple[str, Array]]:
+def _judge(
+    given: RankingEvidence, part: slice, wanted: Collection[str], prior: Prior
+) -> Iterator[tuple[str, Array]]:
     joints = np.ascontiguousarray(given.joints[part].transpose(1, 2, 0))
     frame = given.frame[part]
     deviation = given.deviation[frame]
@@ -55,8 +57,8 @@ def _judge(given: Given, part: slice, wanted: Collection[str], prior: Prior) -> 
     if upward is not None and ("balance" in wanted or "contact" in wanted):
         beside, apart = standing(joints, upward)
         if "balance" in wanted:
-            yield "balance", prior.balance.judge(beside, HEIGHT * sine)
+            yield "balance", prior.balance.judge(beside, CENTRE_OF_MASS_HEIGHT_METRES * sine)
         if "contact" in wanted:
-            yield "contact", prior.contact.judge(apart, STANCE * sine)
+            yield "contact", prior.contact.judge(apart, STANCE_WIDTH_METRES * sine)
     if "depth" in wanted and given.depth is not None:
         yield "depth", given.depth.judge(joints[JOINT["neck"], 2], frame)

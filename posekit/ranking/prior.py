@@ -14,18 +14,18 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.directions import DIRECTIONS, UP, rows_of
+from posekit.ranking.directions import DIRECTION_NAMES, UP_INDEX, rows_of
 from posekit.ranking.student import Student
 from posekit.safe_io import nearest
 
-TERMS: Final = ("image", "posture", "gravity", "balance", "contact", "depth")
+TERM_NAMES: Final = ("image", "posture", "gravity", "balance", "contact", "depth")
 """What a survivor is judged by."""
 
-WEIGHTS: Final = (*TERMS, "chi2")
+WEIGHT_NAMES: Final = (*TERM_NAMES, "chi2")
 """What has a weight: the terms, and the chi2 of a refinement where it is the image's term."""
 
 
-class Spread(NamedTuple):
+class SmallDistancePrior(NamedTuple):
     r"""A distance that is mostly small: its log-density is :math:`-\log(1 + (d/s)^2)`, but for a constant.
 
     Attributes
@@ -54,13 +54,13 @@ class Spread(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Block:
+class DirectionBlock:
     """Directions that are judged together, apart from those of other blocks.
 
     Parameters
     ----------
     names : tuple of str
-        Some of `DIRECTIONS`, in their order.
+        Some of `DIRECTION_NAMES`, in their order.
     student : Student
         Of their components, three a direction.
     """
@@ -69,11 +69,11 @@ class Block:
     student: Student
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.names if name not in DIRECTIONS]
+        unknown = [name for name in self.names if name not in DIRECTION_NAMES]
         if unknown:
-            raise InputError(f"{unknown[0]!r} is no direction; {nearest(unknown[0], DIRECTIONS)}")
-        if list(self.names) != sorted(set(self.names), key=DIRECTIONS.index) or not self.names:
-            raise InputError(f"directions of a block must be in the order {', '.join(DIRECTIONS)}")
+            raise InputError(f"{unknown[0]!r} is no direction; {nearest(unknown[0], DIRECTION_NAMES)}")
+        if list(self.names) != sorted(set(self.names), key=DIRECTION_NAMES.index) or not self.names:
+            raise InputError(f"directions of a block must be in the order {', '.join(DIRECTION_NAMES)}")
         size = 3 * len(self.names)
         if self.student.mean.shape != (size,) or self.student.scale.shape != (size, size):
             raise InputError(
@@ -83,7 +83,7 @@ class Block:
     @cached_property
     def without_up(self) -> int:
         """How many components are left where nobody knows which way is up."""
-        return 3 * sum(name != DIRECTIONS[UP] for name in self.names)
+        return 3 * sum(name != DIRECTION_NAMES[UP_INDEX] for name in self.names)
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
@@ -104,14 +104,14 @@ class Prior:
 
     Parameters
     ----------
-    blocks : tuple of Block
+    blocks : tuple of DirectionBlock
         Each direction at most once.
     temperature : float
         Metres: the postures' log-density is divided by 1 + deviation / temperature. A survivor that is a centimetre off
         is no draw from a distribution that is sharp to a degree.
     weights : mapping
-        Of each of `WEIGHTS`, zero or more.
-    balance, contact : Spread
+        Of each of `WEIGHT_NAMES`, zero or more.
+    balance, contact : SmallDistancePrior
         Of the centre of mass beside the feet's support, and of one ankle above the other.
     name, source : str
         What it is called, and what it is from.
@@ -122,11 +122,11 @@ class Prior:
         Where a number is impossible.
     """
 
-    blocks: tuple[Block, ...]
+    blocks: tuple[DirectionBlock, ...]
     temperature: float
     weights: Mapping[str, float]
-    balance: Spread
-    contact: Spread
+    balance: SmallDistancePrior
+    contact: SmallDistancePrior
     name: str = ""
     source: str = field(default="", repr=False)
 
@@ -134,9 +134,9 @@ class Prior:
         names = [name for block in self.blocks for name in block.names]
         if len(set(names)) != len(names):
             raise InputError(f"{self.name}: a direction is in more than one block; expected each once")
-        if set(self.weights) != set(WEIGHTS):
+        if set(self.weights) != set(WEIGHT_NAMES):
             raise InputError(
-                f"{self.name}: weights of {', '.join(self.weights)}; expected {', '.join(WEIGHTS)}"
+                f"{self.name}: weights of {', '.join(self.weights)}; expected {', '.join(WEIGHT_NAMES)}"
             )
         for what, value in (
             *((f"weights.{name}", value) for name, value in self.weights.items()),
@@ -167,7 +167,7 @@ class Prior:
         posture, gravity = np.zeros(flat.shape[1]), np.zeros(flat.shape[1])
         for block in self.blocks:
             alone = block.without_up
-            if len(found) > UP and alone < len(block.rows):
+            if len(found) > UP_INDEX and alone < len(block.rows):
                 student = block.student
                 if sine > 0:
                     student = student.widened(np.where(np.arange(len(block.rows)) < alone, 0.0, sine**2))

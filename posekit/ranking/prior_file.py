@@ -12,15 +12,15 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.directions import DIRECTIONS
-from posekit.ranking.prior import WEIGHTS, Block, Prior, Spread
+from posekit.ranking.directions import DIRECTION_NAMES
+from posekit.ranking.prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
 from posekit.ranking.student import Student
 from posekit.safe_io import nearest, parse_toml, read_toml, refusal, shown, write_lines
 
-SCHEMA: Final = "posekit.posture_prior/1"
+PRIOR_SCHEMA: Final = "posekit.posture_prior/1"
 BUILT_IN: Final = ("cmu",)
 MAX_BYTES: Final = 1_000_000
-DIGITS: Final = 5
+N_DECIMALS: Final = 5
 """Decimals of means and scales: a direction is told to a thousandth of a degree."""
 
 
@@ -56,9 +56,9 @@ def parse_prior(table: dict[str, Any], source: str) -> Prior:
     InputError
         Where it is not what `posekit.posture_prior/1` says.
     """
-    if table.get("schema") != SCHEMA:
+    if table.get("schema") != PRIOR_SCHEMA:
         raise refusal(
-            source, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line"
+            source, "schema", shown(table.get("schema")), f'"{PRIOR_SCHEMA}"', "name it in the first line"
         )
     fields = ("schema", "source", "dof", "temperature", "weights", "balance", "contact", "block")
     for name in table:
@@ -71,11 +71,13 @@ def parse_prior(table: dict[str, Any], source: str) -> Prior:
     spreads = {}
     for name in ("balance", "contact"):
         entry = _table(table, name, source)
-        spreads[name] = Spread(_number(entry, "scale", source, name), _number(entry, "usual", source, name))
+        spreads[name] = SmallDistancePrior(
+            _number(entry, "scale", source, name), _number(entry, "usual", source, name)
+        )
     blocks = table.get("block")
-    if not isinstance(blocks, list) or not 0 < len(blocks) <= len(DIRECTIONS):
+    if not isinstance(blocks, list) or not 0 < len(blocks) <= len(DIRECTION_NAMES):
         raise refusal(
-            source, "block", shown(blocks), f"1 to {len(DIRECTIONS)} tables", "give them as [[block]]"
+            source, "block", shown(blocks), f"1 to {len(DIRECTION_NAMES)} tables", "give them as [[block]]"
         )
     try:
         return Prior(
@@ -83,7 +85,7 @@ def parse_prior(table: dict[str, Any], source: str) -> Prior:
             source=str(table.get("source", "")),
             blocks=tuple(_block(block, dof, source, k) for k, block in enumerate(blocks)),
             temperature=_number(table, "temperature", source),
-            weights={name: _number(weights, name, source, "weights") for name in (*WEIGHTS, *weights)},
+            weights={name: _number(weights, name, source, "weights") for name in (*WEIGHT_NAMES, *weights)},
             balance=spreads["balance"],
             contact=spreads["contact"],
         )
@@ -99,13 +101,13 @@ def write_prior(path: str | Path, prior: Prior) -> None:
 def prior_lines(prior: Prior) -> Iterator[str]:
     """Spell a prior, line by line."""
     text = prior.source.replace("\\", "/").replace('"', "'")
-    yield f'schema = "{SCHEMA}"'
+    yield f'schema = "{PRIOR_SCHEMA}"'
     yield f'source = "{" ".join(text.split())}"'
     yield f"dof = {prior.blocks[0].student.dof:.6g}  # degrees of freedom of the t distributions"
     yield f"temperature = {prior.temperature:.6g}  # metres"
     yield ""
     yield "[weights]"
-    yield from (f"{name} = {prior.weights[name]:.3g}" for name in WEIGHTS)
+    yield from (f"{name} = {prior.weights[name]:.3g}" for name in WEIGHT_NAMES)
     for name, spread in (("balance", prior.balance), ("contact", prior.contact)):
         yield ""
         yield f"[{name}]"
@@ -123,10 +125,10 @@ def prior_lines(prior: Prior) -> Iterator[str]:
 
 
 def _spell(values: Array) -> str:
-    return "[" + ", ".join(f"{value + 0.0:.{DIGITS}f}" for value in np.round(values, DIGITS)) + "]"
+    return "[" + ", ".join(f"{value + 0.0:.{N_DECIMALS}f}" for value in np.round(values, N_DECIMALS)) + "]"
 
 
-def _block(entry: object, dof: float, source: str, k: int) -> Block:
+def _block(entry: object, dof: float, source: str, k: int) -> DirectionBlock:
     field = f"block[{k}]"
     if not isinstance(entry, dict) or set(entry) != {"directions", "mean", "scale"}:
         raise refusal(source, field, shown(entry), "directions, mean and scale", "give these three")
@@ -152,7 +154,7 @@ def _block(entry: object, dof: float, source: str, k: int) -> Block:
         raise refusal(
             source, f"{field}.scale", "a matrix that is not positive definite", "variances", "correct it"
         )
-    return Block(
+    return DirectionBlock(
         names=tuple(names), student=Student(mean=np.array(mean, dtype=np.float64), scale=scale, dof=dof)
     )
 

@@ -11,15 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.depth import Depth
-from posekit.ranking.given import Given, numbers
+from posekit.ranking.given import RankingEvidence, numbers
 from posekit.ranking.judging import judge
-from posekit.ranking.prior import TERMS, Prior
+from posekit.ranking.prior import TERM_NAMES, Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.ranking import Ranking, softmax
 from posekit.ranking.upright import Up
 from posekit.safe_io import nearest
 
-DEVIATION: Final = 0.012
+DEFAULT_DEVIATION_METRES: Final = 0.012
 """Metres by which survivors are off, where nobody says: 2 px at 4 m, or a torso that gives."""
 
 
@@ -38,7 +38,7 @@ def rank(
     frame: ArrayLike | None = None,
     length_residual: ArrayLike | None = None,
     chi2: ArrayLike | None = None,
-    deviation: ArrayLike = DEVIATION,
+    deviation: ArrayLike = DEFAULT_DEVIATION_METRES,
     up: Up | None = None,
     depth: Depth | None = None,
     extra: Mapping[str, ArrayLike | Term] | None = None,
@@ -101,11 +101,11 @@ def rank(
     >>> round(float(ranking.probability.sum()), 9), len(ranking.order) == len(frame)
     (1.0, True)
     """
-    given = Given.checked(joints, lengths, frame, length_residual, chi2, deviation, up, depth)
+    given = RankingEvidence.checked(joints, lengths, frame, length_residual, chi2, deviation, up, depth)
     added = dict(extra or {})
     left_out = _left_out(without, added)
     prior = prior or load_prior()
-    terms = judge(given, [name for name in TERMS if name not in left_out], prior)
+    terms = judge(given, [name for name in TERM_NAMES if name not in left_out], prior)
     refined = given.chi2 is not None
     if refined and "image" in terms:
         terms["image"] = _least_where_unknown(terms["image"], given.frame)
@@ -126,15 +126,15 @@ def rank(
 def _left_out(without: Iterable[str], added: Mapping[str, object]) -> set[str]:
     names = {without} if isinstance(without, str) else set(without)
     for name in added:
-        if name in TERMS:
+        if name in TERM_NAMES:
             raise InputError(f"{name!r} is a term already; expected another name for one of your own")
     for name in sorted(names):
-        if name not in (*TERMS, *added):
-            raise InputError(f"{name!r} is no term to leave out; {nearest(name, (*TERMS, *added))}")
+        if name not in (*TERM_NAMES, *added):
+            raise InputError(f"{name!r} is no term to leave out; {nearest(name, (*TERM_NAMES, *added))}")
     return names
 
 
-def _added(name: str, term: ArrayLike | Term, given: Given) -> Array:
+def _added(name: str, term: ArrayLike | Term, given: RankingEvidence) -> Array:
     """Return a term from outside, with its frame's mean where it is not known; 0 where none of its frame is."""
     values = numbers(name, term(given.joints) if callable(term) else term, (len(given.joints),))
     if (values == np.inf).any():

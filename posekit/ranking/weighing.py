@@ -22,9 +22,9 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.ranking import Ranking, softmax
 
-RIDGE: Final = 1e-3
-STEPS: Final = 100
-PRECISION: Final = 1e-9
+RIDGE_PENALTY: Final = 1e-3
+MAX_ITERATIONS: Final = 100
+MIN_IMPROVEMENT: Final = 1e-9
 
 
 class Choices(NamedTuple):
@@ -71,7 +71,7 @@ def fit_weights(
         raise InputError("no terms or no frames to fit weights to")
     weights = np.full(len(wanted), 0.5)
     value, slope, curve = _objective(sets, weights)
-    for _ in range(STEPS):
+    for _ in range(MAX_ITERATIONS):
         free = (weights > 0) | (slope > 0)
         step = np.zeros(len(wanted))
         step[free] = np.linalg.solve(-curve[np.ix_(free, free)], slope[free])
@@ -83,7 +83,7 @@ def fit_weights(
                 break
             size /= 2
         gain, weights, value, slope, curve = better - value, tried, better, next_slope, next_curve
-        if gain < PRECISION:
+        if gain < MIN_IMPROVEMENT:
             break
     return dict(zip(wanted, weights.tolist(), strict=True))
 
@@ -106,8 +106,8 @@ def _choices(ranking: Ranking, nearest: NDArray[np.intp], names: Sequence[str]) 
 
 def _objective(sets: Sequence[Choices], weights: Array) -> tuple[float, Array, Array]:
     """Return the mean log-likelihood of the choices less the ridge, its gradient and its Hessian."""
-    value = -RIDGE * float(weights @ weights)
-    slope, curve = -2 * RIDGE * weights, -2 * RIDGE * np.eye(len(weights))
+    value = -RIDGE_PENALTY * float(weights @ weights)
+    slope, curve = -2 * RIDGE_PENALTY * weights, -2 * RIDGE_PENALTY * np.eye(len(weights))
     for one in sets:
         p = softmax(one.terms @ weights, one.frame)
         count = len(one.chosen)

@@ -16,7 +16,7 @@ from posekit.geometry import Array
 from posekit.recovery.body import Judges
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
-from posekit.refinement import GIVING
+from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.sight import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.settings import Tolerance
@@ -32,7 +32,7 @@ def certified_within(noise: Noise) -> Tolerance:
     whatever the noise: three of those deviations do not contradict it. Distances: what is allowed of any measured body,
     and more in proportion where lengths are known worse than such bodies'.
     """
-    worse = max(1.0, max(noise.by_segment.values()) / max(GIVING.values()))
+    worse = max(1.0, max(noise.by_segment.values()) / max(MEASURED_LENGTH_DEVIATIONS.values()))
     rigid = RIGID_TOLERANCE * worse
     return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=DEVIATIONS * LIMIT_DEVIATION)
 

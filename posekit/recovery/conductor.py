@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, load_figure, stature_from_lengths
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
-from posekit.objects.nearer import Nearer
+from posekit.objects.nearer import NearerEnds
 from posekit.ranking import Up, load_prior
 from posekit.recovery.body import Body, FigureBody, Judges
 from posekit.recovery.camera_record import CameraRecords
@@ -107,7 +107,8 @@ def recover(
         posture near it (`posekit.refinement`). By default where the noise is known: from `rooting`, from the view, or
         because a detector saw the points; and no tolerance is given.
     length_deviation : float, optional
-        Relative standard deviation of lengths, for that; by default what bodies give (`posekit.refinement.GIVING`).
+        Relative standard deviation of lengths, for that; by default what bodies give
+        (`posekit.refinement.MEASURED_LENGTH_DEVIATIONS`).
     progress : callable, optional
         Called with the number of frames done since the last call.
 
@@ -143,7 +144,7 @@ def recover(
     fit = _fit(view, body, scale, tolerance, rooting)
     fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
     noise = _noise(view, body, tolerance, rooting, refine, length_deviation)
-    hand = None if nearer is None else Nearer.of(nearer, body.linkage, len(view))
+    hand = None if nearer is None else NearerEnds.of(nearer, body.linkage, len(view))
     grower = Grower(view=view, fit=fit, body=body, judges=judges, nearer=hand, infer=infer)
     refiner = None if noise is None else Refiner(grower=grower, noise=noise, rooting=rooting)
     grown: dict[int, Grown] = {}

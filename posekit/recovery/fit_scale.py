@@ -8,7 +8,7 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError, PosekitError
 from posekit.formats.own import PER_METRE, Family, ScaledOrthographicModel, Unit, View
 from posekit.geometry import Array
-from posekit.linkages import Family as Solutions
+from posekit.linkages import LinkageFamily as Solutions
 from posekit.linkages import Minima, search
 from posekit.recovery.body import Body
 from posekit.recovery.fit_camera import CameraFit

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from posekit.cameras import Camera
 from posekit.formats.own import View
 from posekit.geometry import Array
-from posekit.hidden import Completion, complete, reject
-from posekit.objects.nearer import Nearer
+from posekit.hidden import CompletedSurvivors, complete, reject
+from posekit.objects.nearer import NearerEnds
 from posekit.recovery.body import Body, FigureBody, Judges
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
@@ -41,7 +41,7 @@ class Grower:
     fit : CameraFit
     body : Body
     judges : Judges
-    nearer : Nearer, optional
+    nearer : NearerEnds, optional
         Flips given by hand.
     infer : bool
         Whether joints that were not seen are completed.
@@ -51,7 +51,7 @@ class Grower:
     fit: CameraFit
     body: Body
     judges: Judges
-    nearer: Nearer | None = None
+    nearer: NearerEnds | None = None
     infer: bool = True
 
     def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
@@ -127,7 +127,7 @@ class Grower:
         suite: Sequence[Check],
         tolerance: Tolerance,
         frame: NDArray[np.intp],
-    ) -> tuple[Leaves, Completion | None]:
+    ) -> tuple[Leaves, CompletedSurvivors | None]:
         """Complete survivors by the joints that were not seen, and drop those that cannot be.
 
         `frame` is the view's frame of each hypothesis.

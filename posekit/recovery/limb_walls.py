@@ -12,7 +12,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LEGS, LIMBS
+from posekit.refinement.anatomy import LEG_LIMBS, LIMB_JOINTS
 from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
 from posekit.tree import Check
 from posekit.validators import Ranges
@@ -56,7 +56,7 @@ class LimbWalls:
             return None
         mine = {
             limb: [check for check in checks if check.name == "joint_range" and joints[1] in check.points]
-            for limb, joints in enumerate(LIMBS)
+            for limb, joints in enumerate(LIMB_JOINTS)
         }
         if not any(mine.values()):
             return None
@@ -70,8 +70,8 @@ class LimbWalls:
 
     def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
         """Say how far limbs are beyond their limits; see `posekit.refinement.walls.Walls`."""
-        start, middle, end = LIMBS[limb]
-        part = self._torso if limb < LEGS.start or self.on_torso else self._hips
+        start, middle, end = LIMB_JOINTS[limb]
+        part = self._torso if limb < LEG_LIMBS.start or self.on_torso else self._hips
         points = np.repeat(self.figure.neutral_points[None, : len(JOINTS)], len(upper), axis=0)
         points[:, middle] = points[:, start] + upper @ part.T
         points[:, end] = points[:, middle] + lower @ part.T

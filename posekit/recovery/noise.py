@@ -18,7 +18,7 @@ from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
-from posekit.refinement import GIVING, RootPrior, Sight
+from posekit.refinement import MEASURED_LENGTH_DEVIATIONS, ObservedFrames, RootPrior
 from posekit.refinement.walls import Walls
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
 
@@ -52,7 +52,8 @@ class Noise:
     offset : float
         How far a detector's joints are from the figure's, standard deviation, metres.
     lengths : float, optional
-        Relative standard deviation of all lengths; what bodies give (`posekit.refinement.GIVING`) if not given.
+        Relative standard deviation of all lengths; if not given what bodies give
+        (`posekit.refinement.MEASURED_LENGTH_DEVIATIONS`).
     """
 
     deviation: float
@@ -85,7 +86,7 @@ class Noise:
     def by_segment(self) -> Mapping[str, float]:
         """Relative standard deviations by segment."""
         if self.lengths is None:
-            return GIVING
+            return MEASURED_LENGTH_DEVIATIONS
         return dict.fromkeys(SEGMENT_NAMES, self.lengths if self.lengths >= LEAST_LENGTHS else 0.0)
 
     @property
@@ -123,7 +124,7 @@ class Seen:
 
     Parameters
     ----------
-    sight : Sight
+    sight : ObservedFrames
         Without their heads.
     deviation : array (H, 19)
         Of joints and head points, pixels.
@@ -133,7 +134,7 @@ class Seen:
         The largest deviation of a neck's depth, metres.
     """
 
-    sight: Sight
+    sight: ObservedFrames
     deviation: Array
     focal: Array
     step: float
@@ -164,7 +165,7 @@ class Seen:
         focal = np.broadcast_to(np.sqrt(camera.K[..., 0, 0] * camera.K[..., 1, 1]), len(chosen))
         deviation = noise.of_points(view, frames, fit.root[chosen, 2], focal)
         necks, step = neck_priors(fit, chosen, camera, float((deviation[:, 0] / focal).max()))
-        sight = Sight(
+        sight = ObservedFrames(
             figure=figure,
             camera=camera,
             image=view.image[frames],

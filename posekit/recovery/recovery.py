@@ -16,7 +16,7 @@ from posekit.body import Figure
 from posekit.cameras.neck import Placement
 from posekit.formats.own import Family, Inferred, Root
 from posekit.geometry import Array
-from posekit.hidden import Completion
+from posekit.hidden import CompletedSurvivors
 from posekit.ranking import Ranking, deviation_of_tolerance
 from posekit.recovery.camera_record import CameraRecords
 from posekit.recovery.fit_camera import CameraFit
@@ -30,7 +30,7 @@ from posekit.settings import Tolerance
 from posekit.skeleton import JOINT, JOINTS
 
 
-def _inferred(completion: Completion, row: int) -> dict[str, Inferred]:
+def _inferred(completion: CompletedSurvivors, row: int) -> dict[str, Inferred]:
     """Describe the joints of one survivor that were not placed by the image."""
     return {
         region.joint: Inferred(

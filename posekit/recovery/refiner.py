@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera
 from posekit.geometry import Array
-from posekit.hidden import Completion
+from posekit.hidden import CompletedSurvivors
 from posekit.ranking import deviation_of_noise
 from posekit.recovery.body import Judges
 from posekit.recovery.certified import Contradiction, certified_within, certifying_checks
@@ -30,9 +30,9 @@ from posekit.recovery.limb_walls import LimbWalls
 from posekit.recovery.noise import Noise, Seen
 from posekit.recovery.sifting import Sifted, blocks, drop, sift
 from posekit.recovery.trees import Batch
-from posekit.refinement import Sight, Trunks, find_trunks, tolerance_of, under_noise
+from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import DEVIATIONS
-from posekit.refinement.trunk import TRUNK
+from posekit.refinement.trunk import N_TRUNK_JOINTS
 from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
@@ -63,7 +63,7 @@ class Lifted:
         On them.
     physical : int array
         Survivors by level, before the motion model.
-    completion : Completion or None
+    completion : CompletedSurvivors or None
         The joints that were not seen.
     """
 
@@ -74,7 +74,7 @@ class Lifted:
     trunks: Trunks
     leaves: Leaves
     physical: NDArray[np.int64]
-    completion: Completion | None
+    completion: CompletedSurvivors | None
 
     @property
     def own(self) -> NDArray[np.intp]:
@@ -216,7 +216,7 @@ class Refiner:
             self.certifying,
         )
 
-    def _with_heads(self, lifted: Lifted) -> Sight:
+    def _with_heads(self, lifted: Lifted) -> ObservedFrames:
         """Return what was seen, with the head.
 
         Only now: the head's turn, unknown at first, would lead trunks astray. A detector's ears and eyes are no points
@@ -296,11 +296,11 @@ def _pinhole(camera: Camera) -> PinholeCamera:
 def _without_twins(leaves: Leaves, trunks: Trunks) -> Leaves:
     """Drop the leaves whose trunk is another than the one that was found: its twin in the same image."""
     # Leaves are sorted by frame and code, and the trunk's joints are a code's first bits: one of a run tells of all.
-    prefix = leaves.code >> max(leaves.level - (TRUNK - 1), 0)
+    prefix = leaves.code >> max(leaves.level - (N_TRUNK_JOINTS - 1), 0)
     begins = np.ones(len(prefix), dtype=np.bool_)
     begins[1:] = (prefix[1:] != prefix[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
     one = np.flatnonzero(begins)
-    carried = trunks.carries(leaves.frame[one], leaves.positions(range(TRUNK), one))
+    carried = trunks.carries(leaves.frame[one], leaves.positions(range(N_TRUNK_JOINTS), one))
     twin = ~carried[np.cumsum(begins) - 1]
     row = np.flatnonzero(twin)
     nothing = np.full(len(row), np.nan)

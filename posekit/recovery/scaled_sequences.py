@@ -12,7 +12,15 @@ import numpy as np
 
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError, PosekitError
-from posekit.following import APART, Beam, Following, MotionModel, Paths, ScaleChoice, best_paths
+from posekit.following import (
+    PATH_SEPARATION_METRES,
+    Beam,
+    Following,
+    MotionModel,
+    Paths,
+    ScaleChoice,
+    best_paths,
+)
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.recovery.conductor import person_of, recover
 from posekit.recovery.recovery import Recovery
@@ -75,7 +83,7 @@ def follow_scaled(
     k: int = 2,
     model: MotionModel | None = None,
     beam: Beam | None = None,
-    apart: float = APART,
+    apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> ScaledFollowing:
     r"""Follow a person whose lengths are known up to a common factor, and tell the factor.

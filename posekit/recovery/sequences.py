@@ -11,7 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
-from posekit.following import APART, Beam, Following, MotionModel, Paths, SurvivorFrame, best_paths
+from posekit.following import (
+    PATH_SEPARATION_METRES,
+    Beam,
+    Following,
+    MotionModel,
+    Paths,
+    SurvivorFrame,
+    best_paths,
+)
 from posekit.following.paths import joints_of
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
@@ -34,7 +42,7 @@ def follow(
     log_probability: Sequence[ArrayLike] | None = None,
     model: MotionModel | None = None,
     beam: Beam | None = None,
-    apart: float = APART,
+    apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> Following:
     """Follow the person through the frames of a recovery, whose survivors cost what they are ranked.
@@ -93,7 +101,7 @@ def follow_frames(
     k: int = 2,
     model: MotionModel | None = None,
     beam: Beam | None = None,
-    apart: float = APART,
+    apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> Following:
     """Follow the person through recovered frames, whose survivors cost nothing unless their probabilities are given.

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.recovery.certified import Contradiction, contradictions
 from posekit.recovery.refined import RefinedSurvivors
-from posekit.refinement import Refined, Sight, merge, refine
-from posekit.refinement.refined import LEVEL
+from posekit.refinement import ObservedFrames, Refined, merge, refine
+from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check, Leaves
 from posekit.tree.leaves import Pruned
 
@@ -107,14 +107,14 @@ class Sifted:
             row=number[gone],
             place=np.where(self.explained[number][gone], 1, 0).astype(np.int8),
             value=self.p[number][gone],
-            lower=np.full(count, LEVEL),
+            lower=np.full(count, REJECTION_PROBABILITY),
             upper=np.full(count, np.inf),
         )
         return drop(leaves, gone, why)
 
 
 def sift(
-    sight: Sight,
+    sight: ObservedFrames,
     postures: Array,
     head: Array,
     hypothesis: NDArray[np.intp],

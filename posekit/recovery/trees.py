@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Configurations
 from posekit.geometry import Array
-from posekit.hidden import Completion
+from posekit.hidden import CompletedSurvivors
 from posekit.objects.mirror import mirrored
 from posekit.recovery.body import Body
 from posekit.recovery.refined import RefinedSurvivors
@@ -50,7 +50,7 @@ class Batch:
     tolerance : Tolerance
     exact : bool array (F,)
         Where there is evidence that the image points are exact, of frames that were judged so.
-    completion : Completion, optional
+    completion : CompletedSurvivors, optional
         The survivors' joints that were not seen; of the leaves before the motion model.
     refined : RefinedSurvivors, optional
         The likeliest postures near the leaves, where the noise is known.
@@ -64,7 +64,7 @@ class Batch:
     body: Body
     tolerance: Tolerance
     exact: NDArray[np.bool_]
-    completion: Completion | None = None
+    completion: CompletedSurvivors | None = None
     refined: RefinedSurvivors | None = None
     spread: float = 0.0
 

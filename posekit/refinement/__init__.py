@@ -1,25 +1,25 @@
 """Noise: the most likely posture for each survivor, how sure it is, and what noise cannot explain.
 
-`Sight` says what was seen and how well; `find_trunks` finds the torsos and hips that the noise allows, from which
-the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves into
-the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge` makes
-one of those that became one. `GIVING` is how much real bodies' lengths give; `diagnose` names lengths that are wrong.
-See docs/noise.md.
+`ObservedFrames` says what was seen and how well; `find_trunks` finds the torsos and hips that the noise allows, from
+which the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves
+into the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge`
+makes one of those that became one. `MEASURED_LENGTH_DEVIATIONS` is how much the lengths of real bodies vary; `diagnose`
+names lengths that are wrong. See docs/noise.md.
 """
 
 from posekit.refinement.allowance import NoisyRange as NoisyRange
 from posekit.refinement.allowance import under_noise as under_noise
 from posekit.refinement.diagnosis import LengthDoubt as LengthDoubt
 from posekit.refinement.diagnosis import diagnose as diagnose
-from posekit.refinement.giving import GIVING as GIVING
+from posekit.refinement.giving import MEASURED_LENGTH_DEVIATIONS as MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.merging import Merged as Merged
 from posekit.refinement.merging import merge as merge
 from posekit.refinement.optics import project as project
 from posekit.refinement.prior import RootPrior as RootPrior
 from posekit.refinement.refine import refine as refine
-from posekit.refinement.refined import LEVEL as LEVEL
+from posekit.refinement.refined import REJECTION_PROBABILITY as REJECTION_PROBABILITY
 from posekit.refinement.refined import Refined as Refined
-from posekit.refinement.sight import Sight as Sight
+from posekit.refinement.sight import ObservedFrames as ObservedFrames
 from posekit.refinement.survival import chi2_survival as chi2_survival
 from posekit.refinement.tolerance import NoiseTolerance as NoiseTolerance
 from posekit.refinement.tolerance import tolerance_of as tolerance_of

@@ -12,27 +12,27 @@ from posekit.body.angles import Limits
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, JOINT, segment_name
 
-TRUNK: Final = tuple(
+TRUNK_JOINTS: Final = tuple(
     JOINT[name] for name in ("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip")
 )
 """The joints of torso and hips: the first six of the tree."""
 
-LIMBS: Final = tuple(
+LIMB_JOINTS: Final = tuple(
     (JOINT[f"{side}_{start}"], JOINT[f"{side}_{middle}"], JOINT[f"{side}_{end}"])
     for start, middle, end in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
     for side in ("right", "left")
 )
 """Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
 
-START, MIDDLE, END = (tuple(limb[k] for limb in LIMBS) for k in range(3))
+LIMB_STARTS, LIMB_MIDDLES, LIMB_ENDS = (tuple(limb[k] for limb in LIMB_JOINTS) for k in range(3))
 
-ARMS, LEGS = slice(0, 2), slice(2, 4)
+ARM_LIMBS, LEG_LIMBS = slice(0, 2), slice(2, 4)
 
 TRUNK_SEGMENTS: Final = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3), (3, 4), (3, 5), (4, 5))
 """The nine distances of torso and hips."""
 
-SHAPE: Final = 9
-"""Numbers that place the trunk's joints in their parts: see `Anatomy.shape`."""
+N_SHAPE_NUMBERS: Final = 9
+"""Numbers that place the trunk's joints in their parts: see `FigureNumbers.shape`."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,7 +50,7 @@ class Bounds:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Anatomy:
+class FigureNumbers:
     """A figure in numbers.
 
     Parameters
@@ -75,7 +75,7 @@ class Anatomy:
     neck_bounds: Bounds
 
     @staticmethod
-    def of(figure: Figure, limits: Limits | None = None) -> Anatomy:
+    def of(figure: Figure, limits: Limits | None = None) -> FigureNumbers:
         """Read a figure; other limits than its own may be given."""
         points = figure.neutral_points
         pelvis = points[3]
@@ -92,7 +92,7 @@ class Anatomy:
         lengths = figure.lengths
         limbs = [
             [lengths[segment_name((a, b))] for a, b in ((limb[0], limb[1]), (limb[1], limb[2]))]
-            for limb in LIMBS
+            for limb in LIMB_JOINTS
         ]
         limits = limits or figure.limits
         first = [
@@ -100,7 +100,7 @@ class Anatomy:
             for joint in ("shoulder", "hip")
             for side in ("right", "left")
         ]
-        return Anatomy(
+        return FigureNumbers(
             shape=np.array(shape),
             limbs=np.array(limbs),
             head=np.asarray(points[list(HEAD)] - points[0]),

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import END, MIDDLE
-from posekit.refinement.descent import BLOCK, Descent, descend
+from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.factors import Rows
 from posekit.refinement.laying import Bases, Laid, Settings
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import moved
 from posekit.refinement.together import (
     LimbTables,
@@ -25,28 +25,28 @@ from posekit.refinement.together import (
     trunk_tables,
 )
 
-AGREES = 20.0
+LAST_STEP_GAIN_RATIO = 20.0
 """Times the precision that a further step may gain where a joint step is taken for the last.
 
 The quadratic's error e, of its promise g, leaves about e^2 / g.
 """
 
 
-FEW = 10
+MAX_BASE_STEPS = 10
 """The most steps of a base."""
 
 
-class Tables(NamedTuple):
+class BaseTables(NamedTuple):
     """The quadratics of trunks, and of the limbs that pull at them."""
 
     trunks: TrunkTables
     limbs: LimbTables
 
     @staticmethod
-    def of(problem: Problem, bases: Bases, laid: Laid) -> Tables:
+    def of(problem: RefinementProblem, bases: Bases, laid: Laid) -> BaseTables:
         """Tabulate trunks alone and their limbs; `problem` is that of all survivors."""
         pulling = laid.pulling
-        return Tables(
+        return BaseTables(
             trunk_tables(problem.take(bases.leaf), bases.found.state),
             limb_tables(pulling.problem, bases.found.state.take(pulling.base), pulling.chains),
         )
@@ -66,20 +66,20 @@ class Tables(NamedTuple):
 
 
 def assemble(
-    problem: Problem,
+    problem: RefinementProblem,
     before: Bases,
     base: Rows,
     leaf: Rows,
     laid: Laid,
     slots: Rows,
     settings: Settings,
-    tables: Tables | None,
+    tables: BaseTables | None,
 ) -> Bases:
     """Put bases together with limbs that pull at them, and refine them.
 
     Parameters
     ----------
-    problem : Problem
+    problem : RefinementProblem
         Of all survivors.
     before : Bases
     base, leaf : int array (G,)
@@ -87,7 +87,7 @@ def assemble(
     laid : Laid
     slots : int array (4, G)
         Limbs among those that pull, -1 for none.
-    tables : Tables, optional
+    tables : BaseTables, optional
         Of trunks and limbs: a joint step is tried first.
     """
     held = before.held[:, base] | (slots >= 0)
@@ -105,18 +105,18 @@ def assemble(
         promised = _step_together(part, tables, before.found.settled[base], base, slots, found, settings)
     rest = np.flatnonzero(~found.settled & (promised <= settings.hopeless))
     if rest.size:
-        few = settings._replace(steps=min(settings.steps, FEW))
+        few = settings._replace(steps=min(settings.steps, MAX_BASE_STEPS))
         found.put(rest, descend(part.take(rest), found.state.take(rest), **few._asdict()))
     return Bases(found, leaf, held)
 
 
 def _step_together(
-    part: Problem,
-    tables: Tables,
+    part: RefinementProblem,
+    tables: BaseTables,
     settled: NDArray[np.bool_],
     base: Rows,
     slots: Rows,
-    found: Descent,
+    found: DescentResult,
     settings: Settings,
 ) -> Array:
     """Take the joint step of trunks and limbs, in place; settled is where chi2 is then what it promised.
@@ -129,8 +129,8 @@ def _step_together(
         found.folds[rows] += limbs.folds[kind, slots[kind, rows]]
         found.active[rows] += limbs.active[kind, slots[kind, rows]]
     promised = np.empty(len(base))
-    for at in range(0, len(base), BLOCK):
-        rows = np.arange(at, min(at + BLOCK, len(base)))
+    for at in range(0, len(base), BLOCK_POSTURES):
+        rows = np.arange(at, min(at + BLOCK_POSTURES, len(base)))
         step, gain, tangents = joint_step(trunks, limbs, base[rows], slots[:, rows])
         promised[rows] = found.chi2[rows] - gain
         worth = np.flatnonzero(promised[rows] <= settings.hopeless)
@@ -143,7 +143,7 @@ def _step_together(
         value, _ = evaluate(part.take(rows), trial)
         better = value <= chi2
         off = value - (chi2 - gain)
-        agrees = off * off <= AGREES * settings.precision * np.maximum(gain, settings.precision)
+        agrees = off * off <= LAST_STEP_GAIN_RATIO * settings.precision * np.maximum(gain, settings.precision)
         found.settled[rows] = better & agrees & settled[rows]
         good = np.flatnonzero(better)
         found.state.put(rows[good], trial.take(good))
@@ -151,9 +151,9 @@ def _step_together(
     return promised
 
 
-def _with_limbs(problem: Problem, held: NDArray[np.bool_]) -> Problem:
+def _with_limbs(problem: RefinementProblem, held: NDArray[np.bool_]) -> RefinementProblem:
     """Leave those limbs out that are not held (4, N)."""
     weight = problem.weight.copy()
-    for joints in (MIDDLE, END):
+    for joints in (LIMB_MIDDLES, LIMB_ENDS):
         weight[list(joints)] *= held
     return replace(problem, weight=weight, free=~held)

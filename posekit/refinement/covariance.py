@@ -20,45 +20,47 @@ from __future__ import annotations
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import END, MIDDLE
-from posekit.refinement.descent import BLOCK
+from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import Equations, assemble, linearise
 from posekit.refinement.limb_terms import LimbTerms
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import backward, cholesky, dot, forward, turned
-from posekit.refinement.state import State, place
+from posekit.refinement.state import PostureState, place
 
-ROOM = 10.0
+UNKNOWN_PLACE_METRES = 10.0
 """Metres: standard deviation of a place of which nothing is known."""
 
-ANY = np.pi / np.sqrt(3.0)
+UNKNOWN_ANGLE_RADIANS = np.pi / np.sqrt(3.0)
 """Radians: standard deviation of an angle of which nothing is known."""
 
-CAP = 0.5
+MAX_TURN_INFORMATION = 0.5
 """See the module: information on a turn, times the noise over the length."""
 
 
-def covariances(problem: Problem, state: State) -> Array:
+def covariances(problem: RefinementProblem, state: PostureState) -> Array:
     """Return the covariance of every joint (N, 14, 3, 3), square metres."""
     n = state.root.shape[1]
     out = np.empty((n, 14, 3, 3))
-    for at in range(0, n, BLOCK):
-        rows = np.arange(at, min(at + BLOCK, n))
+    for at in range(0, n, BLOCK_POSTURES):
+        rows = np.arange(at, min(at + BLOCK_POSTURES, n))
         part, here = problem.take(rows), state.take(rows)
         out[rows] = _covariances(part, here, linearise(part, here))
     return out
 
 
-def _covariances(problem: Problem, state: State, here: Equations) -> Array:
+def _covariances(problem: RefinementProblem, state: PostureState, here: Equations) -> Array:
     if here.limbs is None:
         return np.full((state.root.shape[1], 14, 3, 3), np.nan)
     n, width = state.root.shape[1], problem.trunk_width
     limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
-    arrow = assemble(here._replace(limbs=limbs), 0.0, ANY**-2 * 1e-6)
+    arrow = assemble(here._replace(limbs=limbs), 0.0, UNKNOWN_ANGLE_RADIANS**-2 * 1e-6)
     index = np.arange(width)
-    arrow.matrix[index, index] += np.where(index < 3, ROOM**-2, np.where(index < 9, ANY**-2, ROOM**-2))[
-        :, None
-    ]
+    arrow.matrix[index, index] += np.where(
+        index < 3,
+        UNKNOWN_PLACE_METRES**-2,
+        np.where(index < 9, UNKNOWN_ANGLE_RADIANS**-2, UNKNOWN_PLACE_METRES**-2),
+    )[:, None]
     trunk = cholesky(arrow.matrix)
     out = np.empty((14, 3, 3, n))
     # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
@@ -75,7 +77,7 @@ def _covariances(problem: Problem, state: State, here: Equations) -> Array:
     own = np.empty((reach, reach, 4, n))
     own[:] = np.eye(reach)[:, :, None, None]
     own = backward(arrow.limbs.factor, own)
-    for segment, joints in ((0, MIDDLE), (1, END)):
+    for segment, joints in ((0, LIMB_MIDDLES), (1, LIMB_ENDS)):
         U = _limb_ways(state, limbs, segment, reach)
         moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
         alone = np.einsum("liun,uwln->liwn", U, own)
@@ -84,32 +86,32 @@ def _covariances(problem: Problem, state: State, here: Equations) -> Array:
     return out.transpose(3, 0, 1, 2)
 
 
-def _with_priors(problem: Problem, state: State, terms: LimbTerms) -> Array:
+def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTerms) -> Array:
     """Add to the limbs' matrices what is known of turns that the image does not show to first order."""
     limb = terms.matrix.copy()
     joints = place(state)
     _, A = problem.see(joints, slice(0, 14))
-    for segment, ends in enumerate((MIDDLE, END)):
+    for segment, ends in enumerate((LIMB_MIDDLES, LIMB_ENDS)):
         first = 2 * segment
         for i in (first, first + 1):
-            limb[i, i] += ANY**-2
+            limb[i, i] += UNKNOWN_ANGLE_RADIANS**-2
         seen = turned(A[list(ends)], state.directions[:, segment])
         ray = joints[list(ends)] if problem.optics.perspective else np.array([0.0, 0.0, 1.0])[:, None]
         c, s = (
             dot(terms.tangents[:, segment, k], np.broadcast_to(ray, (*seen.shape[:1], 3, *seen.shape[2:])))
             for k in range(2)
         )
-        size = np.maximum(np.sqrt(c * c + s * s), TINY)
-        known = CAP * state.limbs[:, segment] * np.sqrt(dot(seen, seen)) / (size * size)
+        size = np.maximum(np.sqrt(c * c + s * s), MIN_LENGTH)
+        known = MAX_TURN_INFORMATION * state.limbs[:, segment] * np.sqrt(dot(seen, seen)) / (size * size)
         for (i, x), (j, y) in (((a, p), (b, q)) for a, p in ((0, c), (1, s)) for b, q in ((0, c), (1, s))):
             limb[first + i, first + j] += known * x * y
     return limb
 
 
-TINY = 1e-12
+MIN_LENGTH = 1e-12
 
 
-def _limb_ways(state: State, terms: LimbTerms, segment: int, reach: int) -> Array:
+def _limb_ways(state: PostureState, terms: LimbTerms, segment: int, reach: int) -> Array:
     """Return how limbs' unknowns move their middles (segment 0) or ends (1), from their starts: (4, 3, U, N)."""
     out = np.zeros((4, 3, reach, state.root.shape[1]))
     for part in range(segment + 1):

@@ -9,37 +9,37 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.refinement.equations import Watch, evaluate, linearise, solve
-from posekit.refinement.problem import Problem
-from posekit.refinement.state import State, moved
+from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.state import PostureState, moved
 
-STEPS = 20
+MAX_STEPS = 20
 """Steps after which a posture is left where it is."""
 
-DAMPING = 1e-4
+INITIAL_DAMPING = 1e-4
 """Fraction of the diagonal that is added to it, at first."""
 
-LEAST, MOST = 1e-12, 1e6
+MIN_DAMPING, MAX_DAMPING = 1e-12, 1e6
 
-LIGHT = 0.1
+LIGHT_DAMPING = 0.1
 """Damping up to which a small promise means that there is nothing left to gain."""
 
-SLOWER, FASTER = 8.0, 0.1
+DAMPING_GROWTH, DAMPING_DECAY = 8.0, 0.1
 
-TINY = 1e-300
+MIN_GAIN = 1e-300
 
-BLOCK = 2048
+BLOCK_POSTURES = 2048
 """Postures worked on at once: enough to spread the overhead of each operation."""
 
-PRECISION = 1e-2
+CHI2_PRECISION = 1e-2
 """Promised decrease of chi2 that ends the search."""
 
 
-class Descent(NamedTuple):
+class DescentResult(NamedTuple):
     """Where the search ended.
 
     Attributes
     ----------
-    state : State
+    state : PostureState
     chi2 : array (N,)
     steps : int array (N,)
     settled : bool array (N,)
@@ -47,7 +47,7 @@ class Descent(NamedTuple):
         How many segments are held at right angles to their rays, and how many limits are felt.
     """
 
-    state: State
+    state: PostureState
     chi2: Array
     steps: NDArray[np.intp]
     settled: NDArray[np.bool_]
@@ -55,17 +55,19 @@ class Descent(NamedTuple):
     active: NDArray[np.intp]
 
     @staticmethod
-    def nothing(like: State, n: int) -> Descent:
+    def nothing(like: PostureState, n: int) -> DescentResult:
         """Make room for n postures."""
         none = np.zeros(n, dtype=np.intp)
-        state = State(*(np.zeros((*array.shape[:-1], n)) for array in like))
-        return Descent(state, np.full(n, np.inf), none, np.zeros(n, dtype=np.bool_), none.copy(), none.copy())
+        state = PostureState(*(np.zeros((*array.shape[:-1], n)) for array in like))
+        return DescentResult(
+            state, np.full(n, np.inf), none, np.zeros(n, dtype=np.bool_), none.copy(), none.copy()
+        )
 
-    def take(self, rows: NDArray[np.intp]) -> Descent:
+    def take(self, rows: NDArray[np.intp]) -> DescentResult:
         """Return some postures."""
-        return Descent(self.state.take(rows), *(array[rows] for array in self[1:]))  # type: ignore[arg-type]
+        return DescentResult(self.state.take(rows), *(array[rows] for array in self[1:]))  # type: ignore[arg-type]
 
-    def put(self, rows: NDArray[np.intp], other: Descent) -> None:
+    def put(self, rows: NDArray[np.intp], other: DescentResult) -> None:
         """Overwrite some postures; the steps that were taken add up."""
         self.state.put(rows, other.state)
         self.steps[rows] += other.steps
@@ -74,26 +76,26 @@ class Descent(NamedTuple):
 
 
 def descend(
-    problem: Problem,
-    start: State,
+    problem: RefinementProblem,
+    start: PostureState,
     *,
-    steps: int = STEPS,
-    precision: float = PRECISION,
+    steps: int = MAX_STEPS,
+    precision: float = CHI2_PRECISION,
     hopeless: float = np.inf,
-) -> Descent:
+) -> DescentResult:
     """Minimise chi2 from postures; it never increases.
 
     Levenberg 1944, Marquardt 1963, damping after Nielsen 1999. A posture is settled where a step promises less
     than `precision` of chi2, be it for a limit in its way, or no step decreases it. It is given up where chi2 is
     beyond `hopeless` and the next step does not promise to halve it.
     """
-    search = _Search(problem, start)
+    search = _BatchDescent(problem, start)
     rows = np.arange(start.root.shape[1])
     for taken in range(steps + 1):
         rows = np.concatenate(
             [
-                search.advance(rows[at : at + BLOCK], precision, hopeless, last=taken == steps)
-                for at in range(0, max(len(rows), 1), BLOCK)
+                search.advance(rows[at : at + BLOCK_POSTURES], precision, hopeless, last=taken == steps)
+                for at in range(0, max(len(rows), 1), BLOCK_POSTURES)
             ]
         )
         if not rows.size:
@@ -101,22 +103,24 @@ def descend(
     return search.found
 
 
-class _Search:
+class _BatchDescent:
     """All postures, and how far each search has come."""
 
-    def __init__(self, problem: Problem, start: State) -> None:
+    def __init__(self, problem: RefinementProblem, start: PostureState) -> None:
         n = start.root.shape[1]
         self.problem, self.state = problem, start.copy()
-        self.damping, self.watch = np.full(n, DAMPING), Watch.none(n)
+        self.damping, self.watch = np.full(n, INITIAL_DAMPING), Watch.none(n)
         self.watching = np.zeros(n, dtype=np.bool_)
         self.passed = np.zeros(n, dtype=np.intp)
         chi2, active = np.empty(n), np.empty(n, dtype=np.intp)
-        for at in range(0, n, BLOCK):
-            rows = np.arange(at, min(at + BLOCK, n))
+        for at in range(0, n, BLOCK_POSTURES):
+            rows = np.arange(at, min(at + BLOCK_POSTURES, n))
             chi2[rows], passed = evaluate(problem.take(rows), self.state.take(rows))
             active[rows] = passed.passed()
         none = np.zeros(n, dtype=np.intp)
-        self.found = Descent(self.state, chi2, none.copy(), np.zeros(n, dtype=np.bool_), none.copy(), active)
+        self.found = DescentResult(
+            self.state, chi2, none.copy(), np.zeros(n, dtype=np.bool_), none.copy(), active
+        )
 
     def advance(
         self, rows: NDArray[np.intp], precision: float, hopeless: float, *, last: bool
@@ -130,7 +134,7 @@ class _Search:
         change, gain = solve(here, self.damping[rows])
         chi2, damping, watching = found.chi2[rows], self.damping[rows], self.watching[rows]
         found.folds[rows] = here.folds()
-        done = (damping > MOST) | ((gain <= precision) & ((damping <= LIGHT) | watching))
+        done = (damping > MAX_DAMPING) | ((gain <= precision) & ((damping <= LIGHT_DAMPING) | watching))
         found.settled[rows] = done
         done |= ~np.isfinite(chi2) | ((chi2 > hopeless) & (gain < 0.5 * chi2) & ~watching)
         if last:
@@ -154,10 +158,10 @@ class _Search:
         ran = self._run_into(rows, passed, better)
         # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
         with np.errstate(invalid="ignore"):
-            ratio = np.clip((chi2 - value) / np.maximum(gain, TINY), 0.0, 1.0)
-        slower = np.where(ran, 1.0, SLOWER)
-        change_by = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), slower)
-        self.damping[rows] = np.maximum(damping * change_by, LEAST)
+            ratio = np.clip((chi2 - value) / np.maximum(gain, MIN_GAIN), 0.0, 1.0)
+        slower = np.where(ran, 1.0, DAMPING_GROWTH)
+        change_by = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, DAMPING_DECAY), slower)
+        self.damping[rows] = np.maximum(damping * change_by, MIN_DAMPING)
         good = np.flatnonzero(better)
         self.state.put(rows[good], trial.take(good))
         found.chi2[rows[good]] = value[good]

@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError, PosekitError
-from posekit.refinement.anatomy import END, LIMBS, MIDDLE, START, TRUNK_SEGMENTS
-from posekit.refinement.descent import PRECISION
+from posekit.refinement.anatomy import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, LIMB_STARTS, TRUNK_SEGMENTS
+from posekit.refinement.descent import CHI2_PRECISION
 from posekit.refinement.limb_descent import fit_limbs
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.prior import RootPrior
-from posekit.refinement.problem import Problem
-from posekit.refinement.refined import LEVEL
-from posekit.refinement.sight import Sight
+from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.refined import REJECTION_PROBABILITY
+from posekit.refinement.sight import ObservedFrames
 from posekit.refinement.start import limb_directions, relift, state_of
 from posekit.refinement.state import parents
 from posekit.refinement.trunk import Trunks, find_trunks
@@ -37,33 +37,33 @@ from posekit.skeleton import SEGMENT_NAMES, segment_name
 MOST_FRAMES: Final = 16
 """Frames that are looked at, evenly chosen."""
 
-COARSE: Final = 2.0 ** (np.arange(-10, 11) / 6)
+COARSE_FACTORS: Final = 2.0 ** (np.arange(-10, 11) / 6)
 """Factors by which lengths are varied."""
 
-FINE: Final = 2.0 ** (np.arange(-4, 5) / 24)
+FINE_FACTORS: Final = 2.0 ** (np.arange(-4, 5) / 24)
 """And around the best of every second."""
 
-FIRST: Final = 5
+N_FRAMES_COMPARED: Final = 5
 """Frames on which suspects are compared."""
 
-CAP: Final = 60.0
+MAX_FRAME_CHI2: Final = 60.0
 """The most that one frame counts, so that a gross mistake in one decides nothing."""
 
-LIMB: Final = 30.0
+MAX_LIMB_CHI2: Final = 30.0
 """A chi2 that a limb on the best trunk, held, is not expected to have."""
 
-DOUBTFUL: Final = 0.1
+MIN_UNEXPLAINED_SHARE: Final = 0.1
 """Share of frames that must be unexplained before lengths are doubted."""
 
-STEPS: Final = 8
+MAX_STEPS: Final = 8
 
-SHOWN: Final = 0.65
+MAX_SHOWN_SHARE: Final = 0.65
 """A segment that never shows more than this share of its length, foreshortened in every frame, is doubted..."""
 
-ENOUGH: Final = 8
+MIN_FRAMES_SHOWN: Final = 8
 """... given as many frames: of random directions one in four shows as little, of eight frames all in 1e-5."""
 
-PARTS: Final[tuple[tuple[int, ...], ...]] = ((0,), (1,), (0, 1))
+SUSPECT_SEGMENTS: Final[tuple[tuple[int, ...], ...]] = ((0,), (1,), (0, 1))
 """Segments of a limb that may be wrong together."""
 
 TRUNK_NAMES: Final = tuple(segment_name(pair) for pair in TRUNK_SEGMENTS)
@@ -106,12 +106,12 @@ class LengthDoubt:
         return f"{need} or the like ({self.least:.3f} to {self.most:.3f} m)"
 
 
-def diagnose(sight: Sight, *, level: float = LEVEL) -> list[LengthDoubt]:
+def diagnose(sight: ObservedFrames, *, level: float = REJECTION_PROBABILITY) -> list[LengthDoubt]:
     """Say which lengths would have to change, and to what, for the data to be explained.
 
     Parameters
     ----------
-    sight : Sight
+    sight : ObservedFrames
         Frames of one person, those without an acceptable posture among them; the more, the more is told. Its root
         must say where the neck is.
     level : float
@@ -145,7 +145,7 @@ def diagnose(sight: Sight, *, level: float = LEVEL) -> list[LengthDoubt]:
     return sorted(doubts, key=lambda doubt: SEGMENT_NAMES.index(doubt.segment))
 
 
-def _of_frames(sight: Sight, frames: NDArray[np.intp]) -> Sight:
+def _of_frames(sight: ObservedFrames, frames: NDArray[np.intp]) -> ObservedFrames:
     """Return some frames, their heads left out."""
     points = sight.points()
     deviation = np.broadcast_to(np.asarray(sight.deviation, dtype=np.float64), points.shape[:2])
@@ -177,21 +177,21 @@ class _Trial(NamedTuple):
     trunks: Trunks
 
 
-def _trunk(sight: Sight, level: float) -> tuple[dict[str, float], list[LengthDoubt], Trunks]:
+def _trunk(sight: ObservedFrames, level: float) -> tuple[dict[str, float], list[LengthDoubt], Trunks]:
     """Vary torso and hips; return the factors of the best explanation, its doubts, and the trunks."""
     given = _judge(sight, sight.figure, level)
     count = len(sight.points())
-    if given.left <= DOUBTFUL * count:
+    if given.left <= MIN_UNEXPLAINED_SHARE * count:
         return {}, [], given.trunks
-    few = _of_frames(sight, np.unique(np.linspace(0, count - 1, FIRST).round().astype(np.intp)))
+    few = _of_frames(sight, np.unique(np.linspace(0, count - 1, N_FRAMES_COMPARED).round().astype(np.intp)))
     tried = {
         (names, f): trial.cost
         for names in _suspects()
-        for f in COARSE[::2].tolist()
+        for f in COARSE_FACTORS[::2].tolist()
         if (trial := _try(few, names, f, level)) is not None
     }
     chosen, around = min(tried, key=lambda key: tried[key])
-    fine = {f: _try(sight, chosen, f, level) for f in (around * FINE).tolist()}
+    fine = {f: _try(sight, chosen, f, level) for f in (around * FINE_FACTORS).tolist()}
     of = {f: trial for f, trial in fine.items() if trial is not None}
     factor = min(of, key=lambda f: of[f].cost)
     best = of[factor]
@@ -213,7 +213,7 @@ def _suspects() -> list[tuple[str, ...]]:
     return [*((name,) for name in TRUNK_NAMES), *sides, SEGMENT_NAMES]
 
 
-def _try(sight: Sight, names: Sequence[str], factor: float, level: float) -> _Trial | None:
+def _try(sight: ObservedFrames, names: Sequence[str], factor: float, level: float) -> _Trial | None:
     """Find trunks with some lengths changed; None where no torso or hips have such lengths."""
     try:
         figure = sight.figure.scaled({name: sight.figure.lengths[name] * factor for name in names})
@@ -222,27 +222,27 @@ def _try(sight: Sight, names: Sequence[str], factor: float, level: float) -> _Tr
     return _judge(sight, figure, level)
 
 
-def _judge(sight: Sight, figure: Figure, level: float) -> _Trial:
+def _judge(sight: ObservedFrames, figure: Figure, level: float) -> _Trial:
     trunks = find_trunks(replace(sight, figure=figure), level=0.0)
     count = len(sight.points())
-    chi2, p = np.full(count, CAP), np.zeros(count)
+    chi2, p = np.full(count, MAX_FRAME_CHI2), np.zeros(count)
     np.minimum.at(chi2, trunks.frame, trunks.chi2)
     np.maximum.at(p, trunks.frame, trunks.p)
     return _Trial(float(chi2.sum()), int((p < level).sum()), trunks)
 
 
-def _limbs(sight: Sight, trunks: Trunks) -> list[LengthDoubt]:
+def _limbs(sight: ObservedFrames, trunks: Trunks) -> list[LengthDoubt]:
     """Vary each limb's lengths on the best trunks."""
     judge = _Limbs.on(sight, trunks)
     doubts = []
-    for limb, joints in enumerate(LIMBS):
+    for limb, joints in enumerate(LIMB_JOINTS):
         names = [segment_name((joints[k], joints[k + 1])) for k in range(2)]
         stated = judge.explained(limb, (), 1.0)
         seen = judge.seen[limb]
-        long = _too_long(sight.figure, judge, limb, names) if seen.sum() >= ENOUGH else []
+        long = _too_long(sight.figure, judge, limb, names) if seen.sum() >= MIN_FRAMES_SHOWN else []
         if long:
             doubts += long
-        elif (seen & ~stated).sum() > DOUBTFUL * seen.sum():
+        elif (seen & ~stated).sum() > MIN_UNEXPLAINED_SHARE * seen.sum():
             doubts += _too_short(sight.figure, judge, limb, names, stated)
     return doubts
 
@@ -252,16 +252,18 @@ def _too_short(
 ) -> list[LengthDoubt]:
     """Name the segments of a limb that let more frames be explained: one rather than both, as little as will do."""
     left = {
-        (parts, f): int((~judge.explained(limb, parts, f)).sum()) for parts in PARTS for f in COARSE.tolist()
+        (parts, f): int((~judge.explained(limb, parts, f)).sum())
+        for parts in SUSPECT_SEGMENTS
+        for f in COARSE_FACTORS.tolist()
     }
     parts, coarse = min(left, key=lambda key: (left[key], len(key[0]), abs(np.log(key[1]))))
     least = left[parts, coarse]
     if not least < (~stated).sum():
         return []
-    near = coarse * (COARSE[1] / COARSE[0]) ** (np.sign(-np.log(coarse)) * np.arange(8) / 8)
+    near = coarse * (COARSE_FACTORS[1] / COARSE_FACTORS[0]) ** (np.sign(-np.log(coarse)) * np.arange(8) / 8)
     allowed = [f for f in near.tolist() if (~judge.explained(limb, parts, f)).sum() <= least]
     factor = min(allowed, key=lambda f: abs(np.log(f)))
-    allowed += [f for f in COARSE.tolist() if left[parts, f] <= least]
+    allowed += [f for f in COARSE_FACTORS.tolist() if left[parts, f] <= least]
     counts = (judge.number, int((~stated).sum()), least)
     return [_doubt(figure, names[k], factor, allowed, counts) for k in parts]
 
@@ -273,9 +275,13 @@ def _too_long(figure: Figure, judge: _Limbs, limb: int, names: list[str]) -> lis
     unexplained = int((seen & ~judge.explained(limb, (), 1.0)).sum())
     doubts = []
     for part, name in enumerate(names):
-        short = [f for f in COARSE[COARSE < SHOWN].tolist() if judge.explained(limb, (part,), f)[seen].all()]
+        short = [
+            f
+            for f in COARSE_FACTORS[COARSE_FACTORS < MAX_SHOWN_SHARE].tolist()
+            if judge.explained(limb, (part,), f)[seen].all()
+        ]
         if short:
-            longer = COARSE[(COARSE >= SHOWN) & (COARSE <= 1.0)].tolist()
+            longer = COARSE_FACTORS[(COARSE_FACTORS >= MAX_SHOWN_SHARE) & (COARSE_FACTORS <= 1.0)].tolist()
             allowed = short + [f for f in longer if judge.explained(limb, (part,), f)[seen].all()]
             doubts.append(_doubt(figure, name, min(short), allowed, (frames, unexplained, 0)))
     return doubts
@@ -303,7 +309,7 @@ class _Limbs(NamedTuple):
 
     Attributes
     ----------
-    problem : Problem
+    problem : RefinementProblem
         Of 4 H columns, lengths held.
     chains : Chains
     far : bool array (4, 2, 4 H)
@@ -313,14 +319,14 @@ class _Limbs(NamedTuple):
         Frames with a trunk.
     """
 
-    problem: Problem
+    problem: RefinementProblem
     chains: Chains
     far: NDArray[np.bool_]
     frame: NDArray[np.intp]
     number: int
 
     @staticmethod
-    def on(sight: Sight, trunks: Trunks) -> _Limbs:
+    def on(sight: ObservedFrames, trunks: Trunks) -> _Limbs:
         """Set limbs on trunks that are explained, or the best there are."""
         n = len(trunks)
         column = np.repeat(np.arange(n), 4)
@@ -329,7 +335,7 @@ class _Limbs(NamedTuple):
         problem = replace(sight, length_deviation=0.0).problem(trunks.frame, trunks.root)
         state = state_of(problem.anatomy, postures)
         directions = limb_directions(postures, np.tile(np.arange(n), (4, 1)), state)
-        start = np.ascontiguousarray(trunks.joints[:, list(START)].transpose(1, 2, 0))
+        start = np.ascontiguousarray(trunks.joints[:, list(LIMB_STARTS)].transpose(1, 2, 0))
         chains = Chains(start, parents(state), directions, state.limbs).take(column)
         choice = np.tile(np.arange(4), n)
         far = np.broadcast_to(np.stack([choice & 1, choice >> 1])[None] > 0, (4, 2, 4 * n))
@@ -340,7 +346,7 @@ class _Limbs(NamedTuple):
     def seen(self) -> NDArray[np.bool_]:
         """Which frames show the ends of both segments (4, number)."""
         weight = self.problem.weight
-        both = (weight[list(MIDDLE)] > 0) & (weight[list(END)] > 0)
+        both = (weight[list(LIMB_MIDDLES)] > 0) & (weight[list(LIMB_ENDS)] > 0)
         seen = np.zeros((4, self.number), dtype=np.bool_)
         seen[:, self.frame] = both
         return seen
@@ -354,7 +360,15 @@ class _Limbs(NamedTuple):
         chi2 = limb_chi2(self.problem, chains)[0]
         used = np.zeros(chi2.shape, dtype=np.bool_)
         used[limb] = True
-        fit_limbs(self.problem, chains, chi2, used, steps=STEPS, precision=PRECISION, hopeless=10.0 * LIMB)
+        fit_limbs(
+            self.problem,
+            chains,
+            chi2,
+            used,
+            steps=MAX_STEPS,
+            precision=CHI2_PRECISION,
+            hopeless=10.0 * MAX_LIMB_CHI2,
+        )
         best = np.full(self.number, np.inf)
         np.minimum.at(best, self.frame, chi2[limb])
-        return np.asarray(best <= LIMB)
+        return np.asarray(best <= MAX_LIMB_CHI2)

@@ -21,7 +21,7 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     which : int array (N,)
         The kind of each row.
     """
-    filled = np.where(np.isnan(table), UNKNOWN, table)
+    filled = np.where(np.isnan(table), NAN_SUBSTITUTE, table)
     mixture = filled @ np.random.default_rng(0).standard_normal(table.shape[1])
     _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
     which = which.reshape(-1)
@@ -30,5 +30,5 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.arange(len(table)), np.arange(len(table))
 
 
-UNKNOWN = 1e9
+NAN_SUBSTITUTE = 1e9
 """Stands for NaN, which equals nothing."""

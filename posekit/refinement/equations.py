@@ -13,16 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import START
+from posekit.refinement.anatomy import LIMB_STARTS
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import backward, cholesky, forward
-from posekit.refinement.state import State, Step, parents, trunk_offsets
+from posekit.refinement.state import PostureState, PostureStep, parents, trunk_offsets
 from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
 
-FLOOR = 1e-6
+DIAGONAL_FLOOR = 1e-6
 """Added to diagonals, one over rad^2 or m^2: what nothing determines does not move."""
 
 
@@ -76,14 +76,14 @@ class Equations(NamedTuple):
         return np.zeros(n, dtype=np.intp) if self.limbs is None else self.limbs.folds.sum(axis=(0, 1))
 
 
-def chains_of(problem: Problem, state: State, offsets: Array | None = None) -> Chains:
+def chains_of(problem: RefinementProblem, state: PostureState, offsets: Array | None = None) -> Chains:
     """Return the limbs of postures, whose trunks' offsets may be known already."""
     offsets = trunk_offsets(state) if offsets is None else offsets
     parent = parents(state, on_torso=problem.legs_on_torso)
-    return Chains(state.root + offsets[list(START)], parent, state.directions, state.limbs)
+    return Chains(state.root + offsets[list(LIMB_STARTS)], parent, state.directions, state.limbs)
 
 
-def linearise(problem: Problem, state: State, watch: Watch | None = None) -> Equations:
+def linearise(problem: RefinementProblem, state: PostureState, watch: Watch | None = None) -> Equations:
     """Linearise the problem at postures; limits that are watched are in the matrices though they are not passed."""
     trunk = trunk_terms(problem, state, watch and watch.hips)
     limbs = None
@@ -93,7 +93,7 @@ def linearise(problem: Problem, state: State, watch: Watch | None = None) -> Equ
     return Equations(trunk, limbs, head)
 
 
-def evaluate(problem: Problem, state: State) -> tuple[Array, Watch]:
+def evaluate(problem: RefinementProblem, state: PostureState) -> tuple[Array, Watch]:
     """Return chi2 of postures (N,), infinite where a joint that was seen is behind the camera, and limits passed."""
     offsets = trunk_offsets(state)
     passed = Watch.none(state.root.shape[1])
@@ -107,10 +107,10 @@ def evaluate(problem: Problem, state: State) -> tuple[Array, Watch]:
         of_head, head = head_chi2(problem, state)
         chi2 += of_head
         passed.head[...] = head
-    return np.where(chi2 < HUGE, chi2, np.inf), passed
+    return np.where(chi2 < MAX_CHI2, chi2, np.inf), passed
 
 
-HUGE = 1e150
+MAX_CHI2 = 1e150
 
 
 class Reduced(NamedTuple):
@@ -179,7 +179,7 @@ class Arrow(NamedTuple):
     starts: Array | None
 
 
-def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> Arrow:
+def assemble(here: Equations, damping: Array | float, floor: float = DIAGONAL_FLOOR) -> Arrow:
     """Eliminate limbs and head."""
     P, g = here.trunk.points, here.trunk.pull
     limbs = head = starts = turns = None
@@ -188,8 +188,8 @@ def assemble(here: Equations, damping: Array | float, floor: float = FLOOR) -> A
         limbs = eliminate(terms.matrix, terms.coupling, terms.gradient, damping, floor)
         start, push = left_over(limbs, terms.start, terms.start_gradient)
         P, g = P.copy(), g.copy()
-        P[list(START)] += start[:3, :3].transpose(2, 0, 1, 3)
-        g[list(START)] += push[:3].transpose(1, 0, 2)
+        P[list(LIMB_STARTS)] += start[:3, :3].transpose(2, 0, 1, 3)
+        g[list(LIMB_STARTS)] += push[:3].transpose(1, 0, 2)
         starts = start_ways(here.trunk)
         if (terms.crossed != 0).any() or terms.slack.any():
             turns = start, push
@@ -216,10 +216,10 @@ def _add_turns(
         matrix[:, turn] += cross.transpose(1, 0, 2)
 
 
-def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
+def solve(here: Equations, damping: Array | float) -> tuple[PostureStep, Array]:
     """Solve for the step, and the decrease of chi2 that it promises (N,), watched limits left out."""
     arrow = assemble(here, damping)
-    last = eliminate(arrow.matrix, arrow.matrix[:, :0], arrow.gradient, damping, FLOOR)
+    last = eliminate(arrow.matrix, arrow.matrix[:, :0], arrow.gradient, damping, DIAGONAL_FLOOR)
     own = last.right[:, 0]
     trunk = -backward(last.factor, own.copy())
     gain = np.einsum("cn,cn->n", own, own) + np.einsum("cn,cn->n", last.damped, trunk * trunk)
@@ -230,7 +230,7 @@ def solve(here: Equations, damping: Array | float) -> tuple[Step, Array]:
     if arrow.head is not None:
         head = follow(arrow.head, trunk[:6])
         gain += _gain(arrow.head, head)
-    return Step(trunk, limbs, head), gain - here.slack
+    return PostureStep(trunk, limbs, head), gain - here.slack
 
 
 def follow(block: Reduced, shift: Array) -> Array:

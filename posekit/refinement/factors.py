@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LIMBS
+from posekit.refinement.anatomy import LIMB_JOINTS
 from posekit.refinement.distinct import distinct
 
 Rows = NDArray[np.intp]
@@ -46,7 +46,7 @@ def factor_postures(frames: Rows, postures: Array) -> Factors:
     key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, 18)], axis=1)
     trunk, trunk_of = distinct(key)
     limb, limb_of = [], np.empty((4, n), dtype=np.intp)
-    for kind, (_, middle, end) in enumerate(LIMBS):
+    for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
         own = np.concatenate(
             [trunk_of[:, None].astype(np.float64), postures[:, middle], postures[:, end]], axis=1
         )
@@ -59,7 +59,7 @@ def factor_postures(frames: Rows, postures: Array) -> Factors:
     return Factors(trunk, trunk_of, tuple(limb), limb_of)
 
 
-class Columns(NamedTuple):
+class LimbColumns(NamedTuple):
     """Limbs side by side: each of M columns has at most one of each kind, all on the same base.
 
     Attributes
@@ -81,11 +81,11 @@ class Columns(NamedTuple):
         return used
 
 
-def columns_of(bases: Sequence[Rows], count: int) -> Columns:
+def columns_of(bases: Sequence[Rows], count: int) -> LimbColumns:
     """Set limbs side by side; `bases` are by kind the bases of its limbs, ascending, of `count`."""
     each = np.stack([np.bincount(base, minlength=count) for base in bases])
     width = each.max(axis=0, initial=0)
     begin = np.cumsum(width) - width
     first = np.cumsum(each, axis=1) - each
     of = tuple(begin[base] + np.arange(len(base)) - first[kind, base] for kind, base in enumerate(bases))
-    return Columns(np.repeat(np.arange(count), width), of)
+    return LimbColumns(np.repeat(np.arange(count), width), of)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 
 
-def degrees_of_freedom(problem: Problem) -> NDArray[np.intp]:
+def degrees_of_freedom(problem: RefinementProblem) -> NDArray[np.intp]:
     r"""Count residuals less the unknowns that they determine (N,).
 
     A limb has as many unknowns as image coordinates, or fewer coordinates: it leaves nothing over. Lengths that are

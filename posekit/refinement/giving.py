@@ -1,4 +1,4 @@
-"""How much the lengths of real bodies give: relative standard deviations to be given to `Sight.length_deviation`."""
+"""How much the lengths of real bodies vary: relative standard deviations for `ObservedFrames.length_deviation`."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Final
 
 from posekit.skeleton import SEGMENT_NAMES
 
-GIVING: Final[Mapping[str, float]] = MappingProxyType(
+MEASURED_LENGTH_DEVIATIONS: Final[Mapping[str, float]] = MappingProxyType(
     {
         name: 0.02 if name in ("right_shoulder-pelvis", "left_shoulder-pelvis") else 0.01
         for name in SEGMENT_NAMES

@@ -9,9 +9,9 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.refinement.joints import neck_limits
 from posekit.refinement.limits import Signs
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import cross, dot
-from posekit.refinement.state import State, head_points
+from posekit.refinement.state import PostureState, head_points
 
 
 class HeadTerms(NamedTuple):
@@ -36,7 +36,7 @@ class HeadTerms(NamedTuple):
     slack: Array
 
 
-def head_terms(problem: Problem, state: State, watch: Signs | None = None) -> HeadTerms:
+def head_terms(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> HeadTerms:
     """Linearise the head."""
     n = state.root.shape[1]
     offsets = head_points(state, problem.anatomy.head)
@@ -67,7 +67,7 @@ def head_terms(problem: Problem, state: State, watch: Signs | None = None) -> He
     return HeadTerms(chi2, matrix, coupling, trunk, gradient, trunk_gradient, crossed, slack)
 
 
-def head_chi2(problem: Problem, state: State) -> tuple[Array, Signs]:
+def head_chi2(problem: RefinementProblem, state: PostureState) -> tuple[Array, Signs]:
     """Return the head's chi2 (N,) and the limits of the neck that are passed (3, N)."""
     terms = head_terms(problem, state)
     return terms.chi2, terms.crossed

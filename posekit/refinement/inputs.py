@@ -9,17 +9,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LIMBS, TRUNK_SEGMENTS
+from posekit.refinement.anatomy import LIMB_JOINTS, TRUNK_SEGMENTS
 from posekit.refinement.prior import RootPrior
 from posekit.skeleton import SEGMENT_NAMES, segment_name
 
-LEAST = 1e-9
+MIN_DEVIATION_PIXELS = 1e-9
 """Pixels: the least standard deviation of a key point."""
 
-EXACT = 1e-5
+EXACT_LENGTH_DEVIATION = 1e-5
 """Relative deviation of a limb's length that is known exactly, where others are not."""
 
-RIGID = 1e-3
+EXACT_DISTANCE_DEVIATION = 1e-3
 """The same for a distance of torso or hips, which are varied together: stiffer, and every step would be tiny."""
 
 
@@ -63,10 +63,10 @@ def weights(name: str, deviation: ArrayLike, points: Array) -> Array:
     except ValueError:
         raise InputError(f"{name} has shape {given.shape}; expected a number or {points.shape[:2]}") from None
     seen = np.isfinite(points).all(axis=2)
-    if not (given[seen] >= LEAST).all():
+    if not (given[seen] >= MIN_DEVIATION_PIXELS).all():
         raise InputError(
-            f"{name} is {float(given[seen].min()):g} pixels where a point was seen; expected {LEAST:g} or more, "
-            "and infinity for a point not to be used"
+            f"{name} is {float(given[seen].min()):g} pixels where a point was seen; expected "
+            f"{MIN_DEVIATION_PIXELS:g} or more, and infinity for a point not to be used"
         )
     return np.where(seen, 1.0 / np.where(seen, given, 1.0), 0.0)
 
@@ -92,11 +92,14 @@ def length_weights(deviation: Mapping[str, float] | float) -> tuple[Array | None
             )
     trunk = np.array([by_name[segment_name(pair)] for pair in TRUNK_SEGMENTS])
     limbs = np.array(
-        [[by_name[segment_name(pair)] for pair in ((limb[0], limb[1]), (limb[1], limb[2]))] for limb in LIMBS]
+        [
+            [by_name[segment_name(pair)] for pair in ((limb[0], limb[1]), (limb[1], limb[2]))]
+            for limb in LIMB_JOINTS
+        ]
     )
     return (
-        1.0 / np.maximum(trunk, RIGID) if trunk.any() else None,
-        1.0 / np.maximum(limbs, EXACT) if limbs.any() else None,
+        1.0 / np.maximum(trunk, EXACT_DISTANCE_DEVIATION) if trunk.any() else None,
+        1.0 / np.maximum(limbs, EXACT_LENGTH_DEVIATION) if limbs.any() else None,
     )
 
 

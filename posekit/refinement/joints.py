@@ -5,23 +5,23 @@ from __future__ import annotations
 from posekit.geometry import Array
 from posekit.refinement.anatomy import Bounds
 from posekit.refinement.limits import Ball, Signs, ball_limits
-from posekit.refinement.problem import Problem
-from posekit.refinement.state import State
+from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.state import PostureState
 from posekit.refinement.walls import ball_walls
 
 
-def pelvis_limits(problem: Problem, state: State, watch: Signs | None = None) -> Ball:
+def pelvis_limits(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> Ball:
     """Judge the hips under the torso; see `ball_limits`."""
     return _judged(problem, "pelvis", state.torso, state.hips, problem.anatomy.pelvis_bounds, watch)
 
 
-def neck_limits(problem: Problem, state: State, watch: Signs | None = None) -> Ball:
+def neck_limits(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> Ball:
     """Judge the head on the torso."""
     return _judged(problem, "neck", state.torso, state.head, problem.anatomy.neck_bounds, watch)
 
 
 def _judged(
-    problem: Problem, part: str, parent: Array, child: Array, bounds: Bounds, watch: Signs | None
+    problem: RefinementProblem, part: str, parent: Array, child: Array, bounds: Bounds, watch: Signs | None
 ) -> Ball:
     if problem.walls is not None:
         walled = ball_walls(problem.walls, part, parent, child, watch)

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK, Descent
+from posekit.refinement.descent import BLOCK_POSTURES, DescentResult
 from posekit.refinement.equations import chains_of
-from posekit.refinement.factors import Columns, Rows, columns_of
+from posekit.refinement.factors import LimbColumns, Rows, columns_of
 from posekit.refinement.limb_descent import fit_limbs
 from posekit.refinement.limb_terms import Chains, limb_chi2
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import relift
 
-FEW = 6
+MAX_LIMB_STEPS = 6
 """The most steps of a limb alone: it goes on together with its trunk."""
 
 
@@ -33,14 +33,14 @@ class Bases(NamedTuple):
 
     Attributes
     ----------
-    found : Descent
+    found : DescentResult
     leaf : int array (B,)
         A survivor of each.
     held : bool array (4, B)
         Which limbs they have.
     """
 
-    found: Descent
+    found: DescentResult
     leaf: Rows
     held: NDArray[np.bool_]
 
@@ -49,7 +49,7 @@ class Bases(NamedTuple):
         return np.asarray(self.found.settled | (self.found.chi2 <= settings.hopeless))
 
 
-class Limbs(NamedTuple):
+class InitialLimbs(NamedTuple):
     """Limbs as they were given.
 
     Attributes
@@ -62,9 +62,11 @@ class Limbs(NamedTuple):
     directions: Array
     far: NDArray[np.bool_]
 
-    def gather(self, which: Rows) -> Limbs:
+    def gather(self, which: Rows) -> InitialLimbs:
         """Return limbs (4, K)."""
-        return Limbs(*(np.stack([array[kind][..., which[kind]] for kind in range(4)]) for array in self))
+        return InitialLimbs(
+            *(np.stack([array[kind][..., which[kind]] for kind in range(4)]) for array in self)
+        )
 
 
 class Pulling(NamedTuple):
@@ -74,14 +76,14 @@ class Pulling(NamedTuple):
     ----------
     base : int array (P,)
         Of each column.
-    problem : Problem
+    problem : RefinementProblem
     chains : Chains
     chi2 : array (4, P)
         Zero where a column has none.
     """
 
     base: Rows
-    problem: Problem
+    problem: RefinementProblem
     chains: Chains
     chi2: Array
 
@@ -105,7 +107,9 @@ class Laid(NamedTuple):
     place: Rows
 
 
-def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings: Settings) -> Laid:
+def lay(
+    problem: RefinementProblem, bases: Bases, columns: LimbColumns, limbs: InitialLimbs, settings: Settings
+) -> Laid:
     """Lay limbs (M columns) on their rays from where their bases are, and fit those that do not meet their image.
 
     `problem` is that of all survivors.
@@ -114,8 +118,8 @@ def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings
     held = chains_of(rows, bases.found.state.take(columns.base)._replace(directions=limbs.directions))
     chains = relift(rows, held, limbs.far)
     chi2 = np.zeros((4, len(columns.base)))
-    for at in range(0, chi2.shape[1], BLOCK):
-        part = np.arange(at, min(at + BLOCK, chi2.shape[1]))
+    for at in range(0, chi2.shape[1], BLOCK_POSTURES):
+        part = np.arange(at, min(at + BLOCK_POSTURES, chi2.shape[1]))
         chi2[:, part] = limb_chi2(rows.take(part), chains.take(part))[0]
     chi2[~columns.used] = 0.0
     mine = [np.flatnonzero(chi2[kind] > settings.precision) for kind in range(4)]
@@ -128,7 +132,7 @@ def lay(problem: Problem, bases: Bases, columns: Columns, limbs: Limbs, settings
         on.directions[kind][..., to] = chains.directions[kind][..., own]
         on.lengths[kind][..., to] = chains.lengths[kind][..., own]
         fit.chi2[kind, to] = chi2[kind, own]
-    few = settings._replace(steps=min(settings.steps, FEW))
+    few = settings._replace(steps=min(settings.steps, MAX_LIMB_STEPS))
     fit_limbs(fit.problem, on, fit.chi2, pulled.used, **few._asdict())
     for kind, (own, to) in enumerate(zip(mine, pulled.of, strict=True)):
         chains.directions[kind][..., own] = on.directions[kind][..., to]

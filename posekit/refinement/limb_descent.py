@@ -6,16 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK, DAMPING, FASTER, LEAST, LIGHT, MOST, SLOWER, TINY
-from posekit.refinement.equations import FLOOR, eliminate
+from posekit.refinement.descent import (
+    BLOCK_POSTURES,
+    DAMPING_DECAY,
+    DAMPING_GROWTH,
+    INITIAL_DAMPING,
+    LIGHT_DAMPING,
+    MAX_DAMPING,
+    MIN_DAMPING,
+    MIN_GAIN,
+)
+from posekit.refinement.equations import DIAGONAL_FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import backward
 from posekit.refinement.state import moved_limbs
 
 
 def fit_limbs(
-    problem: Problem,
+    problem: RefinementProblem,
     chains: Chains,
     chi2: Array,
     used: NDArray[np.bool_],
@@ -30,13 +39,13 @@ def fit_limbs(
     and the next step does not promise to halve it. Only those that are `used` (4, M) are looked at.
     """
     n = chains.start.shape[2]
-    damping = np.full((4, n), DAMPING)
+    damping = np.full((4, n), INITIAL_DAMPING)
     watch = np.zeros((4, 4, n), dtype=np.int8)
     rows = np.flatnonzero((used & (chi2 > precision)).any(axis=0))
     for _ in range(steps):
         left: list[NDArray[np.intp]] = []
-        for at in range(0, len(rows), BLOCK):
-            part = rows[at : at + BLOCK]
+        for at in range(0, len(rows), BLOCK_POSTURES):
+            part = rows[at : at + BLOCK_POSTURES]
             going = _advance(problem, chains, chi2, used, damping, watch, part, precision, hopeless)
             left.append(part[going])
         rows = np.concatenate(left) if left else rows[:0]
@@ -45,7 +54,7 @@ def fit_limbs(
 
 
 def _advance(
-    problem: Problem,
+    problem: RefinementProblem,
     chains: Chains,
     chi2: Array,
     used: NDArray[np.bool_],
@@ -59,11 +68,11 @@ def _advance(
     problem = problem.take(rows)
     now, watched, value, damped = chains.take(rows), watch[..., rows], chi2[:, rows], damping[:, rows]
     terms = limb_terms(problem, now, watched if watched.any() else None)
-    block = eliminate(terms.matrix, terms.coupling[:, :0], terms.gradient, damped, FLOOR)
+    block = eliminate(terms.matrix, terms.coupling[:, :0], terms.gradient, damped, DIAGONAL_FLOOR)
     step = -backward(block.factor, block.right[:, -1].copy())
     gain = (block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0) - terms.slack
     watching = (watched != 0).any(axis=0)
-    done = (damped > MOST) | ((gain <= precision) & ((damped <= LIGHT) | watching))
+    done = (damped > MAX_DAMPING) | ((gain <= precision) & ((damped <= LIGHT_DAMPING) | watching))
     done |= (value > hopeless) & (gain < 0.5 * value) & ~watching
     done |= ~used[:, rows]
     if done.all():
@@ -75,11 +84,13 @@ def _advance(
     new = np.where((watched == 0) & ~better & ~done, passed, 0)
     ran = new.any(axis=0)
     with np.errstate(invalid="ignore"):
-        ratio = np.clip((value - trial) / np.maximum(gain, TINY), 0.0, 1.0)
+        ratio = np.clip((value - trial) / np.maximum(gain, MIN_GAIN), 0.0, 1.0)
     change = np.where(
-        better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), np.where(ran | done, 1.0, SLOWER)
+        better,
+        np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, DAMPING_DECAY),
+        np.where(ran | done, 1.0, DAMPING_GROWTH),
     )
-    damping[:, rows] = np.maximum(damped * change, LEAST)
+    damping[:, rows] = np.maximum(damped * change, MIN_DAMPING)
     watch[..., rows] = np.where(better | done, 0, watched + new)
     chi2[:, rows] = np.where(better, trial, value)
     chains.directions[..., rows] = np.where(better[:, None, None], directions, now.directions)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import END, MIDDLE
+from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import dot
 from posekit.refinement.state import place_limbs
 from posekit.refinement.walls import Beyond, beyond_walls, wall_rows
@@ -81,10 +81,10 @@ class LimbTerms(NamedTuple):
     slack: Array
 
 
-_MIDDLE, _END = ([joint - 6 for joint in joints] for joints in (MIDDLE, END))
+_MIDDLE, _END = ([joint - 6 for joint in joints] for joints in (LIMB_MIDDLES, LIMB_ENDS))
 
 
-def limb_terms(problem: Problem, chains: Chains, watch: Signs | None = None) -> LimbTerms:
+def limb_terms(problem: RefinementProblem, chains: Chains, watch: Signs | None = None) -> LimbTerms:
     """Linearise limbs; limits that are watched are in the matrices though they are not passed."""
     n = chains.start.shape[2]
     points = np.empty((8, 3, n))
@@ -142,7 +142,9 @@ def limb_terms(problem: Problem, chains: Chains, watch: Signs | None = None) -> 
     return terms
 
 
-def _add_limits(problem: Problem, out: Outside | Beyond, residual: Array, J: Array, terms: LimbTerms) -> None:
+def _add_limits(
+    problem: RefinementProblem, out: Outside | Beyond, residual: Array, J: Array, terms: LimbTerms
+) -> None:
     """Add the limits that are passed or watched, in place: radians, and how they change."""
     k, m = out.limb, out.row
     scale = 1.0 / problem.limit_deviation
@@ -159,7 +161,7 @@ def _add_limits(problem: Problem, out: Outside | Beyond, residual: Array, J: Arr
     terms.slack[k, m] = (judged * judged).sum(axis=0) - cost
 
 
-def limb_chi2(problem: Problem, chains: Chains) -> tuple[Array, Signs]:
+def limb_chi2(problem: RefinementProblem, chains: Chains) -> tuple[Array, Signs]:
     """Return the limbs' chi2 (4, N) and the limits that are passed (4, 4, N): `limb_terms` without the derivatives."""
     n = chains.start.shape[2]
     points = np.empty((8, 3, n))

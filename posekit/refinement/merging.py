@@ -12,10 +12,10 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.refinement.refined import Refined
 
-WITHIN = 0.005
+MERGE_DISTANCE_METRES = 0.005
 """Metres: survivors none of whose joints are farther apart became one, unless told otherwise."""
 
-DIRECTION = np.array([0.48, 0.6, 0.64])
+PROJECTION_AXIS = np.array([0.48, 0.6, 0.64])
 """A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
 
 
@@ -54,7 +54,9 @@ class Merged:
         return [[branches[int(row)] for row in rows] for rows in self.members()]
 
 
-def merge(refined: Refined, *, within: float = WITHIN, keep: NDArray[np.bool_] | None = None) -> Merged:
+def merge(
+    refined: Refined, *, within: float = MERGE_DISTANCE_METRES, keep: NDArray[np.bool_] | None = None
+) -> Merged:
     """Merge survivors of a frame that became one: all joints within a distance of those of a likelier one.
 
     The likeliest survivor takes in all that are near it, then the likeliest of the rest, and so on: the result does
@@ -81,7 +83,7 @@ def merge(refined: Refined, *, within: float = WITHIN, keep: NDArray[np.bool_] |
     rows = np.flatnonzero(chosen)
     joints = refined.joints[rows]
     # Ties are broken by where the joints are: by nothing that depends on the order.
-    shadow = joints @ DIRECTION
+    shadow = joints @ PROJECTION_AXIS
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
@@ -126,7 +128,7 @@ def _near(frame: NDArray[np.intp], joints: Array, within: float) -> tuple[NDArra
     that near.
     """
     n, count = len(frame), joints.shape[1]
-    shadow = joints @ DIRECTION
+    shadow = joints @ PROJECTION_AXIS
     key = shadow[:, count // 2 :].mean(axis=1)  # of the far ends of the body, which differ most
     order = np.lexsort((key, frame))
     spread = float(np.ptp(key)) + 2 * within + 1.0 if n else 1.0

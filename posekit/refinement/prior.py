@@ -10,10 +10,10 @@ from posekit.cameras import Camera, PinholeCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
 
-FARTHEST = 1e6
+MAX_ROOT_METRES = 1e6
 """Metres beyond which a root is taken for a mistake."""
 
-LEAST = 1e-6
+MIN_ROOT_DEVIATION_METRES = 1e-6
 """Metres: least standard deviation that a root is given; a root that is known exactly is known to a micrometre."""
 
 
@@ -46,9 +46,9 @@ class RootPrior:
                 f"the root's covariance has shape {covariance.shape}; expected ({len(mean)}, 3, 3)"
             )
         known = np.isfinite(mean).all(axis=1)
-        if (np.abs(mean[known]) > FARTHEST).any():
+        if (np.abs(mean[known]) > MAX_ROOT_METRES).any():
             raise InputError(
-                f"a root is {np.abs(mean[known]).max():g} m away; expected at most {FARTHEST:g} m"
+                f"a root is {np.abs(mean[known]).max():g} m away; expected at most {MAX_ROOT_METRES:g} m"
             )
         part = covariance[known]
         if not np.isfinite(part).all() or np.abs(part - part.transpose(0, 2, 1)).max(initial=0.0) > 1e-9:
@@ -96,5 +96,8 @@ class RootPrior:
         W = np.zeros((len(self.mean), 3, 3))
         if known.any():
             values, vectors = np.linalg.eigh(self.covariance[known])
-            W[known] = vectors.transpose(0, 2, 1) / np.sqrt(np.maximum(values, LEAST**2))[:, :, None]
+            W[known] = (
+                vectors.transpose(0, 2, 1)
+                / np.sqrt(np.maximum(values, MIN_ROOT_DEVIATION_METRES**2))[:, :, None]
+            )
         return W

@@ -8,18 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import Anatomy
+from posekit.refinement.anatomy import FigureNumbers
 from posekit.refinement.optics import Optics
 from posekit.refinement.walls import Walls
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Problem:
+class RefinementProblem:
     """The data of N postures; the batch is the last axis.
 
     Parameters
     ----------
-    anatomy : Anatomy
+    anatomy : FigureNumbers
     optics : Optics
     image, weight : array (14, 2, N), (14, N)
         Pixels, and one over their standard deviation; zero where a joint was not seen.
@@ -40,7 +40,7 @@ class Problem:
         Leave the limbs as they are, and unseen.
     """
 
-    anatomy: Anatomy
+    anatomy: FigureNumbers
     optics: Optics
     image: Array
     weight: Array
@@ -55,7 +55,7 @@ class Problem:
     walls: Walls | None = None
     trunk_only: bool = False
 
-    def take(self, rows: NDArray[np.intp] | slice) -> Problem:
+    def take(self, rows: NDArray[np.intp] | slice) -> RefinementProblem:
         """Return the data of some postures."""
         changed: dict[str, object] = {"optics": self.optics.take(rows)}
         for item in fields(self):
@@ -64,7 +64,7 @@ class Problem:
                 changed[item.name] = value[..., rows]
         return replace(self, **changed)  # type: ignore[arg-type]
 
-    def trunk_alone(self) -> Problem:
+    def trunk_alone(self) -> RefinementProblem:
         """Return the same problem with the limbs left out."""
         return replace(self, trunk_only=True)
 
@@ -114,7 +114,9 @@ def _residual(image: Array, seen: Array, weight: Array) -> Array:
     residual = (image - seen) * weight[:, None]
     behind = np.isnan(residual)
     if behind.any():
-        residual[behind] = np.broadcast_to(np.where(weight > 0, FAR, 0.0)[:, None], residual.shape)[behind]
+        residual[behind] = np.broadcast_to(
+            np.where(weight > 0, BEHIND_CAMERA_RESIDUAL, 0.0)[:, None], residual.shape
+        )[behind]
     return residual
 
 
@@ -127,5 +129,5 @@ def _whitened(image: Array, jacobian: Array, seen: Array, weight: Array) -> tupl
     return residual, jacobian
 
 
-FAR = 1e100
+BEHIND_CAMERA_RESIDUAL = 1e100
 """Standard deviations by which a joint behind the camera is off."""

@@ -7,32 +7,32 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
-from posekit.refinement.descent import PRECISION, STEPS
+from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.factors import factor_postures
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.inputs import frames_of, numbers
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import Refined
-from posekit.refinement.search import Found, search
-from posekit.refinement.sight import Sight
+from posekit.refinement.search import SearchResult, search
+from posekit.refinement.sight import ObservedFrames
 from posekit.refinement.state import head_points, place
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
-FARTHEST = 1e6
+MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a survivor is not refined."""
 
-FAR = 1e3
+UNPLACED_METRES = 1e3
 """Metres: stands for the joints of survivors that cannot be placed."""
 
 
 def refine(
-    sight: Sight,
+    sight: ObservedFrames,
     postures: ArrayLike,
     *,
     frame: ArrayLike | None = None,
     head: ArrayLike | None = None,
-    steps: int = STEPS,
-    precision: float = PRECISION,
+    steps: int = MAX_STEPS,
+    precision: float = CHI2_PRECISION,
     hopeless: float = np.inf,
 ) -> Refined:
     r"""Refine survivors to the most likely postures near them.
@@ -49,7 +49,7 @@ def refine(
 
     Parameters
     ----------
-    sight : Sight
+    sight : ObservedFrames
         What was seen.
     postures : array (N, 14, 3) or (N, nq)
         Survivors, camera frame, metres; or configurations. NaN for joints that are not known; a survivor without a
@@ -82,9 +82,9 @@ def refine(
     positions = numbers("postures", given, (None, len(JOINTS), 3))
     count = len(sight.points())
     frames = frames_of(frame, len(positions), count)
-    near = ~(np.abs(positions) > FARTHEST).any(axis=(1, 2))
+    near = ~(np.abs(positions) > MAX_COORDINATE_METRES).any(axis=(1, 2))
     placeable = np.asarray(np.isfinite(positions[:, 0]).all(axis=1) & near)
-    positions = np.where(placeable[:, None, None], positions, FAR)
+    positions = np.where(placeable[:, None, None], positions, UNPLACED_METRES)
     problem = sight.problem(frames, positions[:, 0])
     skull = None if head is None else _heads(head, count, frames)
     factors = factor_postures(frames, positions)
@@ -96,7 +96,11 @@ def refine(
 
 
 def _refined(
-    figure: Figure, problem: Problem, frames: NDArray[np.intp], searched: Found, placeable: NDArray[np.bool_]
+    figure: Figure,
+    problem: RefinementProblem,
+    frames: NDArray[np.intp],
+    searched: SearchResult,
+    placeable: NDArray[np.bool_],
 ) -> Refined:
     found, first = searched
     joints = place(found.state).transpose(2, 0, 1).copy()

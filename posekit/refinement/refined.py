@@ -12,12 +12,12 @@ from posekit.body import Figure
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.refinement.covariance import covariances
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, state_of
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import SEGMENTS
 
-LEVEL = 1e-3
+REJECTION_PROBABILITY = 1e-3
 """Probability with which noise alone gives a posture that is rejected."""
 
 
@@ -56,7 +56,7 @@ class Refined:
     start_chi2: Array
     steps: NDArray[np.intp]
     converged: NDArray[np.bool_]
-    problem: Problem
+    problem: RefinementProblem
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -84,7 +84,7 @@ class Refined:
         known = np.isfinite(self.chi2)
         return np.where(known, chi2_survival(np.where(known, self.chi2, 0.0), self.dof), 0.0)
 
-    def explained(self, level: float = LEVEL) -> NDArray[np.bool_]:
+    def explained(self, level: float = REJECTION_PROBABILITY) -> NDArray[np.bool_]:
         """Return which survivors (N,) the noise can explain: those with p of at least `level`."""
         if not 0 <= level < 1:
             raise InputError(f"level is {level!r}; expected a probability, zero or more and less than one")

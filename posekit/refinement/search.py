@@ -13,29 +13,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.bases import Tables, assemble
-from posekit.refinement.descent import BLOCK, Descent, descend
+from posekit.refinement.bases import BaseTables, assemble
+from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import chains_of, evaluate
-from posekit.refinement.factors import Columns, Factors, Rows, columns_of
-from posekit.refinement.laying import Bases, Laid, Limbs, Settings, lay
+from posekit.refinement.factors import Factors, LimbColumns, Rows, columns_of
+from posekit.refinement.laying import Bases, InitialLimbs, Laid, Settings, lay
 from posekit.refinement.limb_terms import Chains, limb_chi2
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, sides, state_of
-from posekit.refinement.state import State
+from posekit.refinement.state import PostureState
 
-ROUNDS = 3
+MAX_PULLING_ROUNDS = 3
 """Times that limbs which turn out to pull are taken in, before survivors go on one by one."""
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """Where the search ended, and the chi2 (N,) with which it began."""
 
-    descent: Descent
+    descent: DescentResult
     first: Array
 
 
 def search(
-    problem: Problem,
+    problem: RefinementProblem,
     postures: Array,
     skull: Array | None,
     factors: Factors,
@@ -43,7 +43,7 @@ def search(
     steps: int,
     precision: float,
     hopeless: float,
-) -> Found:
+) -> SearchResult:
     """Refine postures (N, 14, 3) and heads (N, 5, 3); chi2 is never more than it was."""
     settings = Settings(steps, precision, hopeless)
     one = factors.trunk
@@ -60,7 +60,7 @@ def search(
     rows = problem.take(one[columns.base])
     given = chains_of(rows, on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
     first = _first(alone, rows, begin, given, factors.trunk_of, origin)
-    limbs = Limbs(given.directions, sides(rows.optics, given))
+    limbs = InitialLimbs(given.directions, sides(rows.optics, given))
     trunks = descend(alone, begin, steps=steps, precision=precision)
     found, late = _grow(
         problem,
@@ -81,27 +81,27 @@ def search(
     rest = np.flatnonzero(worse & (found.chi2 <= hopeless))
     if rest.size:
         found.put(rest, descend(problem.take(rest), found.state.take(rest), **settings._asdict()))
-    return Found(found, first)
+    return SearchResult(found, first)
 
 
 def _grow(
-    problem: Problem,
+    problem: RefinementProblem,
     bases: Bases,
-    limbs: Limbs,
+    limbs: InitialLimbs,
     base_of: Rows,
-    columns: Columns,
+    columns: LimbColumns,
     origin: Rows,
     settings: Settings,
-) -> tuple[Descent, Rows]:
+) -> tuple[DescentResult, Rows]:
     """Refine survivors (N,) from their bases outward, round by round; their limbs are `limbs` at `origin` (4, N).
 
     Return them, and which have limbs that pull after the last round.
     """
     n = len(base_of)
-    found = Descent.nothing(bases.found.state, n)
+    found = DescentResult.nothing(bases.found.state, n)
     leaves, column, late = np.arange(n), origin, np.arange(0)
     which = np.repeat(np.arange(len(columns.base))[None], 4, axis=0)
-    for turn in range(ROUNDS + 1):
+    for turn in range(MAX_PULLING_ROUNDS + 1):
         laid = lay(problem, bases, columns, limbs.gather(which), settings)
         each = _at(laid.chi2, column, 0.0)
         pull = each > settings.precision
@@ -109,11 +109,11 @@ def _grow(
         over = ~np.isfinite(total) | ~bases.open(settings)[base_of]
         tables = None
         if turn == 0 and pull.any():
-            tables = Tables.of(problem, bases, laid)
+            tables = BaseTables.of(problem, bases, laid)
             least = _at(tables.least(bases, laid), _at(laid.place, np.where(pull, column, -1), -1), 0.0)
             over |= (least > settings.hopeless).any(axis=0)
         going = pull.any(axis=0) & ~over
-        if turn == ROUNDS:
+        if turn == MAX_PULLING_ROUNDS:
             late, going = leaves[going], np.zeros_like(going)
         done = np.flatnonzero(~going)
         _write(found, leaves[done], bases, base_of[done], laid, column[:, done], total[done])
@@ -150,12 +150,12 @@ def _groups(base_of: Rows, column: Rows, pull: NDArray[np.bool_], laid: Laid) ->
     return group.reshape(-1), one, slots[:, one]
 
 
-def _columns(column: Rows, origin: Rows, base_of: Rows, count: int) -> tuple[Columns, Rows, Rows]:
+def _columns(column: Rows, origin: Rows, base_of: Rows, count: int) -> tuple[LimbColumns, Rows, Rows]:
     """Set limbs that are not yet held (`column` of 0 or more) side by side on `count` new bases.
 
     Returns
     -------
-    columns : Columns
+    columns : LimbColumns
     column : int array (4, n)
         Each survivor's, -1 where its limb is held.
     which : int array (4, M)
@@ -178,7 +178,7 @@ def _columns(column: Rows, origin: Rows, base_of: Rows, count: int) -> tuple[Col
 
 
 def _write(
-    found: Descent, rows: Rows, bases: Bases, base: Rows, laid: Laid, column: Rows, total: Array
+    found: DescentResult, rows: Rows, bases: Bases, base: Rows, laid: Laid, column: Rows, total: Array
 ) -> None:
     """Write down survivors: their bases, and the limbs in `column` (4, n) that those do not hold."""
     part = bases.found.take(base)
@@ -199,13 +199,20 @@ def _at(table: NDArray[Any], column: Rows, nothing: float) -> NDArray[Any]:
     return out
 
 
-def _first(alone: Problem, rows: Problem, begin: State, limbs: Chains, trunk_of: Rows, origin: Rows) -> Array:
+def _first(
+    alone: RefinementProblem,
+    rows: RefinementProblem,
+    begin: PostureState,
+    limbs: Chains,
+    trunk_of: Rows,
+    origin: Rows,
+) -> Array:
     """Return the chi2 of survivors as they were given (N,), from their trunks' and their limbs'."""
     trunk, limb = np.empty(begin.root.shape[1]), np.empty((4, limbs.start.shape[2]))
-    for at in range(0, len(trunk), BLOCK):
-        part = np.arange(at, min(at + BLOCK, len(trunk)))
+    for at in range(0, len(trunk), BLOCK_POSTURES):
+        part = np.arange(at, min(at + BLOCK_POSTURES, len(trunk)))
         trunk[part] = evaluate(alone.take(part), begin.take(part))[0]
-    for at in range(0, limb.shape[1], BLOCK):
-        part = np.arange(at, min(at + BLOCK, limb.shape[1]))
+    for at in range(0, limb.shape[1], BLOCK_POSTURES):
+        part = np.arange(at, min(at + BLOCK_POSTURES, limb.shape[1]))
         limb[:, part] = limb_chi2(rows.take(part), limbs.take(part))[0]
     return np.asarray(trunk[trunk_of] + np.take_along_axis(limb, origin, axis=1).sum(axis=0))

@@ -13,26 +13,26 @@ from posekit.body.angles import Limits
 from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.anatomy import Anatomy
+from posekit.refinement.anatomy import FigureNumbers
 from posekit.refinement.inputs import batch_last, length_weights, numbers, root_of, weights
 from posekit.refinement.optics import optics_of
 from posekit.refinement.prior import RootPrior
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.walls import Walls
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
 LIMIT_DEVIATION = 2.0
 """Degrees: standard deviation with which limits of joints are known, unless told otherwise."""
 
-FARTHEST = 1e8
+MAX_COORDINATE_PIXELS = 1e8
 """Pixels beyond which key points are taken for as far: no posture is seen there, and squares stay finite."""
 
-HELD = 1e6
+DEPTH_HOLD_PER_METRE = 1e6
 """One over metres: what holds the depth of a root that the camera does not see."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sight:
+class ObservedFrames:
     """F frames as they were seen.
 
     Parameters
@@ -78,9 +78,13 @@ class Sight:
 
     def points(self) -> Array:
         """Return the key points (F, 14, 2)."""
-        return np.clip(numbers("image", self.image, (None, len(JOINTS), 2)), -FARTHEST, FARTHEST)
+        return np.clip(
+            numbers("image", self.image, (None, len(JOINTS), 2)),
+            -MAX_COORDINATE_PIXELS,
+            MAX_COORDINATE_PIXELS,
+        )
 
-    def problem(self, frames: NDArray[np.intp], necks: Array) -> Problem:
+    def problem(self, frames: NDArray[np.intp], necks: Array) -> RefinementProblem:
         """Lay out the data of survivors in some frames (N,); their necks (N, 3) are where a root is held."""
         points = self.points()
         count = len(points)
@@ -93,19 +97,21 @@ class Sight:
         optics = optics_of(self.camera, frames)
         mean, whitening = root_of(self.root, count)
         held = np.zeros((3, 3))
-        held[2, 2] = 0.0 if optics.perspective else HELD
+        held[2, 2] = 0.0 if optics.perspective else DEPTH_HOLD_PER_METRE
         known = np.asarray(np.isfinite(mean).all(axis=1))[frames]
         root = np.where(known[:, None], mean[frames], necks)
         head = head_weight = None
         if self.head_image is not None:
             head = np.clip(
-                numbers("head_image", self.head_image, (count, len(HEAD_POINTS), 2)), -FARTHEST, FARTHEST
+                numbers("head_image", self.head_image, (count, len(HEAD_POINTS), 2)),
+                -MAX_COORDINATE_PIXELS,
+                MAX_COORDINATE_PIXELS,
             )
             given = 1.0 if self.head_deviation is None else self.head_deviation
             head_weight = weights("head_deviation", given, head)
         seen = head is not None and head_weight is not None and bool(head_weight.any())
-        return Problem(
-            anatomy=Anatomy.of(self.figure, self.limits),
+        return RefinementProblem(
+            anatomy=FigureNumbers.of(self.figure, self.limits),
             optics=optics,
             image=batch_last(np.nan_to_num(points[frames])),
             weight=batch_last(weight[frames]),

@@ -6,7 +6,7 @@ import numpy as np
 
 from posekit.geometry import Array
 
-TINY = 1e-300
+MIN_PIVOT = 1e-300
 """Least pivot: a matrix that is positive but for rounding must not give NaN."""
 
 
@@ -62,7 +62,7 @@ def rotation(turn: Array) -> Array:
 def cholesky(matrix: Array) -> Array:
     """Factor symmetric positive definite matrices (k, k, ...), in place: L of L L' in the lower triangle."""
     for j in range(len(matrix)):
-        pivot = np.sqrt(np.maximum(matrix[j, j], TINY))
+        pivot = np.sqrt(np.maximum(matrix[j, j], MIN_PIVOT))
         matrix[j, j] = pivot
         column = matrix[j + 1 :, j]
         column /= pivot

@@ -7,18 +7,18 @@ from numpy.typing import NDArray
 
 from posekit.body.frames import fit_rotation, hips_frame, torso_frame
 from posekit.geometry import Array
-from posekit.refinement.anatomy import END, LIMBS, MIDDLE, Anatomy
+from posekit.refinement.anatomy import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, FigureNumbers
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import dot
-from posekit.refinement.state import State, parents
+from posekit.refinement.state import PostureState, parents
 
-HANGING = 2
+HANGING_AXIS = 2
 """The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
 
 
-def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> State:
+def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None) -> PostureState:
     """Lay the figure's torso, hips and head onto those of postures (N, 14, 3) and heads (N, 5, 3); limbs are left open.
 
     What is NaN is put in its neutral place; the neck must be known.
@@ -44,7 +44,7 @@ def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> St
         skull = _laid(anatomy.head, head - postures[:, :1])
         skull = np.where(np.isnan(skull), torso, skull)
     rotations = [_batch_last(rotation) for rotation in (torso, hips, skull)]
-    return State(
+    return PostureState(
         root=postures[:, 0].T.copy(),
         torso=rotations[0],
         hips=rotations[1],
@@ -55,14 +55,14 @@ def state_of(anatomy: Anatomy, postures: Array, head: Array | None = None) -> St
     )
 
 
-def limb_directions(postures: Array, rows: NDArray[np.intp], state: State) -> Array:
+def limb_directions(postures: Array, rows: NDArray[np.intp], state: PostureState) -> Array:
     """Return the directions of limbs (4, 2, 3, M): of each kind those of some postures (4, M), on trunks (M).
 
     A segment whose ends are not known hangs along its part.
     """
     out = np.empty((4, 2, 3, rows.shape[1]))
-    hanging = -parents(state)[:, :, HANGING]
-    for limb, joints in enumerate(LIMBS):
+    hanging = -parents(state)[:, :, HANGING_AXIS]
+    for limb, joints in enumerate(LIMB_JOINTS):
         for segment in range(2):
             along = (postures[rows[limb], joints[segment + 1]] - postures[rows[limb], joints[segment]]).T
             far = np.sqrt(dot(along, along))
@@ -92,7 +92,7 @@ def sides(optics: Optics, chains: Chains) -> NDArray[np.bool_]:
     return np.asarray(dot(chains.directions, np.stack([middle, end], axis=1)) > 0)
 
 
-def relift(problem: Problem, chains: Chains, far: NDArray[np.bool_]) -> Chains:
+def relift(problem: RefinementProblem, chains: Chains, far: NDArray[np.bool_]) -> Chains:
     """Lay limbs on their rays, each segment to its side `far` (4, 2, N).
 
     Where the ray is out of reach, the segment points to the nearest place on it. Where a joint was not seen, or its
@@ -100,7 +100,7 @@ def relift(problem: Problem, chains: Chains, far: NDArray[np.bool_]) -> Chains:
     """
     directions = chains.directions.copy()
     start = chains.start
-    for segment, ends in enumerate((MIDDLE, END)):
+    for segment, ends in enumerate((LIMB_MIDDLES, LIMB_ENDS)):
         seen = problem.weight[list(ends)] > 0
         length = chains.lengths[:, segment]
         along = _lifted(problem.optics, problem.image[list(ends)], start, length, far[:, segment])

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import ARMS, END, LEGS, MIDDLE
+from posekit.refinement.anatomy import ARM_LIMBS, LEG_LIMBS, LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.small import product, rotation, turned, unit
 
 Rows = NDArray[np.intp]
 
 
-class State(NamedTuple):
+class PostureState(NamedTuple):
     """N postures.
 
     Attributes
@@ -32,7 +32,7 @@ class State(NamedTuple):
     directions : array (4, 2, 3, N)
         Unit vectors of the limbs' upper and lower segments, camera frame.
     shape : array (9, N)
-        See `posekit.refinement.anatomy.Anatomy`, metres.
+        See `posekit.refinement.anatomy.FigureNumbers`, metres.
     limbs : array (4, 2, N)
         Lengths of the limbs' segments, metres.
     """
@@ -45,21 +45,21 @@ class State(NamedTuple):
     shape: Array
     limbs: Array
 
-    def take(self, rows: Rows) -> State:
+    def take(self, rows: Rows) -> PostureState:
         """Return some postures."""
-        return State(*(array[..., rows] for array in self))
+        return PostureState(*(array[..., rows] for array in self))
 
-    def put(self, rows: Rows, other: State) -> None:
+    def put(self, rows: Rows, other: PostureState) -> None:
         """Overwrite some postures."""
         for mine, theirs in zip(self, other, strict=True):
             mine[..., rows] = theirs
 
-    def copy(self) -> State:
+    def copy(self) -> PostureState:
         """Return a copy."""
-        return State(*(array.copy() for array in self))
+        return PostureState(*(array.copy() for array in self))
 
 
-class Step(NamedTuple):
+class PostureStep(NamedTuple):
     """A step away from N postures.
 
     Attributes
@@ -76,13 +76,13 @@ class Step(NamedTuple):
     limbs: Array | None = None
     head: Array | None = None
 
-    def take(self, rows: Rows) -> Step:
+    def take(self, rows: Rows) -> PostureStep:
         """Return the steps of some postures."""
         limbs = None if self.limbs is None else self.limbs[..., rows]
-        return Step(self.trunk[..., rows], limbs, None if self.head is None else self.head[..., rows])
+        return PostureStep(self.trunk[..., rows], limbs, None if self.head is None else self.head[..., rows])
 
 
-def trunk_offsets(state: State) -> Array:
+def trunk_offsets(state: PostureState) -> Array:
     """Place torso and hips relative to the root (6, 3, N), metres."""
     out = np.zeros((6, 3, state.root.shape[1]))
     shape = state.shape
@@ -96,7 +96,7 @@ def trunk_offsets(state: State) -> Array:
     return out
 
 
-def place(state: State, offsets: Array | None = None) -> Array:
+def place(state: PostureState, offsets: Array | None = None) -> Array:
     """Place all joints (14, 3, N), camera frame, metres."""
     out = np.empty((14, 3, state.root.shape[1]))
     out[:6] = state.root + (trunk_offsets(state) if offsets is None else offsets)
@@ -111,16 +111,16 @@ def place_limbs(starts: Array, directions: Array, lengths: Array, out: Array) ->
     out[_END] = middle + lengths[:, 1, None] * directions[:, 1]
 
 
-_MIDDLE, _END = ([joint - 6 for joint in joints] for joints in (MIDDLE, END))
+_MIDDLE, _END = ([joint - 6 for joint in joints] for joints in (LIMB_MIDDLES, LIMB_ENDS))
 
 
-def moved(state: State, step: Step, tangents: Array | None) -> State:
+def moved(state: PostureState, step: PostureStep, tangents: Array | None) -> PostureState:
     """Take a step; `tangents` (4, 2, 2, 3, N) are the unit vectors along which it turns the limbs."""
     trunk = step.trunk
     directions, limbs = state.directions, state.limbs
     if step.limbs is not None and tangents is not None:
         directions, limbs = moved_limbs(directions, limbs, step.limbs, tangents)
-    return State(
+    return PostureState(
         root=state.root + trunk[:3],
         torso=product(rotation(trunk[3:6]), state.torso),
         hips=product(rotation(trunk[6:9]), state.hips),
@@ -141,13 +141,13 @@ def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array)
     return unit(along), lengths
 
 
-def parents(state: State, *, on_torso: bool = False) -> Array:
+def parents(state: PostureState, *, on_torso: bool = False) -> Array:
     """Return the rotation of the part by which each limb is judged (4, 3, 3, N): it hangs on it, unless `on_torso`."""
     out = np.empty((4, 3, 3, state.root.shape[1]))
-    out[ARMS], out[LEGS] = state.torso, state.torso if on_torso else state.hips
+    out[ARM_LIMBS], out[LEG_LIMBS] = state.torso, state.torso if on_torso else state.hips
     return out
 
 
-def head_points(state: State, offsets: Array) -> Array:
+def head_points(state: PostureState, offsets: Array) -> Array:
     """Place the head's points relative to the root (5, 3, N)."""
     return np.stack([turned(state.head, np.broadcast_to(o[:, None], state.root.shape)) for o in offsets])

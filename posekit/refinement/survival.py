@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from posekit.errors import InputError
 from posekit.geometry import Array
 
-MOST = 1000
+MAX_DEGREES_OF_FREEDOM = 1000
 """Degrees of freedom beyond which the sum is refused: no posture has so many."""
 
-FARTHEST = 740.0
+MAX_HALF_CHI2 = 740.0
 """Half a sum of squares from which on the exponential is no number; the probability is then zero to 1e-14."""
 
 
@@ -54,9 +54,9 @@ def chi2_survival(chi2: ArrayLike, dof: ArrayLike) -> Array:
     x, freedom = np.broadcast_arrays(np.asarray(chi2, dtype=np.float64), np.asarray(dof, dtype=np.float64))
     if (x < 0).any():
         raise InputError(f"chi2 is {float(np.nanmin(x)):g}; expected a sum of squares, zero or more")
-    if not ((freedom >= 0) & (freedom <= MOST) & (freedom == np.floor(freedom))).all():
-        raise InputError(f"degrees of freedom must be whole numbers from 0 to {MOST}")
-    y = np.minimum(x / 2, FARTHEST)
+    if not ((freedom >= 0) & (freedom <= MAX_DEGREES_OF_FREEDOM) & (freedom == np.floor(freedom))).all():
+        raise InputError(f"degrees of freedom must be whole numbers from 0 to {MAX_DEGREES_OF_FREEDOM}")
+    y = np.minimum(x / 2, MAX_HALF_CHI2)
     odd = np.mod(freedom, 2) == 1
     # The terms y^a e^-y / Gamma(a + 1), each from the one before; in logarithms they would lose digits.
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):

@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK
-from posekit.refinement.equations import FLOOR, assemble, eliminate, left_over, linearise
+from posekit.refinement.descent import BLOCK_POSTURES
+from posekit.refinement.equations import DIAGONAL_FLOOR, assemble, eliminate, left_over, linearise
 from posekit.refinement.limb_terms import Chains, limb_terms
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import backward
-from posekit.refinement.state import State, Step
+from posekit.refinement.state import PostureState, PostureStep
 from posekit.refinement.trunk_terms import start_ways, trunk_terms
 
 
@@ -64,12 +64,12 @@ class LimbTables(NamedTuple):
 
 def joint_step(
     trunks: TrunkTables, limbs: LimbTables, which: NDArray[np.intp], columns: NDArray[np.intp]
-) -> tuple[Step, Array, Array]:
+) -> tuple[PostureStep, Array, Array]:
     """Solve for the joint step of trunks (N,) and limbs in some columns (4, N), -1 for none.
 
     Returns
     -------
-    Step
+    PostureStep
     array (N,)
         The decrease of chi2 that it promises.
     array (4, 2, 2, 3, N)
@@ -91,7 +91,7 @@ def joint_step(
     head = None
     if trunks.head.shape[1]:
         head = (trunks.head[which] + (trunks.head_slope[which] @ trunk[:, :6])[..., 0]).T
-    return Step(np.ascontiguousarray(trunk[..., 0].T), steps, head), gain, tangents
+    return PostureStep(np.ascontiguousarray(trunk[..., 0].T), steps, head), gain, tangents
 
 
 def gain_of(matrix: Array, gradient: Array) -> Array:
@@ -99,16 +99,16 @@ def gain_of(matrix: Array, gradient: Array) -> Array:
     return np.asarray(np.einsum("nc,nc->n", np.linalg.solve(matrix, gradient[..., None])[..., 0], gradient))
 
 
-def trunk_tables(problem: Problem, state: State) -> TrunkTables:
+def trunk_tables(problem: RefinementProblem, state: PostureState) -> TrunkTables:
     """Tabulate trunks, their limbs left out."""
     parts = []
     alone = problem.trunk_alone()
     n = state.root.shape[1]
-    for at in range(0, n, BLOCK):
-        rows = np.arange(at, min(at + BLOCK, n))
+    for at in range(0, n, BLOCK_POSTURES):
+        rows = np.arange(at, min(at + BLOCK_POSTURES, n))
         arrow = assemble(linearise(alone.take(rows), state.take(rows)), 0.0)
         index = np.arange(len(arrow.gradient))
-        arrow.matrix[index, index] += FLOOR
+        arrow.matrix[index, index] += DIAGONAL_FLOOR
         head, slope = np.zeros((0, len(rows))), np.zeros((0, 6, len(rows)))
         if arrow.head is not None:
             both = -backward(arrow.head.factor, arrow.head.right.copy())
@@ -119,15 +119,15 @@ def trunk_tables(problem: Problem, state: State) -> TrunkTables:
     return TrunkTables(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
-def limb_tables(problem: Problem, trunks: State, chains: Chains) -> LimbTables:
+def limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains) -> LimbTables:
     """Tabulate limbs, each column on its own trunk (M)."""
     n = chains.start.shape[2]
     parts = []
-    for at in range(0, max(n, 1), BLOCK):
-        rows = np.arange(at, min(at + BLOCK, n))
+    for at in range(0, max(n, 1), BLOCK_POSTURES):
+        rows = np.arange(at, min(at + BLOCK_POSTURES, n))
         part = problem.take(rows)
         terms = limb_terms(part, chains.take(rows))
-        block = eliminate(terms.matrix, terms.coupling, terms.gradient, 0.0, FLOOR)
+        block = eliminate(terms.matrix, terms.coupling, terms.gradient, 0.0, DIAGONAL_FLOOR)
         start, push = left_over(block, terms.start, terms.start_gradient)
         trunk = trunk_terms(part, trunks.take(rows))
         ways = start_ways(trunk)

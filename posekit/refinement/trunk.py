@@ -23,34 +23,34 @@ from posekit.body import Figure
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.descent import BLOCK, descend
+from posekit.refinement.descent import BLOCK_POSTURES, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.merging import groups_of
-from posekit.refinement.problem import Problem
-from posekit.refinement.refined import LEVEL
-from posekit.refinement.sight import Sight
+from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.refined import REJECTION_PROBABILITY
+from posekit.refinement.sight import ObservedFrames
 from posekit.refinement.small import product, unit
 from posekit.refinement.start import state_of
-from posekit.refinement.state import State, trunk_offsets
+from posekit.refinement.state import PostureState, trunk_offsets
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 
-TRIED = 2
+N_CHOICES_FOLLOWED = 2
 """Near and far choices that are followed to their minima, the likeliest first."""
 
-STEPS = 12
+MAX_STEPS = 12
 
-WITHIN = 0.01
+SAME_TRUNK_METRES = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
 
-TRUNK = 6
+N_TRUNK_JOINTS = 6
 """Joints of torso and hips."""
 
-SAME = 1e-5
+LIFT_ROUNDING_METRES = 1e-5
 """Metres by which a trunk may be lifted otherwise than it was found: rounding, tangent to a ray."""
 
-PROMISING = 150.0
+PROMISING_CHI2 = 150.0
 """A chi2 beyond which a mirrored start is followed only while its steps promise to halve it."""
 
 
@@ -92,7 +92,7 @@ class Trunks:
         """
         out = np.zeros((len(JOINTS), len(self), 1))
         for joint, (parent, _) in enumerate(TREE_SEGMENTS, start=1):
-            if joint < TRUNK:
+            if joint < N_TRUNK_JOINTS:
                 out[joint, :, 0] = np.linalg.norm(self.joints[:, joint] - self.joints[:, parent], axis=1)
             else:
                 out[joint] = figure.lengths[segment_name((parent, joint))]
@@ -107,22 +107,24 @@ class Trunks:
             The trunk of each leaf.
         postures : array (N, 14, 3)
         """
-        apart = postures[:, :TRUNK] - self.joints[hypothesis]
+        apart = postures[:, :N_TRUNK_JOINTS] - self.joints[hypothesis]
         with np.errstate(invalid="ignore"):
-            return np.asarray(~(np.abs(apart) > SAME).any(axis=(1, 2)))
+            return np.asarray(~(np.abs(apart) > LIFT_ROUNDING_METRES).any(axis=(1, 2)))
 
 
-def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -> Trunks:
+def find_trunks(
+    sight: ObservedFrames, *, level: float = REJECTION_PROBABILITY, within: float = SAME_TRUNK_METRES
+) -> Trunks:
     """Find the trunks that the noise can explain.
 
     Parameters
     ----------
-    sight : Sight
+    sight : ObservedFrames
         Its root must say where the neck is, however roughly.
     level : float
         Probability with which noise alone gives a trunk that is left out.
     within : float
-        Metres; see `WITHIN`.
+        Metres; see `SAME_TRUNK_METRES`.
 
     Returns
     -------
@@ -145,21 +147,25 @@ def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -
     begin = state_of(one.anatomy, flat)
     chi2 = np.empty(len(frames))
     every = np.repeat(np.arange(len(known)), starts.shape[1])
-    for at in range(0, len(frames), BLOCK):
-        rows = np.arange(at, min(at + BLOCK, len(frames)))
+    for at in range(0, len(frames), BLOCK_POSTURES):
+        rows = np.arange(at, min(at + BLOCK_POSTURES, len(frames)))
         chi2[rows] = evaluate(one.take(every[rows]), begin.take(rows))[0]
-    order = np.argsort(chi2.reshape(len(known), starts.shape[1]), axis=1, kind="stable")[:, :TRIED]
+    order = np.argsort(chi2.reshape(len(known), starts.shape[1]), axis=1, kind="stable")[
+        :, :N_CHOICES_FOLLOWED
+    ]
     chosen = (np.arange(len(known))[:, None] * starts.shape[1] + order).reshape(-1)
     which = np.repeat(np.arange(len(known)), order.shape[1])
-    first = descend(one.take(which), begin.take(chosen), steps=STEPS)
+    first = descend(one.take(which), begin.take(chosen), steps=MAX_STEPS)
     best = (
         np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
         + np.arange(len(known)) * order.shape[1]
     )
     turned = _reflections(first.state.take(best), one.optics.perspective)
     again = np.tile(np.arange(len(known)), 3)
-    second = descend(one.take(again), turned, steps=STEPS, hopeless=PROMISING)
-    state = State(*(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True)))
+    second = descend(one.take(again), turned, steps=MAX_STEPS, hopeless=PROMISING_CHI2)
+    state = PostureState(
+        *(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True))
+    )
     row = np.concatenate([which, again])
     value, active = (
         np.concatenate([a, b]) for a, b in ((first.chi2, second.chi2), (first.active, second.active))
@@ -176,8 +182,8 @@ def find_trunks(sight: Sight, *, level: float = LEVEL, within: float = WITHIN) -
 
 
 def _trunks(
-    sight: Sight,
-    one: Problem,
+    sight: ObservedFrames,
+    one: RefinementProblem,
     frame: NDArray[np.intp],
     joints: Array,
     chi2: Array,
@@ -191,7 +197,7 @@ def _trunks(
     return Trunks(frame=frame, joints=joints, image=image, chi2=chi2, dof=dof, p=p)
 
 
-def _lifts(sight: Sight, frames: NDArray[np.intp]) -> Array:
+def _lifts(sight: ObservedFrames, frames: NDArray[np.intp]) -> Array:
     """Lift trunks by every near and far choice, (len(frames), 32, 14, 3): out of reach means nearest to the ray."""
     problem = sight.problem(frames, np.zeros((len(frames), 3)))
     image, optics = problem.image[:6], problem.optics
@@ -218,7 +224,7 @@ def _lifts(sight: Sight, frames: NDArray[np.intp]) -> Array:
     return out
 
 
-def _reflections(state: State, perspective: bool) -> State:
+def _reflections(state: PostureState, perspective: bool) -> PostureState:
     """Return torsos, hips, and both, as a mirror at right angles to the ray shows them: (3 N)."""
     ray = (
         unit(state.root)
@@ -229,4 +235,4 @@ def _reflections(state: State, perspective: bool) -> State:
     flipped = np.array([-1.0, 1.0, 1.0])[None, :, None]
     torso, hips = (product(mirror, rotation) * flipped for rotation in (state.torso, state.hips))
     parts = (state._replace(torso=torso), state._replace(hips=hips), state._replace(torso=torso, hips=hips))
-    return State(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))
+    return PostureState(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))

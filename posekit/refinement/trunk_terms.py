@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LEGS, START, TRUNK_SEGMENTS
+from posekit.refinement.anatomy import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.joints import pelvis_limits
 from posekit.refinement.limits import Ball, Signs
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.small import dot, turned
-from posekit.refinement.state import State, trunk_offsets
+from posekit.refinement.state import PostureState, trunk_offsets
 
 
 class TrunkTerms(NamedTuple):
@@ -49,7 +49,7 @@ class TrunkTerms(NamedTuple):
     turns: tuple[slice, ...]
 
 
-def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> TrunkTerms:
+def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> TrunkTerms:
     """Linearise the trunk."""
     offsets = trunk_offsets(state)
     residual, A = problem.see(state.root + offsets, slice(0, 6))
@@ -87,7 +87,7 @@ def trunk_terms(problem: Problem, state: State, watch: Signs | None = None) -> T
     )
 
 
-def trunk_chi2(problem: Problem, state: State, offsets: Array) -> tuple[Array, Signs]:
+def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) -> tuple[Array, Signs]:
     """Return the trunk's chi2 (N,) and the limits of the hips that are passed (3, N)."""
     residual, away = problem.miss(state.root + offsets, slice(0, 6)), _root(problem, state)
     chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
@@ -130,24 +130,26 @@ def start_ways(terms: TrunkTerms) -> Array:
     """Return how the trunk's unknowns move limbs' starts and turn their parts (4, 6, C, N)."""
     width, n = terms.ways.shape[2:]
     out = np.zeros((4, 6, width, n))
-    out[:, :3] = terms.ways[list(START)]
+    out[:, :3] = terms.ways[list(LIMB_STARTS)]
     for limb in range(4):
         for i, column in enumerate(range(9)[terms.turns[limb]]):
             out[limb, 3 + i, column] = 1.0
     return out
 
 
-def turns_of(problem: Problem) -> tuple[slice, ...]:
+def turns_of(problem: RefinementProblem) -> tuple[slice, ...]:
     """Return which unknowns turn the part by which each limb is judged: torso or hips."""
     torso, hips = slice(3, 6), slice(6, 9)
-    return tuple(hips if limb >= LEGS.start and not problem.legs_on_torso else torso for limb in range(4))
+    return tuple(
+        hips if limb >= LEG_LIMBS.start and not problem.legs_on_torso else torso for limb in range(4)
+    )
 
 
-def _root(problem: Problem, state: State) -> Array:
+def _root(problem: RefinementProblem, state: PostureState) -> Array:
     return turned(problem.root_weight, state.root - problem.root)
 
 
-def _ways(problem: Problem, state: State, offsets: Array) -> Array:
+def _ways(problem: RefinementProblem, state: PostureState, offsets: Array) -> Array:
     ways = np.zeros((6, 3, problem.trunk_width, state.root.shape[1]))
     for i in range(3):
         ways[:, i, i] = 1.0
@@ -179,7 +181,7 @@ def _add_ball(ball: Ball, squared: float, matrix: Array, gradient: Array) -> Non
     gradient[hips] += push
 
 
-def shape_ways(state: State) -> Array:
+def shape_ways(state: PostureState) -> Array:
     """Return how the nine numbers of the shape move the trunk's joints (6, 3, 9, N)."""
     ways = np.zeros((6, 3, 9, state.root.shape[1]))
     forward, left, up = state.torso[:, 0], state.torso[:, 1], state.torso[:, 2]

@@ -10,7 +10,7 @@ from os import PathLike
 
 from posekit.errors import InputError
 
-LONGEST = 60
+MAX_SHOWN_CHARACTERS = 60
 """Characters of a value, a name or a list of names that are shown before it is cut."""
 
 
@@ -45,7 +45,7 @@ def shown(value: object) -> str:
             return "[" + ", ".join(shown(entry) for entry in value) + "]"
         return f"a list of {len(value)} entries"
     if isinstance(value, str):
-        return cut(json.dumps(value[: LONGEST + 1]))
+        return cut(json.dumps(value[: MAX_SHOWN_CHARACTERS + 1]))
     if value is None or isinstance(value, bool):
         return json.dumps(value)
     if isinstance(value, float) and not math.isfinite(value):
@@ -55,14 +55,18 @@ def shown(value: object) -> str:
 
 def cut(text: str) -> str:
     """Shorten a text that is too long to show."""
-    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
+    return text if len(text) <= MAX_SHOWN_CHARACTERS else text[: MAX_SHOWN_CHARACTERS - 1] + "…"
 
 
 def nearest(name: str, names: Iterable[str]) -> str:
     """Suggest what a name was meant to be: the nearest valid names, or all of them where none is near."""
     valid = list(names)
-    flipped = "-".join(reversed(name[:LONGEST].split("-")))
-    near = [flipped] if "-" in name and flipped in valid else difflib.get_close_matches(name[:LONGEST], valid)
+    flipped = "-".join(reversed(name[:MAX_SHOWN_CHARACTERS].split("-")))
+    near = (
+        [flipped]
+        if "-" in name and flipped in valid
+        else difflib.get_close_matches(name[:MAX_SHOWN_CHARACTERS], valid)
+    )
     if near:
         return f"did you mean {' or '.join(near)}?"
     return f"valid names are {', '.join(valid)}"

@@ -9,12 +9,13 @@ from typing import Literal
 
 from posekit.errors import InputError
 
-CONSTRAINTS = ("closure", "coplanar", "perpendicular", "collinear")
+SCALE_CONSTRAINTS = ("closure", "coplanar", "perpendicular", "collinear")
 
 How = Literal["min", "value", "stature", "constraints"]
 
-EXPECTED = (
-    f"min, a number, stature:PX, or some of {', '.join(CONSTRAINTS)}, as in closure or closure:1,coplanar:0.5"
+SCALE_EXPECTED = (
+    f"min, a number, stature:PX, or some of {', '.join(SCALE_CONSTRAINTS)}, "
+    "as in closure or closure:1,coplanar:0.5"
 )
 
 
@@ -40,11 +41,11 @@ class Scale:
     def __post_init__(self) -> None:
         given = [self.value] if self.how in ("value", "stature") else list(self.weights.values())
         if not all(number is not None and math.isfinite(number) and number > 0 for number in given):
-            raise InputError(f"--scale: {given} is not positive and finite; expected {EXPECTED}")
-        unknown = [name for name in self.weights if name not in CONSTRAINTS]
+            raise InputError(f"--scale: {given} is not positive and finite; expected {SCALE_EXPECTED}")
+        unknown = [name for name in self.weights if name not in SCALE_CONSTRAINTS]
         if unknown or (self.how == "constraints" and not self.weights):
             raise InputError(
-                f"--scale: {(unknown or ['nothing'])[0]!r} is no way to find a scale; expected {EXPECTED}"
+                f"--scale: {(unknown or ['nothing'])[0]!r} is no way to find a scale; expected {SCALE_EXPECTED}"
             )
 
 
@@ -99,5 +100,5 @@ def _is_number(text: str) -> bool:
 
 def _number(text: str) -> float:
     if not _is_number(text):
-        raise InputError(f"--scale: {text!r} is not a number; expected {EXPECTED}")
+        raise InputError(f"--scale: {text!r} is not a number; expected {SCALE_EXPECTED}")
     return float(text)

@@ -1,6 +1,6 @@
 """Synthetic views with truth: a walker, random legal postures, motion capture; noise and seeds.
 
-Each is a `Scene`: a figure, a camera, every point in the camera's frame and where it is seen.
+Each is a `SyntheticScene`: a figure, a camera, every point in the camera's frame and where it is seen.
 """
 
 from posekit.synthesis.camera_sphere import CameraSphere as CameraSphere
@@ -12,7 +12,7 @@ from posekit.synthesis.mocap import mocap_scene as mocap_scene
 from posekit.synthesis.mocap import mocap_scenes as mocap_scenes
 from posekit.synthesis.random_postures import random_postures as random_postures
 from posekit.synthesis.random_postures import random_views as random_views
-from posekit.synthesis.scene import Scene as Scene
+from posekit.synthesis.scene import SyntheticScene as SyntheticScene
 from posekit.synthesis.walker import Walker as Walker
 from posekit.synthesis.walker_scene import seq1 as seq1
 from posekit.synthesis.walker_scene import seq2 as seq2

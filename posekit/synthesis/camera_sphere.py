@@ -13,11 +13,11 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.synthesis.viewpoints import look_at, to_camera, uniform_directions
 
-ROUNDS = 200
+MAX_DRAWS = 200
 """Draws of one camera before it is said that none fits."""
 
 
-class Placement(NamedTuple):
+class CameraPlacements(NamedTuple):
     """Where cameras stand.
 
     Attributes
@@ -69,7 +69,7 @@ class CameraSphere:
         width, height = self.size
         return PinholeCamera(K=np.array([[self.f, 0, width / 2], [0, self.f, height / 2], [0, 0, 1.0]]))
 
-    def place(self, points: Array, up: Array, rng: np.random.Generator) -> Placement:
+    def place(self, points: Array, up: Array, rng: np.random.Generator) -> CameraPlacements:
         """Draw a camera for each of N bodies until its points are in front of it and inside the picture.
 
         The direction is uniform on the sphere and the distance uniform in its range; the camera looks at the
@@ -86,22 +86,22 @@ class CameraSphere:
         Raises
         ------
         InputError
-            Where a body does not fit from any of `ROUNDS` cameras.
+            Where a body does not fit from any of `MAX_DRAWS` cameras.
         """
         n = len(points)
         middle = (np.nanmin(points, axis=1) + np.nanmax(points, axis=1)) / 2
         R, position = np.empty((n, 3, 3)), np.empty((n, 3))
         rows: NDArray[np.intp] = np.arange(n)
-        for _ in range(ROUNDS):
+        for _ in range(MAX_DRAWS):
             distance = rng.uniform(*self.distance, len(rows))
             position[rows] = middle[rows] + distance[:, None] * uniform_directions(len(rows), rng)
             R[rows] = look_at(position[rows], middle[rows], up)
             rows = rows[~self.fits(to_camera(points[rows], R[rows], position[rows]))]
             if len(rows) == 0:
-                return Placement(R, position)
+                return CameraPlacements(R, position)
         raise InputError(
             f"body {rows[0]} does not fit into {self.size[0]} x {self.size[1]} pixels at f = {self.f:g} from "
-            f"{self.distance[0]:g} to {self.distance[1]:g} m, in {ROUNDS} tries; move away or lower f"
+            f"{self.distance[0]:g} to {self.distance[1]:g} m, in {MAX_DRAWS} tries; move away or lower f"
         )
 
     def fits(self, points_cam: Array) -> NDArray[np.bool_]:

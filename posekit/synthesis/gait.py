@@ -19,7 +19,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.synthesis.monotone_cubic import PeriodicMonotoneCubic
 
-SLOWEST, FASTEST = 0.5, 1.3
+MIN_RELATIVE_SPEED, MAX_RELATIVE_SPEED = 0.5, 1.3
 """The range of v of the hip, knee and elbow curves: mid gait. Faster is running, slower has other curves."""
 
 
@@ -77,10 +77,10 @@ class Gait:
     velocity: float
 
     def __post_init__(self) -> None:
-        if not SLOWEST <= self.velocity <= FASTEST:
+        if not MIN_RELATIVE_SPEED <= self.velocity <= MAX_RELATIVE_SPEED:
             raise InputError(
-                f"the walker's velocity is {self.velocity:g} leg lengths/s; expected {SLOWEST:g} to "
-                f"{FASTEST:g}: slower and faster gaits follow other curves"
+                f"the walker's velocity is {self.velocity:g} leg lengths/s; expected {MIN_RELATIVE_SPEED:g} to "
+                f"{MAX_RELATIVE_SPEED:g}: slower and faster gaits follow other curves"
             )
 
     @property
@@ -113,8 +113,8 @@ class Gait:
             torsion=np.radians(4 * v * np.cos(2 * np.pi * t)),
             shoulder=np.radians(3 - 4.94 * v - 9.88 * v * np.cos(2 * np.pi * sides)),
             elbow=np.radians(self._elbow(sides)),
-            hip=np.radians(HIP(sides)),
-            knee=np.radians(KNEE(sides)),
+            hip=np.radians(HIP_FLEXION(sides)),
+            knee=np.radians(KNEE_FLEXION(sides)),
         )
 
     @cached_property
@@ -127,8 +127,8 @@ def _wave(turns: Array) -> Array:
     return np.sin(2 * np.pi * turns)
 
 
-HIP = PeriodicMonotoneCubic(x=[0.5, 0.9], y=[-15.0, 25.0])
+HIP_FLEXION = PeriodicMonotoneCubic(x=[0.5, 0.9], y=[-15.0, 25.0])
 """Hip flexion of mid gait, degrees over the phase."""
 
-KNEE = PeriodicMonotoneCubic(x=[0.17, 0.4, 0.75, 1.0], y=[3.0, 3.0, 70.0, 3.0])
+KNEE_FLEXION = PeriodicMonotoneCubic(x=[0.17, 0.4, 0.75, 1.0], y=[3.0, 3.0, 70.0, 3.0])
 """Knee flexion of mid gait, degrees over the phase."""

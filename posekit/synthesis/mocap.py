@@ -14,7 +14,7 @@ from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.capture import Capture
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import Scene
+from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import look_at, to_camera
 
 
@@ -42,7 +42,7 @@ def mocap_scene(
     position: ArrayLike | None = None,
     sphere: CameraSphere | None = None,
     figure: Figure | None = None,
-) -> Scene:
+) -> SyntheticScene:
     """See one clip with one camera that stands still.
 
     Parameters
@@ -112,7 +112,7 @@ def mocap_scenes(
     *,
     sphere: CameraSphere | None = None,
     figure: Figure | None = None,
-) -> tuple[Scene, ...]:
+) -> tuple[SyntheticScene, ...]:
     """Draw n frames evenly over all clips, each seen by a camera of its own.
 
     Parameters
@@ -128,7 +128,7 @@ def mocap_scenes(
 
     Returns
     -------
-    tuple of Scene
+    tuple of SyntheticScene
         One a clip: independent views of one figure, the clip's action as the label of each.
 
     Raises

@@ -9,7 +9,7 @@ from posekit.body.frames import quaternions, torso_frame
 from posekit.cameras import PinholeCamera
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TORSO
-from posekit.synthesis.scene import Scene
+from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import to_camera
 
 
@@ -25,7 +25,7 @@ def observe(
     lee_chen_f: float | None = None,
     size: tuple[int, int] | None = None,
     labels: tuple[str, ...] = (),
-) -> Scene:
+) -> SyntheticScene:
     """Make the scene of points that cameras see in F frames.
 
     Parameters
@@ -40,7 +40,7 @@ def observe(
 
     Returns
     -------
-    Scene
+    SyntheticScene
     """
     points_cam = to_camera(points, R_cam_world, position)
     if q is None:
@@ -48,7 +48,7 @@ def observe(
     else:
         torso = np.moveaxis(points_cam[:, : len(TORSO)], 1, 0)
         q_cam = np.concatenate([torso[0], quaternions(torso_frame(*torso)), q[:, 7:]], axis=1)
-    return Scene(
+    return SyntheticScene(
         figure=figure,
         camera=camera,
         joints_cam=points_cam[:, : len(JOINTS)],

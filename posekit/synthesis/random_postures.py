@@ -10,9 +10,9 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import Scene
+from posekit.synthesis.scene import SyntheticScene
 
-UP = np.array([0.0, 0.0, 1.0])
+UP_TORSO = np.array([0.0, 0.0, 1.0])
 """Up in the torso's frame at which the postures stand."""
 
 LEAST_ACCEPTED = 1e-3
@@ -64,7 +64,7 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
 
 def random_views(
     figure: Figure, n: int, rng: np.random.Generator, sphere: CameraSphere | None = None
-) -> Scene:
+) -> SyntheticScene:
     """Draw random legal postures, each seen by its own camera.
 
     Parameters
@@ -78,7 +78,7 @@ def random_views(
 
     Returns
     -------
-    Scene
+    SyntheticScene
         n independent frames, all points in front of their camera and inside the picture.
 
     Raises
@@ -89,7 +89,7 @@ def random_views(
     sphere = sphere or CameraSphere()
     q = random_postures(figure, n, rng)
     points = figure.forward_kinematics(q)
-    placement = sphere.place(points, UP, rng)
+    placement = sphere.place(points, UP_TORSO, rng)
     return observe(
         figure, sphere.camera, points, placement.R_cam_world, placement.position, q=q, size=sphere.size
     )

@@ -19,7 +19,7 @@ def _absent() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scene:
+class SyntheticScene:
     """What a virtual camera sees of a figure in F frames, with the truth. NaN marks what is not known.
 
     Frames may be a sequence of one camera, or independent views of one person: everything is in the camera's
@@ -118,7 +118,7 @@ class Scene:
         headless = np.asarray(np.isnan(self.head_image).any(axis=(1, 2)))
         return np.where(headless[:, None], self.joints_cam[:, 0], np.nan)
 
-    def select(self, frames: ArrayLike) -> Scene:
+    def select(self, frames: ArrayLike) -> SyntheticScene:
         """Return some of the frames, by index or mask, as a scene of the same camera."""
         rows: NDArray[np.intp] = np.arange(len(self))[np.asarray(frames)].reshape(-1)
         K = self.camera.K
@@ -127,7 +127,7 @@ class Scene:
         labels = tuple(self.labels[k] for k in rows) if self.labels else ()
         return replace(self, camera=camera, labels=labels, **arrays)
 
-    def with_noise(self, sigma: float, rng: np.random.Generator) -> Scene:
+    def with_noise(self, sigma: float, rng: np.random.Generator) -> SyntheticScene:
         """Add Gaussian noise to every image point; the truth stays.
 
         Parameters

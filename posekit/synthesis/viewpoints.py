@@ -8,7 +8,7 @@ from posekit.body.frames import cross, unit
 from posekit.errors import InputError
 from posekit.geometry import Array
 
-VERTICAL = 1e-6
+MIN_SINE_TO_UP = 1e-6
 """Sine between line of sight and `up` below which no roll makes the camera upright."""
 
 
@@ -39,7 +39,7 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
     up = np.broadcast_to(up, forward.shape)
     spare = np.eye(3)[np.argmin(np.abs(forward), axis=-1)]
     right = cross(forward, unit(up))
-    upright = np.linalg.norm(right, axis=-1, keepdims=True) > VERTICAL
+    upright = np.linalg.norm(right, axis=-1, keepdims=True) > MIN_SINE_TO_UP
     right = unit(np.where(upright, right, cross(forward, spare)))
     return np.stack([right, cross(forward, right), forward], axis=-2)
 

@@ -28,7 +28,7 @@ from posekit.synthesis.gait import Gait, GaitAngles
 COUNTER_TORSION = 1.0
 """How far the torso turns against the hips, as a fraction of the hips' torsion."""
 
-NECK = TABLE_A2.points[0]
+NECK_HEAD_CENTRED = TABLE_A2.points[0]
 """The neck in the head-centred frame, metres (Table A.2a)."""
 
 R_HEAD_REP103 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -95,7 +95,7 @@ class Walker:
         gait = self.gait.angles(phases)
         R_torso = R_HEAD_REP103 @ _turned(-COUNTER_TORSION * gait.torsion, gait.lean)
         R_hips = R_HEAD_REP103 @ _turned(gait.torsion, np.zeros_like(gait.torsion))
-        neck = np.broadcast_to(NECK, (len(phases), 3))
+        neck = np.broadcast_to(NECK_HEAD_CENTRED, (len(phases), 3))
         head = neck[:, None] + self.figure.head_points[1:]
         angles = np.zeros((len(phases), len(DOFS)))
         angles[:, :3] = self.figure.ik.neck(R_torso, neck, head)

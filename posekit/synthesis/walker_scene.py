@@ -10,14 +10,14 @@ from numpy.typing import ArrayLike
 from posekit.cameras import lee_chen
 from posekit.errors import InputError
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import Scene
+from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import look_at
 from posekit.synthesis.walker import Walker
 
 F = 0.05
 """Distance of the paper's image plane from the centre of projection, metres (Table 2: 5 cm)."""
 
-FRAMES = 5
+N_FRAMES = 5
 FRAME_TIME = 0.2
 """Seconds a frame (Lee & Chen 1985, Appendix)."""
 
@@ -31,7 +31,7 @@ SEQ2_PHASE0 = 0.68
 """What the paper does not tell: the velocity (leg lengths/s), and the phase of frame 1 at which the survivors come
 closest to its Tables 3 and 4 (found by `posekit reproduce lee-chen`)."""
 
-UP = np.array([0.0, 1.0, 0.0])
+UP_WORLD = np.array([0.0, 1.0, 0.0])
 
 
 def walker_scene(
@@ -40,11 +40,11 @@ def walker_scene(
     camera: ArrayLike = SEQ1_CAMERA,
     target: ArrayLike = (0.0, 0.0, 0.0),
     f: float = F,
-    frames: int = FRAMES,
+    frames: int = N_FRAMES,
     dt: float = FRAME_TIME,
     phase0: float = 0.0,
     carried: bool = True,
-) -> Scene:
+) -> SyntheticScene:
     """See a walker with the camera of the 1985 paper.
 
     Parameters
@@ -68,7 +68,7 @@ def walker_scene(
 
     Returns
     -------
-    Scene
+    SyntheticScene
         Its world is the head-centred frame (of the first frame, where the camera stands).
 
     Raises
@@ -89,7 +89,7 @@ def walker_scene(
             "numbers x, y, z each, metres"
         )
     pinhole = lee_chen.pinhole(f)
-    R = look_at(position, aim, UP)
+    R = look_at(position, aim, UP_WORLD)
     time = dt * np.arange(frames, dtype=np.float64)
     q = walker.configurations(walker.phase(time, phase0))
     if not carried:
@@ -106,11 +106,11 @@ def walker_scene(
     )
 
 
-def seq1(*, velocity: float = SEQ_VELOCITY, phase0: float = SEQ1_PHASE0) -> Scene:
+def seq1(*, velocity: float = SEQ_VELOCITY, phase0: float = SEQ1_PHASE0) -> SyntheticScene:
     """Make the built-in SEQ1: the walker comes towards the camera, which is straight ahead."""
     return walker_scene(Walker(velocity=velocity), camera=SEQ1_CAMERA, phase0=phase0)
 
 
-def seq2(*, velocity: float = SEQ_VELOCITY, phase0: float = SEQ2_PHASE0) -> Scene:
+def seq2(*, velocity: float = SEQ_VELOCITY, phase0: float = SEQ2_PHASE0) -> SyntheticScene:
     """Make the built-in SEQ2: the camera is ahead of the walker, and to the right."""
     return walker_scene(Walker(velocity=velocity), camera=SEQ2_CAMERA, phase0=phase0)

@@ -12,13 +12,13 @@ from posekit.errors import InputError
 from posekit.formats.own import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS
-from posekit.synthesis import Scene, seq1, seq2
+from posekit.synthesis import SyntheticScene, seq1, seq2
 
-BUILT_IN: dict[str, Callable[[], Scene]] = {"seq1": seq1, "seq2": seq2}
+BUILT_IN: dict[str, Callable[[], SyntheticScene]] = {"seq1": seq1, "seq2": seq2}
 """The two sequences of Lee & Chen 1985, §4, walked by posekit's own walker."""
 
 
-def view_of(scene: Scene) -> View:
+def view_of(scene: SyntheticScene) -> View:
     """Make the view of a scene, with the truth.
 
     The 1985 camera's f is left open and the head's points are in Table A.2's frame, in which the paper gives
@@ -70,7 +70,7 @@ def builtin_view(name: str) -> View:
     return view_of(BUILT_IN[name]())
 
 
-def _head(scene: Scene) -> Array | None:
+def _head(scene: SyntheticScene) -> Array | None:
     """Return neck and head points (6, 3), metres, where the view has to tell them."""
     own, standard = scene.figure.head_points, load_figure().head_points
     built_in = np.allclose(own, standard, rtol=0, atol=1e-12)

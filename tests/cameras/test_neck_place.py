@@ -15,7 +15,7 @@ from posekit.cameras.neck.place import MOST, REACH
 from posekit.cameras.neck.suggestion import SUFFICES
 from posekit.errors import InputError
 from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import CameraSphere, Scene, random_views, seq1, seq2
+from posekit.synthesis import CameraSphere, SyntheticScene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree
 from posekit.validators.rigid_parts import rigid_parts
 
@@ -24,7 +24,7 @@ VIEWS = random_views(FIGURE, 120, np.random.default_rng(20))
 NEAR = random_views(FIGURE, 30, np.random.default_rng(21), CameraSphere(distance=(1.8, 2.2), f=700.0))
 
 
-def placed(scene: Scene, **options: Any) -> list[Placement]:
+def placed(scene: SyntheticScene, **options: Any) -> list[Placement]:
     return place(scene.camera, scene.figure, scene.image, scene.head_image, **options)
 
 
@@ -52,7 +52,7 @@ def test_exact_views_are_placed_exactly(method: Any) -> None:
 
 
 @pytest.mark.parametrize("scene", [seq1(), seq2()], ids=["seq1", "seq2"])
-def test_the_papers_walker_is_placed_by_its_head_or_without_it(scene: Scene) -> None:
+def test_the_papers_walker_is_placed_by_its_head_or_without_it(scene: SyntheticScene) -> None:
     for method in ("auto", "search"):
         for found, neck in zip(
             placed(scene, method=method, deviation=1e-5), scene.joints_cam[:, 0], strict=True

@@ -8,7 +8,7 @@ from posekit.body.lengths import torso_points
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.pose import Poses, poses
 from posekit.skeleton import JOINT, TORSO
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 
 FIGURE = load_figure()
 TORSO_POINTS = torso_points(FIGURE.lengths)
@@ -23,7 +23,7 @@ PARTS = {
 }
 
 
-def placed(part: str, scene: Scene, deviation: float = 1.0) -> Poses:
+def placed(part: str, scene: SyntheticScene, deviation: float = 1.0) -> Poses:
     points, image = PARTS[part][0], PARTS[part][1](scene)
     return poses(scene.camera, points, image, np.full(image.shape[:2], deviation), np.zeros(len(points)))
 

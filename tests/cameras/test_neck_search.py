@@ -13,7 +13,7 @@ from posekit.cameras.neck.body import Sight, sight
 from posekit.cameras.neck.closure import Closure
 from posekit.cameras.neck.search import Depths, search
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import CameraSphere, Scene, random_views, seq1, seq2
+from posekit.synthesis import CameraSphere, SyntheticScene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree
 
 FIGURE = load_figure()
@@ -27,7 +27,7 @@ SWAPPED = [
 
 
 def searched(
-    scene: Scene, tolerance: float, tangent: float = ROUNDING, image: np.ndarray | None = None
+    scene: SyntheticScene, tolerance: float, tangent: float = ROUNDING, image: np.ndarray | None = None
 ) -> tuple[Sight, Closure, list[Depths]]:
     seen = sight(
         scene.camera, scene.figure, scene.image if image is None else image, np.full(len(scene), tangent)
@@ -37,7 +37,7 @@ def searched(
     return seen, closure, found
 
 
-def true_distance(scene: Scene) -> np.ndarray:
+def true_distance(scene: SyntheticScene) -> np.ndarray:
     return np.asarray(np.linalg.norm(scene.joints_cam[:, 0], axis=1))
 
 
@@ -58,7 +58,7 @@ def inside(found: Depths, distance: float, slack: float = 1e-7) -> bool:
     ],
     ids=["random", "seq1", "seq2", "far", "near", "child"],
 )
-def test_the_true_distance_is_a_minimum_without_residual(scene: Scene) -> None:
+def test_the_true_distance_is_a_minimum_without_residual(scene: SyntheticScene) -> None:
     _, _, found = searched(scene, EXACT)
     several = 0
     for distance, depths in zip(true_distance(scene), found, strict=True):

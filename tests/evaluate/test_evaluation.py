@@ -13,9 +13,9 @@ from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.evaluate import (
     Choice,
+    FrameSampling,
     Method,
-    Ranking,
-    Sampling,
+    SurvivorOrder,
     Sweep,
     by_path,
     by_probability,
@@ -23,7 +23,7 @@ from posekit.evaluate import (
     write_evaluation,
 )
 from posekit.evaluate.condition import lost_to, numbers
-from posekit.evaluate.frames import KEYS
+from posekit.evaluate.frames import CONDITION_KEYS
 from posekit.evaluate.material import of_capture, of_view
 from posekit.evaluate.report import csv_lines, document, summary
 from posekit.formats.own import OpenCVModel, View
@@ -36,7 +36,7 @@ from posekit.views.builtin import forget_camera, view_of
 
 FIGURE = load_figure()
 SWEEP = Sweep(yaws=(0.0, 90.0, 135.0), heights=(1.0, 2.0))
-FEW = Sampling(frames_per_clip=3)
+FEW = FrameSampling(frames_per_clip=3)
 
 
 def walk(velocity: float, frames: int = 20, fps: float = 30.0) -> np.ndarray:
@@ -148,20 +148,23 @@ def test_noise_is_one_draw_of_several_sizes(capture: Capture) -> None:
 def test_the_same_seed_gives_the_same_numbers_in_any_number_of_processes(capture: Capture) -> None:
     method = Method(noise=(0.0, 1.0), seed=1)
     alone, together = (
-        evaluate(capture, sampling=Sampling(frames_per_clip=2), sweep=SWEEP, method=method, jobs=jobs)
+        evaluate(capture, sampling=FrameSampling(frames_per_clip=2), sweep=SWEEP, method=method, jobs=jobs)
         for jobs in (1, 2)
     )
     assert json.dumps([*document(alone)[1]]) == json.dumps([*document(together)[1]])
     other = evaluate(
-        capture, sampling=Sampling(frames_per_clip=2), sweep=SWEEP, method=dataclasses.replace(method, seed=2)
+        capture,
+        sampling=FrameSampling(frames_per_clip=2),
+        sweep=SWEEP,
+        method=dataclasses.replace(method, seed=2),
     )
     assert json.dumps([*document(alone)[1]]) != json.dumps([*document(other)[1]])
 
 
 def test_conditions_share_out_all_frames(exact: Any) -> None:
-    counts = [len(rows) for _, rows in exact.frames.conditions(KEYS)]
+    counts = [len(rows) for _, rows in exact.frames.conditions(CONDITION_KEYS)]
     assert counts == [3] * (2 * 3 * 2 * 2)
-    every = np.concatenate([rows for _, rows in exact.frames.conditions(KEYS)])
+    every = np.concatenate([rows for _, rows in exact.frames.conditions(CONDITION_KEYS)])
     assert sorted(every.tolist()) == list(range(len(exact.frames)))
     assert [key["noise"] for key, _ in exact.frames.conditions(("noise",))] == [0.0, 2.0]
 
@@ -172,7 +175,7 @@ class Oracle:
     def __init__(self, truth: dict[float, np.ndarray], probability: float | None = None) -> None:
         self.truth, self.probability = truth, probability
 
-    def __call__(self, frames: Any, figure: Any) -> list[Ranking]:
+    def __call__(self, frames: Any, figure: Any) -> list[SurvivorOrder]:
         found = []
         for frame in frames:
             away = np.linalg.norm(frame.joints - self.truth[frame.time], axis=-1).mean(axis=1)
@@ -181,7 +184,7 @@ class Oracle:
             )
             if stated is not None and len(away):
                 stated[np.argmin(away)] = self.probability
-            found.append(Ranking(order=np.argsort(away), probability=stated))
+            found.append(SurvivorOrder(order=np.argsort(away), probability=stated))
         return found
 
 
@@ -189,7 +192,7 @@ class Oracle:
 def seen(capture: Capture) -> View:
     """Return a view of one camera, with a time of its own for every frame."""
     work = of_capture(
-        capture, Sampling(frames_per_clip=20), Sweep(yaws=(60.0,), heights=(1.5,)), Method(noise=(0.0,))
+        capture, FrameSampling(frames_per_clip=20), Sweep(yaws=(60.0,), heights=(1.5,)), Method(noise=(0.0,))
     )
     return dataclasses.replace(work.works[0].view, deviation=None)
 
@@ -220,16 +223,20 @@ def test_probabilities_are_judged(seen: View, sure: float) -> None:
     ("rank", "says"),
     [
         (lambda frames, figure: [], "expected 20"),
-        (lambda frames, figure: [Ranking(order=np.zeros(len(one), dtype=int)) for one in frames], "no order"),
+        (
+            lambda frames, figure: [SurvivorOrder(order=np.zeros(len(one), dtype=int)) for one in frames],
+            "no order",
+        ),
         (
             lambda frames, figure: [
-                Ranking(order=np.arange(len(one)), probability=np.full(len(one), np.nan)) for one in frames
+                SurvivorOrder(order=np.arange(len(one)), probability=np.full(len(one), np.nan))
+                for one in frames
             ],
             "numbers from 0 to 1",
         ),
         (
             lambda frames, figure: [
-                Ranking(order=np.arange(len(one)), probability=np.array([0.5])) for one in frames
+                SurvivorOrder(order=np.arange(len(one)), probability=np.array([0.5])) for one in frames
             ],
             "numbers from 0 to 1",
         ),
@@ -243,20 +250,22 @@ def test_a_ranking_that_is_none_is_refused(seen: View, rank: Any, says: str) -> 
 def test_a_sequence_is_followed_camera_by_camera_in_order(capture: Capture) -> None:
     heard: list[list[float]] = []
 
-    def last(frames: Sequence[FrameRecovery], rankings: Sequence[Ranking]) -> Choice:
+    def last(frames: Sequence[FrameRecovery], rankings: Sequence[SurvivorOrder]) -> Choice:
         heard.append([frame.time for frame in frames])
         assert [len(one.order) for one in rankings] == [len(frame) for frame in frames]
         return Choice(survivor=np.array([len(frame) - 1 for frame in frames]))
 
     method = Method(noise=(0.0, 1.0), choose=last)
-    found = evaluate(capture, sampling=Sampling(frames_per_clip=6), sweep=SWEEP, method=method)
+    found = evaluate(capture, sampling=FrameSampling(frames_per_clip=6), sweep=SWEEP, method=method)
     assert len(heard) == 2 * 2 * len(SWEEP)  # clips, levels, cameras
     assert all(np.allclose(np.diff(times), 1 / 30) and len(times) == 6 for times in heard)
     told = of(found, noise=0.0)
     assert told["error_mm"]["mpjpe"]["path"]["mean"] > 0
     assert 0 <= told["limbs_right"]["path"] <= 1
     assert "MPJPE path" in "\n".join(summary(found))
-    still = of_capture(capture, Sampling(frames_per_clip=6, consecutive=True), SWEEP, Method(noise=(0.0,)))
+    still = of_capture(
+        capture, FrameSampling(frames_per_clip=6, consecutive=True), SWEEP, Method(noise=(0.0,))
+    )
     moved = np.diff(still.works[0].view.truth[:6].mean(axis=1), axis=0)
     assert np.linalg.norm(moved, axis=1).min() > 0.01  # the camera stands, the walker does not
 
@@ -306,7 +315,7 @@ def test_a_person_is_followed(seen: View) -> None:
 
 def test_a_sequence_without_survivors_has_no_path(seen: View) -> None:
     none = [FrameRecovery(time=float(at), batch=None, index=0) for at in range(3)]
-    empty = Ranking(order=np.empty(0, dtype=np.intp))
+    empty = SurvivorOrder(order=np.empty(0, dtype=np.intp))
     assert by_path(none, [empty] * 3).survivor.tolist() == [-1, -1, -1]
 
 
@@ -326,7 +335,7 @@ def test_views_are_taken_as_they_are() -> None:
     told = of(evaluation, noise=0.0)
     assert told["frames"] == 6
     assert told["retained_branch"] == 1.0
-    assert {key["yaw"] for key, _ in evaluation.frames.conditions(KEYS)} == {None}
+    assert {key["yaw"] for key, _ in evaluation.frames.conditions(CONDITION_KEYS)} == {None}
     assert of(evaluation, action="scene", noise=1.0)["frames"] == 6
 
 
@@ -379,14 +388,14 @@ def test_a_person_outside_the_picture_is_left_out_and_counted(capture: Capture) 
     method = Method(noise=(0.0,))
     with pytest.raises(InputError, match="leaves every picture"):
         of_capture(capture, FEW, dataclasses.replace(near, f=5000.0), method)
-    still = of_capture(capture, Sampling(frames_per_clip=20, consecutive=True), near, method)
+    still = of_capture(capture, FrameSampling(frames_per_clip=20, consecutive=True), near, method)
     assert still.frames + still.out_of_picture == 2 * 20 * 2
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: Sampling(frames_per_clip=0), "--frames-per-clip"),
+        (lambda: FrameSampling(frames_per_clip=0), "--frames-per-clip"),
         (lambda: Sweep(yaws=()), "--yaws"),
         (lambda: Sweep(yaws=(0.0, np.nan)), "--yaws"),
         (lambda: Sweep(heights=(1.0, 1.0)), "each once"),
@@ -411,16 +420,16 @@ def test_what_makes_no_sense_is_refused(make: Any, says: str) -> None:
 def test_what_does_not_go_with_the_motion_is_refused(capture: Capture, seen: View) -> None:
     method = Method(noise=(0.0,))
     with pytest.raises(InputError, match='--clips: "swim" is not in'):
-        evaluate(capture, sampling=Sampling(clips=("swim",)), method=method)
+        evaluate(capture, sampling=FrameSampling(clips=("swim",)), method=method)
     with pytest.raises(InputError, match="no clip is of both"):
-        evaluate(capture, sampling=Sampling(clips=("slow",), actions=("hurrying",)), method=method)
+        evaluate(capture, sampling=FrameSampling(clips=("slow",), actions=("hurrying",)), method=method)
     with pytest.raises(InputError, match="--heights: 9 m"):
         evaluate(capture, sweep=Sweep(heights=(9.0,)), method=method)
     with pytest.raises(InputError, match="--jobs: 0"):
         evaluate(capture, method=method, jobs=0)
     with pytest.raises(InputError, match="views; expected at most"):
         evaluate(
-            capture, sweep=Sweep(yaws=tuple(np.arange(3000) / 50)), sampling=Sampling(frames_per_clip=40)
+            capture, sweep=Sweep(yaws=tuple(np.arange(3000) / 50)), sampling=FrameSampling(frames_per_clip=40)
         )
     with pytest.raises(InputError, match="no frame has a truth"):
         evaluate(dataclasses.replace(seen, truth=np.full(seen.truth.shape, np.nan)), method=method)

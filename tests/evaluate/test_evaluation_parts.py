@@ -9,7 +9,7 @@ from posekit.body import load_figure
 from posekit.errors import ViewerError
 from posekit.evaluate.certificate import certify
 from posekit.evaluate.errors import best_of_frames, of_chosen, survivor_errors
-from posekit.evaluate.scores import THRESHOLDS, correct_poses, correct_poses_score, reliability
+from posekit.evaluate.scores import THRESHOLDS_METRES, correct_poses, correct_poses_score, reliability
 from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.measures import mpjpe, pa_mpjpe
@@ -148,10 +148,10 @@ def test_correct_poses_are_counted() -> None:
     worst = np.concatenate([rng.exponential(0.1, 200), [np.nan, np.inf, 0.0, 0.05]])
     curve = correct_poses(worst)
     with np.errstate(invalid="ignore"):
-        assert np.array_equal(curve, [(worst < threshold).mean() for threshold in THRESHOLDS])
+        assert np.array_equal(curve, [(worst < threshold).mean() for threshold in THRESHOLDS_METRES])
     assert (np.diff(curve) >= 0).all()
     # The curve every millimetre, by trapezoids, against the area itself.
-    assert correct_poses_score(worst) == pytest.approx(np.trapezoid(curve, THRESHOLDS) * 1000, abs=0.6)
+    assert correct_poses_score(worst) == pytest.approx(np.trapezoid(curve, THRESHOLDS_METRES) * 1000, abs=0.6)
     assert correct_poses_score(np.zeros(3)) == 300.0
     assert correct_poses_score(np.full(3, np.nan)) == 0.0
     assert np.isnan(correct_poses_score(np.empty(0)))

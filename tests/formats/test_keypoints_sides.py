@@ -17,14 +17,14 @@ from posekit.formats.keypoints.side_flips import GROUPS, flips
 from posekit.formats.keypoints.side_gait import gait_evidence
 from posekit.formats.keypoints.sides import SURE
 from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, parse_skeleton_map
-from posekit.synthesis import Scene, Walker, random_views, walker_scene
+from posekit.synthesis import SyntheticScene, Walker, random_views, walker_scene
 
 COCO = load_skeleton_map("coco_17")
 FACE = slice(0, 5)
 ARMS, LEGS = slice(5, 11), slice(11, 17)
 
 
-def seen(scene: Scene, rng: np.random.Generator, *, head: bool, noise: float = 0.005) -> KeyPoints:
+def seen(scene: SyntheticScene, rng: np.random.Generator, *, head: bool, noise: float = 0.005) -> KeyPoints:
     """Make COCO's key points of a scene: noise in heights of the person; the 1985 camera's are a thousand a metre."""
     landmarks = np.full((len(scene), len(LANDMARK), 2), np.nan)
     landmarks[:, :19] = np.concatenate([scene.image, scene.head_image], axis=1) * (
@@ -45,7 +45,7 @@ def seen(scene: Scene, rng: np.random.Generator, *, head: bool, noise: float = 0
 
 
 @cache
-def walks(carried: bool, frames: int, dt: float) -> tuple[Scene, ...]:
+def walks(carried: bool, frames: int, dt: float) -> tuple[SyntheticScene, ...]:
     """See a walker from 12 directions, from the hips' height and from above the head, 4 to 7 m away."""
     rng = np.random.default_rng(8)
     scenes = []

@@ -13,7 +13,7 @@ from posekit.batch.recipe import Recipe
 from posekit.batch.run_folder import Asked, Failure, run_folder
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.evaluate import Evaluation, Method, Sampling, Sweep, by_path, evaluate, write_evaluation
+from posekit.evaluate import Evaluation, FrameSampling, Method, Sweep, by_path, evaluate, write_evaluation
 from posekit.formats.own import (
     SCHEMAS,
     Family,
@@ -60,7 +60,7 @@ KINDS = (
 @cache
 def evaluation(**options: Any) -> Evaluation:
     """Evaluate two frames, seen through two cameras."""
-    sampling = Sampling(frames_per_clip=2, consecutive="choose" in options)
+    sampling = FrameSampling(frames_per_clip=2, consecutive="choose" in options)
     sweep = Sweep(yaws=(0.0, 90.0), heights=(1.5,))
     return evaluate(
         some_capture(), sampling=sampling, sweep=sweep, method=Method(noise=(0.0, 2.0), **options)

@@ -13,7 +13,16 @@ from posekit.body import load_figure
 from posekit.body.frames import unit
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.hidden import Completion, Kind, Outcome, Region, Sampling, complete, reject, together
+from posekit.hidden import (
+    CompletedSurvivors,
+    CompletionOutcome,
+    OcclusionSampling,
+    PositionKind,
+    Region,
+    complete,
+    reject,
+    together,
+)
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_views
 from posekit.tree import Check, InterpretationTree, Leaves
@@ -44,7 +53,7 @@ class Hidden:
     head: np.ndarray
     image: np.ndarray
     leaves: Leaves
-    done: Completion
+    done: CompletedSurvivors
     checks: Sequence[Check]
 
     @property
@@ -64,7 +73,7 @@ def hide(
     seed: int = 0,
     n: int = 6,
     checks: Sequence[Check] = CHECKS,
-    sampling: Sampling | None = None,
+    sampling: OcclusionSampling | None = None,
     tolerance: float = TOLERANCE,
     noise: float = 0.0,
 ) -> Hidden:
@@ -94,7 +103,9 @@ def check_truth(case: Hidden, *, frames: int | None = None) -> None:
     true = case.true
     assert len(set(case.leaves.frame[true])) == (len(case.truth) if frames is None else frames)
     for k in true:
-        assert case.done.outcome[k] in (Outcome.COMPLETED, Outcome.EXACT), case.done.reason(k)
+        assert case.done.outcome[k] in (CompletionOutcome.COMPLETED, CompletionOutcome.EXACT), (
+            case.done.reason(k)
+        )
         for region in case.done.regions(k):
             truth = case.truth[case.leaves.frame[k], JOINT[region.joint]]
             assert outside(region, truth) <= region.accuracy + ROUNDING, region
@@ -105,7 +116,7 @@ def check_completions(case: Hidden) -> None:
     postures, done = case.leaves.postures(), case.done
     known = np.isfinite(postures)
     assert np.array_equal(done.postures[known], postures[known])
-    completed = done.outcome == Outcome.COMPLETED
+    completed = done.outcome == CompletionOutcome.COMPLETED
     assert completed.any()
     assert np.isfinite(done.postures[completed]).all()
     assert np.isnan(done.postures[~completed][~known[~completed]]).all()
@@ -163,7 +174,7 @@ def test_hiding_nothing_changes_nothing() -> None:
     case = hide((), n=4)
     assert np.array_equal(case.done.postures, case.leaves.postures())
     assert not case.done.inferred.any()
-    assert (case.done.outcome == Outcome.EXACT).all()
+    assert (case.done.outcome == CompletionOutcome.EXACT).all()
     assert case.done.regions(0) == []
     assert reject(case.leaves, case.done)[0] is case.leaves
 
@@ -304,7 +315,7 @@ def test_sets_are_those_of_rejection_sampling(hidden: tuple[str, ...], which: in
             radius = np.linalg.norm(found - region.representative, axis=1).max()
             assert abs(region.radius - radius) <= wide
         joint = joints[1 - which] if which >= 0 else joints[1]
-        assert regions[joint].kind == (Kind.SPHERE_REGION if which >= 0 else Kind.REGION)
+        assert regions[joint].kind == (PositionKind.SPHERE_REGION if which >= 0 else PositionKind.REGION)
         # A Fibonacci lattice of 400 points is off by its boundary: half a step along it, averaged.
         assert regions[joint].fraction == pytest.approx(fraction, abs=0.015)
 
@@ -314,16 +325,22 @@ def test_sets_are_those_of_rejection_sampling(hidden: tuple[str, ...], which: in
 
 def test_kinds_are_those_of_the_pattern() -> None:
     expected = {
-        ("right_wrist",): {"right_wrist": Kind.SPHERE_REGION},
-        ("right_elbow",): {"right_elbow": Kind.SPHERE_REGION, "right_wrist": Kind.DEPTH_INTERVAL},
-        ("right_elbow", "right_wrist"): {"right_elbow": Kind.SPHERE_REGION, "right_wrist": Kind.REGION},
+        ("right_wrist",): {"right_wrist": PositionKind.SPHERE_REGION},
+        ("right_elbow",): {
+            "right_elbow": PositionKind.SPHERE_REGION,
+            "right_wrist": PositionKind.DEPTH_INTERVAL,
+        },
+        ("right_elbow", "right_wrist"): {
+            "right_elbow": PositionKind.SPHERE_REGION,
+            "right_wrist": PositionKind.REGION,
+        },
         ("left_shoulder", "right_shoulder", "left_elbow"): {
-            "right_shoulder": Kind.CIRCLE,
-            "left_shoulder": Kind.CIRCLE,
-            "right_elbow": Kind.DEPTH_INTERVAL,
-            "left_elbow": Kind.REGION,
-            "right_wrist": Kind.DEPTH_INTERVAL,
-            "left_wrist": Kind.DEPTH_INTERVAL,
+            "right_shoulder": PositionKind.CIRCLE,
+            "left_shoulder": PositionKind.CIRCLE,
+            "right_elbow": PositionKind.DEPTH_INTERVAL,
+            "left_elbow": PositionKind.REGION,
+            "right_wrist": PositionKind.DEPTH_INTERVAL,
+            "left_wrist": PositionKind.DEPTH_INTERVAL,
         },
     }
     for hidden, kinds in expected.items():
@@ -331,7 +348,7 @@ def test_kinds_are_those_of_the_pattern() -> None:
         assert {region.joint: region.kind for region in case.done.regions(case.true[0])} == kinds
         names = {JOINTS[joint] for joint in np.flatnonzero(case.done.inferred[case.true[0]])}
         assert names == set(kinds)
-    assert Kind.DEPTH_INTERVAL.label == "depth interval"
+    assert PositionKind.DEPTH_INTERVAL.label == "depth interval"
 
 
 def test_the_rigid_torso_leaves_a_hidden_shoulder_one_position() -> None:
@@ -340,7 +357,7 @@ def test_the_rigid_torso_leaves_a_hidden_shoulder_one_position() -> None:
         region = case.done.regions(k)[0]
         assert (region.joint, region.kind, region.radius, region.fraction) == (
             "right_shoulder",
-            Kind.POINT,
+            PositionKind.POINT,
             0.0,
             1.0,
         )
@@ -360,7 +377,7 @@ def test_a_seen_wrist_beyond_a_hidden_elbow_stays_on_its_ray() -> None:
 
 
 def test_the_representative_is_nearest_to_the_middle_of_the_samples() -> None:
-    case = hide(("left_wrist",), seed=8, n=2, sampling=Sampling(sphere=3000))
+    case = hide(("left_wrist",), seed=8, n=2, sampling=OcclusionSampling(sphere=3000))
     for k in case.true:
         _, positions, _ = rejection_sample(case, k, ("left_wrist",), 20_000)
         wrist = positions[:, 1]
@@ -373,7 +390,7 @@ def test_the_representative_is_nearest_to_the_middle_of_the_samples() -> None:
 def test_finer_sampling_moves_no_end_by_more_than_was_said() -> None:
     coarse, fine = (
         hide(("left_elbow",), seed=9, n=3),
-        hide(("left_elbow",), seed=9, n=3, sampling=Sampling(sphere=1600)),
+        hide(("left_elbow",), seed=9, n=3, sampling=OcclusionSampling(sphere=1600)),
     )
     slack = coarse.done.accuracy[:, :, None] + ROUNDING
     assert (np.abs(coarse.done.lower - fine.done.lower) <= slack).all()
@@ -386,12 +403,12 @@ def test_two_hidden_knees_are_chosen_so_that_the_legs_do_not_collide(monkeypatch
     knees = ("right_knee", "left_knee")
     case = hide(knees, seed=2, checks=wide)
     check_completions(case)
-    assert (case.done.outcome == Outcome.COMPLETED).all()
+    assert (case.done.outcome == CompletionOutcome.COMPLETED).all()
     # The middles alone would not do.
-    monkeypatch.setattr(together, "TRIED", {2: (1,)})
+    monkeypatch.setattr(together, "N_WAYS_TRIED", {2: (1,)})
     alone = hide(knees, seed=2, checks=wide).done.outcome
-    assert (alone == Outcome.UNDECIDED).any()
-    assert (alone == Outcome.COMPLETED).any()
+    assert (alone == CompletionOutcome.UNDECIDED).any()
+    assert (alone == CompletionOutcome.COMPLETED).any()
 
 
 @pytest.mark.parametrize(("ranges", "motion"), [("urdf", ("walking",)), ("table1", ())])
@@ -405,7 +422,7 @@ def test_motion_and_measured_points_are_completed_too(ranges: str, motion: tuple
         rules=(1,),
     )
     case = hide(("right_elbow", "left_knee"), seed=12, n=12, checks=checks, tolerance=0.01, noise=1.0)
-    completed = case.done.outcome == Outcome.COMPLETED
+    completed = case.done.outcome == CompletionOutcome.COMPLETED
     assert completed.any()
     points = case.points[completed]
     for check in checks:
@@ -416,9 +433,9 @@ def test_a_measured_torso_without_its_pelvis_spins_and_proves_nothing() -> None:
     checks = suite(rigid_tolerance=0.03, rigid_mode="distances", angle_tolerance=2.0)
     case = hide(("pelvis",), seed=5, n=8, checks=checks, tolerance=0.01, noise=1.0)
     assert not case.done.impossible.any()
-    completed = np.flatnonzero(case.done.outcome == Outcome.COMPLETED)
+    completed = np.flatnonzero(case.done.outcome == CompletionOutcome.COMPLETED)
     pelvis = [case.done.regions(k)[0] for k in completed]
-    assert {region.kind for region in pelvis} == {Kind.CIRCLE}
+    assert {region.kind for region in pelvis} == {PositionKind.CIRCLE}
     frames = set()
     for k in completed:
         truth = case.truth[case.leaves.frame[k]]
@@ -435,7 +452,7 @@ def test_a_measured_torso_without_its_pelvis_spins_and_proves_nothing() -> None:
 # --- what is impossible ---------------------------------------------------------------------------------
 
 
-def out_of_reach(joint: str, hidden: str) -> tuple[Leaves, Completion]:
+def out_of_reach(joint: str, hidden: str) -> tuple[Leaves, CompletedSurvivors]:
     scene = random_views(FIGURE, 2, np.random.default_rng(0))
     image = scene.image.copy()
     image[:, JOINT[hidden]] = np.nan
@@ -475,7 +492,7 @@ def test_a_shoulder_whose_arm_has_no_legal_lift_is_rejected() -> None:
 
 def test_what_only_the_sampling_did_not_find_is_undecided() -> None:
     case = hide(("right_hip",), seed=0)
-    open_ = np.flatnonzero(case.done.outcome == Outcome.UNDECIDED)
+    open_ = np.flatnonzero(case.done.outcome == CompletionOutcome.UNDECIDED)
     assert len(open_)
     assert (case.done.miss[open_] > 0.0).any()
     assert not (case.done.miss[open_] == 0.0).any()
@@ -505,7 +522,7 @@ def test_an_image_of_another_shape_is_refused() -> None:
 @pytest.mark.parametrize("name", ["sphere", "ends", "circle", "rotations", "hosts", "rounds"])
 def test_too_few_samples_are_refused(name: str) -> None:
     with pytest.raises(InputError, match=name):
-        replace(Sampling(), **{name: -1})
+        replace(OcclusionSampling(), **{name: -1})
 
 
 def test_image_points_beyond_all_bounds_do_no_harm() -> None:

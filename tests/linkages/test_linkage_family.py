@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import CameraError, InputError
-from posekit.linkages import Family, Linkage, load_linkage, name_nearer, read_nearer, span
+from posekit.linkages import Linkage, LinkageFamily, load_linkage, name_nearer, read_nearer, span
 from posekit.validators.linkage import closure
 
 HUMAN = load_linkage("taylor_human")
@@ -48,19 +48,19 @@ def random_human(rng: np.random.Generator) -> np.ndarray:
     return points
 
 
-def look(linkage: Linkage, points: np.ndarray, s: float, aspect: float = 1.0) -> Family:
+def look(linkage: Linkage, points: np.ndarray, s: float, aspect: float = 1.0) -> LinkageFamily:
     camera = ScaledOrthographicCamera(scale=s, aspect=aspect)
-    return Family(linkage=linkage, image=camera.project(points), aspect=aspect)
+    return LinkageFamily(linkage=linkage, image=camera.project(points), aspect=aspect)
 
 
-def hinge(**more: float) -> Family:
+def hinge(**more: float) -> LinkageFamily:
     """Two segments of length 5 and 2, seen 30 and 16 pixels long: they need s of 6 and 8."""
     linkage = Linkage.from_names(
         name="hinge",
         segments={("a", "b"): 5.0, ("b", "c"): 2.0},
         height=more.get("height"),
     )
-    return Family(linkage=linkage, image=np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 16.0]]))
+    return LinkageFamily(linkage=linkage, image=np.array([[0.0, 0.0], [30.0, 0.0], [30.0, 16.0]]))
 
 
 def test_the_bound_is_the_largest_of_the_segments_and_named() -> None:
@@ -207,7 +207,7 @@ def test_a_point_that_is_not_seen_takes_only_its_own_segments(rng: np.random.Gen
     points = random_human(rng)
     image = ScaledOrthographicCamera(scale=8.0).project(points)
     image[HUMAN.points.index("right_elbow")] = np.nan
-    family = Family(linkage=HUMAN, image=image)
+    family = LinkageFamily(linkage=HUMAN, image=image)
     assert [HUMAN.segment_names[k] for k in np.flatnonzero(~family.seen)] == [
         "right_shoulder-right_elbow",
         "right_elbow-right_wrist",
@@ -223,7 +223,7 @@ def test_a_hidden_hip_cuts_the_human_in_two(rng: np.random.Generator) -> None:
     points = random_human(rng)
     image = ScaledOrthographicCamera(scale=8.0).project(points)
     image[HUMAN.points.index("left_hip")] = np.nan  # and with it the middle of the hips
-    family = Family(linkage=HUMAN, image=image)
+    family = LinkageFamily(linkage=HUMAN, image=image)
     known = ~np.isnan(family.points(8.0, family.flips_of(points))[:, 2])
     arms = [name for name in HUMAN.points if name.split("_")[1] in ("shoulder", "elbow", "wrist")]
     assert [HUMAN.points[k] for k in np.flatnonzero(known)] == arms
@@ -240,18 +240,18 @@ def test_a_hidden_hip_cuts_the_human_in_two(rng: np.random.Generator) -> None:
 )
 def test_image_points_that_are_not_finite_are_refused(place: list[float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        Family(linkage=hinge().linkage, image=np.array([[0.0, 0.0], place, [1.0, 1.0]]))
+        LinkageFamily(linkage=hinge().linkage, image=np.array([[0.0, 0.0], place, [1.0, 1.0]]))
 
 
 def test_an_image_of_another_shape_is_refused() -> None:
     with pytest.raises(InputError, match=r"shape \(2, 2\); expected \(3, 2\)"):
-        Family(linkage=hinge().linkage, image=np.zeros((2, 2)))
+        LinkageFamily(linkage=hinge().linkage, image=np.zeros((2, 2)))
 
 
 @pytest.mark.parametrize("aspect", [0.0, -1.0, np.nan, np.inf])
 def test_an_impossible_aspect_ratio_is_refused(aspect: float) -> None:
     with pytest.raises(CameraError, match="aspect must be finite and positive"):
-        Family(linkage=hinge().linkage, image=np.zeros((3, 2)), aspect=aspect)
+        LinkageFamily(linkage=hinge().linkage, image=np.zeros((3, 2)), aspect=aspect)
 
 
 def test_flips_given_by_hand() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from posekit.linkages import Family, Linkage, load_linkage, name_nearer, search
+from posekit.linkages import Linkage, LinkageFamily, load_linkage, name_nearer, search
 
 SEEDS = 200
 SIZE = 600.0
@@ -48,14 +48,14 @@ def joint_angles(points: np.ndarray, *, closed: bool) -> np.ndarray:
 def worst_angles(linkage: Linkage, points: np.ndarray, kind: str) -> np.ndarray:
     """Recover an object from noisy views, flips given by hand as Taylor did: the worst angle of each (degrees)."""
     s = SIZE / float(np.linalg.norm(np.ptp(points[:, :2], axis=0)))
-    flips = Family(linkage=linkage, image=points[:, :2] * s).flips_of(points)
+    flips = LinkageFamily(linkage=linkage, image=points[:, :2] * s).flips_of(points)
     nearer = name_nearer(linkage, flips)
     rng = np.random.default_rng(2000)
     closed = kind == "closure"
     worst = np.full(SEEDS, np.inf)
     for seed in range(SEEDS):
         image = points[:, :2] * s + rng.normal(size=(len(points), 2))
-        family = Family(linkage=linkage, image=image)
+        family = LinkageFamily(linkage=linkage, image=image)
         found = search(family, {kind: 1.0}, nearer=nearer)
         if len(found):
             recovered = family.points(found.s[0], flips * ~family.vanished(found.s[0]))
@@ -84,7 +84,7 @@ def test_without_noise_they_are_exact() -> None:
         (FOUR_BAR, seen(four_bar(140), 50, 220), "closure"),
         (CHAIN, seen(chain((50, 110, 110, 80)), 45, 60), "coplanar"),
     ):
-        family = Family(linkage=linkage, image=points[:, :2] * 3.0)
+        family = LinkageFamily(linkage=linkage, image=points[:, :2] * 3.0)
         found = search(family, {kind: 1.0})
         assert np.abs(found.s[found.residual < 1e-20] / 3.0 - 1).min() < 1e-9
         assert found.residual[0] < 1e-20

@@ -8,8 +8,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from posekit.errors import InputError
-from posekit.linkages import Family, Linkage, Minima, load_linkage, name_nearer, search
-from posekit.linkages.residuals import Closure, Flatness, Perpendicularity, Residual, Slice
+from posekit.linkages import Linkage, LinkageFamily, Minima, load_linkage, name_nearer, search
+from posekit.linkages.residuals import Flatness, LoopClosure, Perpendicularity, Residual, Slice
 from posekit.linkages.roots import find_roots
 
 Edges = list[tuple[int, int]]
@@ -68,8 +68,8 @@ def random_object(
     return linkage, points, {"closure": 1.0, "coplanar": 0.5}
 
 
-def look(linkage: Linkage, points: np.ndarray, s: float) -> Family:
-    return Family(linkage=linkage, image=points[:, :2] * s)
+def look(linkage: Linkage, points: np.ndarray, s: float) -> LinkageFamily:
+    return LinkageFamily(linkage=linkage, image=points[:, :2] * s)
 
 
 def holds_truth(found: Minima, points: np.ndarray, s: float, within: float = 1e-9) -> bool:
@@ -81,7 +81,7 @@ def holds_truth(found: Minima, points: np.ndarray, s: float, within: float = 1e-
 
 
 def residual_by_hand(
-    family: Family, signs: np.ndarray, scales: np.ndarray, weights: Mapping[str, float]
+    family: LinkageFamily, signs: np.ndarray, scales: np.ndarray, weights: Mapping[str, float]
 ) -> np.ndarray:
     """Place the points anew for each scale (G,), by least squares over the segments, and measure them."""
     linkage, unit = family.linkage, float(family.linkage.lengths.mean())
@@ -116,7 +116,7 @@ def residual_by_hand(
 
 
 def minima_by_force(
-    family: Family, segments: np.ndarray, weights: Mapping[str, float]
+    family: LinkageFamily, segments: np.ndarray, weights: Mapping[str, float]
 ) -> list[tuple[float, float]]:
     """Find local minima (s, residual) inside the range for every string of flips: dense in s, then scipy."""
     scales = family.minimum_scale / np.cos(np.linspace(0, np.arccos(1 / 50), 1200))
@@ -146,7 +146,7 @@ def test_the_minima_are_those_of_brute_force(rng: np.random.Generator, kind: str
     for _ in range(2 if kind == "closure and coplanar" else 4):
         linkage, points, weights = random_object(rng, kind, 4)
         image = (points[:, :2] + noise * rng.normal(size=(len(points), 2))) * 100
-        family = Family(linkage=linkage, image=image)
+        family = LinkageFamily(linkage=linkage, image=image)
         found = search(family, weights)
         forced = minima_by_force(family, found.constraints.segments, weights)
         inner = [
@@ -171,7 +171,7 @@ def test_every_minimum_is_one_of_its_own_curve(rng: np.random.Generator, kind: s
     for _ in range(10):
         linkage, points, weights = random_object(rng, kind, 5)
         image = (points[:, :2] + 0.05 * rng.normal(size=(len(points), 2))) * 100
-        family = Family(linkage=linkage, image=image)
+        family = LinkageFamily(linkage=linkage, image=image)
         found = search(family, weights)
         assert (np.diff(found.residual) >= -1e-24).all()
         assert (found.s >= family.minimum_scale).all()
@@ -380,7 +380,7 @@ def test_the_unit_of_length_does_not_matter(rng: np.random.Generator) -> None:
     ],
 )
 def test_nothing_to_search_by_is_refused(weights: dict[str, float], message: str) -> None:
-    family = Family(
+    family = LinkageFamily(
         linkage=load_linkage("four_bar"), image=np.array([[0.0, 0], [50, 10], [90, 90], [10, 110]])
     )
     with pytest.raises(InputError, match=message):
@@ -388,14 +388,14 @@ def test_nothing_to_search_by_is_refused(weights: dict[str, float], message: str
 
 
 def test_an_open_chain_has_no_loop() -> None:
-    family = Family(linkage=load_linkage("planar_chain"), image=np.arange(12.0).reshape(6, 2) ** 2)
+    family = LinkageFamily(linkage=load_linkage("planar_chain"), image=np.arange(12.0).reshape(6, 2) ** 2)
     with pytest.raises(InputError, match="it has no loop to search by closure"):
         search(family, {"closure": 1.0})
 
 
 def test_a_loop_that_is_not_seen_is_named() -> None:
     image = np.array([[0.0, 0], [50, 10], [90, 90], [np.nan, np.nan]])
-    family = Family(linkage=load_linkage("four_bar"), image=image)
+    family = LinkageFamily(linkage=load_linkage("four_bar"), image=image)
     with pytest.raises(
         InputError, match="too little is seen of any loop to search by closure: d is not seen"
     ):
@@ -421,7 +421,7 @@ def test_an_unknown_nearer_end_is_refused(rng: np.random.Generator) -> None:
 
 def test_an_object_seen_end_on_fixes_no_scale() -> None:
     with pytest.raises(InputError, match="seen end on"):
-        search(Family(linkage=load_linkage("four_bar"), image=np.ones((4, 2))), {"closure": 1.0})
+        search(LinkageFamily(linkage=load_linkage("four_bar"), image=np.ones((4, 2))), {"closure": 1.0})
 
 
 # --- the parts --------------------------------------------------------------------------------------------
@@ -430,7 +430,7 @@ def test_an_object_seen_end_on_fixes_no_scale() -> None:
 @pytest.mark.parametrize(
     "term",
     [
-        Closure(loop=np.array([1.0, -0.5, 1.0, -1.0])),
+        LoopClosure(loop=np.array([1.0, -0.5, 1.0, -1.0])),
         Flatness(
             spread=np.random.default_rng(0).normal(size=(5, 4)),
             place=np.random.default_rng(1).normal(size=(5, 2)),

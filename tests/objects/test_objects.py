@@ -22,7 +22,7 @@ from posekit.objects import (
 )
 from posekit.objects.certify import Certifier
 from posekit.objects.draw import draw_configurations
-from posekit.objects.spread import Spread
+from posekit.objects.spread import ImageSpread
 from posekit.objects.triangles import Triangles, triangles
 from posekit.robots import load_robot
 from posekit.robots.kinematics import Kinematics, body_points
@@ -253,9 +253,9 @@ class TestScale:
                 },
             )
         )
-        from posekit.linkages import Family
+        from posekit.linkages import LinkageFamily
 
-        family = Family(linkage=thing.linkage, image=points[:, :2] * SCALE)
+        family = LinkageFamily(linkage=thing.linkage, image=points[:, :2] * SCALE)
         found = Triangles.of(family)
         assert len(found) == 1 and len(triangles(thing.linkage)) == 1
         # How sharp the root is depends on how far the triangle is from its line of sight.
@@ -503,7 +503,7 @@ class TestTolerance:
             linkage=Linkage.from_names(name="arm", segments={("a", "b"): 1.0, ("b", "c"): 1.0})
         )
         spanned = span(thing.working)
-        spread = Spread.of(spanned, np.array([[0, 0], [1, 0], [1.1, 0]]), 0.01)
+        spread = ImageSpread.of(spanned, np.array([[0, 0], [1, 0], [1.1, 0]]), 0.01)
         level, steep = spread.between(0, 1), spread.between(1, 2)
         np.testing.assert_allclose(level, np.sqrt(1 - 0.98**2))
         assert steep < 0.003 and spread.between(0, 2) == pytest.approx(level + steep)
@@ -572,7 +572,7 @@ class TestCertifier:
 
     def test_only_so_many_are_looked_for(self, robots, monkeypatch):
         thing, truth = robots("panda")
-        monkeypatch.setattr(certify, "MOST", 2)
+        monkeypatch.setattr(certify, "MAX_POSTURES_CERTIFIED", 2)
         found = Certifier(robot_of(thing), thing.linkage.points).certify(truth, tolerance=1e-6)
         assert found.certified == [True, True, False] and np.isnan(found.q[2]).all()
         assert "first 2 postures alone" in found.reasons[2]

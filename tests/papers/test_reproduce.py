@@ -10,7 +10,14 @@ import pytest
 from posekit.papers import lee_chen_printed as printed
 from posekit.papers.lee_chen import reproduce_lee_chen
 from posekit.papers.lee_chen_table2 import CameraEstimate, camera_estimates, exact_image, exact_tables
-from posekit.papers.lee_chen_tables34 import GROUP, PHASES, TOLERANCE, Sequence1985, closest, sequences
+from posekit.papers.lee_chen_tables34 import (
+    GROUPING_METRES,
+    N_PHASES,
+    PAPER_TOLERANCE,
+    Sequence1985,
+    closest,
+    sequences,
+)
 from posekit.papers.taylor import reproduce_taylor
 from posekit.recovery import recover
 from posekit.skeleton import JOINTS
@@ -83,8 +90,8 @@ def test_the_misprinted_eye_is_named_and_spoils_the_linear_solution() -> None:
     [
         ("T", printed.T, 0.021),
         ("R", printed.R, 1e-4),
-        ("position", printed.POSITION, 0.016),
-        ("head", printed.HEAD, 0.024),
+        ("position", printed.PRINTED_POSITION, 0.016),
+        ("head", printed.PRINTED_HEAD, 0.024),
     ],
 )
 def test_the_whole_of_table_2_is_near_the_print(part: str, values: np.ndarray, within: float) -> None:
@@ -117,8 +124,8 @@ def test_the_built_in_phase_is_what_the_search_finds(name: str) -> None:
     assert found(name).phase == pytest.approx(PHASE0[name], abs=1e-12)
     assert found(name).velocity == SEQ_VELOCITY
     candidates = sequences(name, SEQ_VELOCITY)
-    assert len(candidates) == PHASES
-    limit = printed.FINAL[name][2]
+    assert len(candidates) == N_PHASES
+    limit = printed.PRINTED_FINAL[name][2]
     allowed = [one for one in candidates if one.truth_survives and one.final[1] <= limit]
     assert found(name).distance == min(one.distance for one in allowed)
 
@@ -143,8 +150,8 @@ def test_levels_behave_as_the_papers_columns_do(name: str) -> None:
     assert (sequence.motion <= sequence.physical).all()
     # The same order of magnitude in every cell: other walkers, other tolerances.
     for ours, theirs in (
-        (sequence.physical, printed.PHYSICAL[name]),
-        (sequence.motion, printed.MOTION[name]),
+        (sequence.physical, printed.PRINTED_PHYSICAL[name]),
+        (sequence.motion, printed.PRINTED_MOTION[name]),
     ):
         assert np.abs(np.log2(ours / np.array(theirs, dtype=np.float64))).max() <= 3
 
@@ -156,10 +163,10 @@ def test_the_built_in_view_gives_the_same_counts(name: str) -> None:
         checks=CHECKS,
         ranges="table1",
         rules=(1, 2),
-        tolerance=TOLERANCE,
-        group=GROUP,
+        tolerance=PAPER_TOLERANCE,
+        group=GROUPING_METRES,
     )
-    for row, frame in enumerate(printed.FRAMES):
+    for row, frame in enumerate(printed.PRINTED_FRAMES):
         levels = recovery.frames[frame - 1].levels
         assert levels["physical"].tolist() == found(name).physical[row].tolist()
         assert levels["motion"].tolist() == found(name).motion[row].tolist()
@@ -169,16 +176,16 @@ def test_the_built_in_view_gives_the_same_counts(name: str) -> None:
 
 
 def test_the_printed_tables_are_typed_as_they_should_be() -> None:
-    for table in (printed.PHYSICAL, printed.MOTION):
+    for table in (printed.PRINTED_PHYSICAL, printed.PRINTED_MOTION):
         for name in ("seq1", "seq2"):
             rows = np.array(table[name])
             assert rows.shape == (3, len(JOINTS))
             assert (np.diff(rows, axis=1) >= 0).all()
-    assert [row[-1] for row in printed.PHYSICAL["seq1"]] == [192, 96, 80]
-    assert [row[-1] for row in printed.PHYSICAL["seq2"]] == [44, 32, 8]
-    assert [row[-1] for row in printed.MOTION["seq1"]] == [32, 20, 28]
-    assert [row[-1] for row in printed.MOTION["seq2"]] == [6, 5, 4]
-    assert printed.FINAL == {"seq1": (32, 16, 2), "seq2": (6, 6, 1)}
+    assert [row[-1] for row in printed.PRINTED_PHYSICAL["seq1"]] == [192, 96, 80]
+    assert [row[-1] for row in printed.PRINTED_PHYSICAL["seq2"]] == [44, 32, 8]
+    assert [row[-1] for row in printed.PRINTED_MOTION["seq1"]] == [32, 20, 28]
+    assert [row[-1] for row in printed.PRINTED_MOTION["seq2"]] == [6, 5, 4]
+    assert printed.PRINTED_FINAL == {"seq1": (32, 16, 2), "seq2": (6, 6, 1)}
 
 
 # --- the report -----------------------------------------------------------------------------------------
@@ -198,7 +205,7 @@ def test_the_files_put_everything_beside_the_print(folder: Path) -> None:
         assert heading in text
     for sequence in (found("seq1"), found("seq2")):
         assert f"{sequence.phase:.2f} of a cycle" in text
-        assert f"{printed.PHYSICAL[sequence.name][0][-1]} / {sequence.physical[0, -1]}" in text
+        assert f"{printed.PRINTED_PHYSICAL[sequence.name][0][-1]} / {sequence.physical[0, -1]}" in text
     assert "not Cutting's" in text
 
 
@@ -227,7 +234,7 @@ def test_the_json_holds_the_numbers(folder: Path) -> None:
         assert one["name"] == name
         assert one["physical"] == found(name).physical.tolist()
         assert one["motion"] == found(name).motion.tolist()
-        assert one["printed_physical"] == [list(row) for row in printed.PHYSICAL[name]]
+        assert one["printed_physical"] == [list(row) for row in printed.PRINTED_PHYSICAL[name]]
         assert one["truth_survives"] is True
         assert one["frames"] == [1, 3, 5]
 

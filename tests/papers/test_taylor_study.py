@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from posekit.body import Figure, load_figure
 from posekit.errors import FigureError, InputError
 from posekit.linkages import Linkage, load_linkage
-from posekit.papers.taylor_protocol import ANGLES, SIX, accuracy, accuracy_lines
+from posekit.papers.taylor_protocol import MARKED_ANGLES, MARKED_JOINTS, accuracy, accuracy_lines
 from posekit.papers.taylor_study import synthetic_study
 from posekit.papers.taylor_survival import survival, survival_lines
 from posekit.papers.taylor_views import exact_views, photographs
@@ -358,8 +358,13 @@ def test_exact_pictures_and_true_flips_leave_no_error():
 
 
 def test_the_six_points_are_a_chain_with_four_angles():
-    assert len(SIX) == 6
-    assert [SIX[b] for _, b, _ in ANGLES] == ["right_elbow", "right_shoulder", "left_shoulder", "left_elbow"]
+    assert len(MARKED_JOINTS) == 6
+    assert [MARKED_JOINTS[b] for _, b, _ in MARKED_ANGLES] == [
+        "right_elbow",
+        "right_shoulder",
+        "left_shoulder",
+        "left_elbow",
+    ]
 
 
 def test_the_synthetic_study_is_the_same_every_time_and_its_tables_are_rectangular():

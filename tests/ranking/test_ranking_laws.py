@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.geometry import Array
-from posekit.ranking import TERMS, Depth, Ranking, Up, load_prior, rank
-from posekit.ranking.prior import WEIGHTS
+from posekit.ranking import TERM_NAMES, Depth, Ranking, Up, load_prior, rank
+from posekit.ranking.prior import WEIGHT_NAMES
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
 
 FIGURE = load_figure()
 LENGTHS = FIGURE.lengths
-PRIOR = replace(load_prior(), weights=dict.fromkeys(WEIGHTS, 1.0))
+PRIOR = replace(load_prior(), weights=dict.fromkeys(WEIGHT_NAMES, 1.0))
 """With every term counting."""
 SWAPPED = [
     JOINT[name.replace("right_", "?_").replace("left_", "right_").replace("?_", "left_")] for name in JOINTS
@@ -129,14 +129,14 @@ def test_a_mirror_changes_nothing() -> None:
         np.testing.assert_allclose(there.terms[name], values, rtol=0, atol=1e-7)
 
 
-@pytest.mark.parametrize("name", TERMS)
+@pytest.mark.parametrize("name", TERM_NAMES)
 def test_a_term_left_out_leaves_the_others_as_they_are(name: str) -> None:
     joints, frame, residual = survivors()
     depth = Depth(estimate=np.full(FRAMES, 4.0), deviation=np.full(FRAMES, 0.1))
     whole = ranked(joints, frame, residual, depth=depth)
     part = ranked(joints, frame, residual, depth=depth, without=[name])
-    assert set(whole.terms) == set(TERMS)
-    assert set(part.terms) == set(TERMS) - {name}
+    assert set(whole.terms) == set(TERM_NAMES)
+    assert set(part.terms) == set(TERM_NAMES) - {name}
     for other, values in part.terms.items():
         np.testing.assert_allclose(values, whole.terms[other], rtol=0, atol=1e-9)
 
@@ -152,7 +152,7 @@ def test_without_up_the_posture_is_judged_as_with_it() -> None:
 
 def test_without_anything_to_go_by_all_are_equal() -> None:
     joints, frame, _ = survivors()
-    ranking = rank(joints, frame=frame, without=TERMS)
+    ranking = rank(joints, frame=frame, without=TERM_NAMES)
     np.testing.assert_allclose(ranking.probability, 1.0 / np.bincount(frame)[frame], rtol=1e-12)
     assert not ranking.terms
 

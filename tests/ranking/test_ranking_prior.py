@@ -12,9 +12,19 @@ import pytest
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking import TERMS, Prior, Ranking, Up, fit_prior, fit_weights, load_prior, rank, write_prior
-from posekit.ranking.directions import DIRECTIONS, directions, mirrored
-from posekit.ranking.prior import WEIGHTS
+from posekit.ranking import (
+    TERM_NAMES,
+    Prior,
+    Ranking,
+    Up,
+    fit_prior,
+    fit_weights,
+    load_prior,
+    rank,
+    write_prior,
+)
+from posekit.ranking.directions import DIRECTION_NAMES, directions, mirrored
+from posekit.ranking.prior import WEIGHT_NAMES
 from posekit.ranking.prior_file import prior_lines
 from posekit.ranking.ranking import softmax
 from posekit.skeleton import JOINT, JOINTS
@@ -34,7 +44,7 @@ def test_the_built_in_prior_is_small_and_says_where_it_is_from() -> None:
     prior = load_prior()
     assert "mocap.cs.cmu.edu" in prior.source
     assert "EIA-0196217" in prior.source
-    assert sorted(name for block in prior.blocks for name in block.names) == sorted(DIRECTIONS)
+    assert sorted(name for block in prior.blocks for name in block.names) == sorted(DIRECTION_NAMES)
 
 
 def test_the_built_in_prior_is_symmetric() -> None:
@@ -120,7 +130,7 @@ def test_impossible_weights_of_postures_are_refused(share: Array) -> None:
 
 def test_a_prior_is_written_and_read_again(tmp_path: Path) -> None:
     prior = replace(
-        fit_prior(postures(), UP, source='a "quoted"\nsource'), weights=dict.fromkeys(WEIGHTS, 0.25)
+        fit_prior(postures(), UP, source='a "quoted"\nsource'), weights=dict.fromkeys(WEIGHT_NAMES, 0.25)
     )
     path = tmp_path / "mine.toml"
     write_prior(path, prior)
@@ -140,7 +150,7 @@ def table(**changed: str) -> str:
         "schema": 'schema = "posekit.posture_prior/1"',
         "dof": "dof = 4",
         "temperature": "temperature = 0.008",
-        "weights": "[weights]\n" + "\n".join(f"{name} = 1.0" for name in WEIGHTS),
+        "weights": "[weights]\n" + "\n".join(f"{name} = 1.0" for name in WEIGHT_NAMES),
         "balance": "[balance]\nscale = 0.1\nusual = 0.5",
         "contact": "[contact]\nscale = 0.1\nusual = 0.5",
         "block": '[[block]]\ndirections = ["up"]\nmean = [0, 0, 1]\nscale = [[1], [0, 1], [0, 0, 1]]',
@@ -171,8 +181,8 @@ def test_a_prior_need_not_have_all_directions(tmp_path: Path) -> None:
         ({"temperature": "temperature = true"}, "temperature"),
         ({"weights": "[weights]\nimage = 1"}, "weights.posture"),
         ({"weights": "weights = 3"}, "weights"),
-        ({"weights": "[weights]\nluck = 1\n" + "\n".join(f"{n} = 1" for n in WEIGHTS)}, "luck"),
-        ({"weights": "[weights]\n" + "\n".join(f"{n} = -1" for n in WEIGHTS)}, "weights.image is -1.0"),
+        ({"weights": "[weights]\nluck = 1\n" + "\n".join(f"{n} = 1" for n in WEIGHT_NAMES)}, "luck"),
+        ({"weights": "[weights]\n" + "\n".join(f"{n} = -1" for n in WEIGHT_NAMES)}, "weights.image is -1.0"),
         ({"balance": "[balance]\nscale = 0\nusual = 0"}, "balance.scale"),
         ({"balance": "[balance]\nscale = 0.1"}, "balance.usual"),
         ({"contact": "[contact]\nscale = 1"}, "contact.usual"),
@@ -290,5 +300,5 @@ def test_a_truth_of_another_frame_is_refused() -> None:
 def test_weights_must_be_of_the_terms() -> None:
     prior = load_prior()
     with pytest.raises(InputError, match="weights of"):
-        replace(prior, weights=dict.fromkeys(TERMS, 1.0))
+        replace(prior, weights=dict.fromkeys(TERM_NAMES, 1.0))
     assert isinstance(prior, Prior)

@@ -21,10 +21,10 @@ from posekit.ranking import (
     load_prior,
     rank,
 )
-from posekit.ranking.directions import DIRECTIONS, directions
+from posekit.ranking.directions import DIRECTION_NAMES, directions
 from posekit.ranking.ground import standing
-from posekit.ranking.image import LEAST
-from posekit.ranking.prior import WEIGHTS
+from posekit.ranking.image import MIN_DEVIATION_METRES
+from posekit.ranking.prior import WEIGHT_NAMES
 from posekit.ranking.student import Student, digamma
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
@@ -88,7 +88,7 @@ def test_directions_are_those_of_the_figures_frames() -> None:
     hips = hips_frame(*(joints[:, JOINT[name]] for name in ("pelvis", "right_hip", "left_hip")))
     np.testing.assert_allclose(found[0].T, np.einsum("nji,nj->ni", R, hips[:, :, 1]), rtol=0, atol=1e-12)
     np.testing.assert_allclose(found[1].T, np.einsum("nji,nj->ni", R, -hips[:, :, 2]), rtol=0, atol=1e-12)
-    for k, name in enumerate(DIRECTIONS[2:10], 2):
+    for k, name in enumerate(DIRECTION_NAMES[2:10], 2):
         start, end = (JOINT[joint] for joint in name.split("-"))
         along = joints[:, end] - joints[:, start]
         along /= np.linalg.norm(along, axis=1, keepdims=True)
@@ -235,7 +235,9 @@ def test_the_image_is_a_t_distribution_of_each_misfit() -> None:
 
 def test_a_torso_is_no_more_rigid_than_torsos_are() -> None:
     joints = random_joints(3)
-    one, other = (rank(joints, LENGTHS, deviation=value).terms["image"] for value in (0.0, LEAST))
+    one, other = (
+        rank(joints, LENGTHS, deviation=value).terms["image"] for value in (0.0, MIN_DEVIATION_METRES)
+    )
     np.testing.assert_allclose(one, other, rtol=0, atol=0)
 
 
@@ -285,7 +287,7 @@ def test_terms_from_outside() -> None:
 def test_contact_prefers_feet_on_one_level() -> None:
     raised = STANDING.copy()
     raised[JOINT["left_ankle"], 2] += 0.2
-    prior = replace(load_prior(), weights=dict.fromkeys(WEIGHTS, 2.0))
+    prior = replace(load_prior(), weights=dict.fromkeys(WEIGHT_NAMES, 2.0))
     terms = rank(np.stack([STANDING, raised]), up=Up(direction=UP), prior=prior).terms["contact"]
     assert terms[0] == pytest.approx(2 * prior.contact.usual)
     assert terms[0] - terms[1] == pytest.approx(2 * np.log1p((0.2 / prior.contact.scale) ** 2))
@@ -361,11 +363,15 @@ def test_what_cannot_be_is_refused(given: dict[str, object], says: str) -> None:
 
 
 def test_the_deviation_of_survivors() -> None:
-    assert deviation_of_noise(0.0, 0.003) == pytest.approx(LEAST)
+    assert deviation_of_noise(0.0, 0.003) == pytest.approx(MIN_DEVIATION_METRES)
     np.testing.assert_allclose(
-        deviation_of_noise([2.0, 4.0], 0.002), np.hypot(LEAST, [0.008, 0.016]), rtol=1e-12
+        deviation_of_noise([2.0, 4.0], 0.002), np.hypot(MIN_DEVIATION_METRES, [0.008, 0.016]), rtol=1e-12
     )
-    np.testing.assert_allclose(deviation_of_tolerance([0.0, 1e-8, 0.22]), [LEAST, LEAST, 0.1], rtol=1e-12)
+    np.testing.assert_allclose(
+        deviation_of_tolerance([0.0, 1e-8, 0.22]),
+        [MIN_DEVIATION_METRES, MIN_DEVIATION_METRES, 0.1],
+        rtol=1e-12,
+    )
     for wrong in (-1.0, np.nan, np.inf):
         with pytest.raises(InputError):
             deviation_of_noise(wrong, 0.002)

@@ -18,7 +18,7 @@ from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
 from posekit.settings import EXACT_TOLERANCE
 from posekit.skeleton import DOFS, HEAD, PARENTS, SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import CameraSphere, Scene, random_postures, random_views
+from posekit.synthesis import CameraSphere, SyntheticScene, random_postures, random_views
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.tree import enumerate_leaves
@@ -37,7 +37,7 @@ FALLBACKS = VIEWS // 1000
 
 
 class Chunk(NamedTuple):
-    scene: Scene
+    scene: SyntheticScene
     view: View
     recovery: Recovery
 
@@ -57,7 +57,7 @@ class Chunk(NamedTuple):
         return np.array([frame.tolerance == EXACT_TOLERANCE for frame in self.recovery.frames])
 
 
-def recovered(scene: Scene) -> Chunk:
+def recovered(scene: SyntheticScene) -> Chunk:
     view = view_of(scene)
     return Chunk(scene, view, recover(view))
 

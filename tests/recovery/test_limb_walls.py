@@ -10,14 +10,14 @@ import pytest
 from posekit.body import Figure, load_figure
 from posekit.body.frames import hips_frame, torso_frame, unit
 from posekit.recovery.limb_walls import LimbWalls
-from posekit.refinement import Sight
-from posekit.refinement.anatomy import LIMBS
+from posekit.refinement import ObservedFrames
+from posekit.refinement.anatomy import LIMB_JOINTS
 from posekit.refinement.equations import evaluate, linearise
 from posekit.refinement.start import limb_directions, state_of
-from posekit.refinement.state import Step, moved
+from posekit.refinement.state import PostureStep, moved
 from posekit.refinement.trunk_terms import start_ways
 from posekit.skeleton import HIPS, JOINT, TORSO
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.validators import judge, load_ranges
 from posekit.validators.joint_range import joint_range
 
@@ -31,7 +31,7 @@ def figure() -> Figure:
 
 
 @cache
-def scene() -> Scene:
+def scene() -> SyntheticScene:
     return random_views(figure(), N, np.random.default_rng(3))
 
 
@@ -54,7 +54,7 @@ def test_they_are_beyond_where_the_checks_say_so(name: str) -> None:
     torso = torso_frame(*(joints[:, JOINT[each]] for each in TORSO))
     hips = hips_frame(*(joints[:, JOINT[each]] for each in HIPS))
     outside = np.zeros((N, 4), dtype=bool)
-    for limb, (start, middle, end) in enumerate(LIMBS):
+    for limb, (start, middle, end) in enumerate(LIMB_JOINTS):
         part = torso if limb < 2 or walls.on_torso else hips
         upper, lower = (
             np.einsum("nij,ni->nj", part, unit(joints[:, b] - joints[:, a]))
@@ -79,7 +79,7 @@ def test_they_are_beyond_where_the_checks_say_so(name: str) -> None:
 def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Generator) -> None:
     view = scene()
     # Nothing but walls counts: image points are all but unknown.
-    sight = Sight(
+    sight = ObservedFrames(
         figure=figure(),
         camera=view.camera,
         image=view.image,
@@ -96,7 +96,7 @@ def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Ge
     assert here.limbs is not None
     assert here.head is not None
     tangents = here.limbs.tangents
-    step = Step(rng.normal(size=(9, N)), rng.normal(size=(4, 4, N)), rng.normal(size=(3, N)))
+    step = PostureStep(rng.normal(size=(9, N)), rng.normal(size=(4, 4, N)), rng.normal(size=(3, N)))
     assert step.limbs is not None
     assert step.head is not None
     trunk, limbs, head = here.trunk, here.limbs, here.head
@@ -108,7 +108,7 @@ def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Ge
     slope += np.einsum("in,in->n", head.trunk_gradient, step.trunk[:6])
 
     def chi2(h: float) -> np.ndarray:
-        part = Step(*(h * array for array in step if array is not None))
+        part = PostureStep(*(h * array for array in step if array is not None))
         return np.asarray(evaluate(problem, moved(state, part, tangents))[0])
 
     difference = (chi2(1e-6) - chi2(-1e-6)) / 4e-6

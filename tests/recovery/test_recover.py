@@ -22,7 +22,7 @@ from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import (
     CameraSphere,
-    Scene,
+    SyntheticScene,
     Walker,
     random_postures,
     random_views,
@@ -265,7 +265,7 @@ def test_a_head_point_that_does_not_fit_is_named() -> None:
         recover(change(SEQ1, head_points={**SEQ1.head_points, "right_eye": eye}), checks=())
 
 
-def distorted_scene(count: int = 10) -> Scene:
+def distorted_scene(count: int = 10) -> SyntheticScene:
     """See random postures through a lens with strong distortion."""
     rng = np.random.default_rng(9)
     points = FIGURE.forward_kinematics(random_postures(FIGURE, count, rng))
@@ -582,7 +582,7 @@ def test_a_margin_that_is_no_number_is_refused(value: float) -> None:
 # --- tolerances -----------------------------------------------------------------------------------------
 
 
-def noisy(pixels: float, count: int = 40) -> Scene:
+def noisy(pixels: float, count: int = 40) -> SyntheticScene:
     """See random postures with noise on all but the head, which keeps its place in depth."""
     scene = random_views(FIGURE, count, np.random.default_rng(6), CameraSphere(distance=(2.5, 3.5)))
     image = scene.with_noise(pixels, np.random.default_rng(7)).image.copy()

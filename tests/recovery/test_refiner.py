@@ -22,10 +22,10 @@ from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
-from posekit.refinement import GIVING
+from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
 from posekit.validators import Validator
 from posekit.views.builtin import forget_camera, view_of
@@ -35,22 +35,22 @@ PIXELS = 2.0
 FRAMES = 40
 
 
-def noisy(scene: Scene, pixels: float = PIXELS) -> View:
+def noisy(scene: SyntheticScene, pixels: float = PIXELS) -> View:
     view = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
     return replace(view, deviation=pixels, root=scene.joints_cam[:, 0])
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
+def scene() -> SyntheticScene:
     return random_views(FIGURE, FRAMES, np.random.default_rng(0))
 
 
 @pytest.fixture(scope="module")
-def recovery(scene: Scene) -> Recovery:
+def recovery(scene: SyntheticScene) -> Recovery:
     return recover(noisy(scene), length_deviation=0.0)
 
 
-def errors(recovery: Recovery, scene: Scene) -> Any:
+def errors(recovery: Recovery, scene: SyntheticScene) -> Any:
     """Return each frame's best mean joint error, metres; infinite without a survivor."""
     return np.array(
         [
@@ -60,7 +60,7 @@ def errors(recovery: Recovery, scene: Scene) -> Any:
     )
 
 
-def test_the_truth_is_near_a_survivor(recovery: Recovery, scene: Scene) -> None:
+def test_the_truth_is_near_a_survivor(recovery: Recovery, scene: SyntheticScene) -> None:
     found = errors(recovery, scene)
     assert (found < 0.035).mean() >= 0.95
     plain = recover(noisy(scene), refine=False)
@@ -97,7 +97,7 @@ def test_survivors_are_what_noise_explains_and_their_chi_square_says_so(recovery
         assert (apart + np.eye(len(frame)) > 0.005).all()  # what became one is one
 
 
-def test_stated_deviations_are_those_of_the_errors(recovery: Recovery, scene: Scene) -> None:
+def test_stated_deviations_are_those_of_the_errors(recovery: Recovery, scene: SyntheticScene) -> None:
     inside = total = 0
     for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
         if not len(frame) or frame.refined is None:
@@ -113,7 +113,9 @@ def test_stated_deviations_are_those_of_the_errors(recovery: Recovery, scene: Sc
     assert 0.75 < inside / total <= 1.0
 
 
-def test_probabilities_sum_to_one_and_know_more_than_chance(recovery: Recovery, scene: Scene) -> None:
+def test_probabilities_sum_to_one_and_know_more_than_chance(
+    recovery: Recovery, scene: SyntheticScene
+) -> None:
     first, middle = [], []
     for frame, probability, truth in zip(
         recovery.frames, recovery.probability, scene.joints_cam, strict=True
@@ -161,7 +163,9 @@ def test_bodies_overlap_no_farther_than_is_allowed() -> None:
 
 @pytest.mark.parametrize("pixels", [0.5, 5.0])
 @pytest.mark.parametrize("ranges", ["urdf", "table1", "anatomical"])
-def test_every_survivor_is_valid_by_the_result_itself(ranges: str, pixels: float, scene: Scene) -> None:
+def test_every_survivor_is_valid_by_the_result_itself(
+    ranges: str, pixels: float, scene: SyntheticScene
+) -> None:
     """What `validate` asks of the result, with its settings, finds nothing."""
     view = noisy(scene.select(np.arange(16)), pixels)
     recovery = recover(view, ranges=ranges)
@@ -205,7 +209,7 @@ def test_lengths_are_allowed_what_bodies_are_or_what_is_said(lengths: float) -> 
     assert certified_within(Noise(deviation=2.0)).rigid == 0.03
 
 
-def test_exact_points_stay_exact_whatever_noise_is_said(scene: Scene) -> None:
+def test_exact_points_stay_exact_whatever_noise_is_said(scene: SyntheticScene) -> None:
     view = replace(view_of(scene), deviation=PIXELS)
     told, plain = recover(view), recover(view_of(scene))
     for a, b in zip(told.frames, plain.frames, strict=True):
@@ -213,14 +217,14 @@ def test_exact_points_stay_exact_whatever_noise_is_said(scene: Scene) -> None:
         np.testing.assert_array_equal(a.joints, b.joints)
 
 
-def test_a_neck_that_is_not_given_is_placed_with_the_noise(scene: Scene) -> None:
+def test_a_neck_that_is_not_given_is_placed_with_the_noise(scene: SyntheticScene) -> None:
     view = replace(noisy(scene), root=np.full((FRAMES, 3), np.nan))
     recovery = recover(view, length_deviation=0.0)
     assert (errors(recovery, scene) < 0.1).mean() >= 0.9
     assert all(frame.root is not None for frame in recovery.frames)
 
 
-def test_bodies_that_give_need_room_for_it(scene: Scene) -> None:
+def test_bodies_that_give_need_room_for_it(scene: SyntheticScene) -> None:
     """With a shoulder that is 2 cm off its place, held lengths lose the truth and uncertain ones keep it."""
     joints = scene.joints_cam.copy()
     shift = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
@@ -235,7 +239,7 @@ def test_bodies_that_give_need_room_for_it(scene: Scene) -> None:
     assert (held < 0.05).mean() <= 0.6
 
 
-def test_flips_that_are_given_by_hand_hold(scene: Scene, recovery: Recovery) -> None:
+def test_flips_that_are_given_by_hand_hold(scene: SyntheticScene, recovery: Recovery) -> None:
     segment = "right_elbow-right_wrist"
     given = recover(noisy(scene), length_deviation=0.0, nearer=[{segment: "right_wrist"}])
     wrist, elbow = JOINT["right_wrist"], JOINT["right_elbow"]
@@ -247,7 +251,7 @@ def test_flips_that_are_given_by_hand_hold(scene: Scene, recovery: Recovery) -> 
     assert beyond > FRAMES / 3
 
 
-def test_less_confident_points_are_less_certain(scene: Scene) -> None:
+def test_less_confident_points_are_less_certain(scene: SyntheticScene) -> None:
     view = noisy(scene)
     confidence = np.ones((FRAMES, 19))
     confidence[:, JOINT["right_wrist"]] = 0.3
@@ -258,11 +262,11 @@ def test_less_confident_points_are_less_certain(scene: Scene) -> None:
     )
     np.testing.assert_allclose(deviation[:, JOINT["right_wrist"]], PIXELS / np.sqrt(0.3))
     np.testing.assert_allclose(deviation[:, JOINT["left_wrist"]], PIXELS)
-    assert noise.by_segment == GIVING
+    assert noise.by_segment == MEASURED_LENGTH_DEVIATIONS
     assert set(replace(noise, lengths=0.03).by_segment.values()) == {0.03}
 
 
-def test_joints_that_are_hidden_stay_unknown_or_are_completed(scene: Scene) -> None:
+def test_joints_that_are_hidden_stay_unknown_or_are_completed(scene: SyntheticScene) -> None:
     view = noisy(scene)
     image = view.image[:4].copy()
     image[:, JOINT["right_wrist"]] = np.nan
@@ -305,7 +309,7 @@ def test_a_file_keeps_what_refinement_says(name: str, unit: Any, recovery: Recov
         np.testing.assert_allclose(a.refined.covariance, b.refined.covariance, rtol=1e-5, atol=1e-300)
 
 
-def test_what_cannot_be_refined_is_refused(scene: Scene) -> None:
+def test_what_cannot_be_refined_is_refused(scene: SyntheticScene) -> None:
     view = noisy(scene)
     with pytest.raises(InputError, match="--refine: only views of a calibrated camera"):
         recover(forget_camera(view), refine=True)
@@ -316,7 +320,7 @@ def test_what_cannot_be_refined_is_refused(scene: Scene) -> None:
 
 
 def test_the_command_line_refines(
-    scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Callable[..., Any]
+    scene: SyntheticScene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Callable[..., Any]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert command("synth", "random", "-o", "view.json", "--frames", "3", "--noise", "2").code == 0
@@ -324,7 +328,7 @@ def test_the_command_line_refines(
     assert command("recover", "view.json", "-o", "r.json").code == 0
     result = files.read_result("r.json")
     told = dict(result.settings["noise"])
-    assert told.pop("by_segment") == GIVING
+    assert told.pop("by_segment") == MEASURED_LENGTH_DEVIATIONS
     assert told == {"deviation": 2.0, "offset": 0.0, "lengths": None}
     assert set(result.settings["judged"]) == {"refined"}
     assert command("recover", "view.json", "-o", "n.json", "--no-refine").code == 0

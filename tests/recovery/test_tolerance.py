@@ -19,7 +19,7 @@ from posekit.settings import (
     Tolerance,
 )
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
@@ -34,7 +34,7 @@ GIVING = {
 
 
 @pytest.fixture(scope="module")
-def bent() -> Scene:
+def bent() -> SyntheticScene:
     """Look at postures of a torso that bends, for a figure whose torso does not."""
     bends = FIGURE.scaled({name: FIGURE.lengths[name] + more for name, more in GIVING.items()})
     return replace(random_views(bends, 24, np.random.default_rng(3)), figure=FIGURE)
@@ -74,7 +74,7 @@ def test_tolerances_are_keys_and_come_back_from_json() -> None:
         assert Tolerance(**json.loads(json.dumps(asdict(tolerance)))) == tolerance
 
 
-def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: Scene) -> None:
+def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: SyntheticScene) -> None:
     loose = recover(view_of(bent), tolerance=LOOSE)
     measured = recover(
         view_of(bent), tolerance=replace(MEASURED_TOLERANCE, tangent=LOOSE.tangent, angle=LOOSE.angle)
@@ -91,7 +91,7 @@ def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: Scene
     assert kept > 0
 
 
-def test_margins_are_the_room_left_to_each_distances_own_bound(bent: Scene) -> None:
+def test_margins_are_the_room_left_to_each_distances_own_bound(bent: SyntheticScene) -> None:
     recovery = recover(view_of(bent), tolerance=MEASURED_TOLERANCE)
     bounds = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
     survivors = 0
@@ -103,7 +103,7 @@ def test_margins_are_the_room_left_to_each_distances_own_bound(bent: Scene) -> N
     assert survivors > 100
 
 
-def test_a_torso_that_bends_keeps_its_true_posture(bent: Scene) -> None:
+def test_a_torso_that_bends_keeps_its_true_posture(bent: SyntheticScene) -> None:
     recovery = recover(view_of(bent), tolerance=MEASURED_TOLERANCE)
     for frame, truth in zip(recovery.frames, bent.joints_cam, strict=True):
         error = np.linalg.norm(frame.joints - truth, axis=-1).mean(axis=1)

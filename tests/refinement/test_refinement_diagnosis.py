@@ -11,13 +11,13 @@ import pytest
 
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError
-from posekit.refinement import LengthDoubt, RootPrior, Sight, diagnose, find_trunks, refine
+from posekit.refinement import LengthDoubt, ObservedFrames, RootPrior, diagnose, find_trunks, refine
 from posekit.skeleton import SEGMENT_NAMES
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 
 
 @cache
-def scene() -> Scene:
+def scene() -> SyntheticScene:
     return random_views(load_figure(), 12, np.random.default_rng(0)).with_noise(2.0, np.random.default_rng(1))
 
 
@@ -26,11 +26,11 @@ def stated(wrong: Sequence[str], factor: float) -> Figure:
     return figure.scaled({name: figure.lengths[name] * factor for name in wrong})
 
 
-def sight_of(figure: Figure, rows: slice = slice(None)) -> Sight:
+def sight_of(figure: Figure, rows: slice = slice(None)) -> ObservedFrames:
     view = scene()
     necks = view.joints_cam[rows, 0]
     root = RootPrior(mean=necks, covariance=np.zeros((len(necks), 3, 3)))
-    return Sight(figure=figure, camera=view.camera, image=view.image[rows], deviation=2.0, root=root)
+    return ObservedFrames(figure=figure, camera=view.camera, image=view.image[rows], deviation=2.0, root=root)
 
 
 def found(wrong: Sequence[str], factor: float, rows: slice = slice(None)) -> dict[str, LengthDoubt]:

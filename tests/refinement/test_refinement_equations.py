@@ -11,15 +11,15 @@ import pytest
 
 from posekit.body import Figure, load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
-from posekit.refinement import RootPrior, Sight, project, refine
+from posekit.refinement import ObservedFrames, RootPrior, project, refine
 from posekit.refinement.equations import evaluate, linearise, solve
 from posekit.refinement.freedom import degrees_of_freedom
-from posekit.refinement.problem import Problem
+from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, state_of
-from posekit.refinement.state import State, Step, head_points, moved, place
+from posekit.refinement.state import PostureState, PostureStep, head_points, moved, place
 from posekit.refinement.trunk_terms import start_ways
 from posekit.skeleton import JOINTS
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 
 N = 60
 
@@ -30,20 +30,26 @@ def figure() -> Figure:
 
 
 @cache
-def scene() -> Scene:
+def scene() -> SyntheticScene:
     return random_views(figure(), N, np.random.default_rng(7))
 
 
-def sight_of(view: Scene, pixels: float, camera: Camera | None = None, **other: object) -> Sight:
+def sight_of(
+    view: SyntheticScene, pixels: float, camera: Camera | None = None, **other: object
+) -> ObservedFrames:
     root = RootPrior(
         mean=view.joints_cam[:, 0] + 0.01, covariance=np.tile(np.diag([4e-4, 9e-4, 1e-2]), (len(view), 1, 1))
     )
     camera = camera or view.camera
     image = camera.project(view.joints_cam)
-    return Sight(figure=view.figure, camera=camera, image=image, deviation=pixels, root=root, **other)  # type: ignore[arg-type]
+    return ObservedFrames(
+        figure=view.figure, camera=camera, image=image, deviation=pixels, root=root, **other
+    )  # type: ignore[arg-type]
 
 
-def somewhere(problem: Problem, view: Scene, rng: np.random.Generator, scale: float) -> State:
+def somewhere(
+    problem: RefinementProblem, view: SyntheticScene, rng: np.random.Generator, scale: float
+) -> PostureState:
     """Return states away from the truth: torsos, limbs and heads turned, roots shifted, lengths changed."""
     state = state_of(problem.anatomy, view.joints_cam, view.head_cam)
     rows = np.tile(np.arange(len(view)), (4, 1))
@@ -53,14 +59,16 @@ def somewhere(problem: Problem, view: Scene, rng: np.random.Generator, scale: fl
     return moved(state, random_step(problem, len(view), rng, scale), tangents.tangents)
 
 
-def random_step(problem: Problem, n: int, rng: np.random.Generator, scale: float) -> Step:
+def random_step(problem: RefinementProblem, n: int, rng: np.random.Generator, scale: float) -> PostureStep:
     trunk = rng.normal(size=(problem.trunk_width, n)) * scale
     trunk[9:] *= 0.1
     limbs = rng.normal(size=(problem.limb_width, 4, n)) * scale
-    return Step(trunk, limbs, rng.normal(size=(3, n)) * scale if problem.head_image is not None else None)
+    return PostureStep(
+        trunk, limbs, rng.normal(size=(3, n)) * scale if problem.head_image is not None else None
+    )
 
 
-def slope_along(problem: Problem, state: State, step: Step) -> np.ndarray:
+def slope_along(problem: RefinementProblem, state: PostureState, step: PostureStep) -> np.ndarray:
     """Return the derivative of chi2 / 2 along a step, from the linearised terms."""
     here = linearise(problem, state)
     trunk, limbs, head = here.trunk, here.limbs, here.head
@@ -99,7 +107,7 @@ def test_the_gradient_is_that_of_finite_differences(
     step = random_step(problem, N, rng, 1.0)
 
     def chi2(h: float) -> np.ndarray:
-        part = Step(*(None if array is None else h * array for array in step))  # type: ignore[arg-type]
+        part = PostureStep(*(None if array is None else h * array for array in step))  # type: ignore[arg-type]
         return np.asarray(evaluate(problem, moved(state, part, tangents.tangents))[0])
 
     slope = slope_along(problem, state, step)
@@ -132,7 +140,7 @@ def test_the_arrow_solves_what_the_whole_matrix_would(rng: np.random.Generator) 
         flat[unknown] = 1.0
 
         def residuals(h: float, flat: np.ndarray = flat) -> np.ndarray:
-            at = moved(state, Step(h * flat[:9], h * flat[9:].reshape(4, 4, 6)), tangents)
+            at = moved(state, PostureStep(h * flat[:9], h * flat[9:].reshape(4, 4, 6)), tangents)
             joints = place(at)
             seen = problem.miss(joints, slice(0, 14))
             root = np.einsum("ijn,jn->in", problem.root_weight, at.root - problem.root)
@@ -178,7 +186,7 @@ def test_covariances_are_those_of_pinocchios_jacobian() -> None:
     view = scene()
     pixels = 1e-5
     root = RootPrior(mean=view.joints_cam[:, 0], covariance=np.tile(1e-12 * np.eye(3), (N, 1, 1)))
-    sight = Sight(
+    sight = ObservedFrames(
         figure=figure(),
         camera=view.camera,
         image=view.image,
@@ -220,7 +228,11 @@ def test_freedom_is_residuals_less_rank(perspective: bool, rng: np.random.Genera
         flat[unknown] = 1e-6
         sides = [
             problem.miss(
-                place(moved(state, Step(s * flat[:9], s * flat[9:].reshape(4, 4, 40)), here.limbs.tangents)),
+                place(
+                    moved(
+                        state, PostureStep(s * flat[:9], s * flat[9:].reshape(4, 4, 40)), here.limbs.tangents
+                    )
+                ),
                 slice(0, 14),
             )
             for s in (1, -1)

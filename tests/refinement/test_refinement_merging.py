@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.refinement import Merged, Refined, RootPrior, Sight, merge, refine
+from posekit.refinement import Merged, ObservedFrames, Refined, RootPrior, merge, refine
 from posekit.refinement.merging import groups_of
 from posekit.synthesis import random_views
 
@@ -48,7 +48,7 @@ def survivors() -> Refined:
     start = view.joints_cam[frame] + rng.normal(size=(100, 14, 3)) * 0.08
     root = RootPrior(mean=view.joints_cam[:, 0], covariance=np.zeros((5, 3, 3)))
     image = view.with_noise(2.0, np.random.default_rng(5)).image
-    sight = Sight(figure=load_figure(), camera=view.camera, image=image, deviation=2.0, root=root)
+    sight = ObservedFrames(figure=load_figure(), camera=view.camera, image=image, deviation=2.0, root=root)
     return refine(sight, start, frame=frame, precision=1e-9, steps=60)
 
 

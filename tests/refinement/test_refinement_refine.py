@@ -13,9 +13,9 @@ from posekit.body import Figure, load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement import Refined, RootPrior, Sight, refine
+from posekit.refinement import ObservedFrames, Refined, RootPrior, refine
 from posekit.skeleton import JOINT, SEGMENT_NAMES
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 
 EXACT = 1e-9
 TIGHT = 1e-18
@@ -28,17 +28,19 @@ def figure() -> Figure:
 
 
 @cache
-def scene(n: int = 120) -> Scene:
+def scene(n: int = 120) -> SyntheticScene:
     return random_views(figure(), n, np.random.default_rng(11))
 
 
-def known_root(view: Scene, deviation: float = 0.0) -> RootPrior:
+def known_root(view: SyntheticScene, deviation: float = 0.0) -> RootPrior:
     return RootPrior(
         mean=view.joints_cam[:, 0], covariance=np.tile(deviation**2 * np.eye(3), (len(view), 1, 1))
     )
 
 
-def sight_of(view: Scene, pixels: float, noise: float | None = None, seed: int = 0, **other: object) -> Sight:
+def sight_of(
+    view: SyntheticScene, pixels: float, noise: float | None = None, seed: int = 0, **other: object
+) -> ObservedFrames:
     noisy = view.with_noise(pixels if noise is None else noise, np.random.default_rng(seed))
     given: dict[str, object] = {
         "figure": figure(),
@@ -47,10 +49,10 @@ def sight_of(view: Scene, pixels: float, noise: float | None = None, seed: int =
         "deviation": pixels,
         "root": known_root(view),
     }
-    return Sight(**(given | other))  # type: ignore[arg-type]
+    return ObservedFrames(**(given | other))  # type: ignore[arg-type]
 
 
-def nudged(view: Scene, size: float, seed: int = 5) -> Array:
+def nudged(view: SyntheticScene, size: float, seed: int = 5) -> Array:
     return view.joints_cam + np.random.default_rng(seed).normal(size=view.joints_cam.shape) * size
 
 
@@ -237,7 +239,7 @@ def test_the_error_is_as_stated() -> None:
     draws, pixels = 300, 0.3
     frame = np.repeat(np.arange(len(view)), draws)
     noise = np.random.default_rng(8).normal(size=(len(frame), 14, 2)) * pixels
-    many = Sight(
+    many = ObservedFrames(
         figure=figure(),
         camera=view.camera,
         image=view.image[frame] + noise,

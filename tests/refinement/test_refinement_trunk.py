@@ -16,8 +16,8 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.refinement import (
     NoisyRange,
+    ObservedFrames,
     RootPrior,
-    Sight,
     Trunks,
     find_trunks,
     merge,
@@ -26,7 +26,7 @@ from posekit.refinement import (
     under_noise,
 )
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.tree import Check, InterpretationTree
 from posekit.validators import load_ranges, make_checks
 
@@ -39,18 +39,20 @@ def figure() -> Figure:
 
 
 @cache
-def scene() -> Scene:
+def scene() -> SyntheticScene:
     return random_views(figure(), N, np.random.default_rng(17))
 
 
-def sight_of(pixels: float, depth: float = 0.0) -> Sight:
+def sight_of(pixels: float, depth: float = 0.0) -> ObservedFrames:
     view = scene()
     rng = np.random.default_rng(23)
     neck = view.joints_cam[:, 0]
     ray = neck / np.linalg.norm(neck, axis=1, keepdims=True)
     root = RootPrior.along_ray(view.camera, neck + depth * rng.standard_normal(N)[:, None] * ray, depth=depth)
     image = view.with_noise(pixels, rng).image
-    return Sight(figure=figure(), camera=view.camera, image=image, deviation=max(pixels, 0.1), root=root)
+    return ObservedFrames(
+        figure=figure(), camera=view.camera, image=image, deviation=max(pixels, 0.1), root=root
+    )
 
 
 def distance(trunks: Trunks) -> Array:

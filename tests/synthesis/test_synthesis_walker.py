@@ -11,7 +11,7 @@ from posekit.cameras import lee_chen
 from posekit.cameras.head.points import TABLE_A2
 from posekit.errors import InputError, PosekitError
 from posekit.skeleton import JOINT, POINTS, SEGMENTS, segment_name
-from posekit.synthesis import Scene, Walker, seq1, seq2, walker_scene
+from posekit.synthesis import SyntheticScene, Walker, seq1, seq2, walker_scene
 
 FIGURE = load_figure()
 PHASES = np.arange(0, 1, 1 / 100)
@@ -185,7 +185,7 @@ def test_impossible_scenes_are_refused():
         ({"labels": ("walking",)}, "1 labels"),
     ):
         with pytest.raises(InputError, match=words):
-            Scene(**{**good, **bad})
+            SyntheticScene(**{**good, **bad})
     with pytest.raises(InputError, match="noise"):
         scene.with_noise(-1, np.random.default_rng(0))
     with pytest.raises(InputError, match="phases"):

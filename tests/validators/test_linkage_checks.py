@@ -5,7 +5,7 @@ import pytest
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.linkages import Family, Linkage, SpanningTree, load_linkage, name_nearer, span
+from posekit.linkages import Linkage, LinkageFamily, SpanningTree, load_linkage, name_nearer, span
 from posekit.tree import Check
 from posekit.validators.linkage import closure, nearer
 
@@ -120,7 +120,7 @@ def test_a_girdle_seen_full_length_counts_once() -> None:
     for (a, b), length in zip(HUMAN.segments[3:], HUMAN.lengths[3:], strict=True):
         points[b] = points[a] + np.array([0.0, 0.6, 0.8]) * length
     camera = ScaledOrthographicCamera(scale=10.0)
-    family = Family(linkage=HUMAN, image=camera.project(points))
+    family = LinkageFamily(linkage=HUMAN, image=camera.project(points))
     assert family.bounding_segment == "right_shoulder-left_shoulder"
     spanned = span(HUMAN)
     leaves = spanned.grow(camera, family.image[None], closure(spanned))
@@ -177,7 +177,7 @@ def test_all_flips_given_by_hand_leave_the_true_posture_alone(rng: np.random.Gen
     for n in (3, 5, 8):
         posture = rng.normal(size=(n, 3))
         spanned = polygon(posture)
-        flips = Family(linkage=spanned.linkage, image=CAMERA.project(posture)).flips_of(posture)
+        flips = LinkageFamily(linkage=spanned.linkage, image=CAMERA.project(posture)).flips_of(posture)
         checks = nearer(
             name_nearer(spanned.linkage, flips),
             joints=spanned.tree.joints,

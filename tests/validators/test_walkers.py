@@ -20,7 +20,7 @@ from posekit.formats.own import View
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import DOFS
-from posekit.synthesis import Scene, random_views
+from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
 from posekit.validators import PHYSICAL, Validator, make_checks
 from posekit.validators.joint_range import joint_range
@@ -32,7 +32,7 @@ FIGURE = load_figure()
 ALL = (*PHYSICAL, "walking")
 
 
-def passing() -> Scene:
+def passing() -> SyntheticScene:
     """Return a person one of whose legs passes the other: both knees are a little in front, as people have them."""
     scene = random_views(FIGURE, 1, np.random.default_rng(2))
     q = np.array(FIGURE.configurations(FIGURE.neutral_points[None]).q)

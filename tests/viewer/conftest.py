@@ -19,7 +19,7 @@ from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_postures
 from posekit.viewer.browser.studio import Studio
 from posekit.viewer.scene.branch import lift_branch
-from posekit.viewer.scene.subject import Subject, subject_of
+from posekit.viewer.scene.subject import DrawnSubject, subject_of
 
 
 @pytest.fixture(scope="session")
@@ -46,7 +46,7 @@ def walked(walk: View) -> Result:
 
 
 @pytest.fixture(scope="session")
-def subject(walk: View, walked: Result) -> Subject:
+def subject(walk: View, walked: Result) -> DrawnSubject:
     """Return its survivors, ready to be drawn."""
     return subject_of(walked, walk)
 

@@ -19,7 +19,7 @@ from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
-from posekit.viewer.scene.subject import Subject, subject_of
+from posekit.viewer.scene.subject import DrawnSubject, subject_of
 
 SMALL = Shot(size=(200, 150), supersample=1)
 FAKE_FFMPEG = """#!{python}
@@ -53,7 +53,7 @@ def fake_ffmpeg(folder: Path, *, fails: bool = False) -> None:
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
 
 
-def test_sequence_becomes_a_gif_that_moves(subject: Subject, tmp_path: Path) -> None:
+def test_sequence_becomes_a_gif_that_moves(subject: DrawnSubject, tmp_path: Path) -> None:
     film = tmp_path / "walk.gif"
     frames = [frame.chosen([0]) for frame in subject.frames]
     done: list[int] = []
@@ -70,7 +70,7 @@ def test_sequence_becomes_a_gif_that_moves(subject: Subject, tmp_path: Path) -> 
     assert all((np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in itertools.pairwise(pictures))
 
 
-def test_turntable_goes_around(subject: Subject, tmp_path: Path) -> None:
+def test_turntable_goes_around(subject: DrawnSubject, tmp_path: Path) -> None:
     film = tmp_path / "turn.gif"
     shot = Shot(size=(200, 150), supersample=1, turntable=4, fps=50)
     style = Style(camera=False)
@@ -80,7 +80,9 @@ def test_turntable_goes_around(subject: Subject, tmp_path: Path) -> None:
         assert gif.info["duration"] == 20
 
 
-def test_mp4_is_handed_to_ffmpeg(subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mp4_is_handed_to_ffmpeg(
+    subject: DrawnSubject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     film = tmp_path / "walk.mp4"
     frames = [frame.chosen([0]) for frame in subject.frames[:2]]
     programs = tmp_path / "programs"
@@ -119,7 +121,7 @@ def test_what_cannot_be_drawn_is_refused_first(name: str, shot: Shot, match: str
 
 
 def test_nothing_is_written_where_nothing_is_drawn(
-    subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    subject: DrawnSubject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with pytest.raises(ViewerError, match="no posture in these frames"):
         write_picture(tmp_path / "a.png", subject, [subject.frames[0].chosen([])])
@@ -137,7 +139,9 @@ def test_nothing_is_written_where_nothing_is_drawn(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_page_needs_no_browser(subject: Subject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_page_needs_no_browser(
+    subject: DrawnSubject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("POSEKIT_BROWSER", "/bin/false")
     page = tmp_path / "a.html"
     assert write_picture(page, subject, [subject.frames[0]], title="36 <postures>") == 1
@@ -189,7 +193,7 @@ def test_render_draws_what_is_known_of_postures(
     assert "nothing says how likely the postures are" in refused(monkeypatch, capsys, *words)
 
 
-def test_the_likeliest_posture_is_chosen(subject: Subject, walked: Result) -> None:
+def test_the_likeliest_posture_is_chosen(subject: DrawnSubject, walked: Result) -> None:
     for shown, frame in zip(subject.frames, walked.frames, strict=True):
         assert frame.probability is not None
         chosen = _chosen(shown, "likeliest", 0)

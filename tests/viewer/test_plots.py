@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.errors import InputError, ViewerError
-from posekit.papers.lee_chen_printed import MOTION, PHYSICAL
+from posekit.papers.lee_chen_printed import PRINTED_MOTION, PRINTED_PHYSICAL
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.viewer.plots.figure import STYLE, save
+from posekit.viewer.plots.figure import PLOT_STYLE, save
 from posekit.viewer.plots.image import plot_image
 from posekit.viewer.plots.levels import plot_levels
 from posekit.viewer.plots.projections import letter, plot_projections, side_view
@@ -116,11 +116,13 @@ def test_an_unknown_joint_leaves_out_its_segments_alone():
 
 def test_levels_are_the_results_and_the_print_is_beside_them():
     frames = [walking_result().frames[index] for index in (0, 2, 4)]
-    figure = plot_levels(frames, printed={"physical": PHYSICAL["seq1"], "motion": MOTION["seq1"]})
+    figure = plot_levels(
+        frames, printed={"physical": PRINTED_PHYSICAL["seq1"], "motion": PRINTED_MOTION["seq1"]}
+    )
     assert len(figure.axes) == 3
     for index, (axes, frame) in enumerate(zip(figure.axes, frames, strict=True)):
         drawn = {line.get_gid(): line.get_xdata() for line in axes.lines}
-        for stage, table in (("physical", PHYSICAL), ("motion", MOTION)):
+        for stage, table in (("physical", PRINTED_PHYSICAL), ("motion", PRINTED_MOTION)):
             np.testing.assert_array_equal(drawn[stage], frame.levels[stage])
             np.testing.assert_array_equal(drawn[f"printed {stage}"], table["seq1"][index])
         np.testing.assert_array_equal(drawn["full tree"], 2.0 ** np.arange(14))
@@ -184,9 +186,9 @@ def test_a_figure_is_written_whole_and_the_same_every_time(tmp_path, suffix, sta
 
 def test_drawing_leaves_matplotlibs_own_settings_alone(monkeypatch):
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)  # holds global state: an import would fail
-    before = {name: mpl.rcParams[name] for name in STYLE}
+    before = {name: mpl.rcParams[name] for name in PLOT_STYLE}
     plot_levels([first_frame()])
-    assert {name: mpl.rcParams[name] for name in STYLE} == before
+    assert {name: mpl.rcParams[name] for name in PLOT_STYLE} == before
 
 
 def pruned_as(pruned):

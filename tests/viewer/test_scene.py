@@ -22,7 +22,7 @@ from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.stage import background_colour
-from posekit.viewer.scene.subject import Subject, check_one_scale, subject_of
+from posekit.viewer.scene.subject import DrawnSubject, check_one_scale, subject_of
 from posekit.viewer.scene.superposed import superposed_looks
 from posekit.viewer.scene.world import upright_world
 
@@ -81,7 +81,7 @@ def test_unknown_transform_hides_and_a_known_one_shows_again() -> None:
     assert "NaN" not in json.dumps(hidden.document())
 
 
-def test_pinocchios_capsules_lie_where_the_posture_has_them(subject: Subject) -> None:
+def test_pinocchios_capsules_lie_where_the_posture_has_them(subject: DrawnSubject) -> None:
     shown = subject.frames[0]
     assert shown.q is not None
     world = upright_world(subject.points())
@@ -102,7 +102,7 @@ def test_pinocchios_capsules_lie_where_the_posture_has_them(subject: Subject) ->
             np.testing.assert_allclose(ends[1], wanted, rtol=0, atol=1e-8)
 
 
-def test_world_is_upright_and_stands_on_the_ground(subject: Subject) -> None:
+def test_world_is_upright_and_stands_on_the_ground(subject: DrawnSubject) -> None:
     world = upright_world(subject.points())
     placed = world.place(subject.frames[0].points)
     assert (placed[:, 0, 2] > placed[:, JOINT["pelvis"], 2]).all()
@@ -123,7 +123,7 @@ def test_tilted_camera_is_stood_upright(rng: np.random.Generator) -> None:
     assert np.ptp(placed[:, 2] - standing[:, 2]) < 1e-12
 
 
-def test_unknown_joints_are_left_out(subject: Subject) -> None:
+def test_unknown_joints_are_left_out(subject: DrawnSubject) -> None:
     points = subject.frames[0].points[0].copy()
     points[JOINT["right_wrist"]] = np.nan
     scene = Scene()
@@ -158,7 +158,7 @@ def test_culprits(reason: str, links: tuple[str, ...], joints: tuple[str, ...]) 
     assert (found.links, found.joints) == (links, joints)
 
 
-def test_branches_of_survivors_give_the_survivors_back(subject: Subject, walked: Result) -> None:
+def test_branches_of_survivors_give_the_survivors_back(subject: DrawnSubject, walked: Result) -> None:
     shown, frame = subject.frames[0], walked.frames[0]
     assert shown.sight is not None
     lengths = np.array([subject.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])
@@ -169,7 +169,7 @@ def test_branches_of_survivors_give_the_survivors_back(subject: Subject, walked:
         np.testing.assert_allclose(joints, frame.joints[k], rtol=0, atol=1e-6)
 
 
-def test_rejected_branches_are_pointed_at(subject: Subject, walked: Result) -> None:
+def test_rejected_branches_are_pointed_at(subject: DrawnSubject, walked: Result) -> None:
     rejected = one_a_reason(rejected_of(walked, subject, 0))
     assert len(set(rejected.reasons)) == len(rejected) > 4
     row = list(rejected.reasons).index("joint_range/left_knee.flexion")
@@ -182,13 +182,13 @@ def test_rejected_branches_are_pointed_at(subject: Subject, walked: Result) -> N
     assert f"/meshcat/posture-{row}/halos/right_knee" in scene.nodes
 
 
-def test_result_without_pruned_branches_is_refused(subject: Subject, walk: View) -> None:
+def test_result_without_pruned_branches_is_refused(subject: DrawnSubject, walk: View) -> None:
     plain = posekit.result_of(posekit.recover(walk))
     with pytest.raises(ViewerError, match="--explain"):
         rejected_of(plain, subject, 0)
 
 
-def test_what_superposed_postures_share_is_drawn_once(subject: Subject) -> None:
+def test_what_superposed_postures_share_is_drawn_once(subject: DrawnSubject) -> None:
     shown = subject.frames[0]
     looks = superposed_looks(shown, subject.figure)
     assert sum("torso" not in look.without for look in looks) == 1
@@ -196,7 +196,7 @@ def test_what_superposed_postures_share_is_drawn_once(subject: Subject) -> None:
     assert sum("left_thigh" not in look.without for look in looks) == len(knees) < len(shown)
 
 
-def test_groups_have_colours_of_their_own(subject: Subject) -> None:
+def test_groups_have_colours_of_their_own(subject: DrawnSubject) -> None:
     two = subject.frames[0].chosen([0, len(subject.frames[0]) - 1])
     looks = superposed_looks(two, subject.figure)
     assert looks[0].body and looks[1].body
@@ -205,7 +205,7 @@ def test_groups_have_colours_of_their_own(subject: Subject) -> None:
     assert "torso" not in looks[1].body
 
 
-def test_side_by_side_keeps_apart(subject: Subject) -> None:
+def test_side_by_side_keeps_apart(subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen(range(4))
     world = upright_world(shown.points)
     scene = compose(shown, figure=subject.figure, world=world, style=Style(azimuth=30)).scene
@@ -216,13 +216,13 @@ def test_side_by_side_keeps_apart(subject: Subject) -> None:
     assert [row_count(n) for n in (1, 7, 8, 36)] == [1, 1, 2, 4]
 
 
-def test_too_many_postures_are_refused(subject: Subject) -> None:
+def test_too_many_postures_are_refused(subject: DrawnSubject) -> None:
     many = subject.frames[0].chosen([0] * 201)
     with pytest.raises(ViewerError, match="201 postures in one picture"):
         compose(many, figure=subject.figure, world=upright_world(many.points), style=Style())
 
 
-def test_fitted_eye_has_all_points_in_its_picture(rng: np.random.Generator, subject: Subject) -> None:
+def test_fitted_eye_has_all_points_in_its_picture(rng: np.random.Generator, subject: DrawnSubject) -> None:
     world = upright_world(subject.points())
     points = rng.normal(size=(40, 3)) * [2, 1, 1]
     for azimuth, elevation in ((0, 0), (55, 14), (200, -30)):

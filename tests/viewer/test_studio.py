@@ -23,9 +23,9 @@ from posekit.viewer.scene.compose import Style, compose
 from posekit.viewer.scene.eye import Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.framing import fitted_eye, view_eye
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.sight import ImageSight
 from posekit.viewer.scene.stage import add_stage
-from posekit.viewer.scene.subject import Subject
+from posekit.viewer.scene.subject import DrawnSubject
 from posekit.viewer.scene.world import World, upright_world
 from posekit.viewer.standalone import standalone_page
 
@@ -33,7 +33,7 @@ SIZE = (640, 480)
 K = np.array([[1150.0, 0.0, 310.0], [0.0, 1100.0, 250.0], [0.0, 0.0, 1.0]])
 
 
-def scene_of_joints(subject: Subject, world: World, points: Array) -> Scene:
+def scene_of_joints(subject: DrawnSubject, world: World, points: Array) -> Scene:
     """Draw joints alone, each in a colour of its own that no light changes."""
     scene = Scene()
     look = Look(bodies=False, bones=False)
@@ -70,7 +70,7 @@ def spread(points: Array) -> Array:
     return moved
 
 
-def test_joints_are_drawn_where_the_camera_projects_them(studio: Studio, subject: Subject) -> None:
+def test_joints_are_drawn_where_the_camera_projects_them(studio: Studio, subject: DrawnSubject) -> None:
     points = spread(subject.frames[0].points[0])
     world = upright_world(points)
     pixels = studio.draw(scene_of_joints(subject, world, points), ViewEye(K=K, world=world), size=SIZE)
@@ -81,7 +81,7 @@ def test_joints_are_drawn_where_the_camera_projects_them(studio: Studio, subject
 
 
 def test_joints_are_drawn_where_a_tilted_camera_and_a_free_eye_see_them(
-    studio: Studio, subject: Subject
+    studio: Studio, subject: DrawnSubject
 ) -> None:
     points = spread(subject.frames[1].points[0])
     roll = np.radians(20)
@@ -102,8 +102,8 @@ def test_joints_are_drawn_where_a_tilted_camera_and_a_free_eye_see_them(
     assert np.isfinite(error).sum() >= 12
 
 
-def test_view_eye_fits_the_views_image(subject: Subject) -> None:
-    sight = Sight(camera=PinholeCamera(K=K), image=np.zeros((14, 2)), size=(640, 480))
+def test_view_eye_fits_the_views_image(subject: DrawnSubject) -> None:
+    sight = ImageSight(camera=PinholeCamera(K=K), image=np.zeros((14, 2)), size=(640, 480))
     eye = view_eye(sight, upright_world(subject.points()), (1280, 960))
     assert isinstance(eye, ViewEye)
     point = np.array([[0.3, -0.2, 4.0]])
@@ -113,7 +113,7 @@ def test_view_eye_fits_the_views_image(subject: Subject) -> None:
 
 @pytest.mark.parametrize("aspect", [1.0, 1.25])
 def test_joints_are_drawn_where_an_uncalibrated_camera_projects_them(
-    studio: Studio, subject: Subject, aspect: float
+    studio: Studio, subject: DrawnSubject, aspect: float
 ) -> None:
     points = spread(subject.frames[0].points[0])
     points += [1.5, 1.4, 0.0] - points[0]
@@ -121,7 +121,7 @@ def test_joints_are_drawn_where_an_uncalibrated_camera_projects_them(
     world = upright_world(points)
     camera = ScaledOrthographicCamera(scale=190.0, aspect=aspect)
     image = camera.project(points[:14])
-    sight = Sight(camera=camera, image=image, size=(640, 480))
+    sight = ImageSight(camera=camera, image=image, size=(640, 480))
     scene = scene_of_joints(subject, world, points)
     for size in (SIZE, (1280, 960)):  # the view's own size, and twice as large
         eye = view_eye(sight, world, size)
@@ -149,7 +149,7 @@ def orange_blue_grey(pixels: Pixels) -> tuple[int, int, int]:
     return int((r - b > 70).sum()), int((b - r > 70).sum()), int(grey.sum())
 
 
-def test_limbs_have_their_colours_and_two_postures_differ(studio: Studio, subject: Subject) -> None:
+def test_limbs_have_their_colours_and_two_postures_differ(studio: Studio, subject: DrawnSubject) -> None:
     pictures = []
     for frame in (0, 2):
         shown = subject.frames[frame].chosen([0])
@@ -163,7 +163,7 @@ def test_limbs_have_their_colours_and_two_postures_differ(studio: Studio, subjec
     assert (np.abs(pictures[0].astype(int) - pictures[1]).max(axis=-1) > 40).mean() > 0.01
 
 
-def test_right_is_on_the_left_of_a_picture_from_the_front(studio: Studio, subject: Subject) -> None:
+def test_right_is_on_the_left_of_a_picture_from_the_front(studio: Studio, subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     made = compose(shown, figure=subject.figure, world=world, style=Style(camera=False))
@@ -172,7 +172,7 @@ def test_right_is_on_the_left_of_a_picture_from_the_front(studio: Studio, subjec
     assert np.nonzero(r - b > 70)[1].mean() < np.nonzero(b - r > 70)[1].mean()
 
 
-def test_camera_with_its_image_is_drawn(studio: Studio, subject: Subject) -> None:
+def test_camera_with_its_image_is_drawn(studio: Studio, subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     eyes: list[Eye] = []
@@ -187,7 +187,7 @@ def test_camera_with_its_image_is_drawn(studio: Studio, subject: Subject) -> Non
     assert T is None
 
 
-def test_background_and_supersampling(studio: Studio, subject: Subject) -> None:
+def test_background_and_supersampling(studio: Studio, subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     eye = eye_at([-3, -2, 1.5], [0, 0, 0.8])
@@ -202,7 +202,7 @@ def test_background_and_supersampling(studio: Studio, subject: Subject) -> None:
         assert shades[3] > shades[1]  # edges are smooth
 
 
-def test_flat_pictures_are_detected(studio: Studio, subject: Subject) -> None:
+def test_flat_pictures_are_detected(studio: Studio, subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     made = compose(shown, figure=subject.figure, world=world, style=Style(camera=False, ground=False))
@@ -270,7 +270,7 @@ def wait_until_gone(pid: int) -> list[int]:
     return group(pid)
 
 
-def test_nothing_listens_while_drawing(studio: Studio, subject: Subject) -> None:
+def test_nothing_listens_while_drawing(studio: Studio, subject: DrawnSubject) -> None:
     shown = subject.frames[0].chosen([0])
     world = upright_world(shown.points)
     made = compose(shown, figure=subject.figure, world=world, style=Style())
@@ -340,7 +340,7 @@ def test_program_that_is_no_browser(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert find_browser() == str(tmp_path / "google-chrome")
 
 
-def test_page_draws_and_loads_nothing_from_outside(subject: Subject, tmp_path: Path) -> None:
+def test_page_draws_and_loads_nothing_from_outside(subject: DrawnSubject, tmp_path: Path) -> None:
     shown = subject.frames[0].chosen([0, 1])
     world = upright_world(shown.points)
     made = compose(shown, figure=subject.figure, world=world, style=Style())

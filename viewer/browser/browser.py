@@ -10,7 +10,7 @@ from posekit.errors import ViewerError
 from posekit.viewer.browser.devtools import DevTools
 from posekit.viewer.browser.find import find_browser
 
-TIMEOUT = 60.0
+STEP_TIMEOUT_SECONDS = 60.0
 """Seconds that one step of the browser may take."""
 
 
@@ -37,7 +37,11 @@ class Browser:
     """
 
     def __init__(
-        self, program: str | None = None, *, timeout: float = TIMEOUT, size: tuple[int, int] = (1280, 720)
+        self,
+        program: str | None = None,
+        *,
+        timeout: float = STEP_TIMEOUT_SECONDS,
+        size: tuple[int, int] = (1280, 720),
     ) -> None:
         self.size = size
         self._tools = DevTools(program or find_browser(), timeout=timeout)

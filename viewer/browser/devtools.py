@@ -21,11 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from posekit.errors import ViewerError
-from posekit.viewer.browser.find import REMEDY
+from posekit.viewer.browser.find import BROWSER_REMEDY
 
 Message = dict[str, Any]
 
-FLAGS = (
+BROWSER_FLAGS = (
     "--headless",
     "--remote-debugging-pipe",
     "--use-gl=angle",
@@ -49,9 +49,9 @@ FLAGS = (
 READ_FD, WRITE_FD = 3, 4
 """The descriptors at which Chromium expects its two pipes."""
 
-CHATTER = (":ERROR:", ":WARNING:", ":INFO:", "DevTools")
-CHUNK = 1 << 20
-LEAVE = 3.0
+LOG_CHATTER = (":ERROR:", ":WARNING:", ":INFO:", "DevTools")
+CHUNK_BYTES = 1 << 20
+EXIT_TIMEOUT_SECONDS = 3.0
 """Seconds that a browser is given to end by itself."""
 
 
@@ -76,7 +76,7 @@ class DevTools:
             self.pid, self._write, self._read = _start(program, self.folder)
         except OSError as error:
             shutil.rmtree(self.folder, ignore_errors=True)
-            raise ViewerError(f"{program}: cannot be started: {error.strerror}; {REMEDY}") from None
+            raise ViewerError(f"{program}: cannot be started: {error.strerror}; {BROWSER_REMEDY}") from None
         self._end = weakref.finalize(self, _finish, self.pid, self._write, self._read, self.folder)
 
     def ask(self, method: str, session: str | None = None, **params: Any) -> Message:
@@ -109,7 +109,7 @@ class DevTools:
         """End the browser and remove what it wrote."""
         if self._end.alive:
             with contextlib.suppress(ViewerError):
-                self.timeout = min(self.timeout, LEAVE)
+                self.timeout = min(self.timeout, EXIT_TIMEOUT_SECONDS)
                 self.ask("Browser.close")
         self._end()
 
@@ -120,7 +120,7 @@ class DevTools:
             if not _ready(self._write, select.POLLOUT, deadline):
                 raise self._gone(f"it took nothing for {self.timeout:g} s during {method}")
             try:
-                data = data[os.write(self._write, data[:CHUNK]) :]
+                data = data[os.write(self._write, data[:CHUNK_BYTES]) :]
             except BlockingIOError:
                 continue
             except BrokenPipeError:
@@ -131,7 +131,7 @@ class DevTools:
         while b"\0" not in pieces[-1]:
             if not _ready(self._read, select.POLLIN, deadline):
                 raise self._gone(f"it gave no answer to {method} within {self.timeout:g} s")
-            piece = os.read(self._read, CHUNK)
+            piece = os.read(self._read, CHUNK_BYTES)
             if not piece:
                 raise self._gone(f"it ended during {method}")
             pieces.append(piece)
@@ -151,7 +151,7 @@ class DevTools:
 
 def _start(program: str, folder: Path) -> tuple[int, int, int]:
     """Start the browser in its own process group; return its id and our ends of the pipes."""
-    flags = [*FLAGS, f"--user-data-dir={folder / 'profile'}"]
+    flags = [*BROWSER_FLAGS, f"--user-data-dir={folder / 'profile'}"]
     if os.geteuid() == 0:
         flags.append("--no-sandbox")  # Chromium refuses to run as root with it
     pipes = [_high(fd) for pair in (os.pipe(), os.pipe()) for fd in pair]
@@ -197,7 +197,7 @@ def _finish(pid: int, write: int, read: int, folder: Path) -> None:
     """Let the browser end, or end it, with all processes of its group; wait for it; remove its folder."""
     for fd in (write, read):
         os.close(fd)
-    deadline = time.monotonic() + LEAVE
+    deadline = time.monotonic() + EXIT_TIMEOUT_SECONDS
     ended = False
     while not ended and time.monotonic() < deadline:
         ended = os.waitpid(pid, os.WNOHANG)[0] == pid
@@ -216,5 +216,5 @@ def _last_line(path: Path) -> str:
     except OSError:
         return ""
     # Chromium always complains of a missing desktop; that says nothing of why it ended.
-    said = [line.strip() for line in lines if line.strip() and not any(word in line for word in CHATTER)]
+    said = [line.strip() for line in lines if line.strip() and not any(word in line for word in LOG_CHATTER)]
     return said[-1][-160:] if said else ""

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from posekit.errors import ViewerError
-from posekit.viewer.browser.browser import TIMEOUT, Browser
+from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS, Browser
 from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.standalone import meshcat_script, player, script_json
 
 Pixels = NDArray[np.uint8]
 
-LARGEST = 8192
+MAX_SIDE_PIXELS = 8192
 """Pixels of a picture's side before supersampling is taken off: what WebGL draws everywhere."""
 
 PLAIN_CONTEXT = """
@@ -30,7 +30,7 @@ HTMLCanvasElement.prototype.getContext = function (kind, options) {
 """
 """Supersampling smooths edges already; multisampling on top of it would double the time."""
 
-APART, FEWEST, SAMPLE = 8, 2e-4, 10_000
+MIN_CHANNEL_DIFFERENCE, MIN_DRAWN_SHARE, N_SAMPLED_PIXELS = 8, 2e-4, 10_000
 """A pixel is drawn on where a channel is further than this from the background; a picture needs this share."""
 
 
@@ -52,7 +52,7 @@ class Studio:
             pixels = studio.draw(scene, eye, size=(1280, 720))
     """
 
-    def __init__(self, browser: str | None = None, *, timeout: float = TIMEOUT) -> None:
+    def __init__(self, browser: str | None = None, *, timeout: float = STEP_TIMEOUT_SECONDS) -> None:
         self._browser = Browser(browser, timeout=timeout, size=(64, 64))
         self._drawn = Scene()
         self._known: set[str] = set()
@@ -147,10 +147,10 @@ class Studio:
 def check_size(size: tuple[int, int], supersample: int) -> None:
     """Refuse a picture that cannot be drawn."""
     width, height = size
-    if min(width, height, supersample) < 1 or max(size) * supersample > LARGEST:
+    if min(width, height, supersample) < 1 or max(size) * supersample > MAX_SIDE_PIXELS:
         raise ViewerError(
             f"a picture of {width}x{height} pixels drawn {supersample} times larger; expected sides from 1 to "
-            f"{LARGEST} pixels, supersampling included; draw it smaller"
+            f"{MAX_SIDE_PIXELS} pixels, supersampling included; draw it smaller"
         )
 
 
@@ -167,12 +167,12 @@ def check_drawn(pixels: Pixels) -> None:
         Where fewer than 0.02 % of the pixels differ from the most common colour.
     """
     packed = np.ascontiguousarray(pixels).view(np.uint32).ravel()
-    values, counts = np.unique(packed[:: max(packed.size // SAMPLE, 1)], return_counts=True)
+    values, counts = np.unique(packed[:: max(packed.size // N_SAMPLED_PIXELS, 1)], return_counts=True)
     common = values[np.argmax(counts)]
     others = packed[packed != common]
-    apart = np.abs(_channels(others) - _channels(common[None])).max(axis=1) > APART
+    apart = np.abs(_channels(others) - _channels(common[None])).max(axis=1) > MIN_CHANNEL_DIFFERENCE
     share = np.count_nonzero(apart) / packed.size
-    if share < FEWEST:
+    if share < MIN_DRAWN_SHARE:
         raise ViewerError(
             f"the picture is flat: {100 * share:.3g} % of its pixels differ from its background; the browser's "
             "WebGL failed, or the camera looks past the scene; check the camera's pose, or use another browser"

@@ -18,14 +18,14 @@ from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.view import View
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
 from posekit.viewer.page.family import family_data, inferred_data, tree_of, walk
-from posekit.viewer.scene.colours import GROUPS, SIDES, number, side
-from posekit.viewer.scene.subject import Shown, Subject, subject_of
+from posekit.viewer.scene.colours import GROUP_RGB, SIDE_RGB, number, side
+from posekit.viewer.scene.subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.world import World, upright_world
 
 Array = NDArray[np.float64]
 Json = dict[str, Any]
 
-STEPS: Final = 10_000
+STEPS_PER_METRE: Final = 10_000
 """Steps a metre: positions are whole numbers of 0.1 mm, a third of the text that full ones would take."""
 MOST_POSTURES: Final = 25_000
 """In one page: about 8 MB of positions."""
@@ -79,9 +79,9 @@ def page_data(
         "kind": "postures" if result is None else "result",
         "points": list(POINTS),
         "joints": len(JOINTS),
-        "steps": STEPS,
-        "colours": {name or "middle": number(colour) for name, colour in SIDES.items()},
-        "groupColours": [number(colour) for colour in GROUPS],
+        "steps": STEPS_PER_METRE,
+        "colours": {name or "middle": number(colour) for name, colour in SIDE_RGB.items()},
+        "groupColours": [number(colour) for colour in GROUP_RGB],
         "pointSides": [side(name) or "middle" for name in POINTS],
         "segments": [[a, b, _segment_side(a, b)] for a, b in SEGMENTS],
         "capsules": _capsules(subject.figure),
@@ -144,7 +144,7 @@ def _uncalibrated(frame: ResultFrame, shown: Shown, world: World) -> Json:
     return found
 
 
-def _truth(result: Result | None, view: View, subject: Subject, chosen: Sequence[int]) -> Array:
+def _truth(result: Result | None, view: View, subject: DrawnSubject, chosen: Sequence[int]) -> Array:
     """Return the true postures; of an uncalibrated view they are moved to where the survivors are drawn."""
     truth = np.array(view.truth[chosen])
     for row, index in enumerate(chosen):
@@ -224,7 +224,7 @@ def _settings(settings: Mapping[str, Any]) -> list[list[str]]:
 
 def _steps(points: Array) -> list[list[int | None]]:
     """Return points (N, K, 3) as N rows of 3 K whole 0.1 mm; None where unknown."""
-    steps = np.rint(points * STEPS).reshape(len(points), 3 * points.shape[1])
+    steps = np.rint(points * STEPS_PER_METRE).reshape(len(points), 3 * points.shape[1])
     return [[None if isnan(value) else int(value) for value in row] for row in steps.tolist()]
 
 

@@ -24,20 +24,20 @@ Array = NDArray[np.float64]
 Json = dict[str, Any]
 Step = tuple[int, int, int]
 
-MIDDLES: Final = {
+MIDDLE_POINTS: Final = {
     "mid_shoulders": (JOINT["right_shoulder"], JOINT["left_shoulder"]),
     "mid_hips": (JOINT["right_hip"], JOINT["left_hip"]),
 }
 """The two points of Taylor's tree between joints; their numbers follow those of `posekit.skeleton.POINTS`."""
 
-SHOULDERS, HIPS = len(POINTS), len(POINTS) + 1
+MID_SHOULDERS, MID_HIPS = len(POINTS), len(POINTS) + 1
 
-TAYLOR: Final = (
-    (JOINT["right_shoulder"], SHOULDERS),
-    (JOINT["left_shoulder"], SHOULDERS),
-    (SHOULDERS, HIPS),
-    (JOINT["right_hip"], HIPS),
-    (JOINT["left_hip"], HIPS),
+TAYLOR_SEGMENTS: Final = (
+    (JOINT["right_shoulder"], MID_SHOULDERS),
+    (JOINT["left_shoulder"], MID_SHOULDERS),
+    (MID_SHOULDERS, MID_HIPS),
+    (JOINT["right_hip"], MID_HIPS),
+    (JOINT["left_hip"], MID_HIPS),
     *(
         (JOINT[f"{side}_{start}"], JOINT[f"{side}_{end}"])
         for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
@@ -49,7 +49,7 @@ TAYLOR: Final = (
 MOST_OF_CURVE: Final = 240
 """Points of the residual's curve in a page."""
 
-FLAT: Final = 1e-9
+FLAT_DEPTH_METRES: Final = 1e-9
 """Metres: a segment that is less deep than this lies in the image plane, and counts as nearer."""
 
 
@@ -62,12 +62,12 @@ def walk(names: Sequence[str]) -> list[Step]:
         The joints of the tree's levels, the root first. With the middles of the girdles among them the tree is
         Taylor's, else the figure's.
     """
-    if not set(MIDDLES) <= set(names) or names[0] not in JOINT:
+    if not set(MIDDLE_POINTS) <= set(names) or names[0] not in JOINT:
         return [(child, parent, -1) for parent, child in TREE_SEGMENTS]
-    pairs = dict(zip((SHOULDERS, HIPS), MIDDLES.values(), strict=True))
+    pairs = dict(zip((MID_SHOULDERS, MID_HIPS), MIDDLE_POINTS.values(), strict=True))
     placed, steps = [JOINT[names[0]]], []
     for parent in placed:
-        for a, b in TAYLOR:
+        for a, b in TAYLOR_SEGMENTS:
             child = b if a == parent else a
             if parent not in (a, b) or child in placed:
                 continue
@@ -85,7 +85,7 @@ def tree_of(names: Sequence[str]) -> Json:
     return {
         "root": steps[0][1],
         "steps": [list(step) for step in steps],
-        "middles": [[name, *pair] for name, pair in MIDDLES.items()],
+        "middles": [[name, *pair] for name, pair in MIDDLE_POINTS.items()],
     }
 
 
@@ -147,7 +147,7 @@ def inferred_data(frame: ResultFrame) -> list[Json]:
 def _nodes(joints: Array) -> Array:
     """Append to joints (N, 14, 3) an unknown head and the girdles' middles: (N, 21, 3)."""
     head = np.full((len(joints), len(POINTS) - len(JOINTS), 3), np.nan)
-    middles = [joints[:, pair].mean(axis=1, keepdims=True) for pair in map(list, MIDDLES.values())]
+    middles = [joints[:, pair].mean(axis=1, keepdims=True) for pair in map(list, MIDDLE_POINTS.values())]
     return np.concatenate([joints, head, *middles], axis=1)
 
 
@@ -161,7 +161,7 @@ def _exact(frame: ResultFrame, image: Array) -> list[bool]:
     return [
         *exact,
         *[False] * (len(POINTS) - len(JOINTS)),
-        *(exact[a] and exact[b] for a, b in MIDDLES.values()),
+        *(exact[a] and exact[b] for a, b in MIDDLE_POINTS.values()),
     ]
 
 
@@ -176,7 +176,9 @@ def _steps(
         lifted = exact[child] and exact[parent]
         # Where a tolerance let one be too short for its image, it is longer at that scale than it is.
         lengths.append(float(np.linalg.norm(apart, axis=1).min()) if lifted else None)
-        columns.append(np.where(apart[:, 2] > FLAT, "1", "0") if lifted else np.full(len(nodes), "r"))
+        columns.append(
+            np.where(apart[:, 2] > FLAT_DEPTH_METRES, "1", "0") if lifted else np.full(len(nodes), "r")
+        )
     return lengths, ["".join(row) for row in zip(*columns, strict=True)]
 
 

@@ -17,10 +17,10 @@ from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.standalone import script_json, standalone_page
 
-START = Eye(position=np.array([-2.6, -3.0, 1.7]), target=np.array([0.0, 0.0, 0.85]))
+START_EYE = Eye(position=np.array([-2.6, -3.0, 1.7]), target=np.array([0.0, 0.0, 0.85]))
 """Until the page's own script has measured the postures."""
 
-SCRIPTS = ("lift.js", "panel.js", "scale.js")
+PAGE_SCRIPTS = ("lift.js", "panel.js", "scale.js")
 """In the order that they need each other; ``scene.js`` runs after them."""
 
 
@@ -33,11 +33,11 @@ def page_html(
 ) -> str:
     """Make the page, as text; see `write_page`."""
     data = page_data(given, view, title=title, frames=frames)
-    scripts = "\n".join(_file(name) for name in SCRIPTS)
+    scripts = "\n".join(_file(name) for name in PAGE_SCRIPTS)
     panel = f"<script>\nconst DATA = {script_json(data)};\n{scripts}\npage.chooseFrame(0);\n</script>"
     return standalone_page(
         Scene(),
-        eye=START,
+        eye=START_EYE,
         title=f"{title} - posekit" if title != "posekit" else title,
         style=_file("page.css"),
         body=f"{_file('page.html')}\n{panel}",

@@ -8,8 +8,8 @@ from typing import Any, Final
 
 from posekit.errors import ViewerError
 
-HOST: Final = "127.0.0.1"
-PATIENCE: Final = 10.0
+LOCAL_HOST: Final = "127.0.0.1"
+IDLE_TIMEOUT_SECONDS: Final = 10.0
 """Seconds that a connection may be idle."""
 
 
@@ -43,22 +43,22 @@ class PageServer(ThreadingHTTPServer):
     def __init__(self, page: str, port: int = 0) -> None:
         self.page = page.encode("utf-8")
         try:
-            super().__init__((HOST, port), _Handler)
+            super().__init__((LOCAL_HOST, port), _Handler)
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or str(error)
             raise ViewerError(
-                f"port {port} of {HOST}: {reason}; expected a free port; give another one, or none"
+                f"port {port} of {LOCAL_HOST}: {reason}; expected a free port; give another one, or none"
             ) from error
 
     @property
     def url(self) -> str:
         """The page's address."""
-        return f"http://{HOST}:{self.server_port}/"
+        return f"http://{LOCAL_HOST}:{self.server_port}/"
 
     @property
     def hosts(self) -> tuple[str, str]:
         """The names by which a browser on this machine asks."""
-        return f"{HOST}:{self.server_port}", f"localhost:{self.server_port}"
+        return f"{LOCAL_HOST}:{self.server_port}", f"localhost:{self.server_port}"
 
     def handle_error(self, request: Any, client_address: Any) -> None:
         """Say nothing when a browser hangs up."""
@@ -68,7 +68,7 @@ class _Handler(BaseHTTPRequestHandler):
     server: PageServer
     server_version = "posekit"
     sys_version = ""
-    timeout = PATIENCE
+    timeout = IDLE_TIMEOUT_SECONDS
 
     def do_GET(self) -> None:
         self._answer(with_body=True)

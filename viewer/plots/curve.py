@@ -8,15 +8,15 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.geometry import Array
-from posekit.viewer.plots.figure import LEFT, RIGHT, drawing
+from posekit.viewer.plots.figure import LEFT_COLOUR, RIGHT_COLOUR, drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FLOOR = 1e-12
+MIN_RESIDUAL_DRAWN = 1e-12
 """Residuals are drawn no lower: below is rounding."""
 
-SHOWN = 3.0
+MAX_SCALE_RATIO = 3.0
 """How many times the least scale is drawn."""
 
 
@@ -44,19 +44,23 @@ def plot_curve(scale: Array, residual: Array, *, minima: tuple[Array, Array], ti
         raise ViewerError(
             f"a curve of {len(scale)} scales and {len(residual)} residuals; expected one of each"
         )
-    near = scale <= SHOWN * scale.min()
+    near = scale <= MAX_SCALE_RATIO * scale.min()
     with drawing() as kind:
         figure = kind(figsize=(5.2, 3.2), layout="constrained")
         axes = figure.subplots()
         axes.plot(
-            scale[near], np.maximum(residual[near], FLOOR), color=LEFT, lw=1.3, label="least over all flips"
+            scale[near],
+            np.maximum(residual[near], MIN_RESIDUAL_DRAWN),
+            color=LEFT_COLOUR,
+            lw=1.3,
+            label="least over all flips",
         )
-        inside = minima[0] <= SHOWN * scale.min()
+        inside = minima[0] <= MAX_SCALE_RATIO * scale.min()
         axes.plot(
             minima[0][inside],
-            np.maximum(minima[1][inside], FLOOR),
+            np.maximum(minima[1][inside], MIN_RESIDUAL_DRAWN),
             "o",
-            color=RIGHT,
+            color=RIGHT_COLOUR,
             ms=4.5,
             label="local minima, each of its own flips",
         )

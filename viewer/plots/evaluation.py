@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
 from posekit.geometry import Array
-from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
+from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 ROLE_LINES: Final[dict[str, Any]] = {"best": "-", "first": "--", "random": ":", "path": "-."}
 ROLE_NAMES: Final = {"best": "best", "first": "ranked first", "random": "at random", "path": "path"}
-SIZE: Final = (5.4, 3.6)
+PLOT_SIZE_INCHES: Final = (5.4, 3.6)
 
 
 def plot_yaw(yaw: Array, errors: Mapping[float, Mapping[str, Array]]) -> Figure:
@@ -39,7 +39,7 @@ def plot_yaw(yaw: Array, errors: Mapping[float, Mapping[str, Array]]) -> Figure:
     lines = [(noise, role, values) for noise, roles in errors.items() for role, values in roles.items()]
     _check(yaw, [values for _, _, values in lines], "yaws")
     with drawing() as kind:
-        figure = kind(figsize=SIZE, layout="constrained")
+        figure = kind(figsize=PLOT_SIZE_INCHES, layout="constrained")
         axes = figure.subplots()
         colours = _colours(list(errors))
         for noise, role, values in lines:
@@ -70,15 +70,17 @@ def plot_survivors(noise: Array, survivors: Mapping[str, Array], without: Array)
     """
     _check(noise, [*survivors.values(), without], "levels of noise")
     with drawing() as kind:
-        figure = kind(figsize=SIZE, layout="constrained")
+        figure = kind(figsize=PLOT_SIZE_INCHES, layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
         for name, line in zip(survivors, ("-", "--", ":", "-."), strict=False):
-            upper.plot(noise, survivors[name], line, marker="o", ms=3.5, color=LEFT, lw=1.3, label=name)
+            upper.plot(
+                noise, survivors[name], line, marker="o", ms=3.5, color=LEFT_COLOUR, lw=1.3, label=name
+            )
         upper.set_yscale("symlog", linthresh=1)
         upper.set_ylim(bottom=0)
         _style(upper, "", "survivors")
         upper.legend()
-        lower.plot(noise, 100 * without, marker="o", ms=3.5, color=RIGHT, lw=1.3)
+        lower.plot(noise, 100 * without, marker="o", ms=3.5, color=RIGHT_COLOUR, lw=1.3)
         lower.set_ylim(0, 100)
         _style(lower, "standard deviation of image points, px", "views without, %")
     return figure
@@ -102,7 +104,7 @@ def plot_correct_poses(threshold: Array, share: Mapping[float, Mapping[str, Arra
     lines = [(noise, role, values) for noise, roles in share.items() for role, values in roles.items()]
     _check(threshold, [values for _, _, values in lines], "thresholds")
     with drawing() as kind:
-        figure = kind(figsize=SIZE, layout="constrained")
+        figure = kind(figsize=PLOT_SIZE_INCHES, layout="constrained")
         axes = figure.subplots()
         colours = _colours(list(share))
         for noise, role, values in lines:
@@ -146,14 +148,14 @@ def plot_reliability(
     with drawing() as kind:
         figure = kind(figsize=(3.8, 4.2), layout="constrained")
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        upper.plot([0, 1], [0, 1], color=MUTED, lw=0.9, linestyle=(0, (1, 2)), label="calibrated")
-        upper.plot(probability, share, "o-", color=LEFT, ms=4.5, lw=1.2, label=f"ECE {error:.3f}")
+        upper.plot([0, 1], [0, 1], color=MUTED_COLOUR, lw=0.9, linestyle=(0, (1, 2)), label="calibrated")
+        upper.plot(probability, share, "o-", color=LEFT_COLOUR, ms=4.5, lw=1.2, label=f"ECE {error:.3f}")
         upper.set_xlim(0, 1)
         upper.set_ylim(0, 1)
         _style(upper, "", f"share with {event}")
         upper.legend()
         edges = np.arange(len(count)) / len(count)
-        lower.bar(edges, count, width=1 / len(count), align="edge", color=MUTED)
+        lower.bar(edges, count, width=1 / len(count), align="edge", color=MUTED_COLOUR)
         _style(lower, "probability of the survivor ranked first", "views")
     return figure
 
@@ -189,6 +191,7 @@ def _legend(figure: Figure, axes: Axes, colours: Mapping[float, str], roles: Seq
         Line2D([], [], color=colour, label=f"{noise:g} px") for noise, colour in colours.items()
     ]
     handles += [
-        Line2D([], [], color=MUTED, linestyle=ROLE_LINES[role], label=ROLE_NAMES[role]) for role in roles
+        Line2D([], [], color=MUTED_COLOUR, linestyle=ROLE_LINES[role], label=ROLE_NAMES[role])
+        for role in roles
     ]
     figure.legend(handles=handles, loc="outside right center")

@@ -14,33 +14,33 @@ from posekit.safe_io.writing import replacing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FORMATS: Final = (".png", ".svg", ".pdf")
-DPI: Final = 160
+PLOT_FORMATS: Final = (".png", ".svg", ".pdf")
+PLOT_DPI: Final = 160
 
-RIGHT: Final = "#D55E00"
-"""Right limbs: vermilion of Okabe & Ito's palette, told from `LEFT` by colour-blind eyes too."""
-LEFT: Final = "#0072B2"
+RIGHT_COLOUR: Final = "#D55E00"
+"""Right limbs: vermilion of Okabe & Ito's palette, told from `LEFT_COLOUR` by colour-blind eyes too."""
+LEFT_COLOUR: Final = "#0072B2"
 """Left limbs: blue of the same palette."""
-TRUNK: Final = "#333333"
-MUTED: Final = "#767676"
+TRUNK_COLOUR: Final = "#333333"
+MUTED_COLOUR: Final = "#767676"
 """What is only there to compare with: printed numbers, what was pruned, hints."""
-FAINT: Final = "#DDDDDD"
+FAINT_COLOUR: Final = "#DDDDDD"
 
-STYLE: Final[Any] = {  # matplotlib's annotations list every key there is
+PLOT_STYLE: Final[Any] = {  # matplotlib's annotations list every key there is
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same on every machine
     "font.size": 9.0,
     "axes.titlesize": 9.5,
     "axes.titlepad": 6.0,
     "axes.labelsize": 9.0,
-    "axes.edgecolor": MUTED,
+    "axes.edgecolor": MUTED_COLOUR,
     "axes.linewidth": 0.6,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
     "xtick.labelsize": 8.0,
     "ytick.labelsize": 8.0,
-    "xtick.color": TRUNK,
-    "ytick.color": TRUNK,
+    "xtick.color": TRUNK_COLOUR,
+    "ytick.color": TRUNK_COLOUR,
     "grid.color": "#E8E8E8",
     "grid.linewidth": 0.6,
     "legend.frameon": False,
@@ -66,7 +66,7 @@ def drawing() -> Iterator[type[Figure]]:
         raise ViewerError(
             "plots need matplotlib, which is not installed; run: pip install 'posekit[pictures]'"
         ) from error
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(PLOT_STYLE):
         yield Figure
 
 
@@ -85,7 +85,7 @@ def save(figure: Figure, path: str | Path) -> None:
     InputError
         Where the suffix is another, or the file cannot be written.
     """
-    kind = suffix(path, *FORMATS)
+    kind = suffix(path, *PLOT_FORMATS)
     date: dict[str, Any] = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[kind]
     with drawing(), replacing(path) as file:
-        figure.savefig(file, format=kind[1:], dpi=DPI, metadata=date, facecolor="white")
+        figure.savefig(file, format=kind[1:], dpi=PLOT_DPI, metadata=date, facecolor="white")

@@ -11,7 +11,7 @@ from posekit.formats.own.camera_model import LeeChenModel, ScaledOrthographicMod
 from posekit.formats.own.result import Result
 from posekit.formats.own.view import View
 from posekit.skeleton import JOINTS
-from posekit.viewer.plots.figure import RIGHT, TRUNK, drawing
+from posekit.viewer.plots.figure import RIGHT_COLOUR, TRUNK_COLOUR, drawing
 from posekit.viewer.plots.panels import panels, same_scale
 from posekit.viewer.plots.stick import add_key, draw_stick
 from posekit.viewer.scene.subject import subject_of
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SAME = 6
+SAME_POINT_DIGITS = 6
 """Digits after the point to which image points of several survivors are one."""
 
 
@@ -63,11 +63,11 @@ def plot_image(view: View, frames: Sequence[int] | None = None, *, result: Resul
             if isinstance(view.camera, ScaledOrthographicModel):
                 panel.set_aspect(1 / view.camera.aspect)
             draw_stick(panel, points, extent=extent)
-            panel.plot(*face.T, linestyle="none", marker=".", markersize=3.5, color=TRUNK, gid="head")
+            panel.plot(*face.T, linestyle="none", marker=".", markersize=3.5, color=TRUNK_COLOUR, gid="head")
             if len(rings):
                 panel.plot(
                     *rings.T, linestyle="none", marker="o", markersize=5.5, markerfacecolor="none",
-                    markeredgecolor=RIGHT, markeredgewidth=0.8, gid="reprojected",
+                    markeredgecolor=RIGHT_COLOUR, markeredgewidth=0.8, gid="reprojected",
                 )  # fmt: skip
             panel.set_title(f"frame {frame + 1}, {view.time[frame]:.3g} s")
         figure.supxlabel(f"image x ({view.unit})" if metric else "image u (pixels)", fontsize=9)
@@ -93,5 +93,5 @@ def _reprojected(view: View, result: Result, frames: Sequence[int], scale: float
             for sight, points in zip(sights, shown.points, strict=True)
         ]
         seen = scale * np.concatenate(images)
-        found.append(np.unique(seen[np.isfinite(seen).all(axis=1)].round(SAME), axis=0))
+        found.append(np.unique(seen[np.isfinite(seen).all(axis=1)].round(SAME_POINT_DIGITS), axis=0))
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.formats.own.result import ResultFrame
-from posekit.viewer.plots.figure import LEFT, MUTED, RIGHT, drawing
+from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 from posekit.viewer.plots.panels import panels
 from posekit.viewer.plots.tree_nodes import scale_count
 
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-STAGES: Final = {
-    "physical": ("physical constraints", LEFT, "o"),
-    "motion": ("and the motion model", RIGHT, "D"),
+STAGE_STYLES: Final = {
+    "physical": ("physical constraints", LEFT_COLOUR, "o"),
+    "motion": ("and the motion model", RIGHT_COLOUR, "D"),
 }
 
 
@@ -58,7 +58,7 @@ def plot_levels(
             kind, len(frames), columns=5, size=(2.5, 3.3), what="frames", sharey=True, extra=0.8
         )
         largest = 1
-        stages = [stage for stage in STAGES if stage == "physical" or _has_motion(frames)]
+        stages = [stage for stage in STAGE_STYLES if stage == "physical" or _has_motion(frames)]
         for index, (panel, frame, name) in enumerate(zip(axes, frames, names, strict=True)):
             rows = {stage: np.asarray(frame.levels[stage]) for stage in stages}
             print_rows = {stage: np.asarray((printed or {})[stage][index]) for stage in printed or {}}
@@ -81,7 +81,7 @@ def _draw(
     panel: Axes, rows: Mapping[str, np.ndarray], print_rows: Mapping[str, np.ndarray], *, trees: int
 ) -> None:
     for stage, counts in rows.items():
-        label, colour, marker = STAGES[stage]
+        label, colour, marker = STAGE_STYLES[stage]
         levels = np.arange(len(counts))
         alive = counts > 0
         panel.plot(
@@ -104,7 +104,7 @@ def _draw(
                 color=colour,
             )
     for stage, counts in print_rows.items():
-        label, colour, marker = STAGES[stage]
+        label, colour, marker = STAGE_STYLES[stage]
         panel.plot(
             counts, np.arange(len(counts)), linestyle="none", marker=marker, markersize=8,
             markerfacecolor="none", markeredgecolor=colour, markeredgewidth=0.7,
@@ -112,7 +112,7 @@ def _draw(
         )  # fmt: skip
     depth = len(next(iter(rows.values())))
     panel.plot(
-        trees * 2.0 ** np.arange(depth), np.arange(depth), color=MUTED, linestyle=(0, (1, 2)), linewidth=0.9,
+        trees * 2.0 ** np.arange(depth), np.arange(depth), color=MUTED_COLOUR, linestyle=(0, (1, 2)), linewidth=0.9,
         label="if nothing were pruned", gid="full tree",
     )  # fmt: skip
 
@@ -143,7 +143,7 @@ def _check(
     printed: Mapping[str, Sequence[Sequence[int]]],
     titles: Sequence[str] | None,
 ) -> None:
-    unknown = set(printed) - set(STAGES)
+    unknown = set(printed) - set(STAGE_STYLES)
     if unknown:
         raise ViewerError(f"printed: got {', '.join(sorted(unknown))}; expected physical, motion or both")
     for stage, rows in printed.items():

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST: Final = 64
+MAX_PANELS: Final = 64
 """Panels in one drawing."""
 
 
@@ -36,8 +36,8 @@ def panels(
     ViewerError
         Where there is nothing to draw, or more than can be read.
     """
-    if not 0 < count <= MOST:
-        raise ViewerError(f"got {count} {what} to draw; expected 1 to {MOST}; choose some of them")
+    if not 0 < count <= MAX_PANELS:
+        raise ViewerError(f"got {count} {what} to draw; expected 1 to {MAX_PANELS}; choose some of them")
     columns = min(columns, count)
     rows = math.ceil(count / columns)
     figure = kind(figsize=(columns * size[0] + 0.4, rows * size[1] + extra), layout="constrained")

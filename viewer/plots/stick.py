@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.skeleton import HIPS, JOINTS, SEGMENTS, SIDES, TORSO, segment_name
-from posekit.viewer.plots.figure import LEFT, RIGHT, TRUNK
+from posekit.viewer.plots.figure import LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-COLOURS: Final = {"right": RIGHT, "left": LEFT, "trunk": TRUNK}
-DASHES: Final = (0, (3.2, 1.6))
-WAVES: Final = 7
+SIDE_COLOURS: Final = {"right": RIGHT_COLOUR, "left": LEFT_COLOUR, "trunk": TRUNK_COLOUR}
+LEFT_DASHES: Final = (0, (3.2, 1.6))
+N_WAVES: Final = 7
 """Waves along a right limb's segment, whatever its length: it is seen which one is foreshortened."""
-AMPLITUDE: Final = 0.012
+WAVE_AMPLITUDE: Final = 0.012
 """Of the waves, as a part of the figure's extent."""
 
 
@@ -60,18 +60,20 @@ def draw_stick(
         if np.isnan(ends).any():
             continue
         whose = side(segment)
-        line = wave(ends, AMPLITUDE * extent) if whose == "right" else ends
+        line = wave(ends, WAVE_AMPLITUDE * extent) if whose == "right" else ends
         axes.plot(
             *line.T,
-            color=colour or COLOURS[whose],
+            color=colour or SIDE_COLOURS[whose],
             linewidth=width,
-            linestyle=DASHES if whose == "left" else "solid",
+            linestyle=LEFT_DASHES if whose == "left" else "solid",
             alpha=alpha,
             solid_capstyle="round",
             solid_joinstyle="round",
             gid=f"{whose}:{segment_name(segment)}",
         )
-    axes.plot(*points.T, linestyle="none", marker="o", markersize=2.2, color=TRUNK, alpha=alpha, gid="joints")
+    axes.plot(
+        *points.T, linestyle="none", marker="o", markersize=2.2, color=TRUNK_COLOUR, alpha=alpha, gid="joints"
+    )
 
 
 def wave(ends: Array, amplitude: float) -> Array:
@@ -80,10 +82,10 @@ def wave(ends: Array, amplitude: float) -> Array:
     length = float(np.hypot(*along))
     if length == 0.0:
         return ends
-    t = np.linspace(0.0, 1.0, 16 * WAVES + 1)
+    t = np.linspace(0.0, 1.0, 16 * N_WAVES + 1)
     across = np.array([-along[1], along[0]]) / length
     # A short segment, pointing at the viewer, would turn into a coil.
-    height = min(amplitude, length / (3 * WAVES)) * np.sin(2 * np.pi * WAVES * t)
+    height = min(amplitude, length / (3 * N_WAVES)) * np.sin(2 * np.pi * N_WAVES * t)
     line: Array = ends[0] + t[:, None] * along + height[:, None] * across
     line[-1] = ends[1]
     return line
@@ -94,13 +96,20 @@ def add_key(figure: Figure) -> None:
     from matplotlib.lines import Line2D
 
     # matplotlib's own sketch filter stands in for the wave: a legend's line has two points only.
-    right = Line2D([], [], color=RIGHT, linewidth=1.5, label="right arm and leg (wavy)")
+    right = Line2D([], [], color=RIGHT_COLOUR, linewidth=1.5, label="right arm and leg (wavy)")
     right.set_sketch_params(scale=2.5, length=14.0, randomness=1.0)
     figure.legend(
         handles=[
             right,
-            Line2D([], [], color=LEFT, linewidth=1.5, linestyle=DASHES, label="left arm and leg (dashed)"),
-            Line2D([], [], color=TRUNK, linewidth=1.5, label="torso and hips"),
+            Line2D(
+                [],
+                [],
+                color=LEFT_COLOUR,
+                linewidth=1.5,
+                linestyle=LEFT_DASHES,
+                label="left arm and leg (dashed)",
+            ),
+            Line2D([], [], color=TRUNK_COLOUR, linewidth=1.5, label="torso and hips"),
         ],
         loc="outside upper center",
         ncols=3 if figure.get_figwidth() > 6 else 1,

@@ -8,20 +8,20 @@ from typing import TYPE_CHECKING, Final
 
 from posekit.errors import ViewerError
 from posekit.formats.own.result import ResultFrame
-from posekit.viewer.plots.figure import MUTED, TRUNK, drawing
+from posekit.viewer.plots.figure import MUTED_COLOUR, TRUNK_COLOUR, drawing
 from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, scale_count, tips
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MARKERS: Final = {"rigid_parts": "s", "joint_range": "X", "collision": "^", "walking": "D"}
+CHECK_MARKERS: Final = {"rigid_parts": "s", "joint_range": "X", "collision": "^", "walking": "D"}
 """One shape a check; what is no check of these (no solution of the lift, for instance) is a P."""
-COLOURS: Final = (
+REASON_COLOURS: Final = (
     "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C564B", "#7F3FBF", "#B8A500", "#2F4F4F",
 )  # fmt: skip
 """Okabe & Ito's palette and four more, for the reasons that took most leaves; the rest is grey."""
-OTHER: Final = "#AAAAAA"
+OTHER_COLOUR: Final = "#AAAAAA"
 
 
 def plot_tree(frame: ResultFrame, levels: int | None = None) -> Figure:
@@ -54,7 +54,7 @@ def plot_tree(frame: ResultFrame, levels: int | None = None) -> Figure:
     lost = Counter[str]()
     for branch, reason in pruned_branches(frame):
         lost[reason] += 2 ** (depth - len(branch))
-    colours = dict(zip((reason for reason, _ in lost.most_common()), COLOURS, strict=False))
+    colours = dict(zip((reason for reason, _ in lost.most_common()), REASON_COLOURS, strict=False))
     with drawing() as kind:
         width = min(max(8.5, 0.1 * len(ends) + 4.0), 22.0)
         figure = kind(figsize=(width, 1.6 + 0.42 * (shown + 1)), layout="constrained")
@@ -103,7 +103,7 @@ def _draw(axes: Axes, ends: Sequence[Tip], shown: int, colours: dict[str, str]) 
 
     places = place(ends)
     living = {tip.branch[:level] for tip in ends if tip.survivors for level in range(len(tip.branch) + 1)}
-    fate = {tip.branch: colours.get(tip.reason, OTHER) for tip in ends if not tip.survivors}
+    fate = {tip.branch: colours.get(tip.reason, OTHER_COLOUR) for tip in ends if not tip.survivors}
     edges = [branch for branch in places if branch]
     for name, chosen, width in (
         ("pruned", [branch for branch in edges if branch not in living], 0.7),
@@ -112,7 +112,10 @@ def _draw(axes: Axes, ends: Sequence[Tip], shown: int, colours: dict[str, str]) 
         axes.add_collection(
             LineCollection(
                 [(places[branch[:-1]], places[branch]) for branch in chosen],
-                colors=[TRUNK if name == "surviving" else fate.get(branch, MUTED) for branch in chosen],
+                colors=[
+                    TRUNK_COLOUR if name == "surviving" else fate.get(branch, MUTED_COLOUR)
+                    for branch in chosen
+                ],
                 linewidths=width,
                 gid=name,
             )
@@ -120,7 +123,7 @@ def _draw(axes: Axes, ends: Sequence[Tip], shown: int, colours: dict[str, str]) 
     for tip in ends:
         x, level = places[tip.branch]
         if tip.survivors:
-            axes.plot(x, level, "o", color=TRUNK, markersize=4, gid="survivor", zorder=3)
+            axes.plot(x, level, "o", color=TRUNK_COLOUR, markersize=4, gid="survivor", zorder=3)
             if tip.survivors > 1:
                 axes.annotate(
                     str(tip.survivors), (x, level), xytext=(0, -6), textcoords="offset points",
@@ -132,12 +135,12 @@ def _draw(axes: Axes, ends: Sequence[Tip], shown: int, colours: dict[str, str]) 
                 markeredgewidth=0, zorder=3,
             )  # fmt: skip
         else:
-            axes.plot(x, level, "|", color=MUTED, markersize=5, gid="dies below", zorder=3)
+            axes.plot(x, level, "|", color=MUTED_COLOUR, markersize=5, gid="dies below", zorder=3)
 
 
 def marker_of(reason: str) -> str:
     """Return the shape of a reason's check."""
-    return MARKERS.get(reason.split("/", maxsplit=1)[0], "P")
+    return CHECK_MARKERS.get(reason.split("/", maxsplit=1)[0], "P")
 
 
 def words(reason: str) -> str:
@@ -153,14 +156,14 @@ def _legend(figure: Figure, lost: Counter[str], colours: dict[str, str]) -> None
     def entry(label: str, colour: str, marker: str) -> Line2D:
         return Line2D([], [], linestyle="none", color=colour, marker=marker, markersize=5, label=label)
 
-    handles = [entry("survivor", TRUNK, "o")]
+    handles = [entry("survivor", TRUNK_COLOUR, "o")]
     handles += [
         entry(f"{words(reason)} ({lost[reason]})", colour, marker_of(reason))
         for reason, colour in colours.items()
     ]
     rest = [reason for reason in lost if reason not in colours]
     if rest:
-        handles.append(entry(f"{len(rest)} other reasons ({sum(lost[r] for r in rest)})", OTHER, "P"))
+        handles.append(entry(f"{len(rest)} other reasons ({sum(lost[r] for r in rest)})", OTHER_COLOUR, "P"))
     figure.legend(
         handles=handles, loc="outside right upper", title="pruned by (leaves lost)", alignment="left"
     )

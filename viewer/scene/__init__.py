@@ -8,8 +8,8 @@ from posekit.viewer.scene.eye import Eye as Eye
 from posekit.viewer.scene.eye import ParallelEye as ParallelEye
 from posekit.viewer.scene.eye import ViewEye as ViewEye
 from posekit.viewer.scene.scene import Scene as Scene
+from posekit.viewer.scene.subject import DrawnSubject as DrawnSubject
 from posekit.viewer.scene.subject import Shown as Shown
-from posekit.viewer.scene.subject import Subject as Subject
 from posekit.viewer.scene.subject import subject_of as subject_of
 from posekit.viewer.scene.world import World as World
 from posekit.viewer.scene.world import upright_world as upright_world

@@ -15,25 +15,25 @@ from posekit.errors import ViewerError
 from posekit.formats.own import Inferred
 from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
-from posekit.viewer.scene.colours import ALARM, POINT_SIDES, SIDES, Rgb, number, side
+from posekit.viewer.scene.colours import ALARM_RGB, POINT_SIDES, SIDE_RGB, Rgb, number, side
 from posekit.viewer.scene.region import add_region
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.shapes import add_ball, add_tubes, glow, matte, smooth
 from posekit.viewer.scene.world import World
 
-SAME = 1e-6
+SAME_POSTURE_METRES = 1e-6
 """Metres within which forward kinematics must give a posture back for its bodies to be drawn by q."""
 
-JOINT_RADIUS, HEAD_POINT_RADIUS, BONE_RADIUS, HALO = 0.032, 0.013, 0.010, 2.2
+JOINT_RADIUS, HEAD_POINT_RADIUS, BONE_RADIUS, HALO_RATIO = 0.032, 0.013, 0.010, 2.2
 """Metres; a halo is that many times the joint it surrounds."""
 
 HEAD_OPACITY = 0.45
 """Through which nose, eyes and ears are seen: they tell where the head looks."""
 
-FADED = 0.25
+FADED_OPACITY = 0.25
 """Opacity of the rest of a body, where something in it is to be pointed at."""
 
-HOLLOW = 0.35
+HOLLOW_OPACITY = 0.35
 """Opacity of joints that were not seen, and of bones that end in one."""
 
 
@@ -65,7 +65,7 @@ class Look:
             raise ViewerError(f"opacity is {self.opacity:g}; expected more than 0 and at most 1")
 
 
-TRANSLUCENT = Look()
+TRANSLUCENT_LOOK = Look()
 
 
 def add_posture(
@@ -76,7 +76,7 @@ def add_posture(
     figure: Figure,
     world: World,
     q: Array | None = None,
-    look: Look = TRANSLUCENT,
+    look: Look = TRANSLUCENT_LOOK,
     links: tuple[str, ...] = (),
     joints: tuple[str, ...] = (),
     inferred: Mapping[str, Inferred] | None = None,
@@ -126,14 +126,14 @@ def add_posture(
     inferred = inferred or {}
     guessed = {index for index, point in enumerate(POINTS) if point in inferred}
     pointed = bool(links or joints)
-    opacity = min(look.opacity, FADED) if pointed else look.opacity
+    opacity = min(look.opacity, FADED_OPACITY) if pointed else look.opacity
     if look.bodies:
         colours = {
-            capsule: (*ALARM, 1.0)
+            capsule: (*ALARM_RGB, 1.0)
             if capsule.link in links
             else (
-                *look.body.get(capsule.link, SIDES[side(capsule.link)]),
-                min(_opacity(capsule.link, opacity), FADED if guessed & set(capsule.points) else 1.0),
+                *look.body.get(capsule.link, SIDE_RGB[side(capsule.link)]),
+                min(_opacity(capsule.link, opacity), FADED_OPACITY if guessed & set(capsule.points) else 1.0),
             )
             for capsule in figure.capsules
             if capsule.link not in look.without
@@ -145,13 +145,13 @@ def add_posture(
         for index, point in enumerate(POINTS):
             if point in look.without:
                 continue
-            opacity = HOLLOW if index in guessed else 1.0
+            opacity = HOLLOW_OPACITY if index in guessed else 1.0
             in_head = index in HEAD
             _add_joint(
                 scene, name, point, placed[index], in_head=in_head, alarm=point in joints, opacity=opacity
             )
             if point in inferred:
-                path, colour = f"{name}/regions/{point}", SIDES[side(point)]
+                path, colour = f"{name}/regions/{point}", SIDE_RGB[side(point)]
                 add_region(scene, path, inferred[point], world=world, shift=shift, colour=colour)
     if look.bones:
         for hollow in (False, True):
@@ -167,9 +167,9 @@ def _add_bones(
     scene: Scene, path: str, placed: Array, chosen: Sequence[tuple[int, int]], *, hollow: bool
 ) -> None:
     pairs = np.array(chosen, dtype=np.intp).reshape(-1, 2)
-    shades = np.array([SIDES[POINT_SIDES[child]] for _, child in chosen]).reshape(-1, 3)
+    shades = np.array([SIDE_RGB[POINT_SIDES[child]] for _, child in chosen]).reshape(-1, 3)
     starts, ends = placed[pairs[:, 0]], placed[pairs[:, 1]]
-    opacity = HOLLOW if hollow else 1.0
+    opacity = HOLLOW_OPACITY if hollow else 1.0
     add_tubes(scene, path, starts, ends, shades, radius=BONE_RADIUS, opacity=opacity)
 
 
@@ -178,13 +178,13 @@ def _add_joint(
 ) -> None:
     if not np.isfinite(middle).all():
         return
-    colour = ALARM if alarm else SIDES[side(point)]
+    colour = ALARM_RGB if alarm else SIDE_RGB[side(point)]
     if in_head:
         add_ball(scene, f"{name}/head/{point}", middle, HEAD_POINT_RADIUS, matte(colour))
         return
     add_ball(scene, f"{name}/joints/{point}", middle, JOINT_RADIUS, matte(colour, opacity))
     if alarm:
-        add_ball(scene, f"{name}/halos/{point}", middle, HALO * JOINT_RADIUS, glow(ALARM, 0.35))
+        add_ball(scene, f"{name}/halos/{point}", middle, HALO_RATIO * JOINT_RADIUS, glow(ALARM_RGB, 0.35))
 
 
 def _add_capsules(
@@ -220,7 +220,7 @@ def _gives_back(figure: Figure, q: Array, points: Array) -> bool:
         return False
     seen = np.isfinite(points).all(axis=1)
     gap = np.linalg.norm(figure.forward_kinematics(q[None])[0] - points, axis=1)[seen]
-    return bool((gap < SAME).all())
+    return bool((gap < SAME_POSTURE_METRES).all())
 
 
 def _laid(capsule: Capsule, points: Array) -> Array:

@@ -12,20 +12,20 @@ from posekit.errors import ViewerError
 from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.scene.subject import Shown, Subject
+from posekit.viewer.scene.subject import DrawnSubject, Shown
 
-TANGENT = 0.01
+TANGENT_METRES = 0.01
 """Metres by which a segment may be too short for its image, where the result does not tell."""
 
 
-def rejected_of(result: Result, subject: Subject, frame: int) -> Shown:
+def rejected_of(result: Result, subject: DrawnSubject, frame: int) -> Shown:
     """Gather a frame's pruned branches, each with the finding that killed it.
 
     Parameters
     ----------
     result : Result
         Written with every pruned branch (``posekit recover --explain``).
-    subject : Subject
+    subject : DrawnSubject
         The same result's, with a camera.
     frame : int
         From 0.
@@ -85,7 +85,7 @@ def one_a_reason(shown: Shown) -> Shown:
 
 
 def lift_branch(
-    camera: Camera, root: Array, image: Array, lengths: Array, bits: str, *, tolerance: float = TANGENT
+    camera: Camera, root: Array, image: Array, lengths: Array, bits: str, *, tolerance: float = TANGENT_METRES
 ) -> Array:
     """Place the joints of a branch (14, 3), metres; NaN beyond its last choice, and where no ray reaches.
 
@@ -122,5 +122,5 @@ def _bits(record: Mapping[str, Any]) -> str:
 
 def _tangent(settings: Mapping[str, Any]) -> float:
     measured = settings.get("measured")
-    value = measured.get("tangent", TANGENT) if isinstance(measured, Mapping) else TANGENT
-    return float(value) if isinstance(value, int | float) else TANGENT
+    value = measured.get("tangent", TANGENT_METRES) if isinstance(measured, Mapping) else TANGENT_METRES
+    return float(value) if isinstance(value, int | float) else TANGENT_METRES

@@ -21,15 +21,15 @@ def number(colour: Rgb) -> int:
     return red << 16 | green << 8 | blue
 
 
-RIGHT: Final = rgb("#e69f00")  # orange
-LEFT: Final = rgb("#0072b2")  # blue
-MIDDLE: Final = rgb("#9a9a9a")
-ALARM: Final = rgb("#d4006a")
-FRUSTUM: Final = rgb("#303030")
+RIGHT_RGB: Final = rgb("#e69f00")  # orange
+LEFT_RGB: Final = rgb("#0072b2")  # blue
+MIDDLE_RGB: Final = rgb("#9a9a9a")
+ALARM_RGB: Final = rgb("#d4006a")
+FRUSTUM_RGB: Final = rgb("#303030")
 
-SIDES: Final = {"right": RIGHT, "left": LEFT, "": MIDDLE}
+SIDE_RGB: Final = {"right": RIGHT_RGB, "left": LEFT_RGB, "": MIDDLE_RGB}
 
-GROUPS: Final = tuple(
+GROUP_RGB: Final = tuple(
     rgb(text)
     for text in ("#009e73", "#cc79a7", "#56b4e9", "#d55e00", "#f0e442", "#0072b2", "#e69f00", "#505050")
 )
@@ -39,7 +39,7 @@ GROUPS: Final = tuple(
 def side(name: str) -> str:
     """Return the side that a joint, link or limb is on: ``right``, ``left`` or empty."""
     word = name.split("_", 1)[0]
-    return word if word in SIDES else ""
+    return word if word in SIDE_RGB else ""
 
 
 POINT_SIDES: Final = tuple(side(name) for name in POINTS)

@@ -13,7 +13,7 @@ from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, PARENTS, POINTS
 from posekit.viewer.scene.body import Look, add_posture
-from posekit.viewer.scene.colours import GROUPS
+from posekit.viewer.scene.colours import GROUP_RGB
 from posekit.viewer.scene.culprit import Culprit, culprit
 from posekit.viewer.scene.framing import sight_axes
 from posekit.viewer.scene.region import corners_of
@@ -24,11 +24,11 @@ from posekit.viewer.scene.subject import Shown
 from posekit.viewer.scene.superposed import superposed_looks
 from posekit.viewer.scene.world import World
 
-LAYOUTS: Final = ("side-by-side", "superposed")
-MOST: Final = 200
+SCENE_LAYOUTS: Final = ("side-by-side", "superposed")
+MAX_POSTURES_DRAWN: Final = 200
 """Postures in one picture: more are neither drawn quickly nor told apart."""
 
-GAP = 0.25
+BODY_GAP_METRES = 0.25
 """Metres between two bodies side by side."""
 
 ROW_GAP, ONE_ROW = 1.3, 7
@@ -64,8 +64,8 @@ class Style:
     ground: bool = True
 
     def __post_init__(self) -> None:
-        if self.layout not in LAYOUTS:
-            raise ViewerError(f"layout: {self.layout!r}; expected {' or '.join(LAYOUTS)}")
+        if self.layout not in SCENE_LAYOUTS:
+            raise ViewerError(f"layout: {self.layout!r}; expected {' or '.join(SCENE_LAYOUTS)}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,10 +99,10 @@ def compose(
     ViewerError
         Where nothing is known of any posture, or there are more than 200.
     """
-    if len(shown) > MOST:
+    if len(shown) > MAX_POSTURES_DRAWN:
         raise ViewerError(
-            f"{len(shown)} postures in one picture; expected at most {MOST}; choose some, as --posture 0,5,7 or "
-            "--posture groups"
+            f"{len(shown)} postures in one picture; expected at most {MAX_POSTURES_DRAWN}; choose some, "
+            "as --posture 0,5,7 or --posture groups"
         )
     known = [k for k in range(len(shown)) if np.isfinite(shown.points[k]).all(axis=1).any()]
     if not known:
@@ -138,7 +138,7 @@ def compose(
         regions = shown.inferred[k].values() if shown.inferred else ()
         drawn += [body, *(corners_of(one, world) + shift for one in regions)]
         if apart and shown.groups is not None:
-            mat = add_mat(scene, f"posture-{k}/mat", body, GROUPS[int(shown.groups[k]) % len(GROUPS)])
+            mat = add_mat(scene, f"posture-{k}/mat", body, GROUP_RGB[int(shown.groups[k]) % len(GROUP_RGB)])
             drawn.append(mat)
     bodies = np.concatenate(drawn)
     points = bodies
@@ -167,7 +167,9 @@ def _shifts(placed: Array, world: World, azimuth: float) -> Array:
     right, ahead = sight_axes(world, azimuth)
     rows = row_count(count)
     columns = int(np.ceil(count / rows))
-    widest, deepest = (_extent(placed @ axis) + gap for axis, gap in ((right, GAP), (ahead, ROW_GAP)))
+    widest, deepest = (
+        _extent(placed @ axis) + gap for axis, gap in ((right, BODY_GAP_METRES), (ahead, ROW_GAP))
+    )
     k = np.arange(count)
     across = (k % columns - (columns - 1) / 2) * widest
     back = (k // columns - (rows - 1) / 2) * deepest

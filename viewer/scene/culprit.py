@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from posekit.body.capsules import AXES
 from posekit.skeleton import HIPS, JOINT, TORSO
 
-RIGID = {"torso": TORSO, "hips": HIPS}
-KNEES = ("right_knee", "left_knee")
+RIGID_JOINTS = {"torso": TORSO, "hips": HIPS}
+KNEE_JOINTS = ("right_knee", "left_knee")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +36,11 @@ def culprit(reason: str) -> Culprit:
     ('right_forearm', 'torso')
     """
     check, _, where = reason.rpartition("/")
-    if check != "collision" and where in RIGID:
-        return Culprit(joints=RIGID[where])
+    if check != "collision" and where in RIGID_JOINTS:
+        return Culprit(joints=RIGID_JOINTS[where])
     words = where.split(".")
     if words[-1] in ("knees", "standing_leg"):
-        return Culprit(joints=KNEES)
+        return Culprit(joints=KNEE_JOINTS)
     parts = [part for word in words for part in word.split("-")]
     links = tuple(part for part in parts if part in AXES)
     joints = [name for part in parts if part not in AXES for name in _joints(part)]

@@ -12,13 +12,13 @@ from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.viewer.scene.world import World
 
-NEAR, FAR = 0.01, 1000.0
+NEAR_METRES, FAR_METRES = 0.01, 1000.0
 """Metres in front of the camera between which things are drawn."""
 
-REACH = 100.0
+RELATIVE_REACH_METRES = 100.0
 """Metres before and behind the origin between which things are drawn where depth is relative."""
 
-FACING: Array = np.diag([1.0, -1.0, -1.0])
+OPENGL_FACING: Array = np.diag([1.0, -1.0, -1.0])
 """From OpenCV's camera axes (y down, z forward) to OpenGL's (y up, z backward), and back."""
 
 
@@ -96,7 +96,7 @@ class ViewEye:
     def matrices(self, width: int, height: int) -> tuple[Array, Array]:
         """Return the pose in the world and the clip matrix, (4, 4) both."""
         pose = self.world.T_world_cam
-        pose[:3, :3] = pose[:3, :3] @ FACING
+        pose[:3, :3] = pose[:3, :3] @ OPENGL_FACING
         K = np.array(self.K, dtype=np.float64)
         K[:2, 2] += 0.5  # to the picture's corner from the middle of its first pixel
         return pose, clip_matrix(K, width, height)
@@ -123,12 +123,12 @@ class ParallelEye:
     def matrices(self, width: int, height: int) -> tuple[Array, Array]:
         """Return the pose in the world and the clip matrix, (4, 4) both."""
         pose = self.world.T_world_cam
-        pose[:3, :3] = pose[:3, :3] @ FACING
+        pose[:3, :3] = pose[:3, :3] @ OPENGL_FACING
         (a, b), (u, v) = np.asarray(self.scale), np.asarray(self.centre) + 0.5
         clip = np.zeros((4, 4))
         clip[0, [0, 3]] = 2 * a / width, 2 * u / width - 1
         clip[1, [1, 3]] = 2 * b / height, 1 - 2 * v / height
-        clip[2, 2], clip[3, 3] = -1 / REACH, 1.0
+        clip[2, 2], clip[3, 3] = -1 / RELATIVE_REACH_METRES, 1.0
         return pose, clip
 
 
@@ -145,6 +145,9 @@ def clip_matrix(K: ArrayLike, width: int, height: int) -> Array:
     clip = np.zeros((4, 4))
     clip[0, :3] = 2 * K[0, 0] / width, -2 * K[0, 1] / width, 1 - 2 * K[0, 2] / width
     clip[1, 1:3] = 2 * K[1, 1] / height, 2 * K[1, 2] / height - 1
-    clip[2, 2:] = -(FAR + NEAR) / (FAR - NEAR), -2 * FAR * NEAR / (FAR - NEAR)
+    clip[2, 2:] = (
+        -(FAR_METRES + NEAR_METRES) / (FAR_METRES - NEAR_METRES),
+        -2 * FAR_METRES * NEAR_METRES / (FAR_METRES - NEAR_METRES),
+    )
     clip[3, 2] = -1.0
     return clip

@@ -8,10 +8,10 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.viewer.scene.eye import CameraEye, Eye, ParallelEye, ViewEye
-from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.sight import ImageSight
 from posekit.viewer.scene.world import World
 
-FLESH = 0.13
+FLESH_METRES = 0.13
 """Metres of body around the outermost joints, to be kept in the picture."""
 
 
@@ -70,12 +70,12 @@ def orbit(
     return [Eye(position=target + distance * axes[2], target=target, fov=fov) for axes in turns]
 
 
-def view_eye(sight: Sight | None, world: World, size: tuple[int, int]) -> CameraEye:
+def view_eye(sight: ImageSight | None, world: World, size: tuple[int, int]) -> CameraEye:
     """Look through the view's own camera: its image, as large as fits, in the middle of the picture.
 
     Parameters
     ----------
-    sight : Sight
+    sight : ImageSight
     world : World
     size : (int, int)
         Width and height of the picture, pixels.
@@ -130,4 +130,6 @@ def _half_angles(fov: float, aspect: float) -> tuple[float, float]:
 def _distance(extent: Array, across: float, tall: float) -> float:
     """Return how far from the middle one must stand: extent (M, 3) to the right, up and towards one."""
     x, y, z = extent.T
-    return float(max((z + (np.abs(x) + FLESH) / across).max(), (z + (np.abs(y) + FLESH) / tall).max()))
+    return float(
+        max((z + (np.abs(x) + FLESH_METRES) / across).max(), (z + (np.abs(y) + FLESH_METRES) / tall).max())
+    )

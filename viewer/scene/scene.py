@@ -27,7 +27,7 @@ ARRAY_TYPES = {0x12: "Uint8Array", 0x15: "Int32Array", 0x16: "Uint32Array", 0x17
 
 
 @dataclass(kw_only=True)
-class Node:
+class SceneNode:
     """What is at one path: an object, where it is, and its properties."""
 
     object: Json | None = None
@@ -51,7 +51,7 @@ class Scene:
     """
 
     def __init__(self) -> None:
-        self.nodes: dict[str, Node] = {}
+        self.nodes: dict[str, SceneNode] = {}
         self.geometries: dict[str, Json] = {}
 
     @property
@@ -69,7 +69,7 @@ class Scene:
         if kind == "delete":
             self.remove(path)
             return
-        node = self.nodes.setdefault(path, Node())
+        node = self.nodes.setdefault(path, SceneNode())
         if kind == "set_object":
             node.object = self._object(data["object"])
             node.properties = {}
@@ -80,7 +80,7 @@ class Scene:
 
     def transform(self, path: str, matrix: Array) -> None:
         """Place the node at `path` by a transform (4, 4); one that is not finite hides it."""
-        node = self.nodes.setdefault(path, Node())
+        node = self.nodes.setdefault(path, SceneNode())
         if np.isfinite(matrix).all():
             node.transform = tuple(np.round(np.asarray(matrix, dtype=np.float64).T.ravel(), 9).tolist())
             node.properties.pop("visible", None)
@@ -100,7 +100,7 @@ class Scene:
 
     def show(self, path: str, visible: bool) -> None:
         """Show or hide the node at `path` with all below it."""
-        self.nodes.setdefault(path, Node()).properties["visible"] = visible
+        self.nodes.setdefault(path, SceneNode()).properties["visible"] = visible
 
     def remove(self, path: str) -> None:
         """Remove the node at `path` with all below it."""
@@ -111,7 +111,7 @@ class Scene:
         """Copy the nodes of another scene at and below `path` to `target`."""
         for name, node in other.nodes.items():
             if name == path or name.startswith(f"{path}/"):
-                self.nodes[target + name[len(path) :]] = Node(
+                self.nodes[target + name[len(path) :]] = SceneNode(
                     object=node.object, transform=node.transform, properties=dict(node.properties)
                 )
         self.geometries.update(other.geometries)
@@ -121,7 +121,7 @@ class Scene:
         twin = Scene()
         twin.geometries = dict(self.geometries)
         for path, node in self.nodes.items():
-            twin.nodes[path] = Node(
+            twin.nodes[path] = SceneNode(
                 object=node.object, transform=node.transform, properties=dict(node.properties)
             )
         return twin
@@ -136,7 +136,7 @@ class Scene:
         known : set of str, optional
             Geometries that the drawer holds already; those that are returned are added to it.
         """
-        before: Mapping[str, Node] = {} if since is None else since.nodes
+        before: Mapping[str, SceneNode] = {} if since is None else since.nodes
         commands: list[Json] = [
             {"type": "delete", "path": path} for path in before if path not in self.nodes and path != "/"
         ]
@@ -166,10 +166,10 @@ class Scene:
         return own
 
 
-def _difference(path: str, old: Node | None, new: Node) -> Iterator[Json]:
+def _difference(path: str, old: SceneNode | None, new: SceneNode) -> Iterator[Json]:
     if new.object is not None and (old is None or old.object != new.object):
         yield {"type": "set_object", "path": path, "object": new.object}
-        old = None if old is None else Node(transform=old.transform)
+        old = None if old is None else SceneNode(transform=old.transform)
     if new.transform is not None and (old is None or old.transform != new.transform):
         yield {"type": "set_transform", "path": path, "matrix": list(new.transform)}
     before = {} if old is None else old.properties

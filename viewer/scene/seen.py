@@ -9,13 +9,13 @@ from posekit.errors import ViewerError
 from posekit.formats.own import LeeChenModel, OpenCVModel, Result, ResultFrame, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS
-from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.sight import ImageSight
 
 ON_RAY = 1e-6
 """Metres across the image within which all positions of a joint are one image point."""
 
 
-def sight_of(frame: ResultFrame, view: View | None, index: int) -> Sight | None:
+def sight_of(frame: ResultFrame, view: View | None, index: int) -> ImageSight | None:
     """Return what a frame's camera sees: the view's image, or without a view that of the survivors."""
     f = frame.camera["f"]
     scale = float(frame.scales[0]) if frame.scales is not None and len(frame.scales) else None
@@ -26,27 +26,29 @@ def sight_of(frame: ResultFrame, view: View | None, index: int) -> Sight | None:
         uncalibrated = ScaledOrthographicCamera(scale=scale)
         image = uncalibrated.project(frame.joints[:1])[0]
         image[[JOINT[name] for name in hidden(frame)]] = np.nan
-        return Sight(camera=uncalibrated, image=image)
+        return ImageSight(camera=uncalibrated, image=image)
     if f is None or len(frame.joints) == 0:
         return None
     camera = lee_chen.pinhole(f)
-    return Sight(camera=camera, image=camera.project(frame.joints[:1])[0])  # all survivors have one image
+    return ImageSight(
+        camera=camera, image=camera.project(frame.joints[:1])[0]
+    )  # all survivors have one image
 
 
-def view_sight(view: View, image: Array, f: float | None, scale: float | None) -> Sight | None:
+def view_sight(view: View, image: Array, f: float | None, scale: float | None) -> ImageSight | None:
     """Return the view's camera with an image; None where f or the scale is not known."""
     model = view.camera
     if isinstance(model, OpenCVModel):
-        return Sight(
+        return ImageSight(
             camera=PinholeCamera(K=model.K, distortion=model.distortion), image=image, size=model.size
         )
     if isinstance(model, LeeChenModel):
         f = model.f if f is None else f
-        return None if f is None else Sight(camera=lee_chen.pinhole(f), image=image)
+        return None if f is None else ImageSight(camera=lee_chen.pinhole(f), image=image)
     scale = model.scale if scale is None else scale
     if scale is None or not np.isfinite(image).all(axis=1).any():
         return None
-    return Sight(camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect), image=image)
+    return ImageSight(camera=ScaledOrthographicCamera(scale=scale, aspect=model.aspect), image=image)
 
 
 def scale_of(truth: Array, view: View, index: int) -> float | None:

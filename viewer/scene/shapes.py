@@ -13,10 +13,10 @@ from posekit.geometry import Array
 from posekit.viewer.scene.colours import Rgb, number
 from posekit.viewer.scene.scene import Json, Scene
 
-BALL = mg.Sphere(1.0)
+UNIT_BALL = mg.Sphere(1.0)
 """Every ball is this one, scaled: one geometry for all."""
 
-AROUND = 10
+N_TUBE_SIDES = 10
 """Sides of a tube."""
 
 
@@ -40,7 +40,7 @@ def _translucent(opacity: float) -> dict[str, Any]:
 def add_ball(scene: Scene, path: str, middle: Array, radius: float, material: mg.Material) -> None:
     """Put a ball (metres, world) at `path`; where its middle is not known it is invisible."""
     node = scene.meshcat[path]
-    node.set_object(mg.Mesh(BALL, material))
+    node.set_object(mg.Mesh(UNIT_BALL, material))
     matrix = np.diag([radius, radius, radius, 1.0])
     matrix[:3, 3] = middle
     node.set_transform(matrix)
@@ -73,30 +73,33 @@ def add_tubes(
     if not known.any():
         return
     vertices, faces = tubes(starts[known], ends[known], radius)
-    shades = np.repeat(colours[known], 2 * AROUND, axis=0)
+    shades = np.repeat(colours[known], 2 * N_TUBE_SIDES, axis=0)
     mesh = mg.TriangularMeshGeometry(vertices, faces, color=shades)
     scene.meshcat[path].set_object(mesh, glow((1.0, 1.0, 1.0), opacity, vertex_colours=True))
 
 
 def tubes(starts: Array, ends: Array, radius: float) -> tuple[Array, Array]:
-    """Return vertices (N * 2 * AROUND, 3) and faces (N * 2 * AROUND, 3) of open tubes."""
+    """Return vertices (N * 2 * N_TUBE_SIDES, 3) and faces (N * 2 * N_TUBE_SIDES, 3) of open tubes."""
     axis = ends - starts
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
     least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
     across = np.cross(axis, least)
     across = across / np.linalg.norm(across, axis=1, keepdims=True)
     third = np.cross(axis, across)
-    angle = 2 * np.pi * np.arange(AROUND) / AROUND
+    angle = 2 * np.pi * np.arange(N_TUBE_SIDES) / N_TUBE_SIDES
     ring = radius * (
         np.cos(angle)[None, :, None] * across[:, None] + np.sin(angle)[None, :, None] * third[:, None]
     )
     vertices = np.stack([starts[:, None] + ring, ends[:, None] + ring], axis=1).reshape(-1, 3)
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
+    k = np.arange(N_TUBE_SIDES)
+    after = (k + 1) % N_TUBE_SIDES
     faces = np.concatenate(
-        [np.stack([k, after, k + AROUND], axis=1), np.stack([after, after + AROUND, k + AROUND], axis=1)]
+        [
+            np.stack([k, after, k + N_TUBE_SIDES], axis=1),
+            np.stack([after, after + N_TUBE_SIDES, k + N_TUBE_SIDES], axis=1),
+        ]
     )
-    offset = 2 * AROUND * np.arange(len(starts))
+    offset = 2 * N_TUBE_SIDES * np.arange(len(starts))
     return vertices, (offset[:, None, None] + faces).reshape(-1, 3)
 
 

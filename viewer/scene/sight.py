@@ -9,13 +9,13 @@ import numpy as np
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import Array
 from posekit.skeleton import PARENTS, POINTS
-from posekit.viewer.scene.colours import FRUSTUM, POINT_SIDES, SIDES, rgb
+from posekit.viewer.scene.colours import FRUSTUM_RGB, POINT_SIDES, SIDE_RGB, rgb
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.shapes import add_ball, add_sheet, add_tubes, glow
 from posekit.viewer.scene.world import World
 
-PLANE = rgb("#dfe5ec")
-RAY_RADIUS, EDGE_RADIUS, IMAGE_RADIUS, DOT = 0.0022, 0.004, 0.004, 0.011
+PLANE_RGB = rgb("#dfe5ec")
+RAY_RADIUS, EDGE_RADIUS, IMAGE_RADIUS, DOT_RADIUS = 0.0022, 0.004, 0.004, 0.011
 """Metres: rays, the frustum's edges, the image's segments and points."""
 
 RAY_OPACITY = 0.45
@@ -23,12 +23,12 @@ RAY_OPACITY = 0.45
 PLANE_GAP = 0.6
 """Metres from the image plane of a camera that is infinitely far to the nearest joint."""
 
-BORDER = 0.08
+IMAGE_BORDER_SHARE = 0.08
 """Of an image whose size is not known: the share of its points' extent that is added on each side."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sight:
+class ImageSight:
     """What a camera sees.
 
     Parameters
@@ -58,7 +58,7 @@ class Sight:
         else:
             seen = self.image[np.isfinite(self.image).all(axis=1)]
             low, high = seen.min(axis=0), seen.max(axis=0)
-            border = BORDER * max(float((high - low).max()), 1e-9)
+            border = IMAGE_BORDER_SHARE * max(float((high - low).max()), 1e-9)
             low, high = low - border, high + border
         return np.array([[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]])
 
@@ -69,7 +69,7 @@ class Sight:
         seen = self.image[np.isfinite(self.image).all(axis=1)]
         return np.asarray(seen.mean(axis=0) * np.array([width, 1.0]))
 
-    def rescaled(self, scale: float) -> Sight:
+    def rescaled(self, scale: float) -> ImageSight:
         """Return the same image, seen by an uncalibrated camera at another scale, pixels a metre."""
         if not isinstance(self.camera, ScaledOrthographicCamera):
             return self
@@ -87,7 +87,7 @@ class Sight:
 
 def add_sight(
     scene: Scene,
-    sight: Sight,
+    sight: ImageSight,
     *,
     world: World,
     points: Array | None = None,
@@ -102,7 +102,7 @@ def add_sight(
 
     Parameters
     ----------
-    sight : Sight
+    sight : ImageSight
     world : World
     points : array (..., 14, 3) or (..., 19, 3), optional
         The postures, camera frame, metres: rays end where they pass the last of them; without them all rays
@@ -126,11 +126,11 @@ def add_sight(
         if not sight.parallel:
             apex = world.place(np.zeros(3))
             starts, ends = np.concatenate([corners, corners]), np.concatenate([np.tile(apex, (4, 1)), ends])
-        colours = np.tile(FRUSTUM, (len(starts), 1))
+        colours = np.tile(FRUSTUM_RGB, (len(starts), 1))
         add_tubes(scene, f"{name}/frustum", starts, ends, colours, radius=EDGE_RADIUS)
-        add_sheet(scene, f"{name}/plane", corners, glow(PLANE, 0.55))
+        add_sheet(scene, f"{name}/plane", corners, glow(PLANE_RGB, 0.55))
     on_plane = world.place(sight.at(sight.image, depth))
-    colours = np.array([SIDES[POINT_SIDES[k]] for k in range(len(sight.image))])
+    colours = np.array([SIDE_RGB[POINT_SIDES[k]] for k in range(len(sight.image))])
     children = np.arange(1, len(PARENTS))
     add_tubes(
         scene,
@@ -142,12 +142,12 @@ def add_sight(
     )
     for k, middle in enumerate(on_plane):
         if np.isfinite(middle).all():
-            radius = DOT if k < len(PARENTS) else DOT / 2
+            radius = DOT_RADIUS if k < len(PARENTS) else DOT_RADIUS / 2
             add_ball(scene, f"{name}/points/{POINTS[k]}", middle, radius, glow(tuple(colours[k])))
     eye = on_plane
     if not sight.parallel:
         eye = np.tile(world.place(np.zeros(3)), (len(on_plane), 1))
-        add_ball(scene, f"{name}/eye", eye[0], 8 * EDGE_RADIUS, glow(FRUSTUM))
+        add_ball(scene, f"{name}/eye", eye[0], 8 * EDGE_RADIUS, glow(FRUSTUM_RGB))
     if rays:
         beyond = depth + PLANE_GAP if sight.parallel else 2 * depth
         reach = np.where(np.isfinite(far), far, np.nanmax(far) if np.isfinite(far).any() else beyond)
@@ -156,7 +156,7 @@ def add_sight(
     return corners[np.isfinite(corners).all(axis=1)] if sight.parallel else eye[:1]
 
 
-def _plane(sight: Sight, points: Array | None, far: Array) -> float:
+def _plane(sight: ImageSight, points: Array | None, far: Array) -> float:
     """Choose the depth of the image plane, metres."""
     if sight.parallel:
         nearest = float(np.nanmin(points[..., 2])) if points is not None and np.isfinite(far).any() else 0.0

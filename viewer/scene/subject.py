@@ -14,9 +14,9 @@ from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultF
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.viewer.scene.seen import check_camera, scale_of, sight_of, view_sight
-from posekit.viewer.scene.sight import Sight
+from posekit.viewer.scene.sight import ImageSight
 
-UNIT = 1e-6
+UNIT_QUATERNION_TOLERANCE = 1e-6
 """How far a quaternion's length may be off for forward kinematics to be asked."""
 
 
@@ -33,7 +33,7 @@ class Shown:
     groups : int array (N,), optional
     reasons : sequence of N str
         Why each was rejected; empty texts for those that were not.
-    sight : Sight, optional
+    sight : ImageSight, optional
         What the camera sees in this frame; of an uncalibrated one, at the first posture's scale.
     scales : array (N,), optional
         The scale of each posture behind an uncalibrated view, pixels a metre.
@@ -49,7 +49,7 @@ class Shown:
     q: Array | None = None
     groups: NDArray[np.int64] | None = None
     reasons: Sequence[str] = ()
-    sight: Sight | None = None
+    sight: ImageSight | None = None
     scales: Array | None = None
     inferred: Sequence[Mapping[str, Inferred]] = ()
     probability: Array | None = None
@@ -96,7 +96,7 @@ class Shown:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Subject:
+class DrawnSubject:
     """All frames, and whose figure it is.
 
     Parameters
@@ -117,7 +117,7 @@ class Subject:
         return np.concatenate([frame.aligned_points.reshape(-1, 3) for frame in chosen])
 
 
-def subject_of(given: Result | Postures | View, view: View | None = None) -> Subject:
+def subject_of(given: Result | Postures | View, view: View | None = None) -> DrawnSubject:
     """Gather what is to be drawn.
 
     Parameters
@@ -149,7 +149,7 @@ def subject_of(given: Result | Postures | View, view: View | None = None) -> Sub
         frames = [_of_frame(frame, figure, view, k) for k, frame in enumerate(given.frames)]
     if not any(len(frame) for frame in frames):
         raise ViewerError("there is no posture in any frame; nothing can be drawn; was everything rejected?")
-    return Subject(figure=figure, frames=frames, R_cam_world=_rotation(view))
+    return DrawnSubject(figure=figure, frames=frames, R_cam_world=_rotation(view))
 
 
 def _of_postures(given: Postures) -> Shown:
@@ -164,7 +164,7 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
     if q is not None and len(q):
         placed = np.asarray(np.isfinite(q[:, :7]).all(axis=1))
         norms = np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1)
-        placed = np.asarray(placed & (np.abs(norms - 1) < UNIT))
+        placed = np.asarray(placed & (np.abs(norms - 1) < UNIT_QUATERNION_TOLERANCE))
         if placed.any():
             # A result has no head points; they hang on the torso alone, by the neck's angles in q.
             head = figure.forward_kinematics(np.where(np.isnan(q[placed]), 0.0, q[placed]))[:, len(JOINTS) :]
@@ -198,7 +198,7 @@ def check_one_scale(shown: Shown) -> None:
     )
 
 
-def _of_view(view: View) -> Subject:
+def _of_view(view: View) -> DrawnSubject:
     points = with_head(np.asarray(view.truth)).copy()
     unseen = np.isnan(points[:, 0]).any(axis=1)
     points[unseen, 0] = view.root[unseen]
@@ -220,7 +220,7 @@ def _of_view(view: View) -> Subject:
         )
     figure = load_figure()
     figure = figure if view.stature is None else figure.from_stature(view.stature)
-    return Subject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
+    return DrawnSubject(figure=figure.scaled(view.lengths), frames=frames, R_cam_world=_rotation(view))
 
 
 def _figure_of(result: Result) -> Figure:

@@ -11,10 +11,10 @@ from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.skeleton import POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.body import Look
-from posekit.viewer.scene.colours import GROUPS, MIDDLE, Rgb
+from posekit.viewer.scene.colours import GROUP_RGB, MIDDLE_RGB, Rgb
 from posekit.viewer.scene.subject import Shown
 
-STEP = 1e-3
+SAME_POINT_METRES = 1e-3
 """Metres: what is nearer than this in every point is drawn once."""
 
 
@@ -48,8 +48,10 @@ def superposed_looks(shown: Shown, figure: Figure) -> list[Look]:
         if groups is not None:
             for k in np.unique(first):
                 owners = set(groups[first == k].tolist())
-                colours[k][name] = GROUPS[owners.pop() % len(GROUPS)] if len(owners) == 1 else MIDDLE
-    if all(colour == MIDDLE for own in colours for colour in own.values()):
+                colours[k][name] = (
+                    GROUP_RGB[owners.pop() % len(GROUP_RGB)] if len(owners) == 1 else MIDDLE_RGB
+                )
+    if all(colour == MIDDLE_RGB for own in colours for colour in own.values()):
         colours = [{} for _ in range(count)]  # groups that differ in combination alone: sides say more
     return [Look(body=body, without=frozenset(names)) for body, names in zip(colours, without, strict=True)]
 
@@ -65,6 +67,6 @@ def _parts(figure: Figure) -> Sequence[tuple[str, tuple[int, ...]]]:
 
 def _first(points: Array) -> NDArray[np.intp]:
     """Return for each posture's points (N, K, 3) the first posture that has them in the same place (N,)."""
-    steps = np.where(np.isnan(points), np.inf, np.round(points / STEP)).reshape(len(points), -1)
+    steps = np.where(np.isnan(points), np.inf, np.round(points / SAME_POINT_METRES)).reshape(len(points), -1)
     _, first, inverse = np.unique(steps, axis=0, return_index=True, return_inverse=True)
     return np.asarray(first[inverse.reshape(-1)])

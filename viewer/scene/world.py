@@ -12,7 +12,7 @@ from posekit.geometry import Array
 CAMERA_UPRIGHT: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """R_world_cam of a camera that is held upright and level: it looks along the world's x, z is up."""
 
-SOLE = 0.06
+ANKLE_HEIGHT_METRES = 0.06
 """Metres from the lowest joint down to the ground: an ankle is not the sole."""
 
 
@@ -87,4 +87,4 @@ def upright_world(points: Array, R_cam_world: Array | None = None) -> World:
     turned = known @ R.T
     low, high = turned.min(axis=0), turned.max(axis=0)
     middle = (low + high) / 2
-    return World(R_world_cam=R, t_world_cam=-np.array([middle[0], middle[1], low[2] - SOLE]))
+    return World(R_world_cam=R, t_world_cam=-np.array([middle[0], middle[1], low[2] - ANKLE_HEIGHT_METRES]))
