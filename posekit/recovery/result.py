@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
+from typing import Any
 
 import numpy as np
 
 from posekit.following.following import Following
 from posekit.formats.own import Result, ResultFrame
-from posekit.formats.own.likelihoods import Likelihoods
+from posekit.formats.own.column import columns_in
 from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
-from posekit.recovery.refined import RefinedSurvivors
 
 
 def result_of(
@@ -70,6 +71,19 @@ def _frame(
     frame: FrameRecovery, margins: list[str], nq: int, explain: bool, probability: Array
 ) -> ResultFrame:
     own = frame.margins
+    refined = frame.refined
+    values: dict[str, Any] = {
+        "q": frame.q.reshape(-1, nq),
+        "margins": {
+            name: np.where(np.isinf(own[name]), np.nan, own[name]) if name in own else np.empty(0)
+            for name in margins
+        },
+        "probability": probability,
+        "refined": None
+        if refined is None
+        else Likelihoods(**{name: getattr(refined, name) for name in columns_in(Likelihoods)}),
+    }
+    values |= {name: getattr(frame, name) for name in SURVIVOR_COLUMNS if name not in values}
     return ResultFrame(
         time=frame.time,
         camera=frame.camera,
@@ -77,34 +91,11 @@ def _frame(
             "joint": frame.level_names,
             **{name: counts.tolist() for name, counts in frame.levels.items()},
         },
-        joints=frame.joints,
-        q=frame.q.reshape(-1, nq),
-        branches=frame.branches,
-        groups=frame.groups,
-        margins={
-            name: np.where(np.isinf(own[name]), np.nan, own[name]) if name in own else np.empty(0)
-            for name in margins
-        },
-        fk_distance=frame.fk_distance,
-        length_residual=frame.length_residual,
         rejected=frame.rejected,
         pruned=[_plain(asdict(branch)) for branch in frame.pruned()] if explain else None,
         family=None if frame.family is None else replace(frame.family, mirrored=frame.mirrored),
-        scales=frame.scales,
         root=frame.root,
-        inferred=frame.inferred,
-        probability=probability,
-        refined=None if frame.refined is None else _likelihoods(frame.refined),
-    )
-
-
-def _likelihoods(refined: RefinedSurvivors) -> Likelihoods:
-    return Likelihoods(
-        chi2=refined.chi2,
-        dof=refined.dof.astype(np.float64),
-        p=refined.p,
-        merged=refined.merged.astype(np.float64),
-        covariance=refined.covariance,
+        **values,
     )
 
 

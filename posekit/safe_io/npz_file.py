@@ -55,6 +55,11 @@ class Archive:
         if declared > limit:
             raise _too_large(self.path, declared, limit)
 
+    def lacks(self, name: str) -> InputError:
+        """Return the refusal of an archive without an array that it should have."""
+        remedy = f"add it; there is {', '.join(self.names)[:200]}"
+        return refusal(self.path, name, "nothing", f"the array {name}", remedy)
+
     def array(self, name: str, kinds: str, shape: tuple[int | None, ...] | None) -> NDArray[Any]:
         """Read an array.
 
@@ -101,10 +106,7 @@ class Archive:
     ) -> Iterator[tuple[IO[bytes], tuple[int, ...], np.dtype[Any], bool]]:
         """Open an array whose header says what is expected, at its data."""
         if name not in self.names:
-            expected = f"the array {name}"
-            raise refusal(
-                self.path, name, "nothing", expected, f"add it; there is {', '.join(self.names)[:200]}"
-            )
+            raise self.lacks(name)
         member = self.zip.getinfo(f"{name}.npy")
         with self.zip.open(member) as file:
             found, fortran, dtype = _header(self.path, name, file)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posekit.formats.own.units import Unit, from_metres, to_metres
+from posekit.formats.own.column import column, columns_in
+from posekit.formats.own.units import Unit
+from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -20,25 +19,23 @@ class Inferred:
     """The set of positions that a joint can have which was not seen, in one posture.
 
     The posture's own joint is a feasible position in the middle of the set.
-
-    Parameters
-    ----------
-    kind : str
-        What the set is: ``completed`` or ``point`` from its rigid part, ``circle``, ``sphere region``, ``depth
-        interval`` of a joint that was seen beyond a hidden one, or ``region`` of space.
-    lower, upper : array (3,)
-        Its bounding box, camera frame, metres.
-    radius : float
-        The largest distance from the posture's joint to a feasible position, metres.
-    fraction : float
-        How much of the circle or sphere is feasible; 1 where there is only one position.
     """
 
-    kind: str
-    lower: Array
-    upper: Array
-    radius: float
-    fraction: float = 1.0
+    schema_title: ClassVar = (
+        "ResultInferred",
+        "What is known of the position of a joint that was not seen.",
+    )
+
+    kind: str = column(
+        "completed, point, circle, sphere region, depth interval or region: what the set of positions is.",
+        kind="str",
+    )
+    lower: Array = column("The least x, y, z of the set, in `unit`.", shape=(3,), length_power=1)
+    upper: Array = column("The greatest x, y, z of the set, in `unit`.", shape=(3,), length_power=1)
+    radius: float = column(
+        "From the posture's joint to the farthest feasible position, in `unit`.", length_power=1
+    )
+    fraction: float = column("How much of the circle or sphere is feasible.", default=1.0)
 
     def __post_init__(self) -> None:
         for name in ("lower", "upper"):
@@ -53,6 +50,8 @@ class Inferred:
                 )
             values.flags.writeable = False
             object.__setattr__(self, name, values)
+        for name in ("radius", "fraction"):
+            object.__setattr__(self, name, float(getattr(self, name)))
         if not (np.isfinite(self.radius) and self.radius >= 0 and 0 <= self.fraction <= 1):
             raise refusal(
                 "result",
@@ -65,20 +64,19 @@ class Inferred:
     def fields(self, unit: Unit) -> dict[str, Any]:
         """Return what a file says, in its unit."""
         return {
-            "kind": self.kind,
-            "lower": from_metres(self.lower, unit).tolist(),
-            "upper": from_metres(self.upper, unit).tolist(),
-            "radius": float(from_metres(self.radius, unit)),
-            "fraction": float(self.fraction),
+            each.key: self.kind
+            if each.kind == "str"
+            else each.in_file(np.asarray(getattr(self, name)), unit).tolist()
+            for name, each in columns_in(Inferred).items()
         }
 
     @staticmethod
     def of(fields: Mapping[str, Any], unit: Unit) -> Inferred:
         """Make it of what a file says."""
-        return Inferred(
-            kind=fields["kind"],
-            lower=to_metres(fields["lower"], unit),
-            upper=to_metres(fields["upper"], unit),
-            radius=float(to_metres(fields["radius"], unit)),
-            fraction=fields["fraction"],
-        )
+        values: dict[str, Any] = {
+            name: fields[each.key]
+            if each.kind == "str"
+            else each.in_memory(np.asarray(fields[each.key], dtype=np.float64), unit)
+            for name, each in columns_in(Inferred).items()
+        }
+        return Inferred(**values)

@@ -7,26 +7,25 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.formats.own.family import Family
-from posekit.formats.own.inferred import Inferred
-from posekit.formats.own.likelihoods import Likelihoods
 from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.root import Root
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.units import Unit
+from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
 from posekit.skeleton import JOINTS
 
-Array = NDArray[np.float64]
-
 CAMERA_FIELDS: Final = ("f", "rotation", "position", "residual")
 LEVELS: Final = ("joint", "physical", "motion")
+EVERYWHERE: Final = tuple(name for name, column in SURVIVOR_COLUMNS.items() if column.everywhere)
+"""Columns that all frames of a result have, or none."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ResultFrame:
-    """The survivors of one frame.
+class ResultFrame(SurvivorColumns):
+    """The survivors of one frame: their columns (`SurvivorColumns`), and what is said of the frame.
 
     Parameters
     ----------
@@ -38,91 +37,26 @@ class ResultFrame:
         ``residual`` (in the unit of the image: metres where there is an f, else pixels).
     levels : mapping
         Survivors per level of the tree: ``joint`` names, ``physical`` and ``motion`` counts, of one length.
-    joints : array (N, 14, 3)
-        OpenCV camera frame, metres, one row a survivor.
-    q : array (N, nq)
-        Configurations in Pinocchio's order: lengths in metres, angles in radians, whatever the file's unit.
-    branches : sequence of N str
-        The near (0) or far (1) choice at each segment.
-    groups : int array (N,), optional
-        The group of each survivor.
-    margins : mapping of str to array (N,)
-        By validator, the distance to the nearest bound; NaN where undecided.
-    fk_distance : array (N,)
-        Distance between the joints and the forward kinematics of q, metres.
-    length_residual : array (N,)
-        The largest length that was lost to a tangent ray, metres.
     rejected : mapping of str to int
         Pruned branches by the finding that killed them.
     pruned : sequence of mappings, optional
         Detail on each pruned branch, of plain values.
     family : Family, optional
         The scales that an uncalibrated frame can have.
-    scales : array (N,), optional
-        The scale that each survivor of such a frame was recovered at, pixels a metre.
     root : Root, optional
         How the neck's depth was found, where the frame is calibrated and it was not given.
-    inferred : sequence of N mappings, optional
-        By survivor, then by joint that was not seen: what is known of its position (`posekit.formats.own.Inferred`).
-    probability : array (N,), optional
-        That each survivor is the one nearest to the truth; they sum to one.
-    refined : Likelihoods, optional
-        How likely and how sure each survivor is, where the noise is known and they were refined.
     """
 
     time: float
     camera: Mapping[str, Any]
     levels: Mapping[str, Sequence[Any]]
-    joints: Array
-    q: Array
-    branches: Sequence[str]
-    groups: NDArray[np.int64] | None = None
-    margins: Mapping[str, Array]
-    fk_distance: Array
-    length_residual: Array
     rejected: Mapping[str, int]
     pruned: Sequence[Mapping[str, Any]] | None = None
     family: Family | None = None
-    scales: Array | None = None
     root: Root | None = None
-    inferred: Sequence[Mapping[str, Inferred]] | None = None
-    probability: Array | None = None
-    refined: Likelihoods | None = None
-
-    @property
-    def chi2(self) -> Array | None:
-        """How badly each survivor fits what was seen (N,), where they were refined."""
-        return None if self.refined is None else self.refined.chi2
 
     def __post_init__(self) -> None:
-        count = len(self.joints)
-        if self.probability is not None:
-            self._set("probability", self.probability, (count,))
-            if not ((self.probability >= 0) & (self.probability <= 1)).all():
-                raise _refused("probability", "a number that is none", "numbers from 0 to 1")
-        if self.refined is not None and len(self.refined) != count:
-            raise _refused("refined", f"{len(self.refined)} entries", f"{count}, one a posture")
-        if self.scales is not None:
-            self._set("scales", self.scales, (count,))
-        if self.inferred is not None and len(self.inferred) != count:
-            raise _refused("inferred", f"{len(self.inferred)} entries", f"{count}, one a posture")
-        self._set("joints", self.joints, (count, len(JOINTS), 3))
-        self._set("q", self.q, (count, np.shape(self.q)[-1]))
-        self._set("fk_distance", self.fk_distance, (count,))
-        self._set("length_residual", self.length_residual, (count,))
-        margins = {}
-        for name, values in self.margins.items():
-            margins[name] = _array(f"margins.{name}", values, (count,))
-        object.__setattr__(self, "margins", margins)
-        if self.groups is not None:
-            groups = np.array(self.groups, dtype=np.int64)
-            if groups.shape != (count,) or (groups < 0).any():
-                raise _refused("groups", f"shape {groups.shape}", f"({count},) numbers from 0")
-            groups.flags.writeable = False
-            object.__setattr__(self, "groups", groups)
-        if len(self.branches) != count:
-            raise _refused("branches", f"{len(self.branches)} codes", f"{count}, one a posture")
-        object.__setattr__(self, "branches", tuple(str(code) for code in self.branches))
+        super().__post_init__()
         object.__setattr__(self, "camera", _camera(self.camera))
         if set(self.levels) != set(LEVELS) or len({len(self.levels[name]) for name in LEVELS}) != 1:
             raise _refused("levels", ", ".join(self.levels), "joint, physical and motion, of one length")
@@ -135,9 +69,6 @@ class ResultFrame:
         object.__setattr__(self, "rejected", {str(name): int(n) for name, n in self.rejected.items()})
         if not np.isfinite(self.time):
             raise _refused("time", str(self.time), "a finite number of seconds")
-
-    def _set(self, name: str, values: Array, shape: tuple[int, ...]) -> None:
-        object.__setattr__(self, name, _array(name, values, shape))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,7 +122,7 @@ class Result:
                     ", ".join(frame.margins) or "none",
                     f"those of frames[0]: {', '.join(first.margins)}",
                 )
-            for name in ("groups", "probability"):
+            for name in EVERYWHERE:
                 if (getattr(frame, name) is None) != (getattr(first, name) is None):
                     raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
 

@@ -26,14 +26,15 @@ from pydantic import ValidationError
 
 from posekit.formats.own.family import Family
 from posekit.formats.own.inferred import Inferred
-from posekit.formats.own.likelihoods import NUMBERS, Likelihoods
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.reading import parse_json
 from posekit.formats.own.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
 from posekit.formats.own.result_schema import SCHEMA, ResultDetails, ResultPathsTold
 from posekit.formats.own.root import Root
-from posekit.formats.own.units import PER_METRE, UNITS, Unit, from_metres, to_metres
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
+from posekit.formats.own.survivor_npz import PADDED, survivor_arrays, survivors_in
+from posekit.formats.own.units import UNITS, Unit, from_metres, to_metres
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import replacing
 from posekit.skeleton import JOINTS
@@ -43,20 +44,7 @@ Array = NDArray[Any]
 MAX_PADDED: Final = 16_000_000_000
 """Bytes that a result may declare with its padding, which is passed over and never held."""
 _MARGIN = "margins/"
-_REFINED = "refined/"
 _PATHS = "paths/"
-_PADDED = (
-    "joints",
-    "q",
-    "branches",
-    "groups",
-    "fk_distance",
-    "length_residual",
-    "scales",
-    "probability",
-    _MARGIN,
-    _REFINED,
-)
 
 
 def write_result_npz(path: str | Path, result: Result) -> None:
@@ -73,16 +61,8 @@ def write_result_npz(path: str | Path, result: Result) -> None:
         **_camera_arrays(frames, unit),
         **_level_arrays(frames),
         **_rejected_arrays(frames),
-        "joints": Ragged(rows=[from_metres(frame.joints, unit) for frame in frames], fill=np.nan),
-        "q": Ragged(rows=[frame.q for frame in frames], fill=np.nan),
-        "branches": Ragged(rows=[np.array(frame.branches, dtype=np.str_) for frame in frames], fill=""),
-        "fk_distance": Ragged(rows=[from_metres(f.fk_distance, unit) for f in frames], fill=np.nan),
-        "length_residual": Ragged(rows=[from_metres(f.length_residual, unit) for f in frames], fill=np.nan),
+        **survivor_arrays(SurvivorColumns, frames, unit, carried=_carried(frames)),
     }
-    if frames[0].groups is not None:
-        arrays["groups"] = Ragged(rows=[_known(frame.groups) for frame in frames], fill=-1)
-    for name in frames[0].margins:
-        arrays[_MARGIN + name] = Ragged(rows=[frame.margins[name] for frame in frames], fill=np.nan)
     if any(frame.pruned is not None for frame in frames):
         pruned = [
             None if frame.pruned is None else [dict(entry) for entry in frame.pruned] for frame in frames
@@ -91,32 +71,9 @@ def write_result_npz(path: str | Path, result: Result) -> None:
     if any(frame.family is not None for frame in frames):
         families = [None if frame.family is None else frame.family.fields(unit) for frame in frames]
         arrays["families"] = np.array(json.dumps(families, allow_nan=False))
-        unknown = [np.full(len(frame.joints), np.nan) for frame in frames]
-        scales = [
-            missing if frame.scales is None else frame.scales / PER_METRE[unit]
-            for frame, missing in zip(frames, unknown, strict=True)
-        ]
-        arrays["scales"] = Ragged(rows=scales, fill=np.nan)
     if any(frame.root is not None for frame in frames):
         roots = [None if frame.root is None else frame.root.fields(unit) for frame in frames]
         arrays["roots"] = np.array(json.dumps(roots, allow_nan=False))
-    if any(frame.inferred is not None for frame in frames):
-        inferred = [
-            None
-            if frame.inferred is None
-            else [{name: one.fields(unit) for name, one in joints.items()} for joints in frame.inferred]
-            for frame in frames
-        ]
-        arrays["inferred"] = np.array(json.dumps(inferred, allow_nan=False))
-    if frames[0].probability is not None:
-        given = [np.empty(0) if frame.probability is None else frame.probability for frame in frames]
-        arrays["probability"] = Ragged(rows=given, fill=np.nan)
-    if any(frame.refined is not None for frame in frames):
-        likelihoods = [frame.refined or Likelihoods.nothing(len(frame.joints)) for frame in frames]
-        for name in NUMBERS:
-            arrays[_REFINED + name] = Ragged(rows=[getattr(each, name) for each in likelihoods], fill=np.nan)
-        packed = [each.packed(unit) for each in likelihoods]
-        arrays[_REFINED + "covariance"] = Ragged(rows=packed, fill=np.nan)
     if result.paths is not None:
         arrays |= {_PATHS + name: values for name, values in result.paths.in_unit(unit).items()}
         arrays[_PATHS + "told"] = np.array(json.dumps(result.paths.told(unit), allow_nan=False))
@@ -133,7 +90,7 @@ def read_result_npz(path: str | Path) -> Result:
 def result_in(archive: Archive) -> Result:
     """Make a result of an open archive."""
     path = archive.path
-    archive.check_held(MAX_ARRAYS, but=_PADDED)
+    archive.check_held(MAX_ARRAYS, but=PADDED)
     _expect(archive, "schema", (SCHEMA,))
     unit: Unit = _expect(archive, "unit", UNITS)  # type: ignore[assignment]
     names = tuple(archive.array("joint_names", "U", (None,)).tolist())
@@ -150,24 +107,21 @@ def result_in(archive: Archive) -> Result:
     if (count < 0).any() or held > MAX_ARRAYS:
         most = f"counts from 0, at most {MAX_ARRAYS / 1e6:,.0f} MB of survivors"
         raise refusal(path, "count", f"counts that need {held / 1e6:,.0f} MB", most, "split the result")
-    rows = {
-        name: to_metres_rows(archive, name, count, tail, unit)
-        for name, tail in (("joints", (len(JOINTS), 3)), ("fk_distance", ()), ("length_residual", ()))
-    }
-    q = _ragged_floats(archive, "q", count, (nq,))
-    branches = archive.ragged("branches", "U", count, ())
-    groups = archive.ragged("groups", "iu", count, ()) if "groups" in archive.names else None
-    margin_rows = {name: _ragged_floats(archive, _MARGIN + name, count, ()) for name in margins}
+    survivors = survivors_in(archive, SurvivorColumns, count, unit, extents={"q": nq, "margins": margins})
     cameras = _cameras(archive, len(time), unit)
     levels = _levels(archive, len(time))
     rejected = _rejected(archive, len(time))
     pruned = _json(archive, "pruned") if "pruned" in archive.names else [None] * len(time)
-    families, roots, inferred = _details(archive, count, unit)
-    scales = _ragged_floats(archive, "scales", count, ()) if families is not None else None
-    probability = (
-        _ragged_floats(archive, "probability", count, ()) if "probability" in archive.names else None
-    )
-    refined = _likelihoods(archive, count, unit)
+    families, roots, survivors["inferred"] = _details(archive, count, unit)
+    scales = survivors["scales"]
+    if families is None:
+        survivors["scales"] = None
+    elif scales is None:
+        raise archive.lacks("scales")
+    else:
+        survivors["scales"] = [
+            None if family is None else scale for family, scale in zip(families, scales, strict=True)
+        ]
     settings = _json(archive, "settings")
     if not isinstance(settings, dict):
         raise refusal(path, "settings", shown(settings), "an object", "write the file again")
@@ -182,23 +136,11 @@ def result_in(archive: Archive) -> Result:
                 time=float(time[index]),
                 camera=cameras[index],
                 levels=levels[index],
-                joints=rows["joints"][index],
-                q=q[index],
-                branches=branches[index].tolist(),
-                groups=None if groups is None else groups[index],
-                margins={name: values[index] for name, values in margin_rows.items()},
-                fk_distance=rows["fk_distance"][index],
-                length_residual=rows["length_residual"][index],
                 rejected=rejected[index],
                 pruned=pruned[index],
                 family=None if families is None else families[index],
-                scales=None
-                if scales is None or families is None or families[index] is None
-                else scales[index] * PER_METRE[unit],
                 root=None if roots is None else roots[index],
-                inferred=None if inferred is None else inferred[index],
-                probability=None if probability is None else probability[index],
-                refined=None if refined is None else refined[index],
+                **{name: None if values is None else values[index] for name, values in survivors.items()},
             )
             for index in range(len(time))
         ],
@@ -231,21 +173,6 @@ def _followed(archive: Archive, frames: int, unit: Unit) -> FollowedPaths | None
     return FollowedPaths.of({**arrays, "survivor": survivor}, told.model_dump(), unit)
 
 
-def to_metres_rows(
-    archive: Archive, name: str, count: Array, tail: tuple[int | None, ...], unit: Unit
-) -> list[Array]:
-    """Read the rows of a padded array of lengths, in metres."""
-    return [to_metres(row, unit) for row in _ragged_floats(archive, name, count, tail)]
-
-
-def _ragged_floats(archive: Archive, name: str, count: Array, tail: tuple[int | None, ...]) -> list[Array]:
-    rows = archive.ragged(name, "f", count, tail)
-    for row in rows:
-        if np.isinf(row).any():
-            raise not_finite(archive.path, name, row)
-    return rows
-
-
 def _floats(archive: Archive, name: str, shape: tuple[int | None, ...]) -> Array:
     values = archive.array(name, "f", shape)
     if np.isinf(values).any():
@@ -263,23 +190,6 @@ def _expect(archive: Archive, name: str, accepted: Sequence[str]) -> str:
 def _json(archive: Archive, name: str) -> Any:
     text = str(archive.array(name, "U", ()))
     return parse_json(f"{archive.path}: {name}", text.encode("utf-8", "surrogatepass"))
-
-
-def _likelihoods(archive: Archive, count: Array, unit: Unit) -> list[Likelihoods | None] | None:
-    """Read how likely and how sure survivors are; None in frames that were not refined."""
-    if _REFINED + "chi2" not in archive.names:
-        return None
-    numbers = {name: _ragged_floats(archive, _REFINED + name, count, ()) for name in NUMBERS}
-    packed = _ragged_floats(archive, _REFINED + "covariance", count, (len(JOINTS), 6))
-    return [
-        None
-        if np.isnan(numbers["chi2"][k]).any()
-        else Likelihoods(
-            covariance=Likelihoods.unpacked(packed[k], unit),
-            **{name: numbers[name][k] for name in NUMBERS},
-        )
-        for k in range(len(count))
-    ]
 
 
 def _details(
@@ -323,8 +233,10 @@ def _details(
     )
 
 
-def _known(groups: NDArray[np.int64] | None) -> NDArray[np.int64]:
-    return np.empty(0, np.int64) if groups is None else groups
+def _carried(frames: Sequence[ResultFrame]) -> frozenset[str]:
+    """Return the optional columns that some frame has; scales where some frame has a family of them."""
+    names = {name for name in SURVIVOR_COLUMNS for frame in frames if getattr(frame, name) is not None}
+    return frozenset(names | ({"scales"} if any(frame.family is not None for frame in frames) else set()))
 
 
 def _camera_arrays(frames: Sequence[ResultFrame], unit: Unit) -> dict[str, Array]:

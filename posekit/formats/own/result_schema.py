@@ -7,15 +7,17 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, FailFast, Field
 
+from posekit.formats.own.inferred import Inferred
+from posekit.formats.own.survivor_columns import SurvivorColumns
+from posekit.formats.own.survivor_models import Count, model_of
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FEW, FileModel, named, refuse
+from posekit.formats.own.validation import FEW, FileModel, refuse
 from posekit.safe_io.refusal import shown
 from posekit.skeleton import JOINTS
 
 SCHEMA = "posekit.result/1"
 
 Maybe = float | None
-Count = Annotated[int, Field(ge=0, le=2**53)]
 MaybePoint = Annotated[list[Maybe], Field(min_length=3, max_length=3)]
 Row = Annotated[list[float], Field(min_length=3, max_length=3)]
 Matrix = Annotated[list[Row], Field(min_length=3, max_length=3)]
@@ -58,64 +60,10 @@ class ResultLevels(FileModel):
     motion: Annotated[list[Count], Field(max_length=1000), FailFast()]
 
 
-class ResultInferred(FileModel):
-    """What is known of the position of a joint that was not seen."""
-
-    kind: str = Field(
-        description="completed, point, circle, sphere region, depth interval or region: what the set of positions is."
-    )
-    lower: Row = Field(description="The least x, y, z of the set, in `unit`.")
-    upper: Row = Field(description="The greatest x, y, z of the set, in `unit`.")
-    radius: float = Field(
-        description="From the posture's joint to the farthest feasible position, in `unit`."
-    )
-    fraction: float = Field(description="How much of the circle or sphere is feasible.")
-
-
-Upper = Annotated[list[float], Field(min_length=6, max_length=6)]
-
-
-class ResultRefined(FileModel):
-    """How likely and how sure a survivor is that was refined."""
-
-    chi2: float = Field(description="Sum of squares of what is off over its standard deviations.")
-    dof: Count = Field(description="Its degrees of freedom.")
-    p: float = Field(description="The probability that noise alone gives a chi2 as large.")
-    merged: Count = Field(description="How many other branches became the same posture.")
-    covariance: Annotated[list[Upper | None], Field(min_length=14, max_length=14)] = Field(
-        description="Of every joint: xx, xy, xz, yy, yz, zz, in the square of `unit`."
-    )
-
-
-class ResultPosture(FileModel):
-    """One survivor."""
-
-    joints: Annotated[list[MaybePoint], Field(min_length=14, max_length=14)] = Field(
-        description="In tree order, OpenCV camera frame, in `unit`."
-    )
-    q: Annotated[list[Maybe], Field(max_length=1000), FailFast()] = Field(
-        description="Configuration in Pinocchio's order: metres and radians whatever the unit."
-    )
-    branches: Annotated[str, Field(max_length=64)] = Field(
-        description="Near (0) or far (1), segment by segment."
-    )
-    group: Count | None = Field(default=None, description="The group of similar survivors it is in.")
-    margins: Annotated[dict[str, Maybe], FEW] = Field(
-        description="By validator: the distance to the nearest bound, in the validator's own unit."
-    )
-    fk_distance: Maybe = Field(description="From the joints to the forward kinematics of q, in `unit`.")
-    length_residual: Maybe = Field(description="Length lost where a ray is tangent, in `unit`.")
-    scale: Maybe = Field(default=None, description="Uncalibrated: pixels a `unit` that it was recovered at.")
-    inferred: Annotated[dict[str, ResultInferred], named(JOINTS, "joint")] | None = Field(
-        default=None,
-        description="Joints that were not seen; those of `joints` are in the middle of their sets.",
-    )
-    probability: Annotated[float, Field(ge=0, le=1)] | None = Field(
-        default=None, description="That it is the one nearest to the truth; over a frame they sum to one."
-    )
-    refined: ResultRefined | None = Field(
-        default=None, description="How likely and how sure, where the noise is known."
-    )
+ResultInferred: Any = model_of(Inferred)
+"""What is known of the position of a joint that was not seen."""
+ResultPosture: Any = model_of(SurvivorColumns)
+"""One survivor, as the table of columns has it."""
 
 
 class ResultMinimum(FileModel):

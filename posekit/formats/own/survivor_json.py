@@ -1,0 +1,113 @@
+"""Tables of survivors as JSON: an object a survivor, with a field a column; null for what is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.units import Unit
+from posekit.geometry import Array
+
+
+def survivor_rows(table: Any, unit: Unit) -> list[dict[str, Any]]:
+    """Write a table of survivors as objects, in the unit of the file.
+
+    Parameters
+    ----------
+    table : SurvivorColumns or Likelihoods
+        A dataclass of columns; those that are None are left out.
+    unit : {"m", "cm", "mm"}
+    """
+    lists: dict[str, list[Any]] = {}
+    for name, column in columns_in(type(table)).items():
+        values = getattr(table, name)
+        if values is not None:
+            lists[column.key] = _written(column, values, unit)
+            if column.by_check and not values:  # no check was asked for: nothing of each survivor
+                lists[column.key] = [{} for _ in range(len(table))]
+    return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
+
+
+def nullable(values: NDArray[Any]) -> list[Any]:
+    """Turn an array into lists, with None for NaN."""
+    unknown = np.isnan(values) if values.dtype.kind == "f" else np.zeros(1, dtype=np.bool_)
+    if not unknown.any():
+        return list(values.tolist())
+    boxed = values.astype(object)
+    boxed[unknown] = None
+    return list(boxed.tolist())
+
+
+def survivor_columns(
+    table: type, rows: Sequence[Any], unit: Unit, *, extents: Mapping[str, Any], carried: frozenset[str]
+) -> dict[str, Any]:
+    """Gather the columns of survivors that were read from JSON.
+
+    Parameters
+    ----------
+    table : type
+        Which columns: a dataclass of them.
+    rows : sequence of N models
+        What the file says of each survivor.
+    unit : {"m", "cm", "mm"}
+        The file's.
+    extents : mapping
+        What a frame without survivors does not tell: how many numbers ``q`` has, which names ``margins``.
+    carried : frozenset of str
+        Optional columns that the frame has.
+
+    Returns
+    -------
+    dict
+        Values by column, None for optional ones that are not carried: what `table` is made of.
+    """
+    return {
+        name: None
+        if column.optional and name not in carried
+        else _read(column, [getattr(row, column.key) for row in rows], unit, extents.get(name))
+        for name, column in columns_in(table).items()
+    }
+
+
+def _written(column: Column, values: Any, unit: Unit) -> list[Any]:
+    if column.kind == "str":
+        return list(values)
+    if column.kind == "table":
+        return survivor_rows(values, unit)
+    if column.kind == "objects":
+        return [{name: one.fields(unit) for name, one in row.items()} for row in values]
+    if column.by_check:
+        lists = [nullable(column.in_file(each, unit)) for each in values.values()]
+        return [dict(zip(values, row, strict=True)) for row in zip(*lists, strict=True)]
+    found = column.in_file(values, unit)
+    if column.null == "row":
+        unknown = np.isnan(found).any(axis=-1)
+        return [
+            [None if lacks else row for row, lacks in zip(matrix, none, strict=True)]
+            for matrix, none in zip(found.tolist(), unknown.tolist(), strict=True)
+        ]
+    return list(found.astype(np.int64).tolist()) if column.whole else nullable(found)
+
+
+def _read(column: Column, found: list[Any], unit: Unit, extent: Any) -> Any:
+    if column.kind == "str":
+        return found
+    if column.kind == "table":
+        return column.of(**survivor_columns(column.of, found, unit, extents={}, carried=frozenset()))
+    if column.kind == "objects":
+        return [
+            {name: column.of.of(one.model_dump(), unit) for name, one in (each or {}).items()}
+            for each in found
+        ]
+    if column.by_check:
+        return {check: np.array([each.get(check) for each in found], dtype=np.float64) for check in extent}
+    if column.null == "row":
+        unknown = [np.nan] * (column.shape[-1] or 0)
+        found = [[unknown if row is None else row for row in each] for each in found]
+    shape = tuple(extent if one is None else one for one in column.shape)
+    values: Array = np.array(found, dtype=np.int64 if column.kind == "int" else np.float64)
+    return column.in_memory(values.reshape(len(found), *shape), unit)

@@ -1,0 +1,61 @@
+"""The pydantic models of survivors, made from the table of their columns."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Annotated, Any, Final
+
+from pydantic import FailFast, Field, create_model
+
+from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.validation import FEW, FileModel, named
+from posekit.skeleton import JOINTS
+
+Count = Annotated[int, Field(ge=0, le=2**53)]
+MAX_EXTENT: Final = 1000
+"""Numbers of an array whose extent no schema says, as that of q."""
+
+
+@cache
+def model_of(table: Any) -> type[FileModel]:
+    """Make the model of the objects that hold one row of a table each.
+
+    Parameters
+    ----------
+    table : type
+        A dataclass of columns, with its name and description in schemas as `schema_title`.
+    """
+    fields: dict[str, Any] = {}
+    for column in columns_in(table).values():
+        kind = _annotation(column)
+        fields[column.key] = (
+            (kind | None, Field(default=None, description=column.meaning))
+            if column.optional
+            else (kind, Field(description=column.meaning))
+        )
+    name, doc = table.schema_title
+    return create_model(name, __base__=FileModel, __doc__=doc, **fields)
+
+
+def _annotation(column: Column) -> Any:
+    """Return the type of one survivor's value in JSON."""
+    if column.kind == "str":
+        return str if column.longest is None else Annotated[str, Field(max_length=column.longest)]
+    if column.kind == "table":
+        return model_of(column.of)
+    if column.kind == "objects":
+        return Annotated[dict[str, model_of(column.of)], named(JOINTS, "joint")]
+    number: Any = Count if column.kind == "int" or column.whole else float
+    if column.lower is not None or column.upper is not None:
+        number = Annotated[number, Field(ge=column.lower, le=column.upper)]
+    kind: Any = number | None if column.null == "number" else number
+    if column.by_check:
+        return Annotated[dict[str, kind], FEW]
+    for depth, extent in enumerate(reversed(column.shape)):
+        inner = kind | None if depth == 1 and column.null == "row" else kind
+        kind = (
+            Annotated[list[inner], Field(max_length=MAX_EXTENT), FailFast()]
+            if extent is None
+            else Annotated[list[inner], Field(min_length=extent, max_length=extent)]
+        )
+    return kind

@@ -1,0 +1,146 @@
+"""Tables of survivors as the arrays of an NPZ: a padded array a column, ``refined/chi2`` for a table in the table."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.npz import Archive, Ragged, not_finite
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
+from posekit.formats.own.units import Unit
+from posekit.geometry import Array
+
+PADDED: Final = tuple(
+    f"{name}/" if column.by_check or column.kind == "table" else name
+    for name, column in SURVIVOR_COLUMNS.items()
+    if column.kind != "objects"
+)
+"""What the names of padded arrays begin with."""
+
+
+def survivor_arrays(
+    table: type, frames: Sequence[Any], unit: Unit, *, carried: frozenset[str], within: str = ""
+) -> dict[str, NDArray[Any] | Ragged]:
+    """Write the columns of some frames' survivors as arrays, in the unit of the file.
+
+    Parameters
+    ----------
+    table : type
+        Which columns: a dataclass of them.
+    frames : sequence of such tables
+    unit : {"m", "cm", "mm"}
+    carried : frozenset of str
+        Optional columns that are written: where a frame lacks one, as not known.
+    within : str
+        What the arrays' names begin with.
+    """
+    arrays: dict[str, NDArray[Any] | Ragged] = {}
+    for name, column in columns_in(table).items():
+        if column.optional and name not in carried:
+            continue
+        values = [getattr(frame, name) for frame in frames]
+        if column.kind == "table":
+            known = [
+                column.of.unknown(len(frame.joints)) if each is None else each
+                for each, frame in zip(values, frames, strict=True)
+            ]
+            arrays |= survivor_arrays(column.of, known, unit, carried=frozenset(), within=f"{name}/")
+        elif column.kind == "objects":
+            texts = [None if each is None else _objects(each, unit) for each in values]
+            arrays[name] = np.array(json.dumps(texts, allow_nan=False))
+        elif column.by_check:
+            for check in values[0]:
+                arrays[f"{name}/{check}"] = Ragged(rows=[each[check] for each in values], fill=np.nan)
+        else:
+            arrays[within + name] = Ragged(
+                rows=[
+                    np.full(len(frame.joints), column.fill) if each is None else _array(column, each, unit)
+                    for each, frame in zip(values, frames, strict=True)
+                ],
+                fill=column.fill,
+            )
+    return arrays
+
+
+def survivors_in(
+    archive: Archive,
+    table: type,
+    count: NDArray[np.int64],
+    unit: Unit,
+    *,
+    extents: Mapping[str, Any],
+    within: str = "",
+) -> dict[str, list[Any] | None]:
+    """Read the columns of all frames' survivors, but for those that are JSON text.
+
+    Parameters
+    ----------
+    archive : Archive
+    table : type
+        Which columns: a dataclass of them.
+    count : int array (F,)
+        Survivors of each frame.
+    unit : {"m", "cm", "mm"}
+        The file's.
+    extents : mapping
+        How many numbers ``q`` has, and which names ``margins``.
+    within : str
+        What the arrays' names begin with.
+
+    Returns
+    -------
+    dict
+        By column one entry a frame; None for an optional column that the archive does not have.
+    """
+    found: dict[str, list[Any] | None] = {}
+    for name, column in columns_in(table).items():
+        if column.kind == "table":
+            found[name] = _tables(archive, column, count, unit)
+        elif column.kind == "objects" or (column.optional and within + name not in archive.names):
+            found[name] = None
+        elif column.by_check:
+            each = {check: _rows(archive, f"{name}/{check}", column, count, ()) for check in extents[name]}
+            found[name] = [{check: rows[k] for check, rows in each.items()} for k in range(len(count))]
+        else:
+            shape = tuple(extents[name] if extent is None else extent for extent in column.shape)
+            rows = _rows(archive, within + name, column, count, shape)
+            found[name] = (
+                [each.tolist() for each in rows]
+                if column.kind == "str"
+                else [column.in_memory(each, unit) for each in rows]
+            )
+    return found
+
+
+def _tables(archive: Archive, column: Column, count: NDArray[np.int64], unit: Unit) -> list[Any] | None:
+    """Read a table in the table; None in frames of which some survivor has a first column that is not known."""
+    names = list(columns_in(column.of))
+    if f"{column.name}/{names[0]}" not in archive.names:
+        return None
+    found = survivors_in(archive, column.of, count, unit, extents={}, within=f"{column.name}/")
+    rows = [{name: (found[name] or [])[k] for name in names} for k in range(len(count))]
+    return [None if np.isnan(row[names[0]]).any() else column.of(**row) for row in rows]
+
+
+def _rows(
+    archive: Archive, name: str, column: Column, count: NDArray[np.int64], shape: tuple[int | None, ...]
+) -> list[Array]:
+    kinds = {"str": "U", "int": "iu"}.get(column.kind, "f")
+    rows = archive.ragged(name, kinds, count, shape)
+    for row in rows if kinds == "f" else ():
+        if np.isinf(row).any():
+            raise not_finite(archive.path, name, row)
+    return rows
+
+
+def _array(column: Column, values: Any, unit: Unit) -> NDArray[Any]:
+    return np.array(values, dtype=np.str_) if column.kind == "str" else column.in_file(values, unit)
+
+
+def _objects(rows: Sequence[Mapping[str, Any]], unit: Unit) -> list[dict[str, Any]]:
+    return [{name: one.fields(unit) for name, one in row.items()} for row in rows]
