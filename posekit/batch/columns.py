@@ -16,6 +16,8 @@ from posekit.batch.image_rows import IMAGE, ImageRows
 from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
 from posekit.formats.motion.survivors import COORDINATES
+from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.survivor_columns import Likelihoods, SurvivorColumns
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.trees import Batch
@@ -27,6 +29,17 @@ TEXTS: Final = ("input", "judged", "reason", "inferred", "rejected")
 NO_SURVIVOR: Final = -1
 UNKNOWN: Final = "root/not_known"
 LEAVES: Final = 8192
+
+BATCH_COLUMNS: Final = sorted(
+    (
+        column
+        for table in (SurvivorColumns, Likelihoods)
+        for column in columns_in(table).values()
+        if column.batch_place
+    ),
+    key=lambda column: column.batch_place,
+)
+"""The columns of a survivor that are numbers in a shard, in their order there."""
 
 Letters = NDArray[np.uint8]
 
@@ -143,12 +156,23 @@ def frames_of(rows: ImageRows, recovery: Recovery, recipe: Recipe) -> Frames:
     )
 
 
+def _asked(column: Column, recipe: Recipe) -> bool:
+    """Tell whether a recipe asks for a column."""
+    return not column.asked_by or bool(getattr(recipe, column.asked_by))
+
+
 def value_columns(recipe: Recipe) -> tuple[str, ...]:
     """List the numbers of a survivor that a recipe asks for."""
-    margins = tuple(f"margin.{check.replace('-', '_')}" for check in recipe.checks) if recipe.margins else ()
-    q = ("fk_distance", *(f"q.{name}" for name in load_figure().configuration_names)) if recipe.q else ()
-    rank = ("probability",) if recipe.rank else ()
-    return (*rank, "scale", "length_residual", "chi2", *margins, *q)
+    parts = {
+        "margins": [check.replace("-", "_") for check in recipe.checks],
+        "q": load_figure().configuration_names,
+    }
+    return tuple(
+        name
+        for column in BATCH_COLUMNS
+        if _asked(column, recipe)
+        for name in column.flat_names(parts.get(column.name, ()))
+    )
 
 
 def schema_of(recipe: Recipe) -> Any:
@@ -281,17 +305,20 @@ def _values(
     batch: Batch, members: Sequence[FrameRecovery], rows: NDArray[np.intp], recipe: Recipe
 ) -> dict[str, Array]:
     """Return the numbers of some survivors by column."""
-    columns: dict[str, Array] = {"length_residual": batch.length_residual[rows]}
-    if members[0].scales is not None:
-        columns["scale"] = np.concatenate([frame.scales for frame in members])
-    if batch.refined is not None:
-        columns["chi2"] = batch.refined.chi2[rows]
-    if recipe.margins:
-        for name, margin in batch.margins.items():
-            columns[f"margin.{name}"] = np.where(np.isinf(margin[rows]), np.nan, margin[rows])
-    if recipe.q:
-        found = batch.configurations
-        columns["fk_distance"] = found.distance[rows]
-        for name, column in zip(batch.body.figure.configuration_names, found.q[rows].T, strict=True):
-            columns[f"q.{name}"] = column
+    columns: dict[str, Array] = {}
+    for column in BATCH_COLUMNS:
+        if not _asked(column, recipe):
+            continue
+        holder = next((one for one in (batch, batch.refined) if hasattr(one, column.name)), None)
+        if column.by_check:
+            margins = {name: margin[rows] for name, margin in batch.margins.items()}
+            values = [np.where(np.isinf(margin), np.nan, margin) for margin in margins.values()]
+            columns |= zip(column.flat_names(list(margins)), values, strict=True)
+        elif column.flat_prefix:
+            names = column.flat_names(batch.body.figure.configuration_names)
+            columns |= zip(names, getattr(holder, column.name)[rows].T, strict=True)
+        elif holder is not None:
+            columns[column.key] = getattr(holder, column.name)[rows]
+        elif getattr(members[0], column.name, None) is not None:  # scales: of each frame, not of the batch
+            columns[column.key] = np.concatenate([getattr(frame, column.name) for frame in members])
     return columns

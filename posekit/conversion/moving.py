@@ -19,6 +19,7 @@ from posekit.formats.kinds import Kind, What
 from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import OpenCVModel, Result, View
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
@@ -238,13 +239,20 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
     says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
     points, up = _placed(points, view, stated, says)
-    names = list(dict.fromkeys(name for frame in result.frames for name in frame.margins))
     values = {
-        f"margin_{name}": np.array([result.frames[k].margins[name][row] for k, row in rows]) for name in names
+        "probability": np.array([probability[k][row] for k, row in rows]),
+        "rank": np.array(ranks, dtype=np.float64),
     }
-    values["probability"] = np.array([probability[k][row] for k, row in rows])
-    values["rank"] = np.array(ranks, dtype=np.float64)
-    values["length_residual"] = np.array([result.frames[k].length_residual[row] for k, row in rows])
+    for name, column in SURVIVOR_COLUMNS.items():
+        of_frame = [getattr(frame, name) for frame in result.frames] if column.in_motion else []
+        if column.by_check:
+            margins = {
+                f"{column.flat_prefix}_{check}": np.array([of_frame[k][check][row] for k, row in rows])
+                for check in of_frame[0]
+            }
+            values = {**margins, **values}
+        elif of_frame:
+            values[column.key] = np.array([of_frame[k][row] for k, row in rows])
     return Moving(
         points=points,
         time=np.array([result.frames[k].time for k, _ in rows]),

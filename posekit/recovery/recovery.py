@@ -168,12 +168,12 @@ class FrameRecovery:
     @property
     def q(self) -> Array:
         """Survivors as configurations (N, nq) in Pinocchio's order."""
-        return self.batch.configurations.q[self._rows] if self.batch else np.empty((0, 0))
+        return self.batch.q[self._rows] if self.batch else np.empty((0, 0))
 
     @property
     def fk_distance(self) -> Array:
         """How far the joints of q are from the posture's (N,), metres."""
-        return self.batch.configurations.distance[self._rows] if self.batch else np.empty(0)
+        return self.batch.fk_distance[self._rows] if self.batch else np.empty(0)
 
     @property
     def length_residual(self) -> Array:

@@ -90,6 +90,16 @@ class Batch:
         """The configurations of all survivors."""
         return self.body.figure.configurations(self.points)
 
+    @property
+    def q(self) -> Array:
+        """Those as arrays (N, nq) in Pinocchio's order."""
+        return self.configurations.q
+
+    @property
+    def fk_distance(self) -> Array:
+        """How far the joints of each configuration are from the posture's (N,), metres."""
+        return self.configurations.distance
+
     @cached_property
     def margins(self) -> dict[str, Array]:
         """The worst margin of each survivor (N,), by validator: degrees or metres."""

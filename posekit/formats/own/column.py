@@ -92,7 +92,9 @@ class Column:
     @property
     def fill(self) -> float | int | str:
         """What stands where nothing is known, or in the padding of an array."""
-        return {"int": -1, "str": ""}.get(self.kind, np.nan)
+        if self.kind == "str":
+            return ""
+        return -1 if self.kind == "int" else np.nan
 
     def checked(self, given: Any, count: int, within: str = "") -> Any:
         """Return the values of `count` survivors, their shape and bounds checked, their arrays read-only.
@@ -171,7 +173,7 @@ def column(meaning: str, *, default: Any = MISSING, **what: Any) -> Any:
 
 
 @cache
-def columns_in(table: type) -> dict[str, Column]:
+def columns_in(table: Any) -> dict[str, Column]:
     """Return the columns of a dataclass by name, in the order of its fields; other fields are passed over."""
     columns = {}
     for item in fields(table):

@@ -7,7 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import FailFast, Field
 
-from posekit.formats.own.result_schema import Count, Maybe, MaybePoint, Names, ResultFamily
+from posekit.formats.own.result_schema import Maybe, MaybePoint, Names, ResultFamily
+from posekit.formats.own.survivor_models import Count
 from posekit.formats.own.units import Unit
 from posekit.formats.own.validation import FEW, FileModel
 

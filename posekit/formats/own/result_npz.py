@@ -107,7 +107,9 @@ def result_in(archive: Archive) -> Result:
     if (count < 0).any() or held > MAX_ARRAYS:
         most = f"counts from 0, at most {MAX_ARRAYS / 1e6:,.0f} MB of survivors"
         raise refusal(path, "count", f"counts that need {held / 1e6:,.0f} MB", most, "split the result")
-    survivors = survivors_in(archive, SurvivorColumns, count, unit, extents={"q": nq, "margins": margins})
+    survivors: dict[str, Any] = survivors_in(
+        archive, SurvivorColumns, count, unit, extents={"q": nq, "margins": margins}
+    )
     cameras = _cameras(archive, len(time), unit)
     levels = _levels(archive, len(time))
     rejected = _rejected(archive, len(time))
@@ -127,6 +129,10 @@ def result_in(archive: Archive) -> Result:
         raise refusal(path, "settings", shown(settings), "an object", "write the file again")
     if not isinstance(pruned, list) or len(pruned) != len(time):
         raise refusal(path, "pruned", shown(pruned), f"a list of {len(time)} entries", "write the file again")
+    rows: list[dict[str, Any]] = [
+        {name: None if values is None else values[k] for name, values in survivors.items()}
+        for k in range(len(time))
+    ]
     return Result(
         unit=unit,
         configuration_names=configuration_names,
@@ -140,9 +146,9 @@ def result_in(archive: Archive) -> Result:
                 pruned=pruned[index],
                 family=None if families is None else families[index],
                 root=None if roots is None else roots[index],
-                **{name: None if values is None else values[index] for name, values in survivors.items()},
+                **own,
             )
-            for index in range(len(time))
+            for index, own in enumerate(rows)
         ],
         paths=_followed(archive, len(time), unit),
     )

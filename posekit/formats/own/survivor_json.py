@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.survivor_columns import Likelihoods, SurvivorColumns
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 
 
-def survivor_rows(table: Any, unit: Unit) -> list[dict[str, Any]]:
+def survivor_rows(table: SurvivorColumns | Likelihoods, unit: Unit) -> list[dict[str, Any]]:
     """Write a table of survivors as objects, in the unit of the file.
 
     Parameters
@@ -23,7 +24,8 @@ def survivor_rows(table: Any, unit: Unit) -> list[dict[str, Any]]:
     unit : {"m", "cm", "mm"}
     """
     lists: dict[str, list[Any]] = {}
-    for name, column in columns_in(type(table)).items():
+    kind: Any = type(table)
+    for name, column in columns_in(kind).items():
         values = getattr(table, name)
         if values is not None:
             lists[column.key] = _written(column, values, unit)
@@ -85,11 +87,7 @@ def _written(column: Column, values: Any, unit: Unit) -> list[Any]:
         return [dict(zip(values, row, strict=True)) for row in zip(*lists, strict=True)]
     found = column.in_file(values, unit)
     if column.null == "row":
-        unknown = np.isnan(found).any(axis=-1)
-        return [
-            [None if lacks else row for row, lacks in zip(matrix, none, strict=True)]
-            for matrix, none in zip(found.tolist(), unknown.tolist(), strict=True)
-        ]
+        return [[None if np.isnan(row).any() else row.tolist() for row in matrix] for matrix in found]
     return list(found.astype(np.int64).tolist()) if column.whole else nullable(found)
 
 

@@ -44,7 +44,8 @@ def _annotation(column: Column) -> Any:
     if column.kind == "table":
         return model_of(column.of)
     if column.kind == "objects":
-        return Annotated[dict[str, model_of(column.of)], named(JOINTS, "joint")]
+        model: Any = model_of(column.of)
+        return Annotated[dict[str, model], named(JOINTS, "joint")]
     number: Any = Count if column.kind == "int" or column.whole else float
     if column.lower is not None or column.upper is not None:
         number = Annotated[number, Field(ge=column.lower, le=column.upper)]
@@ -52,7 +53,7 @@ def _annotation(column: Column) -> Any:
     if column.by_check:
         return Annotated[dict[str, kind], FEW]
     for depth, extent in enumerate(reversed(column.shape)):
-        inner = kind | None if depth == 1 and column.null == "row" else kind
+        inner: Any = kind | None if depth == 1 and column.null == "row" else kind
         kind = (
             Annotated[list[inner], Field(max_length=MAX_EXTENT), FailFast()]
             if extent is None

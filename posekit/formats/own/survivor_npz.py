@@ -75,7 +75,7 @@ def survivors_in(
     *,
     extents: Mapping[str, Any],
     within: str = "",
-) -> dict[str, list[Any] | None]:
+) -> dict[str, Any]:
     """Read the columns of all frames' survivors, but for those that are JSON text.
 
     Parameters
