@@ -1,30 +1,25 @@
 """Any articulated object from an uncalibrated view: the truth is among the survivors, and the rest is said plainly."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks.studies.object_study import study_lines, study_object
 from posekit.errors import InputError
 from posekit.formats.own import ScaledOrthographicModel
 from posekit.formats.own.object_view import ObjectView
-from posekit.linkages import Linkage, load_linkage, span
+from posekit.linkages import Linkage, span
 from posekit.objects import (
     ArticulatedObject,
     ObjectTolerance,
-    certify,
     load_object,
     object_lines,
     recover_object,
     tolerance_of,
 )
-from posekit.objects.certify import Certifier
 from posekit.objects.draw import draw_configurations
 from posekit.objects.spread import ImageSpread
 from posekit.objects.triangles import Triangles, triangles
-from posekit.robots import load_robot
 from posekit.robots.kinematics import Kinematics, body_points
 from posekit.settings.scale import Scale
 
@@ -88,28 +83,6 @@ def drawn(seed, segments, loops):
         },
     )
     return ArticulatedObject(linkage=linkage), points[None]
-
-
-@pytest.fixture(scope="module")
-def robots():
-    found = {}
-
-    def of(name, n=3, seed=0):
-        if name not in found:
-            found[name] = load_object(name)
-        thing = found[name]
-        model = robot_of(thing).model
-        kinematics = Kinematics(model=model, points=body_points(thing.linkage.points))
-        rng = np.random.default_rng(seed)
-        q = np.tile(pin.neutral(model), (n, 1))
-        for at in kinematics.space.bounded_q:
-            lower, upper = np.clip([kinematics.space.lower[at], kinematics.space.upper[at]], -np.pi, np.pi)
-            q[:, at] = rng.uniform(lower, upper, n)
-        turned = rng.standard_normal((n, 4))
-        q[:, 3:7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
-        return thing, kinematics.positions(q)
-
-    return of
 
 
 class TestLaws:
@@ -539,54 +512,6 @@ class TestTolerance:
             tolerance_of(load_object("taylor_human"), rigid=0.02)
 
 
-class TestCertifier:
-    @pytest.mark.parametrize("name", ["panda", "ur5", "allegro"])
-    def test_the_truth_has_a_configuration(self, robots, name):
-        thing, _ = robots(name)
-        robot = robot_of(thing)
-        certifier = Certifier(robot, thing.linkage.points)
-        q = draw_configurations(robot, 40, np.random.default_rng(10))
-        points = certifier.kinematics.positions(q) + np.array([0.3, -0.2, 4.0])
-        found = certifier.certify(points, tolerance=1e-6)
-        assert all(found.certified) and not any(found.reasons)
-        np.testing.assert_allclose(certifier.kinematics.positions(found.q), points, atol=1e-6)
-        assert (found.q[:, 7:] >= robot.lower[7:]).all() and (found.q[:, 7:] <= robot.upper[7:]).all()
-
-    def test_what_cannot_be_reached_is_undecided_with_the_reason(self, robots):
-        thing, truth = robots("panda")
-        certifier = Certifier(robot_of(thing), thing.linkage.points)
-        stretched = truth[:1] * 1.2
-        found = certifier.certify(stretched, tolerance=1e-6)
-        assert found.certified == [False]
-        assert found.reasons[0].startswith(
-            "undecided: no configuration was found, with limits or without; panda_"
-        )
-        q = pin.neutral(robot_of(thing).model)[None].copy()
-        q[0, 10] = 0.4  # panda_joint4, whose limits are -3.07 and -0.07
-        q[0, 12] = 1.0
-        found = certifier.certify(certifier.kinematics.positions(q), tolerance=1e-6)
-        assert found.certified == [False]
-        assert (
-            "no configuration within the limits was found; without them panda_joint4 is" in found.reasons[0]
-        )
-
-    def test_only_so_many_are_looked_for(self, robots, monkeypatch):
-        thing, truth = robots("panda")
-        monkeypatch.setattr(certify, "MAX_POSTURES_CERTIFIED", 2)
-        found = Certifier(robot_of(thing), thing.linkage.points).certify(truth, tolerance=1e-6)
-        assert found.certified == [True, True, False] and np.isnan(found.q[2]).all()
-        assert "first 2 postures alone" in found.reasons[2]
-
-    def test_the_study_counts(self, robots):
-        thing, _ = robots("panda")
-        study = study_object(thing, count=4, seed=1)
-        assert study.flips == 64 and study.found.all() and study.sure.all()
-        assert (study.certified <= study.survivors).all() and (study.survivors <= 16).all()
-        assert study_lines("panda", study)[0].startswith("| panda | 64 | ")
-        with pytest.raises(InputError, match="has no robot"):
-            study_object(load_object("taylor_human"))
-
-
 class TestBadInput:
     def test_too_many_survivors(self):
         thing, truth = drawn(1, 16, 0)
@@ -603,47 +528,3 @@ class TestBadInput:
         ur5, _ = robots("ur5")
         with pytest.raises(InputError, match="not those of the linkage ur5"):
             recover_object(view_of(panda, truth), ur5)
-
-    def test_names_of_nothing(self):
-        with pytest.raises(InputError, match="did you mean panda"):
-            load_object("pandaa")
-        with pytest.raises(InputError, match="taylor_human"):
-            load_object("nothing like it")
-
-    def test_a_urdf_by_path(self, tmp_path):
-        robot = load_robot("ur5", geometry=False)
-        path = tmp_path / "arm.urdf"
-        path.write_text(robot.urdf, encoding="utf-8")
-        thing = load_object(path)
-        assert thing.linkage.points == load_object("ur5").linkage.points
-
-    def test_a_linkage_file_with_a_robot(self, tmp_path):
-        path = tmp_path / "forearm.toml"
-        lines = [
-            'schema = "posekit.linkage/1"', 'urdf = "panda"', "unit = 1",
-            'points = ["panda_joint3", "panda_joint4", "panda_joint5"]', "[segments]",
-            "panda_joint3-panda_joint4 = 0.0825", "panda_joint4-panda_joint5 = 0.4",
-        ]  # fmt: skip
-        path.write_text("\n".join(lines), encoding="utf-8")
-        with pytest.raises(InputError, match=r"0\.4 m long, and 0\.3927\d+ m in its robot panda"):
-            load_object(path)
-        good = "\n".join(lines).replace("0.4", "0.393")
-        path.write_text(good, encoding="utf-8")
-        thing = load_object(path)
-        assert thing.robot is not None
-        np.testing.assert_allclose(thing.linkage.lengths[1], np.hypot(0.0825, 0.384), rtol=1e-12)
-        path.write_text(good.replace("unit = 1", ""), encoding="utf-8")
-        with pytest.raises(InputError, match="its lengths are relative"):
-            load_object(path)
-        path.write_text(good.replace("panda_joint5", "panda_elbow"), encoding="utf-8")
-        with pytest.raises(InputError, match=r"panda_elbow.* is no link or joint"):
-            load_object(path)
-        path.write_text(good.replace("panda_joint5", "panda_joint7"), encoding="utf-8")
-        with pytest.raises(
-            InputError, match="is no rigid segment of its robot panda: panda_joint5, panda_joint6"
-        ):
-            load_object(path)
-
-    def test_built_in_linkages_load(self):
-        thing = load_object("taylor_human")
-        assert thing.robot is None and thing.linkage.points == load_linkage("taylor_human").points

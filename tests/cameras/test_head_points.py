@@ -1,0 +1,58 @@
+"""Head points: names and places that agree, enough of them, not in one plane."""
+
+import numpy as np
+import pytest
+
+from posekit.cameras.head import (
+    TABLE_A2,
+    HeadPoints,
+)
+from posekit.errors import HeadError
+
+
+def changed(**points):
+    return dict(zip(TABLE_A2.names, TABLE_A2.points, strict=True)) | points
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (dict(list(changed().items())[:5]), r"^5 of 5 head points are known, at least 6 are needed$"),
+        ({}, r"^0 of 0 head points are known"),
+        (
+            changed(nose=[0.0, np.nan, 0.0]),
+            r"^head point nose is at \[0.0, nan, 0.0\]; expected three finite",
+        ),
+        (changed(nose=[np.inf, 0.0, 0.0]), r"^head point nose is at"),
+        (changed(nose=[0.0, 0.0]), r"^head point nose has shape \(2,\); expected three numbers"),
+        (changed(nose="here"), r"^head point nose is 'here'; expected three numbers"),
+        (changed(nose=TABLE_A2.points[2] + 1e-6), r"^head points nose and right_eye coincide \(.* m apart\)"),
+        (changed(neck=[-0.34, 0.6, 0.0], nose=[-0.34, 0.65, 0]), None),
+    ],
+)
+def test_head_points_that_cannot_determine_a_camera(points, message):
+    if message is None:
+        assert HeadPoints.from_mapping(points).names == TABLE_A2.names
+        return
+    with pytest.raises(HeadError, match=message):
+        HeadPoints.from_mapping(points)
+
+
+def test_coplanar_head():
+    flat = {name: point * [0, 1, 1] for name, point in changed().items()}
+    with pytest.raises(HeadError, match=r"^the 6 head points lie in one plane .*; add a point off it"):
+        HeadPoints.from_mapping(flat)
+
+
+def test_names_and_points_must_agree():
+    with pytest.raises(HeadError, match=r"6 names and points of shape \(5, 3\)"):
+        HeadPoints(names=TABLE_A2.names, points=TABLE_A2.points[:5])
+    with pytest.raises(HeadError, match="named twice: nose"):
+        HeadPoints(
+            names=("neck", "nose", "nose", "left_eye", "right_ear", "left_ear"), points=TABLE_A2.points
+        )
+
+
+def test_unknown_point_names_the_nearest():
+    with pytest.raises(HeadError, match=r"no point 'right_eyes', only neck.*; did you mean right_eye\?"):
+        TABLE_A2.index("right_eyes")
