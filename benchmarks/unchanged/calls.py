@@ -16,11 +16,11 @@ import numpy as np
 
 import posekit
 
-CALLS: dict[str, Callable[..., Any]] = {}
+NAMED_CALLS: dict[str, Callable[..., Any]] = {}
 
 
 def call(function: Callable[..., Any]) -> Callable[..., Any]:
-    CALLS[function.__name__] = function
+    NAMED_CALLS[function.__name__] = function
     return function
 
 
@@ -233,7 +233,7 @@ def errors(*paths: str) -> Any:
 def main() -> None:
     """Run one call, and write what it returns."""
     name, *arguments = sys.argv[1:]
-    Path("answer.json").write_text(json.dumps(plain(CALLS[name](*arguments))))
+    Path("answer.json").write_text(json.dumps(plain(NAMED_CALLS[name](*arguments))))
 
 
 if __name__ == "__main__":

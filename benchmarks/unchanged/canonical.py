@@ -14,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-DIGEST = re.compile(r"\b[0-9a-f]{64}\b|\b[0-9a-f]{16}\b")
+HEX_DIGEST = re.compile(r"\b[0-9a-f]{64}\b|\b[0-9a-f]{16}\b")
 VOLATILE_TEXT: tuple[tuple[re.Pattern[str], str], ...] = (
-    (DIGEST, "<digest>"),  # of settings, versions and contents, which are compared themselves
+    (HEX_DIGEST, "<digest>"),  # of settings, versions and contents, which are compared themselves
     (re.compile(r"\b\d+(\.\d+)? ?(s|ms|min)\b(?! of)"), "<time>"),
     (re.compile(r"\b\d+(\.\d+)? [KMG]i?B\b"), "<memory>"),
 )
-TEXTS = {".md", ".txt", ".log"}
-TOKENS = {".trc", ".bvh", ".mot", ".urdf", ".srdf", ".xml"}
+TEXT_SUFFIXES = {".md", ".txt", ".log"}
+TOKEN_SUFFIXES = {".trc", ".bvh", ".mot", ".urdf", ".srdf", ".xml"}
 GLTF_TYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 
 
@@ -39,7 +39,7 @@ def files_of(folder: Path, places: dict[str, str]) -> dict[str, Any]:
     for path in sorted(folder.rglob("*")):
         inner = path.relative_to(folder)
         if path.is_file() and not any(part.startswith(".") for part in inner.parts):
-            found[DIGEST.sub("<digest>", inner.as_posix())] = file_of(path, places)
+            found[HEX_DIGEST.sub("<digest>", inner.as_posix())] = file_of(path, places)
     return found
 
 
@@ -55,9 +55,9 @@ def file_of(path: Path, places: dict[str, str]) -> dict[str, Any]:
     }
     if kind in readers:
         return {"kind": kind[1:], "content": named(readers[kind](path), places)}
-    if kind in TOKENS:
+    if kind in TOKEN_SUFFIXES:
         return {"kind": "tokens", "content": named(re.split(r'[\s"<>]+', path.read_text()), places)}
-    if kind in TEXTS:
+    if kind in TEXT_SUFFIXES:
         return {"kind": "text", "content": text_of(path.read_text(), places)}
     content = path.read_bytes()
     return {

@@ -10,8 +10,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from benchmarks.unchanged.differences import ABSENT, EXACT, REFINED, Difference, differences, numbers
-from benchmarks.unchanged.expected import EXPECTED, VOLATILE, Allowed, allowed
+from benchmarks.unchanged.differences import (
+    ABSENT_VALUE,
+    EXACT_TOLERANCE,
+    REFINED_TOLERANCE,
+    Difference,
+    differences,
+    numbers,
+)
+from benchmarks.unchanged.expected import EXPECTED_DIFFERENCES, VOLATILE_PLACES, Allowed, allowed
 
 SHOWN_PER_CASE = 12
 SHOWN_CHARACTERS = 90
@@ -29,7 +36,9 @@ class Found:
     pictures: list[tuple[str, Difference]] = field(default_factory=list)
 
 
-def compare(before: Path, after: Path, output: Path | None, expected: tuple[Allowed, ...] = EXPECTED) -> int:
+def compare(
+    before: Path, after: Path, output: Path | None, expected: tuple[Allowed, ...] = EXPECTED_DIFFERENCES
+) -> int:
     """Compare two recordings, and write or print a report.
 
     Parameters
@@ -67,14 +76,14 @@ def find(before: dict[str, Any], after: dict[str, Any], expected: tuple[Allowed,
     found = Found(cases=len(before.keys() | after.keys()))
     for case in sorted(before.keys() | after.keys()):
         if case not in before or case not in after:
-            there = [ABSENT if case not in records else "recorded" for records in (before, after)]
+            there = [ABSENT_VALUE if case not in records else "recorded" for records in (before, after)]
             all_differences: Iterator[tuple[str, Difference]] = iter([("value", Difference("case", *there))])
         else:
             all_differences = _of_case(before[case], after[case])
         for kind, one in all_differences:
-            if allowed(case, one.place, VOLATILE):
+            if allowed(case, one, VOLATILE_PLACES):
                 continue
-            meant = allowed(case, one.place, expected)
+            meant = allowed(case, one, expected)
             if meant is not None:
                 found.expected[meant].append((case, one))
             elif kind == "text":
@@ -92,7 +101,7 @@ def _records(folder: Path) -> dict[str, Any]:
 
 def _of_case(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[str, Difference]]:
     """Yield a case's differences, each with its kind: ``value``, ``text`` or ``picture``."""
-    tolerance = REFINED if before["refined"] else EXACT
+    tolerance = REFINED_TOLERANCE if before["refined"] else EXACT_TOLERANCE
     for part in ("refined", "runs"):
         one, other = (
             [run["argv"] for run in record["runs"]] if part == "runs" else record[part]
@@ -109,7 +118,7 @@ def _of_case(before: dict[str, Any], after: dict[str, Any]) -> Iterator[tuple[st
     for name in sorted(before["files"].keys() | after["files"].keys()):
         one, other = before["files"].get(name), after["files"].get(name)
         if one is None or other is None:
-            there = [ABSENT if each is None else f"a file ({each['kind']})" for each in (one, other)]
+            there = [ABSENT_VALUE if each is None else f"a file ({each['kind']})" for each in (one, other)]
             yield "value", Difference(f"{name}:", *there)
         elif one["kind"] == other["kind"] and one["kind"] in {"text", "picture"}:
             if one["content"] != other["content"]:

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
-REFERENCE = re.compile(r"@([a-z0-9-]+)(?=[/:]|$)")
+CASE_REFERENCE = re.compile(r"@([a-z0-9-]+)(?=[/:]|$)")
 INPUTS_READ = frozenset(
     {"synth-walker", "synth-walker-side", "synth-random", "synth-random-noise", "synth-uncalibrated"}
 )
 """The views of which `inputs` makes detectors' files, motion, and files that are wrong."""
 
-CASES = Path(__file__).with_name("cases.txt")
+CASES_FILE = Path(__file__).with_name("cases.txt")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +49,9 @@ class Case:
     @property
     def reads(self) -> set[str]:
         """What it reads: names of cases, ``inputs``, ``data``."""
-        return {name for command in self.commands for word in command for name in REFERENCE.findall(word)}
+        return {
+            name for command in self.commands for word in command for name in CASE_REFERENCE.findall(word)
+        }
 
 
 def cases(*, data: bool, only: str = "*") -> list[Case]:
@@ -63,7 +65,7 @@ def cases(*, data: bool, only: str = "*") -> list[Case]:
         A glob of names; what those read is kept too.
     """
     corpus: dict[str, Case] = {}
-    for line in CASES.read_text().splitlines():
+    for line in CASES_FILE.read_text().splitlines():
         if not line.strip() or line.startswith("#"):
             continue
         name, text = line.split(maxsplit=1)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-COCO = (
+COCO_POINTS = (
     "nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder left_elbow right_elbow "
     "left_wrist right_wrist left_hip right_hip left_knee right_knee left_ankle right_ankle"
 ).split()
@@ -16,11 +16,11 @@ BODY_25 = (
     "nose mid_shoulders right_shoulder right_elbow right_wrist left_shoulder left_elbow left_wrist mid_hips "
     "right_hip right_knee right_ankle left_hip left_knee left_ankle right_eye left_eye right_ear left_ear"
 ).split() + [""] * 6
-HUMAN36M = (
+HUMAN36M_POINTS = (
     "mid_hips right_hip right_knee right_ankle left_hip left_knee left_ankle spine mid_shoulders nose head "
     "left_shoulder left_elbow left_wrist right_shoulder right_elbow right_wrist"
 ).split()
-MEDIAPIPE = {0: "nose", 2: "left_eye", 5: "right_eye", 7: "left_ear", 8: "right_ear"} | dict(
+MEDIAPIPE_LANDMARKS = {0: "nose", 2: "left_eye", 5: "right_eye", 7: "left_ear", 8: "right_ear"} | dict(
     zip(
         (11, 12, 13, 14, 15, 16, 23, 24, 25, 26, 27, 28),
         [
@@ -31,12 +31,12 @@ MEDIAPIPE = {0: "nose", 2: "left_eye", 5: "right_eye", 7: "left_ear", 8: "right_
         strict=True,
     )
 )
-JOINTS = (
+JOINT_NAMES = (
     "neck right_shoulder left_shoulder pelvis right_hip left_hip right_elbow left_elbow right_wrist left_wrist "
     "right_knee left_knee right_ankle left_ankle"
 ).split()
-HEAD = "nose right_eye left_eye right_ear left_ear".split()
-SIZE = (1920, 1080)
+HEAD_NAMES = "nose right_eye left_eye right_ear left_ear".split()
+PICTURE_SIZE = (1920, 1080)
 
 Points = dict[str, tuple[float, float]]
 
@@ -72,12 +72,12 @@ def _openpose(folder: Path, frames: list[Points]) -> None:
 
 def _coco(folder: Path, frames: list[Points]) -> None:
     """Write COCO's annotations and results, and what has their form: Halpe, WholeBody, Human3.6M, AlphaPose."""
-    width, height = SIZE
+    width, height = PICTURE_SIZE
     images = [
         {"id": k, "file_name": f"frame{k}.jpg", "width": width, "height": height} for k in range(len(frames))
     ]
     for name, points, category in (
-        ("coco", COCO, {"id": 1, "name": "person", "keypoints": COCO, "skeleton": []}),
+        ("coco", COCO_POINTS, {"id": 1, "name": "person", "keypoints": COCO_POINTS, "skeleton": []}),
         ("coco-25", BODY_25, {"id": 1, "name": "person"}),
     ):
         annotations = [
@@ -94,17 +94,17 @@ def _coco(folder: Path, frames: list[Points]) -> None:
             folder / f"{name}.json", {"images": images, "categories": [category], "annotations": annotations}
         )
     for name, points in (
-        ("coco-results", COCO),
-        ("h36m", HUMAN36M),
-        ("halpe", [*COCO, "", "mid_shoulders", "mid_hips", *[""] * 6]),
-        ("wholebody", [*COCO, *[""] * 116]),
+        ("coco-results", COCO_POINTS),
+        ("h36m", HUMAN36M_POINTS),
+        ("halpe", [*COCO_POINTS, "", "mid_shoulders", "mid_hips", *[""] * 6]),
+        ("wholebody", [*COCO_POINTS, *[""] * 116]),
     ):
         results: list[dict[str, Any]] = [
             {"image_id": k, "category_id": 1, "keypoints": _triples(seen, points, 0.75), "score": 0.5 + k / 8}
             for k, seen in enumerate(frames)
         ]
         _write(folder / f"{name}.json", results)
-        if points is COCO:
+        if points is COCO_POINTS:
             tracked = [
                 dict(one, image_id=f"frame{one['image_id']}.jpg", idx=1, box=[0, 0, 9, 9]) for one in results
             ]
@@ -113,18 +113,23 @@ def _coco(folder: Path, frames: list[Points]) -> None:
 
 def _mediapipe(folder: Path, frames: list[Points]) -> None:
     """Write landmarks as JSON, and a row a frame as CSV."""
-    width, height = SIZE
+    width, height = PICTURE_SIZE
 
     def landmark(seen: Points, k: int) -> dict[str, float]:
-        u, v = seen[MEDIAPIPE.get(k, "nose")]
-        return {"x": u / width, "y": v / height, "z": 0.0, "visibility": 0.9 if k in MEDIAPIPE else 0.1}
+        u, v = seen[MEDIAPIPE_LANDMARKS.get(k, "nose")]
+        return {
+            "x": u / width,
+            "y": v / height,
+            "z": 0.0,
+            "visibility": 0.9 if k in MEDIAPIPE_LANDMARKS else 0.1,
+        }
 
     landmarks = [
         {"frame": k, "timestamp_ms": 40 * k, "pose_landmarks": [landmark(seen, n) for n in range(33)]}
         for k, seen in enumerate(frames)
     ]
     _write(folder / "mediapipe.json", {"image_width": width, "image_height": height, "frames": landmarks})
-    names = list(MEDIAPIPE.values())
+    names = list(MEDIAPIPE_LANDMARKS.values())
     rows = [["frame", *(f"{name}_{what}" for name in names for what in ("x", "y", "visibility"))]]
     for k, seen in enumerate(frames):
         rows.append(
@@ -135,9 +140,9 @@ def _mediapipe(folder: Path, frames: list[Points]) -> None:
 
 def _mmpose(folder: Path, frames: list[Points]) -> None:
     """Write the demos' layout, with names, and the Inferencer's, without."""
-    rest = {"keypoint_scores": [0.9] * len(COCO), "bbox": [[0, 0, 9, 9]], "bbox_score": 0.8}
-    people = [[{"keypoints": [seen[name] for name in COCO]} | rest] for seen in frames]
-    meta = {"dataset_name": "coco", "keypoint_id2name": {str(k): name for k, name in enumerate(COCO)}}
+    rest = {"keypoint_scores": [0.9] * len(COCO_POINTS), "bbox": [[0, 0, 9, 9]], "bbox_score": 0.8}
+    people = [[{"keypoints": [seen[name] for name in COCO_POINTS]} | rest] for seen in frames]
+    meta = {"dataset_name": "coco", "keypoint_id2name": {str(k): name for k, name in enumerate(COCO_POINTS)}}
     info = [{"frame_id": k + 1, "instances": one} for k, one in enumerate(people)]
     _write(folder / "mmpose.json", {"meta_info": meta, "instance_info": info})
     _write(folder / "mmpose-list.json", [{"frame_id": k, "instances": one} for k, one in enumerate(people)])
@@ -145,25 +150,25 @@ def _mmpose(folder: Path, frames: list[Points]) -> None:
 
 def _deeplabcut(folder: Path, frames: list[Points]) -> None:
     """Write a table whose points have names of a user's own, one of them missing."""
-    own = [name.replace("left_", "L ").replace("right_", "R ") for name in COCO]
+    own = [name.replace("left_", "L ").replace("right_", "R ") for name in COCO_POINTS]
     header = [
         ["scorer", *["net"] * 51],
         ["bodyparts", *(name for name in own for _ in range(3))],
         ["coords", *["x", "y", "likelihood"] * 17],
     ]
-    table = [[str(k), *(str(x) for x in _triples(seen, COCO, 0.9))] for k, seen in enumerate(frames)]
+    table = [[str(k), *(str(x) for x in _triples(seen, COCO_POINTS, 0.9))] for k, seen in enumerate(frames)]
     table[0][4:7] = ["", "", ""]
     _write(folder / "deeplabcut.csv", _lines([*header, *table]))
 
 
 def _table(folder: Path, frames: list[Points]) -> None:
     """Write the table of image points that `posekit batch` reads."""
-    camera = {"model": "opencv", "K": [[1500, 0, 960], [0, 1500, 540], [0, 0, 1]], "size": list(SIZE)}
+    camera = {"model": "opencv", "K": [[1500, 0, 960], [0, 1500, 540], [0, 0, 1]], "size": list(PICTURE_SIZE)}
     first = {"time": 0.0, "image": {"neck": [960.0, 540.0]}}
     np.savez(
         folder / "table.npz",
-        image=np.array([[seen[name] for name in JOINTS] for seen in frames]),
-        head_image=np.array([[seen[name] for name in HEAD] for seen in frames]),
+        image=np.array([[seen[name] for name in JOINT_NAMES] for seen in frames]),
+        head_image=np.array([[seen[name] for name in HEAD_NAMES] for seen in frames]),
         time=np.arange(len(frames)) / 4,
         view=json.dumps({"schema": "posekit.view/1", "unit": "m", "camera": camera, "frames": [first]}),
     )

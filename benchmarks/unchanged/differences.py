@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-EXACT = 1e-12
-REFINED = 1e-9
-ABSENT = "(absent)"
+EXACT_TOLERANCE = 1e-12
+REFINED_TOLERANCE = 1e-9
+ABSENT_VALUE = "(absent)"
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def differences(before: Any, after: Any, tolerance: float, place: str = "") -> I
             if key in before and key in after:
                 yield from differences(before[key], after[key], tolerance, inner)
             else:
-                yield Difference(inner, before.get(key, ABSENT), after.get(key, ABSENT))
+                yield Difference(inner, before.get(key, ABSENT_VALUE), after.get(key, ABSENT_VALUE))
     elif isinstance(before, list) and isinstance(after, list):
         if len(before) != len(after):
             yield Difference(f"{place}.length", len(before), len(after))

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+
+from benchmarks.unchanged.differences import Difference
 
 
 @dataclass(frozen=True)
@@ -18,18 +21,23 @@ class Allowed:
         A glob of places, as ``result.json:settings.versions.*``; brackets stand for themselves.
     reason : str
         Why.
+    within : float
+        Numbers may be so far apart, and no farther.
     """
 
     case: str
     place: str
     reason: str
+    within: float = math.inf
 
-    def covers(self, case: str, place: str) -> bool:
+    def covers(self, case: str, difference: Difference) -> bool:
         """Whether a difference is one of these."""
-        return fnmatchcase(case, self.case) and fnmatchcase(place, self.place.replace("[", "[[]"))
+        place = self.place.replace("[", "[[]")
+        near = difference.distance <= self.within
+        return near and fnmatchcase(case, self.case) and fnmatchcase(difference.place, place)
 
 
-VOLATILE: tuple[Allowed, ...] = (
+VOLATILE_PLACES: tuple[Allowed, ...] = (
     Allowed("*", "*settings.versions*", "versions of packages"),
     Allowed("*", "*:versions*", "versions of packages"),
     Allowed("batch-*", "*settings.made_with*", "versions of packages"),
@@ -42,10 +50,10 @@ VOLATILE: tuple[Allowed, ...] = (
 )
 """What differs between two runs of one program, or follows from where it ran; nothing is said of it."""
 
-EXPECTED: tuple[Allowed, ...] = ()
+EXPECTED_DIFFERENCES: tuple[Allowed, ...] = ()
 """What this change means to change. It is listed with its reason, and empty again for the next one."""
 
 
-def allowed(case: str, place: str, among: tuple[Allowed, ...]) -> Allowed | None:
+def allowed(case: str, difference: Difference, among: tuple[Allowed, ...]) -> Allowed | None:
     """Return the first of `among` that covers a difference."""
-    return next((one for one in among if one.covers(case, place)), None)
+    return next((one for one in among if one.covers(case, difference)), None)

@@ -11,10 +11,10 @@ import numpy as np
 
 from benchmarks.unchanged.detections import points_of, write_detections
 
-FILES = Path(__file__).with_name("files")
-POSE2SIM = {"right": "R", "left": "L"}
-MATRIX = [[1500.0, 0.0, 960.0], [0.0, 1500.0, 540.0], [0.0, 0.0, 1.0]]
-UNSEEN = (("left_wrist",), ("right_elbow", "left_knee"))
+STATIC_FILES = Path(__file__).with_name("files")
+SIDE_LETTERS = {"right": "R", "left": "L"}
+CAMERA_MATRIX = [[1500.0, 0.0, 960.0], [0.0, 1500.0, 540.0], [0.0, 0.0, 1.0]]
+UNSEEN_JOINTS = (("left_wrist",), ("right_elbow", "left_knee"))
 
 
 def write_inputs(folder: Path, work: Path, data: Path | None) -> None:
@@ -29,12 +29,12 @@ def write_inputs(folder: Path, work: Path, data: Path | None) -> None:
     data : Path or None
         The folder of real recordings.
     """
-    shutil.copytree(FILES, folder)
+    shutil.copytree(STATIC_FILES, folder)
     views = {case.name: case / "view.json" for case in work.iterdir() if (case / "view.json").is_file()}
     view = _json(views["synth-random"])
     _views(folder, view, _json(views["synth-random-noise"]), _json(views["synth-uncalibrated"]))
     write_detections(folder, [points_of(frame) for frame in view["frames"]])
-    np.savez(folder / "camera.npz", mtx=MATRIX, dist=np.zeros(5), image_width=1920, image_height=1080)
+    np.savez(folder / "camera.npz", mtx=CAMERA_MATRIX, dist=np.zeros(5), image_width=1920, image_height=1080)
     _motion(folder, _json(views["synth-walker-side"]))
     _wrong(folder, view)
     if data is not None:
@@ -55,7 +55,7 @@ def _views(folder: Path, view: Any, noisy: Any, photo: Any) -> None:
     """Write views with joints, necks or heads that were not seen, rounded ones, a photograph, and postures."""
     for source, name in ((view, "hidden"), (noisy, "hidden-noise")):
         frames = [dict(frame, image=dict(frame["image"])) for frame in source["frames"][:2]]
-        for frame, unseen in zip(frames, UNSEEN, strict=True):
+        for frame, unseen in zip(frames, UNSEEN_JOINTS, strict=True):
             for joint in unseen:
                 del frame["image"][joint]
         _write(folder / f"{name}.json", source | {"frames": frames})
@@ -139,7 +139,7 @@ def _motion(folder: Path, view: Any) -> None:
         clip_fps=np.array([20.0]),
         up="+y",
     )
-    short = ["".join(POSE2SIM.get(word, word.capitalize()) for word in name.split("_")) for name in names]
+    short = ["".join(SIDE_LETTERS.get(word, word.capitalize()) for word in name.split("_")) for name in names]
     kept = [k for k, name in enumerate(short) if name not in {"Neck", "Pelvis"}]
     trc = [
         "PathFileType\t4\t(X/Y/Z)\tmotion.trc",

@@ -105,6 +105,15 @@ def test_what_was_meant_and_what_is_volatile_is_no_failure(unchanged: SimpleName
     assert [one.place for _, one in found.expected[meant]] == ["result.json:frames[0].n"]
 
 
+def test_a_difference_that_was_meant_goes_no_farther_than_was_said(unchanged: SimpleNamespace) -> None:
+    meant = unchanged.expected.Allowed("a", "result.json:x", "another order of sums", within=1e-6)
+    for off, count in ((1e-7, 0), (1e-5, 1)):
+        found = unchanged.compare.find(
+            {"a": recorded({"x": 0.5})}, {"a": recorded({"x": 0.5 + off})}, (meant,)
+        )
+        assert len(found.unexpected["a"]) == count
+
+
 def test_a_case_or_a_file_that_is_missing_is_a_failure(unchanged: SimpleNamespace, tmp_path: Path) -> None:
     for name, records in (("before", {"a": recorded(1), "b": recorded(1)}), ("after", {"a": recorded(1)})):
         (tmp_path / name / "records").mkdir(parents=True)
