@@ -3,11 +3,10 @@
 import csv
 import importlib
 import json
-import sys
-import warnings
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -26,42 +25,10 @@ HUMAN = load_robot("human")
 STANDING = FIGURE.neutral_points[None, :14].copy()
 
 
-class Outcome(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
-Run = Callable[..., Outcome]
-
-
 @pytest.fixture
-def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Run:
+def run(run: Callable[..., Any]) -> Callable[..., Any]:
     """Return a way to run the command in this process, in a folder of its own."""
-    monkeypatch.chdir(tmp_path)
-    main = importlib.import_module("posekit.cli").main
-
-    def run(*arguments: str) -> Outcome:
-        monkeypatch.setattr(sys, "argv", ["posekit", "validate", *arguments])
-        with warnings.catch_warnings():
-            warnings.simplefilter("default")
-            capsys.readouterr()
-            with pytest.raises(SystemExit) as caught:
-                main()
-        text = capsys.readouterr()
-        return Outcome(caught.value.code if isinstance(caught.value.code, int) else 0, text.out, text.err)
-
-    return run
-
-
-def assert_refused(outcome: Outcome, *parts: str) -> None:
-    assert outcome.code == 2, outcome
-    assert outcome.out == ""
-    assert outcome.err.startswith("posekit: error: ")
-    assert outcome.err.count("\n") == 1
-    assert outcome.err[:-1].isprintable()
-    for part in parts:
-        assert part in outcome.err
+    return partial(run, "validate")
 
 
 def some_q(count: int = 4) -> np.ndarray:
@@ -74,7 +41,7 @@ def some_q(count: int = 4) -> np.ndarray:
 # --- joints ---------------------------------------------------------------------------------------------
 
 
-def test_joints_are_judged_on_a_robot_by_name(run: Run) -> None:
+def test_joints_are_judged_on_a_robot_by_name(run) -> None:
     bent = STANDING.copy()
     bent[0, JOINTS.index("right_ankle")] += [0.30, 0.0, 0.0]  # the shank longer by a third
     np.savez("p.npz", joints=np.concatenate([STANDING, bent, STANDING]))
@@ -97,7 +64,7 @@ def test_joints_are_judged_on_a_robot_by_name(run: Run) -> None:
     assert report.postures[1].worst.margin < 0
 
 
-def test_without_a_report_nothing_is_written(run: Run) -> None:
+def test_without_a_report_nothing_is_written(run) -> None:
     np.savez("p.npz", joints=STANDING)
     outcome = run("p.npz")
     assert outcome.code == 0
@@ -105,14 +72,14 @@ def test_without_a_report_nothing_is_written(run: Run) -> None:
     assert [path.name for path in Path().iterdir()] == ["p.npz"]
 
 
-def test_a_urdf_of_ones_own_is_loaded_in_a_child_first(run: Run) -> None:
+def test_a_urdf_of_ones_own_is_loaded_in_a_child_first(run) -> None:
     np.savez("p.npz", joints=STANDING)
     Path("mine.urdf").write_text(find("human").urdf.read_text(encoding="utf-8"), encoding="utf-8")
     for trust in ("--untrusted", "--trusted"):
         assert run("p.npz", "--urdf", "mine.urdf", "--joint-map", "human", trust).code == 0
 
 
-def test_motion_capture_is_read_with_its_clips_and_up(run: Run) -> None:
+def test_motion_capture_is_read_with_its_clips_and_up(run) -> None:
     names = [name.replace("right_", "r_").replace("left_", "l_") for name in JOINTS]
     turned = STANDING[:, :, [1, 2, 0]]  # y up: forward z, left x
     np.savez(
@@ -133,7 +100,7 @@ def test_motion_capture_is_read_with_its_clips_and_up(run: Run) -> None:
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
-def test_configurations_are_taken_as_they_are(run: Run, suffix: str) -> None:
+def test_configurations_are_taken_as_they_are(run, suffix: str) -> None:
     write_configurations(f"q.{suffix}", some_q(), HUMAN.configuration_names)
     outcome = run(f"q.{suffix}", "--urdf", "human", "-o", "report.json")
     assert outcome.code == 1
@@ -164,7 +131,7 @@ def test_a_root_that_is_left_out_stands_at_the_origin() -> None:
         np.testing.assert_array_equal(short.in_order_of(HUMAN.configuration_names), some_q())
 
 
-def test_a_plain_array_named_q_will_do(run: Run) -> None:
+def test_a_plain_array_named_q_will_do(run) -> None:
     np.savez("q.npz", q=some_q()[:1].astype(np.float32))
     assert run("q.npz", "--urdf", "human").code == 0
     np.savez("f.npz", q=pin.neutral(FIGURE.model)[None])
@@ -172,7 +139,7 @@ def test_a_plain_array_named_q_will_do(run: Run) -> None:
     assert run("f.npz", "--checks", "joint-range", "--ranges", "table1").code == 0
 
 
-def test_ranges_by_the_robots_own_names(run: Run) -> None:
+def test_ranges_by_the_robots_own_names(run) -> None:
     np.savez("q.npz", q=some_q())
     text = 'schema = "posekit.ranges/1"\nkind = "joints"\n[limits]\nright_knee_Z = [-30.0, 100.0]\n'
     Path("wide.toml").write_text(text, encoding="utf-8")
@@ -206,7 +173,7 @@ def test_ranges_by_the_robots_own_names(run: Run) -> None:
     ],
 )
 def test_bad_configurations_are_refused(
-    run: Run, arrays: dict[str, np.ndarray], parts: tuple[str, ...]
+    run, arrays: dict[str, np.ndarray], parts: tuple[str, ...], assert_refused
 ) -> None:
     np.savez("q.npz", **arrays)  # type: ignore[arg-type]
     assert_refused(run("q.npz", "--urdf", "human", "-o", "r.json"), *parts)
@@ -224,7 +191,7 @@ def test_bad_configurations_are_refused(
     ],
 )
 def test_json_that_breaks_the_schema_is_refused(
-    run: Run, document: dict[str, Any], parts: tuple[str, ...]
+    run, document: dict[str, Any], parts: tuple[str, ...], assert_refused
 ) -> None:
     text = json.dumps({"schema": "posekit.configurations/1", **document})
     Path("q.json").write_text(text, encoding="utf-8")
@@ -245,13 +212,13 @@ def test_configurations_are_read_back(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("allowed", "code"), [("0", 1), ("1", 0), ("25%", 0), ("24.9%", 1), ("100%", 0), ("0%", 1), ("4", 0)]
 )
-def test_some_may_be_not_valid(run: Run, allowed: str, code: int) -> None:
+def test_some_may_be_not_valid(run, allowed: str, code: int) -> None:
     np.savez("q.npz", q=some_q())
     outcome = run("q.npz", "--urdf", "human", "--checks", "joint-range", "--fail-over", allowed)
     assert outcome.code == code
 
 
-def test_undecided_counts_as_not_valid(run: Run) -> None:
+def test_undecided_counts_as_not_valid(run) -> None:
     joints = np.repeat(STANDING, 2, axis=0)
     joints[1, 3] = np.nan
     np.savez("p.npz", joints=joints)
@@ -262,7 +229,7 @@ def test_undecided_counts_as_not_valid(run: Run) -> None:
 # --- reports --------------------------------------------------------------------------------------------
 
 
-def test_csv_has_one_row_a_posture(run: Run) -> None:
+def test_csv_has_one_row_a_posture(run) -> None:
     np.savez("q.npz", q=some_q())
     assert run("q.npz", "--urdf", "human", "-o", "r.csv").code == 1
     with Path("r.csv").open(encoding="utf-8", newline="") as file:
@@ -273,7 +240,7 @@ def test_csv_has_one_row_a_posture(run: Run) -> None:
     assert (rows[1]["worst_margin"], rows[1]["unit"], rows[1]["where"]) == ("-20", "deg", "right_knee_Z")
 
 
-def test_markdown_has_tables_and_settings(run: Run) -> None:
+def test_markdown_has_tables_and_settings(run) -> None:
     np.savez("q.npz", q=some_q())
     assert run("q.npz", "--urdf", "human", "-o", "r.md").code == 1
     text = Path("r.md").read_text(encoding="utf-8")
@@ -283,7 +250,7 @@ def test_markdown_has_tables_and_settings(run: Run) -> None:
     assert "made up" in text
 
 
-def test_json_keeps_its_schema(run: Run) -> None:
+def test_json_keeps_its_schema(run) -> None:
     jsonschema = pytest.importorskip("jsonschema")
     np.savez("q.npz", q=some_q())
     assert run("q.npz", "--urdf", "human", "-o", "r.json").code == 1
@@ -294,9 +261,7 @@ def test_json_keeps_its_schema(run: Run) -> None:
     assert "verdicts" not in document
 
 
-def test_a_large_file_is_judged_in_batches_and_listed_in_part(
-    run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_large_file_is_judged_in_batches_and_listed_in_part(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """With small bounds: the same verdicts as at once, those not valid listed with their numbers, up to the cap."""
     module = importlib.import_module("posekit.validation.validate")
     rng = np.random.default_rng(1)
@@ -358,7 +323,9 @@ def test_the_lengths_are_those_of_the_whole_file(monkeypatch: pytest.MonkeyPatch
         (("-o", "nowhere/r.json"), ("nowhere/r.json",)),
     ],
 )
-def test_a_bad_option_is_refused(run: Run, options: tuple[str, ...], parts: tuple[str, ...]) -> None:
+def test_a_bad_option_is_refused(
+    run, options: tuple[str, ...], parts: tuple[str, ...], assert_refused
+) -> None:
     np.savez("p.npz", joints=STANDING)
     assert_refused(run("p.npz", *options), *parts)
     assert [path.name for path in Path().iterdir()] == ["p.npz"]

@@ -125,6 +125,7 @@ def test_a_view_comes_back_from_key_points(
     np.testing.assert_allclose(again.image[:, JOINT["neck"]], shoulders, rtol=0, atol=1e-9)
     model = again.camera
     assert isinstance(model, OpenCVModel)
+    assert isinstance(view.camera, OpenCVModel)
     np.testing.assert_allclose(model.K, view.camera.K, rtol=0, atol=1e-9)
 
 
@@ -152,6 +153,8 @@ def test_any_points_may_be_missing_in_any_format(
     again = read_keypoints(path, name)
     assert again.landmarks.shape == given_points.landmarks.shape
     expected = given_points.landmarks
+    assert isinstance(walking.camera, OpenCVModel)
+    assert walking.camera.size is not None
     size = walking.camera.size if again.normalised else (1, 1)
     np.testing.assert_allclose(again.landmarks * size, expected, rtol=0, atol=1e-9, equal_nan=True)
     if base(name) not in FLAGGED:
