@@ -28,8 +28,8 @@ from posekit.body import Figure, load_figure
 from posekit.body.lengths import hips_points, torso_points
 from posekit.body.stature import stature_from_lengths
 from posekit.cameras import PinholeCamera
-from posekit.cameras.head.perspective import rotation
 from posekit.cameras.neck import Placement, place
+from posekit.geometry import rotation_from_vector
 from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
@@ -167,7 +167,7 @@ def calibration(path: Path) -> tuple[PinholeCamera, np.ndarray, np.ndarray]:
     """Read the first camera of a Pose2Sim calibration: Rodrigues' vector, metres."""
     first = next(iter(tomllib.loads(path.read_text()).values()))
     camera = PinholeCamera(K=np.array(first["matrix"]), distortion=np.array([*first["distortions"], 0.0]))
-    return camera, rotation(np.array(first["rotation"])), np.array(first["translation"])
+    return camera, rotation_from_vector(np.array(first["rotation"])), np.array(first["translation"])
 
 
 def triangulated(folder: Path) -> np.ndarray:

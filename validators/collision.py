@@ -16,10 +16,9 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.capsules import Capsule
-from posekit.body.frames import cross
 from posekit.body.pool import collides, make_pool
 from posekit.compiled import check_kernels as kernels
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.tree import Check, Findings, Rule
 from posekit.validators.screening import screened
 

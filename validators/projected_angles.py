@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import cross, torso_frame, unit
-from posekit.geometry import Array
+from posekit.body.frames import torso_frame
+from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings
 from posekit.validators.ranges import Ranges

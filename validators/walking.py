@@ -16,9 +16,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import cross, torso_frame, unit
+from posekit.body.frames import torso_frame
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
 from posekit.tree import Check, Findings
 

@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.frames import cross
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 
 FREE = 1e-6
 """Sine below which an angle is free: the limb is straight, or points along the abduction axis.

@@ -8,9 +8,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from posekit.body.frames import unit
 from posekit.errors import FigureError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT
 
 AXES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
@@ -127,7 +126,7 @@ def read_capsules(
         middle = placement.translation - start
         center = float(middle @ axis)
         beside = np.linalg.norm(middle - center * axis)
-        tilt = np.linalg.norm(np.cross(placement.rotation[:, 2], axis)) * shape.halfLength
+        tilt = np.linalg.norm(cross(placement.rotation[:, 2], axis)) * shape.halfLength
         if max(beside, tilt) > OFF_AXIS:
             raise FigureError(
                 f"link {link!r}: its capsule lies {max(beside, tilt):.3g} m beside the line between its joints; "

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.body.angles import Limits, ball_angles, direction_angles, limb_angles
-from posekit.body.frames import fit_rotation, hips_frame, into, transposed_product, unit
+from posekit.body.frames import hips_frame
 from posekit.errors import FigureError
-from posekit.geometry import Array
+from posekit.geometry import Array, fit_rotation, relative_rotation, rotate_back, unit
 from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SIDES
 
 
@@ -51,21 +51,21 @@ class ClosedForm:
     def neck(self, R_torso: Array, neck: Array, head: Array) -> Array:
         """Find flexion, bending and rotation of the neck (N, 3), radians, from the head's points (N, 5, 3)."""
         R_head = self.head_frame(neck, head)
-        return ball_angles(transposed_product(R_torso, R_head), self._limits_of("neck.flexion", 3))
+        return ball_angles(relative_rotation(R_torso, R_head), self._limits_of("neck.flexion", 3))
 
     def pelvis(self, R_torso: Array, R_hips: Array) -> Array:
         """Find flexion, bending and rotation of the pelvis (N, 3), radians."""
-        return ball_angles(transposed_product(R_torso, R_hips), self._limits_of("pelvis.flexion", 3))
+        return ball_angles(relative_rotation(R_torso, R_hips), self._limits_of("pelvis.flexion", 3))
 
     def limb(self, joint: str, R_parent: Array, start: Array, middle: Array, end: Array | None) -> Array:
         """Find a limb's four angles (N, 4), radians; rotation and hinge NaN where its end (N, 3) is not known."""
         limits = self._limits_of(f"{joint}.flexion", 4)
-        upper = into(R_parent, unit(middle - start))
+        upper = rotate_back(R_parent, unit(middle - start))
         angles = np.full((len(start), 4), np.nan)
         angles[:, :2] = direction_angles(upper, limits)
         if end is not None:
             known = np.isfinite(end).all(axis=1)
-            lower = into(R_parent, unit(end - middle))
+            lower = rotate_back(R_parent, unit(end - middle))
             angles[known] = limb_angles(upper[known], lower[known], limits)
         return angles
 

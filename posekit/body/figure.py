@@ -18,13 +18,13 @@ from posekit.body.angles import Limits
 from posekit.body.axes import axis_signs
 from posekit.body.capsules import Capsule, read_capsules
 from posekit.body.closed_form import ClosedForm, with_head
-from posekit.body.frames import quaternions, torso_frame
+from posekit.body.frames import torso_frame
 from posekit.body.lengths import check_lengths
 from posekit.body.pool import collides, make_pool
 from posekit.body.stature import lengths_from_stature
 from posekit.body.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
 from posekit.errors import FigureError
-from posekit.geometry import Array
+from posekit.geometry import Array, quaternion_from_rotation
 from posekit.robots.kinematics import Kinematics, body_points
 from posekit.robots.srdf import check_srdf
 from posekit.skeleton import (
@@ -311,7 +311,7 @@ class Figure:
         R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
         q = np.full((len(points), self.model.nq), np.nan)
         q[:, :3] = points[:, 0]
-        q[:, 3:7] = quaternions(R_torso)
+        q[:, 3:7] = quaternion_from_rotation(R_torso)
         angles = self.ik.angles(points, R_torso)
         angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
         q[:, self.angle_index] = angles

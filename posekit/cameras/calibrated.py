@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from posekit.cameras import PinholeCamera
-from posekit.cameras.rotation import nearest_rotation
+from posekit.cameras.rotation import rotation_from_rounded
 from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
 from posekit.safe_io import nearest, refusal, shown
@@ -83,7 +83,7 @@ class CalibratedCamera:
         counts = (0, 4) if self.fisheye else COEFFICIENTS
         try:
             PinholeCamera(K=K)
-            R = None if self.R is None else nearest_rotation(self.R)
+            R = None if self.R is None else rotation_from_rounded(self.R)
         except CameraError as error:
             raise CameraError(f"camera {shown(self.name)}: {error}") from None
         if len(distortion) not in counts or not np.isfinite(distortion).all():

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.closed_form import with_head
-from posekit.body.frames import unit
-from posekit.geometry import Array
+from posekit.geometry import Array, unit
 from posekit.settings import Tolerance
 from posekit.skeleton import DOFS, JOINT, SEGMENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.validators import Ranges, judge, make_checks

@@ -9,10 +9,9 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.frames import cross, unit
 from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, unit
 from posekit.skeleton import JOINT
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.viewpoints import look_at

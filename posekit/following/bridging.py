@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.following.channels import directions
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.skeleton import TREE_SEGMENTS
 
 COASTING_SECONDS: Final = 0.2
@@ -94,7 +94,7 @@ def _turning(
     """Return segments (len(rows), 3) on the way between known ones."""
     before, after, part = _between(time, known, rows)
     a, b = unit[before], unit[after]
-    sine = np.linalg.norm(np.cross(a, b), axis=1)
+    sine = np.linalg.norm(cross(a, b), axis=1)
     angle = np.arctan2(sine, (a * b).sum(axis=1))
     level = sine < 1e-9  # the same, or opposite: no way is shortest
     safe = np.where(level, 1.0, sine)

@@ -7,8 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import cross
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.hidden.asking import Index, Mask
 from posekit.hidden.lattices import circle
 from posekit.hidden.rays import Rays

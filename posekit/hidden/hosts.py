@@ -6,10 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from posekit.body.frames import unit
-from posekit.geometry import Array
+from posekit.geometry import Array, rotation_about, unit
 from posekit.hidden.asking import Index, Mask
-from posekit.hidden.lattices import turned
 
 N_SUBSAMPLES = 8
 """Parts into which the neighbourhood of a sample is split: eight arcs, or a cube's eight corners."""
@@ -153,4 +151,4 @@ class Hosts:
         else:
             vector = np.tile(CUBE_CORNERS, (len(rows), 1)) * width[parent, None]
             axis, angle = unit(vector), np.linalg.norm(vector, axis=1)
-        return each.filled(turned(axis, angle) @ each.R, self.turn), parent
+        return each.filled(rotation_about(axis, angle) @ each.R, self.turn), parent

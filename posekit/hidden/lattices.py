@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 
-from posekit.body.frames import cross
-from posekit.geometry import Array
+from posekit.geometry import Array, rotation_from_quaternion
 
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 """Radians from one point of a Fibonacci lattice to the next."""
@@ -53,44 +52,7 @@ def rotations(n: int) -> Array:
     near, far = np.sqrt(s / n), np.sqrt(1.0 - s / n)
     alpha, beta = 2.0 * np.pi * s / math.sqrt(2.0), 2.0 * np.pi * s / SPIRAL_PSI
     x, y, z, w = near * np.sin(alpha), near * np.cos(alpha), far * np.sin(beta), far * np.cos(beta)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def basis(axis: Array) -> Array:
-    """Complete unit vectors (..., 3) to rotations (..., 3, 3) whose first column they are.
-
-    Without a branch that jumps but for the sign of z (Duff et al. 2017).
-    """
-    x, y, z = axis[..., 0], axis[..., 1], axis[..., 2]
-    sign = np.where(z >= 0.0, 1.0, -1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=-1)
-    second = np.stack([b, sign + y * y * a, -y], axis=-1)
-    return np.stack([axis, first, second], axis=-1)
-
-
-def turned(axis: Array, angle: Array) -> Array:
-    """Return the rotations (..., 3, 3) by an angle (...), radians, about unit vectors (..., 3) (Rodrigues)."""
-    x, y, z = axis[..., 0], axis[..., 1], axis[..., 2]
-    zero = np.zeros_like(x)
-    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*x.shape, 3, 3)
-    sine, cosine = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
-    return np.asarray(np.eye(3) + sine * K + (1.0 - cosine) * (K @ K))
-
-
-def onto(start: Array, end: Array) -> Array:
-    """Return the shortest rotations (..., 3, 3) that turn unit vectors (..., 3) into others."""
-    axis = cross(start, end)
-    sine = np.linalg.norm(axis, axis=-1)
-    cosine = np.einsum("...i,...i->...", start, end)
-    safe = np.where(sine[..., None] > 0.0, axis / np.where(sine, sine, 1.0)[..., None], basis(start)[..., 1])
-    return turned(safe, np.arctan2(sine, cosine))
+    return rotation_from_quaternion(np.stack([x, y, z, w], axis=-1))
 
 
 def sphere_spacing(n: int, part: Array | float = 1.0) -> Array:

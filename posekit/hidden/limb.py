@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.body.frames import unit
-from posekit.geometry import Array
+from posekit.geometry import Array, frame_along, unit
 from posekit.hidden.asking import METRES_PER_RADIAN, Index, Mask, PostureRows, ask
 from posekit.hidden.hosts import Hosts
-from posekit.hidden.lattices import GOLDEN_ANGLE, basis, sphere_spacing, zone
+from posekit.hidden.lattices import GOLDEN_ANGLE, sphere_spacing, zone
 from posekit.hidden.placed import LimbPlacements
 from posekit.hidden.plan import JointState, LimbChain, OcclusionPattern
 from posekit.hidden.rays import Rays
@@ -202,7 +201,7 @@ class LimbPlacer:
             axis, lower, upper = self._zones()
             reached = np.flatnonzero(lower <= upper)
             local = zone(n, lower[reached], upper[reached])
-            d = np.einsum("hij,hnj->hni", basis(axis[reached]), local).reshape(-1, 3)
+            d = np.einsum("hij,hnj->hni", frame_along(axis[reached]), local).reshape(-1, 3)
             host, seed = np.repeat(reached, n), np.tile(np.arange(n), len(reached))
             middle, excess = base[host] + self.lengths[0] * d, np.zeros(len(host))
             near = np.zeros(len(host), dtype=np.intp)
@@ -238,7 +237,7 @@ class LimbPlacer:
             whole = np.ones(len(axis))
             turn = 2.0 * np.pi * np.mod(rows.seed * INVERSE_PLASTIC_NUMBER, 1.0)
             local = zone(n, -whole, whole, turn)
-            f = np.einsum("sij,snj->sni", basis(axis), local).reshape(-1, 3)
+            f = np.einsum("sij,snj->sni", frame_along(axis), local).reshape(-1, 3)
             parent, k = np.repeat(np.arange(len(axis)), n), np.tile(np.arange(n), len(axis))
             end, far = rows.middle[parent] + self.lengths[1] * f, np.zeros(len(parent), dtype=np.intp)
             seed = rows.seed[parent] if self.states[0] == JointState.HIDDEN else rows.seed[parent] * n + k
@@ -329,7 +328,7 @@ class LimbPlacer:
         foot, height = self.rays.foot(self.limb.end, self.frame, base)
         direction = self.rays.direction[self.frame, self.limb.end]
         known = np.isfinite(height)
-        across = basis(np.where(known[:, None], direction, z))[..., 1]
+        across = frame_along(np.where(known[:, None], direction, z))[..., 1]
         towards = (foot - base) / np.where(height > ONTO_RAY, height, 1.0)[:, None]
         axis = np.where((height > ONTO_RAY)[:, None], towards, across)
         upper, lower = self.lengths[0], self.lengths[1] + max(self.tolerance, 0.0)
@@ -339,5 +338,5 @@ class LimbPlacer:
 
 def _swung(direction: Array, by: Array) -> Array:
     """Swing unit vectors (S, 3) by (S, 2) radians along two directions square to them."""
-    B = basis(direction)
+    B = frame_along(direction)
     return unit(direction + np.tan(by[:, :1]) * B[..., 1] + np.tan(by[:, 1:]) * B[..., 2])

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import fit_rotation, unit
-from posekit.geometry import Array
+from posekit.geometry import Array, fit_rotation, rotation_about, rotation_between, unit
 from posekit.hidden.asking import Index, PostureRows, ask
 from posekit.hidden.closure import closing_angles
 from posekit.hidden.hosts import EXACT_WITHIN, Hosts, Turn
-from posekit.hidden.lattices import circle, onto, rotation_spacing, rotations, turned
+from posekit.hidden.lattices import circle, rotation_spacing, rotations
 from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
 from posekit.hidden.rays import Rays
 from posekit.hidden.settings import OcclusionSampling
@@ -93,9 +92,9 @@ class TrunkPlacer:
         if known:
             n = self.sampling.circle // HIP_COARSENING if loose else self.sampling.circle
             axis = unit(seen[:, 0])
-            first = onto(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
+            first = rotation_between(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
             row = np.repeat(np.arange(len(hosts)), n)
-            R = turned(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
+            R = rotation_about(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
             spacing = 2.0 * np.pi / n
         else:
             every = rotations(self.sampling.rotations // HIP_COARSENING if loose else self.sampling.rotations)
@@ -128,7 +127,7 @@ class TrunkPlacer:
         turn = Turn(pivot=TORSO_JOINTS[0], about=None, free=(HIP_JOINTS[0],), body=offset[None])
         axis, first = unit(hosts.points[:, left] - hosts.points[:, right]), hosts.R
         row = np.repeat(rows, n)
-        R = turned(axis[row], np.tile(circle(n), len(rows))) @ first[row]
+        R = rotation_about(axis[row], np.tile(circle(n), len(rows))) @ first[row]
         spun = hosts.take(row).filled(R, turn)
         if self._hips_seen():
             row, R = self._closing(hosts, turn.pivot, offset, rows, axis[rows], first[rows])
@@ -172,14 +171,14 @@ class TrunkPlacer:
             np.einsum("nij,j->ni", first, offset),
             self.sampling.circle,
         )
-        return row[which], turned(axis[which], angle) @ first[which]
+        return row[which], rotation_about(axis[which], angle) @ first[which]
 
     def _closing_rings(self, hosts: Hosts, pivot: int, offset: Array) -> tuple[Index, Array]:
         """Do the same where only the neck is known: on rings of pelvis positions, spun about each root."""
         z = np.array([0.0, 0.0, 1.0])
         tilt = np.pi * (np.arange(N_PELVIS_RINGS) + 0.5) / N_PELVIS_RINGS
         towards = np.stack([np.sin(tilt), np.zeros(N_PELVIS_RINGS), np.cos(tilt)], axis=1)
-        ring = onto(np.broadcast_to(unit(offset), towards.shape), towards)
+        ring = rotation_between(np.broadcast_to(unit(offset), towards.shape), towards)
         row, R = self._closing(
             hosts,
             pivot,
@@ -190,7 +189,7 @@ class TrunkPlacer:
         )
         spin = np.tile(circle(N_PELVIS_RINGS), len(row))
         row, R = np.repeat(row, N_PELVIS_RINGS), np.repeat(R, N_PELVIS_RINGS, axis=0)
-        return row, turned(np.einsum("nij,j->ni", R, unit(offset)), spin) @ R
+        return row, rotation_about(np.einsum("nij,j->ni", R, unit(offset)), spin) @ R
 
     def _last(self, joints: tuple[int, ...]) -> bool:
         """Whether nothing of the trunk hangs on the part that is turned."""

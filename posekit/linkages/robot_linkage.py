@@ -12,7 +12,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.linkages import Linkage
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.kinematics import find_frame, frame_index
@@ -89,7 +89,7 @@ class Carried:
                     moved, there = place[here], parent
                 else:
                     continue
-                if np.linalg.norm(np.cross(axis, moved)) <= ON_AXIS:
+                if np.linalg.norm(cross(axis, moved)) <= ON_AXIS:
                     place[there] = placement.act(moved) if there == parent else moved
                     waiting.append(there)
 

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
-from posekit.measures.pairs import Array, paired
+from posekit.geometry import Array, best_rotation, centred_covariance
+from posekit.measures.pairs import paired
 
 LEAST_POINTS = 3
 """Any two points are laid onto any two others without error: below three there is nothing to measure."""
@@ -92,28 +93,23 @@ def align(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Alignm
         raise InputError(f"scale is {scale!r}; expected True (similarity) or False (rigid)")
     x, y, known = paired(points, target)
     used = known.sum(axis=-1)
-    weight = known[..., None] / np.maximum(used, 1)[..., None, None]
+    weights = known / np.maximum(used, 1)[..., None]
     x, y = (np.where(known[..., None], each, 0.0) for each in (x, y))
-    mean_x, mean_y = ((weight * each).sum(axis=-2) for each in (x, y))
-    x, y = ((each - mean[..., None, :]) * known[..., None] for each, mean in ((x, mean_x), (y, mean_y)))
-    spread_x, spread_y = ((weight * each**2).sum(axis=(-2, -1)) for each in (x, y))
+    fit = centred_covariance(x, y, weights)
+    spread_x, spread_y = ((weights[..., None] * each**2).sum(axis=(-2, -1)) for each in (fit.x, fit.y))
     possible = used >= LEAST_POINTS
-    for spread, mean in ((spread_x, mean_x), (spread_y, mean_y)):
+    for spread, mean in ((spread_x, fit.mean_x), (spread_y, fit.mean_y)):
         possible &= np.sqrt(spread) > NO_EXTENT * np.linalg.norm(mean, axis=-1)
-    covariance = np.einsum("...pi,...pj->...ij", weight * y, x)
-    U, D, Vt = np.linalg.svd(covariance)
-    S = np.ones_like(D)
-    S[..., 2] = np.sign(np.linalg.det(U) * np.linalg.det(Vt))
-    R = np.einsum("...ij,...j,...jk->...ik", U, S, Vt)
-    c = (D * S).sum(axis=-1) / np.where(possible, spread_x, 1.0) if scale else np.ones_like(spread_x)
+    R, values = best_rotation(fit.covariance)
+    c = values.sum(axis=-1) / np.where(possible, spread_x, 1.0) if scale else np.ones_like(spread_x)
     c = np.where(possible, c, np.nan)
     R = np.where(possible[..., None, None], R, np.nan)
-    t = mean_y - c[..., None] * np.einsum("...ij,...j->...i", R, mean_x)
+    t = fit.mean_y - c[..., None] * np.einsum("...ij,...j->...i", R, fit.mean_x)
     return Alignment(
         rotation=R,
         translation=t,
         scale=c,
         used=used,
         left_out=known.shape[-1] - used,
-        unique=possible & (D[..., 1] + S[..., 2] * D[..., 2] > COLLINEAR * D[..., 0]),
+        unique=possible & (values[..., 1] + values[..., 2] > COLLINEAR * values[..., 0]),
     )

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
-from posekit.measures.pairs import Array, paired
+from posekit.geometry import Array, cross
+from posekit.measures.pairs import paired
 
 Triple = tuple[int, int, int]
 
@@ -103,7 +104,7 @@ def joint_angles(points: ArrayLike, triples: Sequence[Triple] = POSTURE_ANGLES) 
     index = np.array(_checked(triples, given.shape[-2]), dtype=np.intp).reshape(-1, 3)
     a, b, c = (given[..., index[:, k], :] for k in range(3))
     u, v = a - b, c - b
-    angle = np.arctan2(np.linalg.norm(np.cross(u, v), axis=-1), (u * v).sum(axis=-1))
+    angle = np.arctan2(np.linalg.norm(cross(u, v), axis=-1), (u * v).sum(axis=-1))
     short = (np.abs(u).max(axis=-1, initial=0.0) == 0) | (np.abs(v).max(axis=-1, initial=0.0) == 0)
     return np.where(short, np.nan, np.degrees(angle))
 

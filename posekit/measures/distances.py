@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
+from posekit.geometry import Array
 from posekit.measures.alignment import align
-from posekit.measures.pairs import Array, paired
+from posekit.measures.pairs import paired
 
 Aligned = Literal["similarity", "rigid", "none"]
 

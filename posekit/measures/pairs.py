@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
-
-Array = NDArray[np.float64]
+from posekit.geometry import Array
 
 
 def paired(points: ArrayLike, target: ArrayLike) -> tuple[Array, Array, NDArray[np.bool_]]:

@@ -9,13 +9,13 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, quaternion_from_rotation
 from posekit.objects.draw import draw_configurations
 from posekit.robots import Robot
 from posekit.robots.descent import Problem, descend
 from posekit.robots.ik import PULL, InverseKinematics, Reach, Solution
 from posekit.robots.kinematics import Kinematics, body_points
-from posekit.robots.starts import lay, quaternions
+from posekit.robots.starts import lay
 
 MAX_POSTURES_CERTIFIED = 256
 """Postures of one frame whose configurations are looked for: some milliseconds each."""
@@ -131,7 +131,7 @@ class Certifier:
         weights = np.isfinite(points[..., 0]).astype(np.float64).repeat(N_SHAPES_ALIGNED, axis=0)
         R, t, left = lay(shapes[near], np.nan_to_num(points).repeat(N_SHAPES_ALIGNED, axis=0), weights)
         laid = q[near]
-        laid[:, :3], laid[:, 3:7] = t, quaternions(R)
+        laid[:, :3], laid[:, 3:7] = t, quaternion_from_rotation(R, shorter=False)
         best = np.argsort(left.reshape(-1, N_SHAPES_ALIGNED), axis=1, kind="stable")[:, :N_RESTARTS]
         return np.take_along_axis(laid.reshape(len(points), N_SHAPES_ALIGNED, -1), best[..., None], axis=1)
 

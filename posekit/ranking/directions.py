@@ -11,8 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.ranking.vectors import across, cross, dot, unit
+from posekit.geometry import Array, cross, dot, perpendicular, unit
 from posekit.skeleton import JOINT, SIDES, segment_name
 
 LIMB_SEGMENT_ENDS: Final = (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
@@ -45,17 +44,21 @@ def directions(joints: Array, up: Array | None = None) -> Array:
         known, all of them where neck, a shoulder or the pelvis is not.
     """
     neck, right, left, pelvis = joints[:4]
-    down = unit(pelvis - neck)
-    left_axis = unit(across(left - right, down))
-    axes = np.stack([cross(down, left_axis), left_axis, -down])
+    down = unit(pelvis - neck, axis=-2)
+    left_axis = unit(perpendicular(left - right, down, axis=-2), axis=-2)
+    axes = np.stack([cross(down, left_axis, axis=-2), left_axis, -down])
     hips_left, hips_down = _hips(joints)
     found = np.empty((UP_INDEX + (up is not None), 3, joints.shape[2]))
-    vectors = [hips_left, hips_down, *(unit(joints[end] - joints[start]) for start, end in LIMB_SEGMENTS)]
+    vectors = [
+        hips_left,
+        hips_down,
+        *(unit(joints[end] - joints[start], axis=-2) for start, end in LIMB_SEGMENTS),
+    ]
     if up is not None:
         vectors.append(up)
     for k, vector in enumerate(vectors):
         for axis in range(3):
-            found[k, axis] = dot(vector, axes[axis])
+            found[k, axis] = dot(vector, axes[axis], axis=-2)
     return found
 
 
@@ -79,5 +82,5 @@ def rows_of(names: tuple[str, ...]) -> NDArray[np.intp]:
 def _hips(joints: Array) -> tuple[Array, Array]:
     """Return the hips' left, and their down square to it, (3, N)."""
     pelvis, right, left = joints[JOINT["pelvis"]], joints[JOINT["right_hip"]], joints[JOINT["left_hip"]]
-    left_axis = unit(left - right)
-    return left_axis, unit(across(right - pelvis, left_axis))
+    left_axis = unit(left - right, axis=-2)
+    return left_axis, unit(perpendicular(right - pelvis, left_axis, axis=-2), axis=-2)

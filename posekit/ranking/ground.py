@@ -12,9 +12,8 @@ from typing import Final
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry import Array, dot, perpendicular
 from posekit.ranking.centre_of_mass import centre_of_mass
-from posekit.ranking.vectors import across, dot
 from posekit.skeleton import JOINT
 
 SUPPORT_HEIGHT_METRES: Final = 0.10
@@ -39,13 +38,13 @@ def standing(joints: Array, up: Array) -> tuple[Array, Array]:
         How much one ankle is higher than the other, metres. Both are NaN where the joints do not tell.
     """
     right, left = joints[JOINT["right_ankle"]], joints[JOINT["left_ankle"]]
-    rise = dot(left - right, up)
+    rise = dot(left - right, up, axis=-2)
     apart = np.abs(rise)
     lower = np.where(rise >= 0, right, left)
-    support = across(np.where(rise >= 0, left - right, right - left), up) * np.exp(
+    support = perpendicular(np.where(rise >= 0, left - right, right - left), up, axis=-2) * np.exp(
         -0.5 * (apart / SUPPORT_HEIGHT_METRES) ** 2
     )
-    centre = across(centre_of_mass(joints) - lower, up)
-    along = dot(centre, support) / np.maximum(dot(support, support), 1e-12)
+    centre = perpendicular(centre_of_mass(joints) - lower, up, axis=-2)
+    along = dot(centre, support, axis=-2) / np.maximum(dot(support, support, axis=-2), 1e-12)
     beside = centre - np.clip(along, 0.0, 1.0) * support
-    return np.sqrt(dot(beside, beside)), apart
+    return np.sqrt(dot(beside, beside, axis=-2)), apart

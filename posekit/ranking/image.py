@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, dot
 from posekit.ranking.student import excess
-from posekit.ranking.vectors import dot
 from posekit.safe_io import nearest
 from posekit.skeleton import RIGID_SEGMENTS, segment_name
 
@@ -63,7 +62,9 @@ def misfit(joints: Array, lengths: Array, length_residual: Array | None, deviati
     for (start, end), length in zip(RIGID_SEGMENTS, lengths, strict=True):
         apart = joints[end] - joints[start]
         total += _known(
-            excess(((np.sqrt(dot(apart, apart)) - length) * inverse) ** 2, 1, MISFIT_DEGREES_OF_FREEDOM)
+            excess(
+                ((np.sqrt(dot(apart, apart, axis=-2)) - length) * inverse) ** 2, 1, MISFIT_DEGREES_OF_FREEDOM
+            )
         )
     if length_residual is not None:
         total += _known(excess((length_residual * inverse) ** 2, 1, MISFIT_DEGREES_OF_FREEDOM))

@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry import Array, dot
+from posekit.geometry.batch_last import backward, cholesky, forward, matrix_vector
 from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import Equations, assemble, linearise
 from posekit.refinement.limb_terms import LimbTerms
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import backward, cholesky, dot, forward, turned
 from posekit.refinement.state import PostureState, place
 
 UNKNOWN_PLACE_METRES = 10.0
@@ -95,14 +95,20 @@ def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTer
         first = 2 * segment
         for i in (first, first + 1):
             limb[i, i] += UNKNOWN_ANGLE_RADIANS**-2
-        seen = turned(A[list(ends)], state.directions[:, segment])
+        seen = matrix_vector(A[list(ends)], state.directions[:, segment])
         ray = joints[list(ends)] if problem.optics.perspective else np.array([0.0, 0.0, 1.0])[:, None]
         c, s = (
-            dot(terms.tangents[:, segment, k], np.broadcast_to(ray, (*seen.shape[:1], 3, *seen.shape[2:])))
+            dot(
+                terms.tangents[:, segment, k],
+                np.broadcast_to(ray, (*seen.shape[:1], 3, *seen.shape[2:])),
+                axis=-2,
+            )
             for k in range(2)
         )
         size = np.maximum(np.sqrt(c * c + s * s), MIN_LENGTH)
-        known = MAX_TURN_INFORMATION * state.limbs[:, segment] * np.sqrt(dot(seen, seen)) / (size * size)
+        known = (
+            MAX_TURN_INFORMATION * state.limbs[:, segment] * np.sqrt(dot(seen, seen, axis=-2)) / (size * size)
+        )
         for (i, x), (j, y) in (((a, p), (b, q)) for a, p in ((0, c), (1, s)) for b, q in ((0, c), (1, s))):
             limb[first + i, first + j] += known * x * y
     return limb

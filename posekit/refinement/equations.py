@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.geometry.batch_last import backward, cholesky, forward
 from posekit.refinement.anatomy import LIMB_STARTS
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import backward, cholesky, forward
 from posekit.refinement.state import PostureState, PostureStep, parents, trunk_offsets
 from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
 

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, dot
 from posekit.refinement.joints import neck_limits
 from posekit.refinement.limits import Signs
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import cross, dot
 from posekit.refinement.state import PostureState, head_points
 
 
@@ -42,7 +41,7 @@ def head_terms(problem: RefinementProblem, state: PostureState, watch: Signs | N
     offsets = head_points(state, problem.anatomy.head)
     residual, A = problem.see_head(state.root + offsets)
     chi2 = np.einsum("jcn,jcn->n", residual, residual)
-    turn = cross(np.broadcast_to(offsets[:, None], A.shape), A)
+    turn = cross(np.broadcast_to(offsets[:, None], A.shape), A, axis=-2)
     J = np.concatenate([turn, A], axis=2)  # along its rotation, then the root
     normal, push = np.einsum("jcin,jckn->ikn", J, J), np.einsum("jcin,jcn->in", J, residual)
     matrix, gradient = normal[:3, :3].copy(), push[:3].copy()
@@ -54,7 +53,7 @@ def head_terms(problem: RefinementProblem, state: PostureState, watch: Signs | N
         squared = problem.limit_deviation**-2
         cost = ball.cost()
         chi2 += cost * squared
-        slack = (dot(ball.residual, ball.residual) - cost) * squared
+        slack = (dot(ball.residual, ball.residual, axis=-2) - cost) * squared
         crossed = ball.crossed
         if ball.jacobian is not None:
             limit = np.einsum("ain,ajn->ijn", ball.jacobian, ball.jacobian) * squared

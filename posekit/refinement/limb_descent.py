@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.geometry.batch_last import backward
 from posekit.refinement.descent import (
     BLOCK_POSTURES,
     DAMPING_DECAY,
@@ -19,7 +20,6 @@ from posekit.refinement.descent import (
 from posekit.refinement.equations import DIAGONAL_FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import backward
 from posekit.refinement.state import moved_limbs
 
 

@@ -16,11 +16,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, dot
 from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import dot
 from posekit.refinement.state import place_limbs
 from posekit.refinement.walls import Beyond, beyond_walls, wall_rows
 
@@ -190,7 +189,7 @@ def _curve(chains: Chains, g_both: Array, g_end: Array, matrix: Array) -> NDArra
     """Add the curvature of turning; return which segments are folds: turned by it more than by the image."""
     folds = np.empty((4, 2, g_end.shape[2]), dtype=np.bool_)
     for segment, g in ((0, g_both), (1, g_end)):
-        bend = np.maximum(-chains.lengths[:, segment] * dot(chains.directions[:, segment], g), 0.0)
+        bend = np.maximum(-chains.lengths[:, segment] * dot(chains.directions[:, segment], g, axis=-2), 0.0)
         first = 2 * segment
         a, b, c = matrix[first, first], matrix[first + 1, first + 1], matrix[first, first + 1]
         # Less than the smaller eigenvalue of [[a, c], [c, b]].

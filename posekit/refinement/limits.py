@@ -19,9 +19,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, dot
 from posekit.refinement.anatomy import Bounds
-from posekit.refinement.small import cross, dot
 
 LEAST = 0.05
 """Cosine of the second angle down to which its tangent is taken as it is in derivatives."""
@@ -100,8 +99,8 @@ def limb_angles(directions: Array, parent: Array) -> Limbs:
     a = sines[0][:, None] * up - cosines[0][:, None] * forward
     b = (sines[0] * y)[:, None] * forward + h[:, None] * left + (cosines[0] * y)[:, None] * up
     # The lower direction after alpha and beta is (-a.d, b.d, .): gamma is the angle of (a.d, -b.d).
-    across_a, across_b = dot(a, lower), -dot(b, lower)
-    cosines[3] = dot(upper, lower)
+    across_a, across_b = dot(a, lower, axis=-2), -dot(b, lower, axis=-2)
+    cosines[3] = dot(upper, lower, axis=-2)
     sines[3] = np.sqrt(across_a * across_a + across_b * across_b)
     bent = sines[3] > 0
     inverse = 1.0 / np.where(bent, sines[3], 1.0)
@@ -273,8 +272,8 @@ def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None
     axis = cos_a * parent[:, 0] - sin_a * parent[:, 2]
     forward = child[:, 0]
     sine, cosine = (
-        np.stack([sin_a, y, dot(cross(up, axis), forward)]),
-        np.stack([cos_a, h, dot(axis, forward)]),
+        np.stack([sin_a, y, dot(cross(up, axis, axis=-2), forward, axis=-2)]),
+        np.stack([cos_a, h, dot(axis, forward, axis=-2)]),
     )
     lower, upper = bounds.lower[0, :, None], bounds.upper[0, :, None]
     middle, half = (lower + upper) / 2, (upper - lower) / 2

@@ -21,8 +21,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.cameras.pinhole import undistort
 from posekit.errors import InputError
-from posekit.geometry import Array
-from posekit.refinement.small import dot
+from posekit.geometry import Array, dot
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -118,7 +117,7 @@ class Optics:
             x, y = np.moveaxis(undistort(np.stack([x, y], axis=-1), self.distortion), -1, 0)
         inverse = 1.0 / np.sqrt(x * x + y * y + 1.0)
         ray[:, 0], ray[:, 1], ray[:, 2] = x * inverse, y * inverse, inverse
-        foot = dot(ray, start)[:, None] * ray
+        foot = dot(ray, start, axis=-2)[:, None] * ray
         return ray, foot
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.frames import fit_rotation, hips_frame, torso_frame
-from posekit.geometry import Array
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.geometry import Array, dot, fit_rotation
 from posekit.refinement.anatomy import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, FigureNumbers
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import dot
 from posekit.refinement.state import PostureState, parents
 
 HANGING_AXIS = 2
@@ -65,7 +64,7 @@ def limb_directions(postures: Array, rows: NDArray[np.intp], state: PostureState
     for limb, joints in enumerate(LIMB_JOINTS):
         for segment in range(2):
             along = (postures[rows[limb], joints[segment + 1]] - postures[rows[limb], joints[segment]]).T
-            far = np.sqrt(dot(along, along))
+            far = np.sqrt(dot(along, along, axis=-2))
             known = far > 0
             out[limb, segment] = np.where(known, along / np.where(known, far, 1.0), hanging[limb])
     return out
@@ -89,7 +88,7 @@ def sides(optics: Optics, chains: Chains) -> NDArray[np.bool_]:
         return np.asarray(chains.directions[:, :, 2] > 0)
     middle = chains.start + chains.lengths[:, 0, None] * chains.directions[:, 0]
     end = middle + chains.lengths[:, 1, None] * chains.directions[:, 1]
-    return np.asarray(dot(chains.directions, np.stack([middle, end], axis=1)) > 0)
+    return np.asarray(dot(chains.directions, np.stack([middle, end], axis=1), axis=-2) > 0)
 
 
 def relift(problem: RefinementProblem, chains: Chains, far: NDArray[np.bool_]) -> Chains:
@@ -114,6 +113,6 @@ def _lifted(optics: Optics, image: Array, start: Array, length: Array, far: NDAr
     """Return the directions (4, 3, N) from starts (4, 3, N) to where rays meet the segments' spheres."""
     ray, foot = optics.rays(image, start)
     apart = foot - start
-    half = np.sqrt(np.maximum(length * length - dot(apart, apart), 0.0))
+    half = np.sqrt(np.maximum(length * length - dot(apart, apart, axis=-2), 0.0))
     along = apart + np.where(far, half, -half)[:, None] * ray
-    return np.asarray(along / np.sqrt(dot(along, along))[:, None])
+    return np.asarray(along / np.sqrt(dot(along, along, axis=-2))[:, None])

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, unit
+from posekit.geometry.batch_last import matrix_product, matrix_vector, step_rotation
 from posekit.refinement.anatomy import ARM_LIMBS, LEG_LIMBS, LIMB_ENDS, LIMB_MIDDLES
-from posekit.refinement.small import product, rotation, turned, unit
 
 Rows = NDArray[np.intp]
 
@@ -122,9 +122,9 @@ def moved(state: PostureState, step: PostureStep, tangents: Array | None) -> Pos
         directions, limbs = moved_limbs(directions, limbs, step.limbs, tangents)
     return PostureState(
         root=state.root + trunk[:3],
-        torso=product(rotation(trunk[3:6]), state.torso),
-        hips=product(rotation(trunk[6:9]), state.hips),
-        head=state.head if step.head is None else product(rotation(step.head), state.head),
+        torso=matrix_product(step_rotation(trunk[3:6]), state.torso),
+        hips=matrix_product(step_rotation(trunk[6:9]), state.hips),
+        head=state.head if step.head is None else matrix_product(step_rotation(step.head), state.head),
         directions=directions,
         shape=state.shape + trunk[9:] if len(trunk) > 9 else state.shape,
         limbs=limbs,
@@ -138,7 +138,7 @@ def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array)
     along += directions
     if len(step) > 4:
         lengths = lengths * np.exp(step[4:]).transpose(1, 0, 2)
-    return unit(along), lengths
+    return unit(along, axis=-2), lengths
 
 
 def parents(state: PostureState, *, on_torso: bool = False) -> Array:
@@ -150,4 +150,6 @@ def parents(state: PostureState, *, on_torso: bool = False) -> Array:
 
 def head_points(state: PostureState, offsets: Array) -> Array:
     """Place the head's points relative to the root (5, 3, N)."""
-    return np.stack([turned(state.head, np.broadcast_to(o[:, None], state.root.shape)) for o in offsets])
+    return np.stack(
+        [matrix_vector(state.head, np.broadcast_to(o[:, None], state.root.shape)) for o in offsets]
+    )

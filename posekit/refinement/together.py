@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.geometry.batch_last import backward
 from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import DIAGONAL_FLOOR, assemble, eliminate, left_over, linearise
 from posekit.refinement.limb_terms import Chains, limb_terms
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import backward
 from posekit.refinement.state import PostureState, PostureStep
 from posekit.refinement.trunk_terms import start_ways, trunk_terms
 

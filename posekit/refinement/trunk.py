@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, unit
+from posekit.geometry.batch_last import matrix_product
 from posekit.refinement.descent import BLOCK_POSTURES, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.freedom import degrees_of_freedom
@@ -30,7 +31,6 @@ from posekit.refinement.merging import groups_of
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.sight import ObservedFrames
-from posekit.refinement.small import product, unit
 from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureState, trunk_offsets
 from posekit.refinement.survival import chi2_survival
@@ -227,12 +227,12 @@ def _lifts(sight: ObservedFrames, frames: NDArray[np.intp]) -> Array:
 def _reflections(state: PostureState, perspective: bool) -> PostureState:
     """Return torsos, hips, and both, as a mirror at right angles to the ray shows them: (3 N)."""
     ray = (
-        unit(state.root)
+        unit(state.root, axis=-2)
         if perspective
         else np.broadcast_to(np.array([[0.0], [0.0], [1.0]]), state.root.shape)
     )
     mirror = np.eye(3)[:, :, None] - 2 * ray[:, None] * ray[None]
     flipped = np.array([-1.0, 1.0, 1.0])[None, :, None]
-    torso, hips = (product(mirror, rotation) * flipped for rotation in (state.torso, state.hips))
+    torso, hips = (matrix_product(mirror, rotation) * flipped for rotation in (state.torso, state.hips))
     parts = (state._replace(torso=torso), state._replace(hips=hips), state._replace(torso=torso, hips=hips))
     return PostureState(*(np.concatenate(arrays, axis=-1) for arrays in zip(*parts, strict=True)))

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, dot
+from posekit.geometry.batch_last import matrix_vector
 from posekit.refinement.anatomy import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.joints import pelvis_limits
 from posekit.refinement.limits import Ball, Signs
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.small import dot, turned
 from posekit.refinement.state import PostureState, trunk_offsets
 
 
@@ -66,7 +66,7 @@ def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | 
         _add_ball(ball, squared, matrix, gradient)
         cost = ball.cost()
         chi2 += cost * squared
-        slack = (dot(ball.residual, ball.residual) - cost) * squared
+        slack = (dot(ball.residual, ball.residual, axis=-2) - cost) * squared
         crossed = ball.crossed
     if problem.shape_weight is not None:
         stretch, J = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
@@ -116,8 +116,8 @@ def spread(terms: TrunkTerms, P: Array, g: Array) -> tuple[Array, Array]:
     torso = g[1:4].copy()
     torso[2] += g[4] + g[5]
     for first, arm, push in ((3, x, torso), (6, y, g[4:])):
-        outward = np.maximum(-dot(arm, push), 0.0)
-        square = dot(arm, arm)
+        outward = np.maximum(-dot(arm, push, axis=-2), 0.0)
+        square = dot(arm, arm, axis=-2)
         share = outward / np.where(square > 0, square, 1.0)
         matrix[first : first + 3, first : first + 3] -= np.einsum("jn,jin,jkn->ikn", share, arm, arm)
         total = outward.sum(axis=0)
@@ -146,7 +146,7 @@ def turns_of(problem: RefinementProblem) -> tuple[slice, ...]:
 
 
 def _root(problem: RefinementProblem, state: PostureState) -> Array:
-    return turned(problem.root_weight, state.root - problem.root)
+    return matrix_vector(problem.root_weight, state.root - problem.root)
 
 
 def _ways(problem: RefinementProblem, state: PostureState, offsets: Array) -> Array:
@@ -199,7 +199,7 @@ def _distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
     residual, J = np.empty_like(shape), np.empty((9, *shape.shape))
     for row, (i, j) in enumerate(TRUNK_SEGMENTS):
         apart = points[j] - points[i]
-        square = dot(apart, apart)
+        square = dot(apart, apart, axis=-2)
         residual[row] = weight[row] * 0.5 * np.log(square / ((mine[j] - mine[i]) ** 2).sum())
         J[row] = weight[row] * np.einsum("in,is->sn", apart, _PLACES[j] - _PLACES[i]) / square
     return residual, J

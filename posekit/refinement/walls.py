@@ -13,9 +13,9 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
+from posekit.geometry.batch_last import matrix_product, step_rotation
 from posekit.refinement.limits import Ball, Signs
-from posekit.refinement.small import cross, product, rotation
 
 STEP = 1e-6
 """Radians by which directions are turned for differences."""
@@ -153,7 +153,7 @@ def ball_walls(
     for axis in range(3):
         spin = np.zeros((3, len(felt)))
         spin[axis] = STEP
-        moved = product(rotation(spin), child[..., felt])
+        moved = matrix_product(step_rotation(spin), child[..., felt])
         higher, lower = walls.ball(part, np.einsum("ikn,ijn->nkj", parent[..., felt], moved)) or asked
         now = np.where(side[:, felt] > 0, higher, -lower)
         slope[:, axis] = (now - over[:, felt]) / STEP
@@ -178,7 +178,7 @@ def wall_rows(walls: Walls, found: Beyond, parent: Array, directions: Array, tan
             slope = (_asked(walls, found, moved) - found.over) / STEP
             slope = np.where((found.side != 0) & (np.abs(slope) < STEEPEST), slope, 0.0)
             rows[:, 2 * segment + tangent] = slope
-            rows[:, 4:] -= slope[:, None] * cross(outward.T, t.T)
+            rows[:, 4:] -= slope[:, None] * cross(outward.T, t.T, axis=-2)
     return rows
 
 

@@ -7,7 +7,16 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import (
+    Array,
+    cross,
+    dot,
+    quaternion_conjugate,
+    quaternion_exp,
+    quaternion_log,
+    quaternion_product,
+    quaternion_rotate,
+)
 
 HINGES = frozenset({"JointModelRX", "JointModelRY", "JointModelRZ", "JointModelRevoluteUnaligned"})
 CONTINUOUS = frozenset(
@@ -122,10 +131,10 @@ class ConfigurationSpace:
         for k, v in zip(self.free_q, self.free_v, strict=True):
             linear, angular = dv[:, v : v + 3], dv[:, v + 3 : v + 6]
             quaternion = q[:, k + 3 : k + 7]
-            out[:, k : k + 3] += rotate(quaternion, _left_jacobian(angular, linear))
-            turned = _product(quaternion, _exponential(angular))
+            out[:, k : k + 3] += quaternion_rotate(quaternion, _left_jacobian(angular, linear))
+            turned = quaternion_product(quaternion, quaternion_exp(angular))
             # Of the two quaternions of a rotation the one nearer to where the step began, as Pinocchio does.
-            turned *= np.where(np.einsum("ni,ni->n", turned, quaternion) < 0, -1.0, 1.0)[:, None]
+            turned *= np.where(dot(turned, quaternion) < 0, -1.0, 1.0)[:, None]
             out[:, k + 3 : k + 7] = turned / np.linalg.norm(turned, axis=1, keepdims=True)
         return out
 
@@ -138,62 +147,21 @@ class ConfigurationSpace:
             c, d = q_to[:, self.turn_q], q_to[:, self.turn_q + 1]
             dv[:, self.turn_v] = np.arctan2(a * d - b * c, a * c + b * d)
         for k, v in zip(self.free_q, self.free_v, strict=True):
-            back = q_from[:, k + 3 : k + 7] * np.array([-1.0, -1.0, -1.0, 1.0])
-            angular = _logarithm(_product(back, q_to[:, k + 3 : k + 7]))
-            linear = rotate(back, q_to[:, k : k + 3] - q_from[:, k : k + 3])
+            back = quaternion_conjugate(q_from[:, k + 3 : k + 7])
+            angular = quaternion_log(quaternion_product(back, q_to[:, k + 3 : k + 7]))
+            linear = quaternion_rotate(back, q_to[:, k : k + 3] - q_from[:, k : k + 3])
             dv[:, v : v + 3] = _inverse_left_jacobian(angular, linear)
             dv[:, v + 3 : v + 6] = angular
         return dv
-
-
-def rotate(quaternion: Array, vector: Array) -> Array:
-    """Rotate vectors (N, 3) by unit quaternions (N, 4), order x, y, z, w."""
-    axis, w = quaternion[:, :3], quaternion[:, 3:]
-    twice = 2.0 * cross(axis, vector)
-    return np.asarray(vector + w * twice + cross(axis, twice))
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Return a x b for (N, 3), without the overhead of the general function."""
-    return np.stack(
-        [
-            a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1],
-            a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2],
-            a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0],
-        ],
-        axis=1,
-    )
 
 
 def _indices(values: list[int]) -> NDArray[np.intp]:
     return np.array(values, dtype=np.intp)
 
 
-def _product(a: Array, b: Array) -> Array:
-    """Multiply quaternions (N, 4), order x, y, z, w."""
-    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + cross(a[:, :3], b[:, :3])
-    scalar = a[:, 3:] * b[:, 3:] - np.einsum("ni,ni->n", a[:, :3], b[:, :3])[:, None]
-    return np.concatenate([vector, scalar], axis=1)
-
-
-def _exponential(angular: Array) -> Array:
-    """Turn rotation vectors (N, 3) into unit quaternions (N, 4)."""
-    angle = np.linalg.norm(angular, axis=1, keepdims=True)
-    half = np.sinc(angle / (2 * np.pi)) / 2  # sin(angle / 2) / angle
-    return np.concatenate([half * angular, np.cos(angle / 2)], axis=1)
-
-
-def _logarithm(quaternion: Array) -> Array:
-    """Turn unit quaternions (N, 4) into rotation vectors (N, 3) no longer than pi."""
-    turned = quaternion * np.where(quaternion[:, 3:] < 0, -1.0, 1.0)
-    sine = np.linalg.norm(turned[:, :3], axis=1, keepdims=True)
-    angle = 2 * np.arctan2(sine, turned[:, 3:])
-    return np.asarray(turned[:, :3] * np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 2.0))
-
-
 def _left_jacobian(angular: Array, linear: Array) -> Array:
     """Return V(angular) linear: the translation of the exponential of a twist (Murray, Li & Sastry 1994, eq. 2.36)."""
-    squared = np.einsum("ni,ni->n", angular, angular)[:, None]
+    squared = dot(angular, angular)[:, None]
     angle = np.sqrt(squared)
     small = angle < SMALL
     safe = np.where(small, 1.0, angle)
@@ -205,7 +173,7 @@ def _left_jacobian(angular: Array, linear: Array) -> Array:
 
 def _inverse_left_jacobian(angular: Array, linear: Array) -> Array:
     """Return the solution x of V(angular) x = linear."""
-    squared = np.einsum("ni,ni->n", angular, angular)[:, None]
+    squared = dot(angular, angular)[:, None]
     angle = np.sqrt(squared)
     small = angle < SMALL
     half = np.where(small, 1.0, angle) / 2

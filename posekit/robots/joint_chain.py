@@ -9,7 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, rotation_from_quaternion
+from posekit.geometry.batch_last import matrix_product, matrix_vector
 
 
 class Level(NamedTuple):
@@ -81,7 +82,7 @@ class JointChain:
                 # Rodrigues: R = aa' + sin [a] + cos (1 - aa'), after the joint's placement.
                 outer = np.outer(axis, axis)
                 self.constant[joint] = self.rotation[joint] @ outer
-                self.sine[joint] = self.rotation[joint] @ np.cross(np.eye(3), axis)
+                self.sine[joint] = self.rotation[joint] @ cross(np.eye(3), axis)
                 self.cosine[joint] = self.rotation[joint] @ (np.eye(3) - outer)
             else:
                 self.slide[joint] = self.rotation[joint] @ axis
@@ -97,8 +98,8 @@ class JointChain:
         for level in self.levels:
             parents = self.parents[level.joints]
             local, shift = self._local(level, columns)
-            rotation[level.joints] = product(rotation[parents], local)
-            origin[level.joints] = origin[parents] + turned(rotation[parents], shift)
+            rotation[level.joints] = matrix_product(rotation[parents], local)
+            origin[level.joints] = origin[parents] + matrix_vector(rotation[parents], shift)
         return rotation, origin
 
     def _local(self, level: Level, columns: Array) -> tuple[Array, Array]:
@@ -125,8 +126,9 @@ class JointChain:
         for place in level.flying:
             joint, at = joints[place], self.at[joints[place]]
             fixed = self.rotation[joint][None, ..., None]
-            shift[place] += turned(fixed, columns[at : at + 3][None])[0]
-            local[place] = product(fixed, _rotation(columns[at + 3 : at + 7])[None])[0]
+            shift[place] += matrix_vector(fixed, columns[at : at + 3][None])[0]
+            turn = rotation_from_quaternion(columns[at + 3 : at + 7], axis=0)
+            local[place] = matrix_product(fixed, turn[None])[0]
         return local, shift
 
     def _cos_sin(self, columns: Array, joints: NDArray[np.intp]) -> tuple[Array, Array]:
@@ -166,22 +168,6 @@ def beyond(model: pin.Model, joint: int) -> list[int]:
     return found
 
 
-def turned(rotation: Array, vector: Array) -> Array:
-    """Rotate vectors (K, 3, N) by matrices (K, 3, 3, N)."""
-    return np.asarray(
-        rotation[:, :, 0] * vector[:, None, 0]
-        + rotation[:, :, 1] * vector[:, None, 1]
-        + rotation[:, :, 2] * vector[:, None, 2]
-    )
-
-
-def product(a: Array, b: Array) -> Array:
-    """Multiply matrices (K, 3, 3, N)."""
-    return np.asarray(
-        a[:, :, 0, None] * b[:, None, 0] + a[:, :, 1, None] * b[:, None, 1] + a[:, :, 2, None] * b[:, None, 2]
-    )
-
-
 def _axis(model: pin.Model, joint: int) -> tuple[Array, bool]:
     """Return a joint's axis in its own frame, and whether it turns about it (or slides along it)."""
     data = model.joints[joint].createData()
@@ -191,15 +177,3 @@ def _axis(model: pin.Model, joint: int) -> tuple[Array, bool]:
     column = np.asarray(data.S).reshape(6)
     turns = bool(np.abs(column[3:]).any())
     return (column[3:] if turns else column[:3]).copy(), turns
-
-
-def _rotation(quaternion: Array) -> Array:
-    """Turn unit quaternions (4, N), order x, y, z, w, into matrices (3, 3, N)."""
-    x, y, z, w = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )

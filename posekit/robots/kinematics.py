@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.geometry.batch_last import matrix_vector
 from posekit.robots.body_point import BodyPoint, Site, body_points, find_frame, frame_index
 from posekit.robots.configuration_space import ConfigurationSpace
-from posekit.robots.joint_chain import JointChain, turned
+from posekit.robots.joint_chain import JointChain
 
 __all__ = ["BodyPoint", "Kinematics", "Placed", "Site", "body_points", "find_frame", "frame_index"]
 
@@ -183,7 +184,7 @@ class Kinematics:
     ) -> Iterator[tuple[NDArray[np.intp], Array]]:
         """Yield where the Jacobian's entries go (K,) and what they are (K, N)."""
         chain = self._chain
-        axis = turned(rotation[chain.dof_joint], chain.dof_axis[:, :, None])
+        axis = matrix_vector(rotation[chain.dof_joint], chain.dof_axis[:, :, None])
         if levers.turn.size:
             arm = np.einsum("ls,sin->lin", levers.shares, sites) if levers.mixed else sites[levers.first]
             a = axis[levers.turn]
@@ -199,7 +200,7 @@ class Kinematics:
     def _place(self, rotation: Array, origin: Array) -> Array:
         """Return the sites' positions (S, 3, N)."""
         sites = self._sites
-        return origin[sites.joint] + turned(rotation[sites.joint], sites.offset[:, :, None])
+        return origin[sites.joint] + matrix_vector(rotation[sites.joint], sites.offset[:, :, None])
 
     def _means(self, sites: Array) -> Array:
         """Return the points' positions (P, 3, N)."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, best_rotation, centred_covariance, quaternion_from_rotation
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.start_tables import Table, Tables, write
 
@@ -112,7 +112,7 @@ class Starts:
         ) @ placement.rotation
         at = self.tables.base
         q[:, at : at + 3] = np.einsum("nij,nj->ni", turn, q[:, at : at + 3]) + shift
-        q[:, at + 3 : at + 7] = quaternions(turn)
+        q[:, at + 3 : at + 7] = quaternion_from_rotation(turn, shorter=False)
         return q
 
 
@@ -141,35 +141,12 @@ def lay(shape: Array, seen: Array, weights: Array) -> tuple[Array, Array, Array]
 
     Kabsch 1976, with Umeyama's (1991) sign. Where the points do not determine the rotation, the one nearest to none.
     """
-    total = np.maximum(weights.sum(axis=1), 1e-12)[:, None]
-    a = np.einsum("nk,nki->ni", weights, shape) / total
-    b = np.einsum("nk,nki->ni", weights, seen) / total
-    x, y = shape - a[:, None], seen - b[:, None]
-    covariance = np.einsum("nk,nki,nkj->nij", weights, y, x)
-    size = np.einsum("nii->n", covariance @ np.swapaxes(covariance, 1, 2)) ** 0.5
-    U, _, Vt = np.linalg.svd(covariance + (1e-9 * size + 1e-15)[:, None, None] * np.eye(3))
-    U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
-    R = U @ Vt
-    left = y - np.einsum("nij,nkj->nki", R, x)
-    return R, b - np.einsum("nij,nj->ni", R, a), np.einsum("nk,nki,nki->n", weights, left, left)
-
-
-def quaternions(R: Array) -> Array:
-    """Turn rotations (N, 3, 3) into unit quaternions (N, 4), x, y, z, w, by the largest entry (Shepperd 1978)."""
-    xx, yy, zz = R[:, 0, 0], R[:, 1, 1], R[:, 2, 2]
-    a, b, c = R[:, 1, 0] + R[:, 0, 1], R[:, 0, 2] + R[:, 2, 0], R[:, 2, 1] + R[:, 1, 2]
-    u, v, w = R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]
-    candidates = np.array(
-        [
-            [1 + xx - yy - zz, a, b, u],
-            [a, 1 - xx + yy - zz, c, v],
-            [b, c, 1 - xx - yy + zz, w],
-            [u, v, w, 1 + xx + yy + zz],
-        ]
-    )
-    largest = np.argmax(np.einsum("iin->in", candidates), axis=0)
-    q = candidates[largest, :, np.arange(len(R))]
-    return np.asarray(q / np.linalg.norm(q, axis=1, keepdims=True))
+    fit = centred_covariance(shape, seen, weights)
+    size = np.einsum("nii->n", fit.covariance @ np.swapaxes(fit.covariance, 1, 2)) ** 0.5
+    R, _ = best_rotation(fit.covariance + (1e-9 * size + 1e-15)[:, None, None] * np.eye(3))
+    left = fit.y - np.einsum("nij,nkj->nki", R, fit.x)
+    shift = fit.mean_y - np.einsum("nij,nj->ni", R, fit.mean_x)
+    return R, shift, np.einsum("nk,nki,nki->n", weights, left, left)
 
 
 def _squared_distances(positions: Array, seen: Array, weights: Array) -> Array:

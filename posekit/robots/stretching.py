@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.robots.body_point import BodyPoint
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.scaled_shape import scale_object
@@ -128,7 +128,7 @@ class Stretching:
         if missed > EXACT and "neck" in place and "pelvis" in place:
             # Points in one plane cannot leave it by such steps: shoulders are helped forward, hips down.
             down = place["pelvis"] - place["neck"]
-            aside = np.cross(down, place[pair[1]] - place[pair[0]]) if len(anchors) > 1 else down
+            aside = cross(down, place[pair[1]] - place[pair[0]]) if len(anchors) > 1 else down
             nudge = AWAY * aside / max(float(np.linalg.norm(aside)), 1e-12)
             other, still = _fit(pair, {**place, **{name: place[name] + nudge for name in pair}}, given)
             new = other if still < missed else new
@@ -217,7 +217,7 @@ def _fit(
 def _on_side(shoulders: dict[str, Array], place: Mapping[str, Array], behind: bool) -> dict[str, Array]:
     """Mirror the shoulders in the plane of spine and breadth, where they are on the other side: no length changes."""
     down = place["pelvis"] - place["neck"]
-    forward = np.cross(down, shoulders["left_shoulder"] - shoulders["right_shoulder"])
+    forward = cross(down, shoulders["left_shoulder"] - shoulders["right_shoulder"])
     size = float(np.linalg.norm(forward))
     if size == 0:
         return shoulders
@@ -235,6 +235,6 @@ def shoulders_are_behind(postures: Array) -> bool | None:
     """
     neck, pelvis = postures[:, JOINT["neck"]], postures[:, JOINT["pelvis"]]
     right, left = postures[:, JOINT["right_shoulder"]], postures[:, JOINT["left_shoulder"]]
-    forward = np.einsum("ni,ni->n", np.cross(pelvis - neck, left - right), (left + right) / 2 - neck)
+    forward = np.einsum("ni,ni->n", cross(pelvis - neck, left - right), (left + right) / 2 - neck)
     known = forward[np.isfinite(forward)]
     return bool(np.median(known) < 0) if known.size else None

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import quaternions, torso_frame
+from posekit.body.frames import torso_frame
 from posekit.cameras import PinholeCamera
-from posekit.geometry import Array
+from posekit.geometry import Array, quaternion_from_rotation
 from posekit.skeleton import JOINTS, TORSO
 from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import to_camera
@@ -47,7 +47,7 @@ def observe(
         q_cam = np.full((len(points), figure.model.nq), np.nan)
     else:
         torso = np.moveaxis(points_cam[:, : len(TORSO)], 1, 0)
-        q_cam = np.concatenate([torso[0], quaternions(torso_frame(*torso)), q[:, 7:]], axis=1)
+        q_cam = np.concatenate([torso[0], quaternion_from_rotation(torso_frame(*torso)), q[:, 7:]], axis=1)
     return SyntheticScene(
         figure=figure,
         camera=camera,

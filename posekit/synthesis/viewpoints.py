@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.body.frames import cross, unit
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, unit
 
 MIN_SINE_TO_UP = 1e-6
 """Sine between line of sight and `up` below which no roll makes the camera upright."""

@@ -18,10 +18,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.body import Figure, load_figure
-from posekit.body.frames import quaternions
 from posekit.cameras.head.points import TABLE_A2
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation
 from posekit.skeleton import DOFS, SIDES
 from posekit.synthesis.gait import Gait, GaitAngles
 
@@ -104,7 +103,7 @@ class Walker:
             for joint in ("shoulder", "elbow", "hip", "knee"):
                 angles[:, DOFS.index(f"{side}_{joint}.flexion")] = getattr(gait, joint)[:, k]
         q = np.empty((len(phases), self.figure.model.nq))
-        q[:, :3], q[:, 3:7] = neck, quaternions(R_torso)
+        q[:, :3], q[:, 3:7] = neck, quaternion_from_rotation(R_torso)
         q[:, self.figure.angle_index] = angles
         return q
 
@@ -138,13 +137,4 @@ class Walker:
 
 def _turned(yaw: Array, pitch: Array) -> Array:
     """Return R_z(yaw) R_y(pitch) (N, 3, 3): turned to the left, leaning forward."""
-    cy, sy, cp, sp = np.cos(yaw), np.sin(yaw), np.cos(pitch), np.sin(pitch)
-    zero = np.zeros_like(yaw)
-    return np.stack(
-        [
-            np.stack([cy * cp, -sy, cy * sp], axis=-1),
-            np.stack([sy * cp, cy, sy * sp], axis=-1),
-            np.stack([-sp, zero, cp], axis=-1),
-        ],
-        axis=-2,
-    )
+    return coordinate_rotation(2, yaw) @ coordinate_rotation(1, pitch)

@@ -15,8 +15,9 @@ from posekit.cameras.head import (
     head_points_cam,
     solve_pose,
 )
-from posekit.cameras.head.perspective import Heads, Placement, look, rotation
+from posekit.cameras.head.perspective import Heads, Placement, look
 from posekit.errors import CameraError, HeadError
+from posekit.geometry import rotation_from_vector
 from posekit.skeleton import HEAD_POINTS
 
 CM = 0.01
@@ -173,7 +174,7 @@ def test_the_unit_of_the_image_goes_with_f(rng):
 
 
 def test_where_the_head_frame_is_does_not_matter(rng):
-    turn = rotation(np.array([[0.3, -1.2, 2.0]]))[0]
+    turn = rotation_from_vector(np.array([[0.3, -1.2, 2.0]]))[0]
     moved = HeadPoints(names=TABLE_A2.names, points=TABLE_A2.points @ turn.T + [1.0, -2.0, 3.0])
     image = paper_image() + 1e-6 * rng.normal(size=(6, 2))
     np.testing.assert_allclose(
@@ -309,7 +310,7 @@ def test_jacobian_against_finite_differences(camera, side, rng):
     heads = Heads(points, rng.normal(size=(count, 7, 2)), seen, K, distortion, np.full(count, side))
     scale = rng.uniform(0.02, 0.1, count)
     slope = side * scale if camera is not None else rng.normal(0, 0.05, count)
-    R = rotation(rng.normal(size=(count, 3)))
+    R = rotation_from_vector(rng.normal(size=(count, 3)))
     here = Placement(R, rng.normal(0, 0.3, (count, 2)), scale, slope)
     residual, jacobian, possible = look(heads, here)
     assert possible.all()

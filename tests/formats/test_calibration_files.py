@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.lens import project
-from posekit.cameras.rotation import rotation_from_vector
 from posekit.errors import InputError
 from posekit.formats.cameras import read_cameras, write_cameras
 from posekit.formats.cameras.yaml_subset import parse_yaml
+from posekit.geometry import rotation_from_vector
 
 K = np.array([[1010.25, 0.0, 640.5], [0.0, 1012.75, 360.25], [0.0, 0.0, 1.0]])
 DIST = np.array([-0.21, 0.05, 0.001, -0.002, 0.01])

@@ -16,7 +16,6 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
 from posekit.body import Figure, load_figure
-from posekit.body.frames import quaternions
 from posekit.errors import InputError
 from posekit.formats.motion.bvh import FORMAT, examine_bvh, read_bvh, write_bvh
 from posekit.formats.motion.bvh_angles import continuous, euler_angles, euler_rotation
@@ -27,6 +26,7 @@ from posekit.formats.motion.motion import UPS, Motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.motion.postures import layout_of, postures_of
 from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map
+from posekit.geometry import quaternion_from_rotation, rotation_from_quaternion
 from posekit.skeleton import DOFS, JOINTS, POINTS
 from posekit.synthesis.walker import Walker
 
@@ -274,10 +274,11 @@ class TestAngles:
         np.testing.assert_allclose(euler_rotation(euler_angles(R)), R, rtol=0, atol=1e-13)
 
     def test_quaternions(self, rng: np.random.Generator) -> None:
-        from posekit.formats.motion.bvh_angles import rotation_of_quaternion
 
         R = Rotation.random(20, random_state=3).as_matrix()
-        np.testing.assert_allclose(rotation_of_quaternion(quaternions(R)), R, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            rotation_from_quaternion(quaternion_from_rotation(R)), R, rtol=0, atol=1e-14
+        )
 
 
 class TestAnyHierarchy:

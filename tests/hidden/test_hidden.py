@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.body import load_figure
-from posekit.body.frames import unit
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
+from posekit.geometry import unit
 from posekit.hidden import (
     CompletedSurvivors,
     CompletionOutcome,

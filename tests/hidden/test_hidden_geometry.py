@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.body import load_figure
-from posekit.body.frames import unit
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.geometry import frame_along, rotation_about, rotation_between, unit
 from posekit.hidden.closure import closing_angles
 from posekit.hidden.groups import box, distinct, largest, mean, pairs
-from posekit.hidden.lattices import basis, onto, rotation_spacing, rotations, sphere_spacing, turned, zone
+from posekit.hidden.lattices import rotation_spacing, rotations, sphere_spacing, zone
 from posekit.hidden.rays import find_rays
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_views
@@ -52,7 +52,7 @@ def test_rotations_are_everywhere() -> None:
     )
     np.testing.assert_allclose(np.linalg.det(R), 1.0, rtol=0, atol=1e-12)
     rng = np.random.default_rng(0)
-    Q = turned(unit(rng.standard_normal((500, 3))), rng.uniform(0, np.pi, 500))
+    Q = rotation_about(unit(rng.standard_normal((500, 3))), rng.uniform(0, np.pi, 500))
     trace = np.einsum("nij,mij->nm", Q, R).max(axis=1)
     assert np.arccos(np.clip((trace - 1) / 2, -1, 1)).max() < 1.1 * rotation_spacing(n)
 
@@ -64,13 +64,13 @@ def test_frames_and_shortest_rotations(numbers: list[float]) -> None:
     if min(np.linalg.norm(a), np.linalg.norm(b)) < 1e-3:
         return
     a, b = unit(a), unit(b)
-    B = basis(a)
+    B = frame_along(a)
     np.testing.assert_allclose(B.T @ B, np.eye(3), rtol=0, atol=1e-12)
     np.testing.assert_array_equal(B[:, 0], a)
-    R = onto(a, b)
+    R = rotation_between(a, b)
     np.testing.assert_allclose(R.T @ R, np.eye(3), rtol=0, atol=1e-9)
     np.testing.assert_allclose(R @ a, b, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(onto(a, -a) @ a, -a, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(rotation_between(a, -a) @ a, -a, rtol=0, atol=1e-12)
 
 
 SCENE = random_views(FIGURE, 5, np.random.default_rng(1))
@@ -119,9 +119,9 @@ def test_the_hips_close_at_the_angles_found() -> None:
     rays = find_rays(PINHOLE, neck, SCENE.image, reach=5.0)
     rng = np.random.default_rng(3)
     turn = rng.uniform(0, 2 * np.pi, 5)
-    offset = np.einsum("nij,nj->ni", turned(axis, -turn), pelvis - neck)
+    offset = np.einsum("nij,nj->ni", rotation_about(axis, -turn), pelvis - neck)
     which, angle = closing_angles(FIGURE, rays, np.arange(5), neck, axis, offset, 120)
-    place = neck[which] + np.einsum("nij,nj->ni", turned(axis[which], angle), offset[which])
+    place = neck[which] + np.einsum("nij,nj->ni", rotation_about(axis[which], angle), offset[which])
     right, left = (
         rays.lift(JOINT[f"{side}_hip"], which, place, FIGURE.lengths[f"pelvis-{side}_hip"], 1e-9)
         for side in ("right", "left")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from posekit.body import Figure, load_figure
-from posekit.body.frames import hips_frame, torso_frame, unit
+from posekit.body.frames import hips_frame, torso_frame
+from posekit.geometry import unit
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.refinement import ObservedFrames
 from posekit.refinement.anatomy import LIMB_JOINTS

@@ -5,11 +5,11 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
-from posekit.body.frames import fit_rotation
 from posekit.compiled import angle_kernels
 from posekit.compiled.angle_kernels import TURN
 from posekit.compiled.frame_kernels import NUMBERS
 from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.geometry import fit_rotation
 from posekit.skeleton import DOFS
 from posekit.tree import Check, Screened
 from posekit.validators import collision, joint_range, rigid_parts

@@ -13,7 +13,7 @@ from posekit.body import Figure, with_head
 from posekit.body.capsules import Capsule
 from posekit.errors import ViewerError
 from posekit.formats.own import Inferred
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.colours import ALARM_RGB, POINT_SIDES, SIDE_RGB, Rgb, number, side
 from posekit.viewer.scene.region import add_region
@@ -228,9 +228,9 @@ def _laid(capsule: Capsule, points: Array) -> Array:
     middle, axis = capsule.place(points[None, list(capsule.points)])
     T = np.eye(4)
     T[:3, 3], z = middle[0], axis[0]
-    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x = cross(np.eye(3)[np.argmin(np.abs(z))], z)
     x = x / np.linalg.norm(x)
-    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T[:3, :3] = np.stack([x, cross(z, x), z], axis=1)
     return T
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.errors import ViewerError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.viewer.scene.world import World
 
 NEAR_METRES, FAR_METRES = 0.01, 1000.0
@@ -67,12 +67,12 @@ class Eye:
         """Return the pose in the world and the clip matrix, (4, 4) both."""
         back = self.position - self.target
         back = back / np.linalg.norm(back)
-        right = np.cross([0.0, 0.0, 1.0], back)
+        right = cross(np.array([0.0, 0.0, 1.0]), back)
         if np.linalg.norm(right) < 1e-9:  # from right above or below, the world's x is up
             right = np.array([0.0, -1.0, 0.0])
         right = right / np.linalg.norm(right)
         pose = np.eye(4)
-        pose[:3, :3] = np.stack([right, np.cross(back, right), back], axis=1)
+        pose[:3, :3] = np.stack([right, cross(back, right), back], axis=1)
         pose[:3, 3] = self.position
         f = height / 2 / np.tan(np.radians(self.fov) / 2)
         K = np.array([[f, 0.0, width / 2], [0.0, f, height / 2], [0.0, 0.0, 1.0]])

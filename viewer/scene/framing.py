@@ -6,7 +6,7 @@ import numpy as np
 
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.viewer.scene.eye import CameraEye, Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.sight import ImageSight
 from posekit.viewer.scene.world import World
@@ -110,7 +110,7 @@ def _axes(world: World, azimuth: float, elevation: float) -> Array:
     right, ahead = sight_axes(world, azimuth)
     e = np.radians(elevation)
     back = -np.cos(e) * ahead + np.sin(e) * np.array([0.0, 0.0, 1.0])
-    return np.stack([right, np.cross(back, right), back])
+    return np.stack([right, cross(back, right), back])
 
 
 def sight_axes(world: World, azimuth: float) -> tuple[Array, Array]:

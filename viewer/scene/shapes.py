@@ -9,7 +9,7 @@ import meshcat.geometry as mg
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.viewer.scene.colours import Rgb, number
 from posekit.viewer.scene.scene import Json, Scene
 
@@ -83,9 +83,9 @@ def tubes(starts: Array, ends: Array, radius: float) -> tuple[Array, Array]:
     axis = ends - starts
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
     least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
-    across = np.cross(axis, least)
+    across = cross(axis, least)
     across = across / np.linalg.norm(across, axis=1, keepdims=True)
-    third = np.cross(axis, across)
+    third = cross(axis, across)
     angle = 2 * np.pi * np.arange(N_TUBE_SIDES) / N_TUBE_SIDES
     ring = radius * (
         np.cos(angle)[None, :, None] * across[:, None] + np.sin(angle)[None, :, None] * third[:, None]
@@ -119,7 +119,7 @@ def smooth(geometry: Json, half_length: float) -> None:
     index = geometry["data"]["index"]
     faces = _unpacked(index, "<u4")
     a, b, c = (vertices[faces[:, k]] for k in range(3))
-    inward = np.einsum("ni,ni->n", np.cross(b - a, c - a), normals[faces].sum(axis=1)) < 0
+    inward = np.einsum("ni,ni->n", cross(b - a, c - a), normals[faces].sum(axis=1)) < 0
     geometry["data"]["index"] = _packed(index, np.where(inward[:, None], faces[:, ::-1], faces))
 
 

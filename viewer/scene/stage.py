@@ -6,7 +6,7 @@ import meshcat.geometry as mg
 import numpy as np
 
 from posekit.errors import ViewerError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.viewer.scene.colours import Rgb, rgb
 from posekit.viewer.scene.framing import FLESH_METRES
 from posekit.viewer.scene.scene import Json, Scene
@@ -117,7 +117,7 @@ def _add_grid(scene: Scene, points: Array) -> None:
     starts, ends = np.array([line[0] for line in lines]), np.array([line[1] for line in lines])
     # Flat strips: a tube of this width would be lost between two pixels from afar.
     along = (ends - starts) / np.linalg.norm(ends - starts, axis=1, keepdims=True)
-    half = 0.006 * np.cross(along, [0.0, 0.0, 1.0])
+    half = 0.006 * cross(along, np.array([0.0, 0.0, 1.0]))
     vertices = np.stack([starts - half, ends - half, ends + half, starts + half], axis=1).reshape(-1, 3)
     faces = (4 * np.arange(len(lines))[:, None, None] + np.array([[0, 1, 2], [0, 2, 3]])).reshape(-1, 3)
     scene.meshcat["ground"].set_object(mg.TriangularMeshGeometry(vertices, faces), glow(GRID_RGB))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.errors import ViewerError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 
 CAMERA_UPRIGHT: Array = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 """R_world_cam of a camera that is held upright and level: it looks along the world's x, z is up."""
@@ -56,7 +56,7 @@ class World:
         ):  # it looks straight down or up: what is above in its picture is ahead
             forward = -self.R_world_cam[:, 1] * [1.0, 1.0, 0.0]
         forward = forward / np.linalg.norm(forward)
-        return forward, np.cross(forward, [0.0, 0.0, 1.0])
+        return forward, cross(forward, np.array([0.0, 0.0, 1.0]))
 
 
 def upright_world(points: Array, R_cam_world: Array | None = None) -> World:

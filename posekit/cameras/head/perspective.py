@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, rotation_from_vector
 
 
 class Heads(NamedTuple):
@@ -81,7 +81,7 @@ class Placement(NamedTuple):
         """Add steps (F, 6 or 7): a rotation vector in the camera's frame, shift, scale, and slope if free."""
         scale = self.scale + step[:, 5]
         slope = self.slope + step[:, 6] if heads.K is None else heads.side * scale
-        return Placement(rotation(step[:, :3]) @ self.R, self.shift + step[:, 3:5], scale, slope)
+        return Placement(rotation_from_vector(step[:, :3]) @ self.R, self.shift + step[:, 3:5], scale, slope)
 
 
 def look(heads: Heads, placement: Placement) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -156,15 +156,3 @@ def _to_pixels(
     of_x += skew[..., None] * of_y
     of_y *= f_y[..., None]
     return f_x * x + skew * y + c_x, f_y * y + c_y
-
-
-def rotation(vector: Array) -> Array:
-    """Return the rotations (..., 3, 3) of rotation vectors (..., 3) (Rodrigues 1840)."""
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
-    cross = np.zeros((*vector.shape, 3))
-    for row, column, axis in ((2, 1, 0), (0, 2, 1), (1, 0, 2)):
-        cross[..., row, column] = vector[..., axis]
-        cross[..., column, row] = -vector[..., axis]
-    half = np.sinc(angle / (2 * np.pi))
-    turned: Array = np.eye(3) + np.sinc(angle / np.pi) * cross + half * half / 2 * (cross @ cross)
-    return turned

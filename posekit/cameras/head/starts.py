@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras.head.dlt import solve
 from posekit.cameras.head.perspective import Placement
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 
 FLAT = 1e-12
 """Added to the squared extent of points of size 1, so that the rest of a head, if flat, has a start too."""
@@ -36,7 +36,7 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     affine = np.swapaxes(np.linalg.solve(normal, transposed @ offset), -1, -2)
     left, values, right = np.linalg.svd(affine, full_matrices=False)
     axes = left @ right
-    R = np.concatenate([axes, np.cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)
+    R = np.concatenate([axes, cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)
     scale = values.mean(axis=-1)
     shift = middle - scale[:, None] * np.einsum("fij,fj->fi", axes, centre)
     return Placement(R, shift, scale, scale.copy() if known else np.zeros(len(R)))

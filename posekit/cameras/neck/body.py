@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
 NEAREST = 0.25
@@ -120,4 +120,4 @@ def _bound(
 
 def _angle(a: Array, b: Array) -> tuple[Array, Array]:
     cosine: Array = np.einsum("...i,...i->...", a, b)
-    return cosine, np.linalg.norm(np.cross(a, b), axis=-1)
+    return cosine, np.linalg.norm(cross(a, b), axis=-1)

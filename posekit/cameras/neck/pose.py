@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head.perspective import Heads, Placement, look
 from posekit.cameras.head.starts import affine_start, reversed_start
-from posekit.geometry import Array
+from posekit.geometry import Array, coordinate_rotation, cross
 
 LEAST = 4
 """Points below which a pose is not determined: three leave up to four, none of which can be told from the others."""
@@ -187,7 +187,7 @@ def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
     """
     _, _, axes = np.linalg.svd(points, full_matrices=False)
     v = np.swapaxes(axes, -1, -2).copy()
-    v[..., 2] = np.cross(v[..., 0], v[..., 1])
+    v[..., 2] = cross(v[..., 0], v[..., 1])
     flat = points @ v[..., :2]
     transposed = np.swapaxes(flat, -1, -2)
     affine = np.linalg.solve(transposed @ flat + TINY * np.eye(2), transposed @ image)
@@ -200,7 +200,7 @@ def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
         tilted[:, :2] = U @ (np.stack([np.ones_like(cosine), cosine], axis=-1)[:, :, None] * np.eye(2))
         tilted[:, 2, 1] = side * np.sqrt(np.maximum(1 - cosine**2, 0.0))
         plane = tilted @ W
-        normal = np.cross(plane[..., 0], plane[..., 1])
+        normal = cross(plane[..., 0], plane[..., 1])
         R = np.concatenate([plane, normal[..., None]], axis=-1) @ np.swapaxes(v, -1, -2)
         starts.append(Placement(R, first.shift, scale, scale.copy()))
     return starts
@@ -208,13 +208,8 @@ def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
 
 def _tilted(placement: Placement) -> list[Placement]:
     """Tilt bodies by `TILT` to four sides, about axes across the line of sight."""
-    cosine, sine = np.cos(TILT), np.sin(TILT)
-    starts = []
-    for side in (sine, -sine):
-        about_x = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -side], [0.0, side, cosine]])
-        about_y = np.array([[cosine, 0.0, side], [0.0, 1.0, 0.0], [-side, 0.0, cosine]])
-        starts += [placement._replace(R=turn @ placement.R) for turn in (about_x, about_y)]
-    return starts
+    turns = (coordinate_rotation(axis, np.asarray(tilt)) for tilt in (TILT, -TILT) for axis in (0, 1))
+    return [placement._replace(R=turn @ placement.R) for turn in turns]
 
 
 def _fit(heads: Heads, weights: Array, start: Placement) -> tuple[Placement, Array, Array, Array]:

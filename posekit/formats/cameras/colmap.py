@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras.calibrated import CalibratedCamera
-from posekit.cameras.rotation import rotation_from_quaternion
+from posekit.cameras.rotation import rotation_from_wxyz
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.fields import MAX_CAMERAS, made, metres_of
 from posekit.geometry import Array
@@ -173,7 +173,7 @@ def _read_images(
 
 def _pose(values: Array, unit: str | float | None, path: Path, place: str) -> dict[str, Any]:
     try:
-        R = rotation_from_quaternion(values[:4])
+        R = rotation_from_wxyz(values[:4])
     except CameraError as error:
         raise InputError(f"{path}: {place}: {error}; correct the file") from None
     return {"R": R, "t": None if unit is None else values[4:] * metres_of(unit)}

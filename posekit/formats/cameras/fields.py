@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras.calibrated import BROWN, CalibratedCamera
-from posekit.cameras.rotation import nearest_rotation, rotation_from_vector
+from posekit.cameras.rotation import rotation_from_given_vector, rotation_from_rounded
 from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
 from posekit.safe_io import cut, one_line, refusal, shown
@@ -288,7 +288,11 @@ def _pose(
     # A matrix says what a vector says, and cannot be misread.
     chosen = max(rotations, key=lambda array: array.size)
     try:
-        R = nearest_rotation(chosen.reshape(3, 3)) if chosen.size == 9 else rotation_from_vector(chosen)
+        R = (
+            rotation_from_rounded(chosen.reshape(3, 3))
+            if chosen.size == 9
+            else rotation_from_given_vector(chosen)
+        )
     except CameraError as error:
         raise InputError(f"{source}: {one_line(place)}R: {error}; correct the file") from None
     return R, translation(t, source, f"{place}t", unit)

@@ -16,9 +16,10 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.cameras.calibrated import AXES, CALIBRATED, CalibratedCamera
-from posekit.cameras.rotation import rotation_from_vector, vector_from_rotation
+from posekit.cameras.rotation import rotation_from_given_vector
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.fields import fitted, made, numbers, translation
+from posekit.geometry import vector_from_rotation
 from posekit.safe_io import cut, one_line, read_toml, refusal, shown, write_text
 
 MAX_BYTES: Final = 10_000_000
@@ -102,7 +103,7 @@ def _three(value: Any, path: Path, field: str) -> np.ndarray:
 
 def _rotation(value: Any, path: Path, field: str) -> np.ndarray:
     try:
-        return rotation_from_vector(_three(value, path, field))
+        return rotation_from_given_vector(_three(value, path, field))
     except CameraError as error:
         raise InputError(f"{path}: {field}: {error}; correct the file") from None
 

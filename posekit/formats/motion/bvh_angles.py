@@ -10,8 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.formats.motion.bvh_kinematics import axis_rotation
-from posekit.geometry import Array
+from posekit.geometry import Array, coordinate_rotation
 
 ORDER: Final = (0, 2, 1)
 """The axes of the three angles."""
@@ -21,7 +20,7 @@ LOCKED: Final = 1e-9
 
 def euler_rotation(angles: Array) -> Array:
     """Return the rotations (..., 3, 3) of angles (..., 3), radians, in the order of `ORDER`."""
-    x, z, y = (axis_rotation(axis, angles[..., k]) for k, axis in enumerate(ORDER))
+    x, z, y = (coordinate_rotation(axis, angles[..., k]) for k, axis in enumerate(ORDER))
     return x @ z @ y
 
 
@@ -86,13 +85,3 @@ def _other_branch(angles: Array) -> Array:
 def _wrapped(angles: Array) -> Array:
     """Bring differences of angles to within half a turn."""
     return np.mod(angles + np.pi, 2 * np.pi) - np.pi
-
-
-def rotation_of_quaternion(quaternion: Array) -> Array:
-    """Return the rotations (T, 3, 3) of unit quaternions (T, 4), order x, y, z, w."""
-    x, y, z, w = (quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True)).T
-    R = np.empty((len(quaternion), 3, 3))
-    R[:, 0] = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], axis=-1)
-    R[:, 1] = np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], axis=-1)
-    R[:, 2] = np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], axis=-1)
-    return R

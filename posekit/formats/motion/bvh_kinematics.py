@@ -12,23 +12,12 @@ from typing import Final
 import numpy as np
 
 from posekit.formats.motion.bvh_file import BvhFile
-from posekit.geometry import Array
+from posekit.geometry import Array, coordinate_rotation
 
 _CHUNK: Final = 2_000_000
 """Numbers in the rotations that are held at a time."""
 SMALL: Final = 1e-3
 """Fraction of the largest offset below which an offset says nothing about its position channels."""
-
-
-def axis_rotation(axis: int, angle: Array) -> Array:
-    """Return rotations (..., 3, 3) by angles (...) in radians about a coordinate axis, 0 to 2."""
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    R = np.zeros((*angle.shape, 3, 3))
-    R[..., axis, axis] = 1.0
-    R[..., j, j] = R[..., k, k] = np.cos(angle)
-    R[..., k, j] = np.sin(angle)
-    R[..., j, k] = -R[..., k, j]
-    return R
 
 
 def points_of(file: BvhFile, *, absolute: bool) -> Array:
@@ -66,7 +55,7 @@ def _place(file: BvhFile, values: Array, points: Array, absolute: bool) -> None:
             value = values[:, column]
             column += 1
             if channel.rotates:
-                one = axis_rotation(channel.axis, np.radians(value))
+                one = coordinate_rotation(channel.axis, np.radians(value))
                 R = one if R is None else R @ one
             elif absolute:
                 local[:, channel.axis] = value

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
-from posekit.formats.motion.bvh_angles import euler_angles, euler_rotation, rotation_of_quaternion
+from posekit.formats.motion.bvh_angles import euler_angles, euler_rotation
 from posekit.formats.motion.motion import UPS
 from posekit.formats.motion.motion_axes import up_rotation
-from posekit.geometry import Array
+from posekit.geometry import Array, rotation_from_quaternion, unit
 from posekit.safe_io import refusal, shown
 from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
 
@@ -165,7 +165,7 @@ def place(figure: Figure, q: Array, up: str = "+z") -> Placed:
         The axis of q's world that points up; it becomes y.
     """
     W = up_rotation(up, "+y")
-    R_torso = W @ rotation_of_quaternion(q[:, 3:7]) @ TO_Y_UP.T
+    R_torso = W @ rotation_from_quaternion(unit(q[:, 3:7])) @ TO_Y_UP.T
     pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
     own = dict(zip(DOFS, (q[:, figure.angle_index] * figure.limits.sign).T, strict=True))
     angles = np.zeros((len(q), len(NODES), 3))

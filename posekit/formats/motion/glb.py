@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
-from posekit.body.frames import quaternions
 from posekit.formats.motion.bvh_angles import euler_rotation
 from posekit.formats.motion.bvh_tree import (
     NODES,
@@ -35,7 +34,7 @@ from posekit.formats.motion.bvh_tree import (
 from posekit.formats.motion.format import MotionFormat
 from posekit.formats.motion.glb_capsule import capsule_mesh
 from posekit.formats.motion.glb_file import INDICES, UINT16, VERTICES, GlbFile
-from posekit.geometry import Array
+from posekit.geometry import Array, quaternion_from_rotation
 from posekit.safe_io import refusal, shown
 
 MAX_BODIES: Final = 1000
@@ -140,7 +139,7 @@ def write_postures_glb(
 def quaternions_along_time(placed: Placed) -> Array:
     """Return each node's rotation as a quaternion (T, 21, 4), x, y, z, w, with no change of sign along time."""
     R = euler_rotation(placed.angles)
-    turns = quaternions(R.reshape(-1, 3, 3)).reshape(*R.shape[:2], 4)
+    turns = quaternion_from_rotation(R)
     back = np.einsum("tji,tji->tj", turns[1:], turns[:-1]) < 0
     turns[1:] *= np.where(np.cumsum(back, axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     return np.asarray(turns)

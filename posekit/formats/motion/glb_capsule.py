@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 
 AROUND: Final = 24
 """Corners of a ring."""
@@ -39,10 +39,10 @@ def capsule_mesh(start: Array, end: Array, radius: float) -> Mesh:
     Vertices lie on the capsule; its faces inside it, by 1 - cos(pi / 24) of the radius at most, under one percent.
     """
     axis = (end - start) / np.linalg.norm(end - start)
-    across = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+    across = cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
-    ring = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), np.cross(axis, across))
+    ring = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), cross(axis, across))
     lift = np.pi / 2 * np.arange(RINGS) / RINGS
     half = np.cos(lift)[:, None, None] * ring + np.sin(lift)[:, None, None] * axis  # from the equator up
     below = half - 2 * np.sin(lift)[:, None, None] * axis

@@ -26,7 +26,7 @@ import numpy as np
 
 from posekit.formats.motion.format import MotionFormat
 from posekit.formats.motion.motion_checks import sniffed
-from posekit.geometry import Array
+from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, rotation_from_quaternion
 from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_text
 
 if TYPE_CHECKING:
@@ -94,10 +94,8 @@ def read_mot(path: str | Path, figure: Figure) -> tuple[Array, Array]:
 
 def yaw_pitch_roll(quaternions: Array) -> Array:
     """Turn unit quaternions (T, 4), x, y, z, w, into angles (T, 3) of R = R_z R_y R_x, radians."""
-    x, y, z, w = quaternions.T
-    forward = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)], axis=-1)
-    left_x, left_y = 2 * (x * y - z * w), 1 - 2 * (x * x + z * z)
-    above_x, above_y = 2 * (x * z + y * w), 2 * (y * z - x * w)
+    R = rotation_from_quaternion(quaternions)
+    forward, left_x, left_y, above_x, above_y = R[:, :, 0], R[:, 0, 1], R[:, 1, 1], R[:, 0, 2], R[:, 1, 2]
     level = np.hypot(forward[:, 0], forward[:, 1])
     # Straight up or down the first column says nothing of the yaw: all the turning about that axis counts as yaw.
     yaw = np.where(level < 1e-9, np.arctan2(-left_x, left_y), np.arctan2(forward[:, 1], forward[:, 0]))
@@ -110,17 +108,8 @@ def yaw_pitch_roll(quaternions: Array) -> Array:
 
 def quaternions_of(angles: Array) -> Array:
     """Turn angles (T, 3) of R = R_z R_y R_x, radians, into unit quaternions (T, 4), x, y, z, w, with w >= 0."""
-    (cz, cy, cx), (sz, sy, sx) = np.cos(angles / 2).T, np.sin(angles / 2).T
-    q = np.stack(
-        [
-            cz * cy * sx - sz * sy * cx,
-            cz * sy * cx + sz * cy * sx,
-            sz * cy * cx - cz * sy * sx,
-            cz * cy * cx + sz * sy * sx,
-        ],
-        axis=-1,
-    )
-    return np.asarray(q * np.where(q[:, 3:] < 0, -1.0, 1.0))
+    yaw, pitch, roll = (coordinate_rotation(2 - k, angles[:, k]) for k in range(3))
+    return quaternion_from_rotation(yaw @ pitch @ roll)
 
 
 def checked_configurations(path: str | Path, figure: Figure, q: Array, time: Array) -> tuple[Array, Array]:

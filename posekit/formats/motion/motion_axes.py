@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from posekit.formats.motion.motion import UPS, Motion
-from posekit.geometry import Array
+from posekit.geometry import Array, cross, cross_matrix
 
 
 def up_rotation(start: str, end: str) -> Array:
@@ -16,12 +16,12 @@ def up_rotation(start: str, end: str) -> Array:
     Its entries are 0, 1 and -1: coordinates change places and signs and nothing is rounded.
     """
     a, b = UPS[start], UPS[end]
-    axis = np.cross(a, b)
+    axis = cross(a, b)
     if not axis.any():
         across = np.roll(a, 1) ** 2  # half a turn about an axis square to both
         return np.eye(3) if start == end else 2 * np.outer(across, across) - np.eye(3)
-    cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    return np.asarray(np.eye(3) + cross + cross @ cross)
+    K = cross_matrix(axis)
+    return np.asarray(np.eye(3) + K + K @ K)
 
 
 def with_up(motion: Motion, up: str) -> Motion:

@@ -15,10 +15,10 @@ from functools import cached_property
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import hips_frame, into
+from posekit.body.frames import hips_frame
 from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, rotate_back
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Findings
@@ -73,7 +73,7 @@ class Completion:
         """The neck (3,) from the middle of the shoulders, in the frame of shoulders and pelvis, metres."""
         neck, right, left, pelvis = torso_points(self.figure.lengths)
         frame = hips_frame(pelvis, right, left)
-        return np.asarray(into(frame[None], (neck - (right + left) / 2)[None])[0])
+        return np.asarray(rotate_back(frame[None], (neck - (right + left) / 2)[None])[0])
 
     @cached_property
     def _spine(self) -> tuple[float, float]:

@@ -1,4 +1,4 @@
-"""Vectors, rotations and rigid motions, each formula once."""
+"""The type of arrays of numbers."""
 
 from __future__ import annotations
 

@@ -1,55 +1,41 @@
-"""Linear algebra of small vectors and matrices for a batch, the batch as the last axis."""
+"""Linear algebra of small vectors and matrices with the batch as the last axis, along which NumPy is fastest."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry.arrays import Array
+from posekit.geometry.vectors import dot
 
 MIN_PIVOT = 1e-300
 """Least pivot: a matrix that is positive but for rounding must not give NaN."""
 
 
-def dot(a: Array, b: Array) -> Array:
-    """Multiply vectors (..., k, N): (..., N)."""
-    return np.asarray(np.einsum("...in,...in->...n", a, b))
-
-
-def turned(a: Array, vectors: Array) -> Array:
+def matrix_vector(a: Array, vectors: Array) -> Array:
     """Multiply matrices (..., i, j, N) and vectors (..., j, N)."""
+    if max(a.shape[-1], vectors.shape[-1]) == 1:
+        # Of a single column `einsum` would add up the terms in another order than of many.
+        return np.asarray((a * vectors[..., None, :, :]).sum(axis=-2))
     return np.asarray(np.einsum("...ijn,...jn->...in", a, vectors))
 
 
-def product(a: Array, b: Array) -> Array:
+def matrix_product(a: Array, b: Array) -> Array:
     """Multiply matrices (..., i, j, N) and (..., j, k, N)."""
     return np.asarray(np.einsum("...ijn,...jkn->...ikn", a, b))
 
 
-def cross(a: Array, b: Array) -> Array:
-    """Cross vectors (..., 3, N)."""
-    twice_a = np.concatenate([a, a[..., :2, :]], axis=-2)
-    twice_b = np.concatenate([b, b[..., :2, :]], axis=-2)
-    out = twice_a[..., 1:4, :] * twice_b[..., 2:5, :]
-    out -= twice_a[..., 2:5, :] * twice_b[..., 1:4, :]
-    return np.asarray(out)
-
-
-def unit(vectors: Array) -> Array:
-    """Scale vectors (..., 3, N) to length one."""
-    return np.asarray(vectors / np.sqrt(dot(vectors, vectors))[..., None, :])
-
-
-def rotation(turn: Array) -> Array:
+def step_rotation(turn: Array) -> Array:
     r"""Return rotations (3, 3, N) about vectors (3, N), by their lengths to third order.
 
-    The rotation of the quaternion :math:`(1, \omega / 2)`, whose angle is :math:`2 \arctan(|\omega| / 2)`: a step of
-    the search need be no exact exponential.
+    The rotation of the quaternion :math:`(1, \omega / 2)`, whose angle is :math:`2 \arctan(|\omega| / 2)` (Cayley
+    1846): a step of a search need be no exact exponential, and this one takes no sine.
     """
     half = 0.5 * turn
-    scale = 2.0 / (1.0 + dot(half, half))
+    squared = dot(half, half, axis=-2)
+    scale = 2.0 / (1.0 + squared)
     x, y, z = half
     out = scale * half[:, None] * half[None, :]
-    diagonal = 1.0 - scale * dot(half, half)
+    diagonal = 1.0 - scale * squared
     for i in range(3):
         out[i, i] += diagonal
     for i, j, w in ((0, 1, -z), (0, 2, y), (1, 2, -x)):
