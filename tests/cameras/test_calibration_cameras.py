@@ -10,13 +10,9 @@ from hypothesis import strategies as st
 
 from posekit.cameras.calibrated import CalibratedCamera, choose_camera, needs_undistortion, pinhole_of
 from posekit.cameras.guesses import camera_from_focal35, camera_from_fov
-from posekit.cameras.rotation import (
-    nearest_rotation,
-    rotation_from_quaternion,
-    rotation_from_vector,
-    vector_from_rotation,
-)
+from posekit.cameras.rotation import rotation_from_rounded, rotation_from_wxyz
 from posekit.errors import CameraError, InputError
+from posekit.geometry import rotation_from_vector, vector_from_rotation
 
 K = np.array([[1000.0, 0.0, 320.0], [0.0, 1010.0, 240.0], [0.0, 0.0, 1.0]])
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3)
@@ -54,14 +50,12 @@ def test_quaternions_are_hamiltons(vector: list[float]) -> None:
     angle = float(np.linalg.norm(vector))
     axis = np.array(vector) / angle if angle else np.array([1.0, 0.0, 0.0])
     q = np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
-    np.testing.assert_allclose(
-        rotation_from_quaternion(q), rotation_from_vector(np.array(vector)), atol=1e-12
-    )
+    np.testing.assert_allclose(rotation_from_wxyz(q), rotation_from_vector(np.array(vector)), atol=1e-12)
 
 
 def test_a_rounded_rotation_becomes_exact() -> None:
     R = rotation_from_vector(np.array([0.3, -0.2, 0.9]))
-    exact = nearest_rotation(R.round(4))
+    exact = rotation_from_rounded(R.round(4))
     np.testing.assert_allclose(exact @ exact.T, np.eye(3), atol=1e-14)
     assert np.abs(exact - R).max() < 1e-4
 
@@ -84,7 +78,7 @@ def test_what_is_no_rotation_is_refused(matrix: np.ndarray, says: str) -> None:
 @pytest.mark.parametrize("q", [[0.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0], [np.nan, 0.0, 0.0, 1.0]])
 def test_a_quaternion_of_another_length_is_refused(q: list[float]) -> None:
     with pytest.raises(CameraError, match="length 1"):
-        rotation_from_quaternion(np.array(q))
+        rotation_from_wxyz(np.array(q))
 
 
 @pytest.mark.parametrize(
