@@ -16,5 +16,6 @@ from posekit.validators.suite import Judgement as Judgement
 from posekit.validators.suite import check_names as check_names
 from posekit.validators.suite import judge as judge
 from posekit.validators.suite import make_checks as make_checks
+from posekit.validators.suite import worst_margins as worst_margins
 from posekit.validators.validator import Validator as Validator
 from posekit.validators.walking import walking as walking

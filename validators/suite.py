@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
+from posekit.body.closed_form import Alike
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.settings import RigidTolerance
@@ -108,6 +109,31 @@ class Judgement:
     def worst(self) -> Array:
         """The smallest margin of each posture (N,); NaN where nothing was decided."""
         return np.asarray(np.fmin.reduce(self.margin, axis=1))
+
+
+def worst_margins(checks: Sequence[Check], points: Array, alike: Alike | None = None) -> dict[str, Array]:
+    """Find the worst margin of each posture (N,) by validator, NaN where nothing was decided: `judge`, but no more.
+
+    Parameters
+    ----------
+    checks : sequence of Check
+    points : array (N, 19, 3)
+        Whole postures, metres.
+    alike : callable, optional
+        Finds postures that have the points of a check in the same places: it judges one of each set of them.
+    """
+    found: dict[str, dict[str, Array]] = {}
+    for check in checks:
+        columns = list(check.points)
+        if alike is None:
+            margin = check.judge(points[:, columns]).margin
+        else:
+            rows, place = alike(check.points)
+            margin = check.judge(points[rows[:, None], columns]).margin[place]
+        margins = found.setdefault(check.name, {})
+        for where, new in zip(check.where, margin.T, strict=True):
+            margins[where] = np.where(np.isnan(new), margins[where], new) if where in margins else new
+    return {name: np.fmin.reduce(list(margins.values())) for name, margins in found.items()}
 
 
 def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.body.angles import Limits, ball_angles, direction_angles, limb_angles
 from posekit.body.frames import hips_frame
 from posekit.errors import FigureError
 from posekit.geometry import Array, fit_rotation, relative_rotation, rotate_back, unit
-from posekit.skeleton import DOFS, HEAD, JOINT, JOINTS, POINTS, SIDES
+from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, JOINTS, POINTS, SIDES, TORSO
+
+Alike = Callable[[Sequence[int]], tuple[NDArray[np.intp], NDArray[np.intp]]]
+"""Finds postures with some points in the same places: one posture of each set, and the set of each posture."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,21 +34,49 @@ class ClosedForm:
     limits: Limits
     head_offsets: Array
 
-    def angles(self, points: Array, R_torso: Array) -> Array:
-        """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians."""
-        joint = {name: points[:, index] for name, index in JOINT.items()}
-        R_hips = hips_frame(joint["pelvis"], joint["right_hip"], joint["left_hip"])
+    def angles(self, points: Array, R_torso: Array, alike: Alike | None = None) -> Array:
+        """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians.
+
+        Parameters
+        ----------
+        points : array (N, 19, 3)
+            Whole postures, metres.
+        R_torso : array (N, 3, 3)
+            Their torso frames (`posekit.body.frames.torso_frame`).
+        alike : callable, optional
+            Finds postures that have some points in the same places: a limb that many share is solved once.
+        """
+        R_hips = hips_frame(*(points[:, JOINT[name]] for name in HIPS))
         angles = np.empty((len(points), len(DOFS)))
-        angles[:, :3] = self.neck(R_torso, points[:, 0], points[:, HEAD])
-        angles[:, 3:6] = self.pelvis(R_torso, R_hips)
+        trunk = tuple(JOINT[name] for name in (*TORSO, *HIPS))
+        every = np.arange(len(points))
+
+        def place(
+            first: int, count: int, of: tuple[int, ...], solve: Callable[[NDArray[np.intp]], Array]
+        ) -> None:
+            rows, sets = (every, every) if alike is None else alike(of)
+            angles[:, first : first + count] = solve(rows)[sets]
+
+        place(0, 3, trunk, lambda rows: self.neck(R_torso[rows], points[rows, 0], points[rows][:, HEAD]))
+        place(3, 3, trunk, lambda rows: self.pelvis(R_torso[rows], R_hips[rows]))
         for k, (limb, R_parent) in enumerate(
             ((("shoulder", "elbow", "wrist"), R_torso), (("hip", "knee", "ankle"), R_hips))
         ):
             for i, side in enumerate(SIDES):
-                start, middle, end = (joint[f"{side}_{name}"] for name in limb)
-                first = 6 + 8 * k + 4 * i
-                angles[:, first : first + 4] = self.limb(f"{side}_{limb[0]}", R_parent, start, middle, end)
+                joints = tuple(JOINT[f"{side}_{name}"] for name in limb)
+                place(
+                    6 + 8 * k + 4 * i,
+                    4,
+                    (*trunk, *joints),
+                    partial(self._limb_of, f"{side}_{limb[0]}", R_parent, points, joints),
+                )
         return angles
+
+    def _limb_of(
+        self, joint: str, R_parent: Array, points: Array, joints: tuple[int, ...], rows: NDArray[np.intp]
+    ) -> Array:
+        start, middle, end = (points[rows, each] for each in joints)
+        return self.limb(joint, R_parent[rows], start, middle, end)
 
     def head_frame(self, neck: Array, head: Array) -> Array:
         """Lay the figure's head onto seen head points (N, 5, 3): R_cam_head (N, 3, 3), NaN where they are unknown."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.body.angles import Limits
 from posekit.body.axes import axis_signs
 from posekit.body.capsules import Capsule, read_capsules
-from posekit.body.closed_form import ClosedForm, with_head
+from posekit.body.closed_form import Alike, ClosedForm, with_head
 from posekit.body.frames import torso_frame
 from posekit.body.lengths import check_lengths
 from posekit.body.pool import collides, make_pool
@@ -279,7 +279,7 @@ class Figure:
         """Ask coal which configurations (N, nq) penetrate in a pair that the SRDF leaves to be checked (N,)."""
         return collides(self._pool, q.T)
 
-    def configurations(self, points: Array) -> Configurations:
+    def configurations(self, points: Array, alike: Alike | None = None) -> Configurations:
         """Turn postures into configurations, in closed form.
 
         All branches of the decomposition are tried; the one inside the limits is taken, else the one that
@@ -291,13 +291,15 @@ class Figure:
         ----------
         points : array (N, 14, 3) or (N, 19, 3)
             Joints, and the head's five points where they are known, metres, any right-handed frame.
+        alike : callable, optional
+            Finds postures that share limbs, which are then solved once (`posekit.body.closed_form.Alike`).
 
         Returns
         -------
         Configurations
         """
         points = with_head(points)
-        q = self.inverse_kinematics(points)
+        q = self.inverse_kinematics(points, alike)
         placed = np.isfinite(q[:, :7]).all(axis=1)
         distance = np.full(len(points), np.nan)
         if placed.any():
@@ -306,13 +308,13 @@ class Figure:
             distance[placed] = np.fmax.reduce(gap, axis=1)
         return Configurations(q, distance)
 
-    def inverse_kinematics(self, points: Array) -> Array:
+    def inverse_kinematics(self, points: Array, alike: Alike | None = None) -> Array:
         """Turn postures (N, 19, 3) into q (N, nq), in closed form: `configurations` without the distance."""
         R_torso = torso_frame(*(points[:, JOINT[joint]] for joint in TORSO))
         q = np.full((len(points), self.model.nq), np.nan)
         q[:, :3] = points[:, 0]
         q[:, 3:7] = quaternion_from_rotation(R_torso)
-        angles = self.ik.angles(points, R_torso)
+        angles = self.ik.angles(points, R_torso, alike)
         angles[:, :3] = np.where(np.isnan(angles[:, :3]), 0.0, angles[:, :3])
         q[:, self.angle_index] = angles
         return q

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Configurations
+from posekit.body.closed_form import Alike
 from posekit.geometry import Array
 from posekit.hidden import CompletedSurvivors
 from posekit.objects.mirror import mirrored
@@ -19,7 +20,7 @@ from posekit.recovery.refined import RefinedSurvivors
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.skeleton import JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
-from posekit.validators import judge
+from posekit.validators import worst_margins
 
 LEVEL = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""
@@ -88,7 +89,7 @@ class Batch:
     @cached_property
     def configurations(self) -> Configurations:
         """The configurations of all survivors."""
-        return self.body.figure.configurations(self.points)
+        return self.body.figure.configurations(self.points, self._alike)
 
     @property
     def q(self) -> Array:
@@ -103,7 +104,13 @@ class Batch:
     @cached_property
     def margins(self) -> dict[str, Array]:
         """The worst margin of each survivor (N,), by validator: degrees or metres."""
-        return {judgement.check: judgement.worst for judgement in judge(self.checks, self.points)}
+        return worst_margins(self.checks, self.points, self._alike)
+
+    @property
+    def _alike(self) -> Alike | None:
+        """Survivors that share limbs: those of one tree, until they are refined or completed one by one."""
+        shared = self.refined is None and self.completion is None and self.leaves.joints == JOINTS
+        return self.leaves.alike if shared else None
 
     @cached_property
     def units(self) -> dict[str, str]:

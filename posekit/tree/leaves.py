@@ -182,6 +182,28 @@ class Leaves:
         """Return the joints on whose branches the positions of some points depend, in tree order."""
         return support_of(tuple(points), self.parents)
 
+    def alike(self, points: Sequence[int]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Find the nodes that have some points in the same places: leaves of one tree share most of their limbs.
+
+        Returns
+        -------
+        rows : int array (S,)
+            The first node of each set of such nodes.
+        place : int array (N,)
+            The set of each node: what is true of ``rows[place]`` is true of the nodes, as far as these points go.
+        """
+        support = self.support(points)
+        if support not in self._alike:
+            choices = select(self.level, support)[self.code]
+            sets = self.frame.astype(np.int64) << len(support) | choices
+            _, rows, place = np.unique(sets, return_index=True, return_inverse=True)
+            self._alike[support] = rows, place
+        return self._alike[support]
+
+    @cached_property
+    def _alike(self) -> dict[tuple[int, ...], tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        return {}
+
     def positions(self, points: Sequence[int], nodes: NDArray[np.intp] | NDArray[np.int32]) -> Array:
         """Place some points in some nodes: (len(nodes), len(points), 3), camera frame, metres."""
         frame, code = self.frame[nodes], self.code[nodes]

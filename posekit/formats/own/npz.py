@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Final
@@ -18,6 +19,8 @@ from posekit.safe_io.refusal import cut, nearest, refusal
 __all__ = ["MAX_ARRAYS", "Archive", "Ragged", "not_finite", "open_npz", "suffix", "write_npz"]
 
 _CHUNK: Final = 1 << 22
+COMPRESSION: Final = 3
+"""Of zlib: half the time of the usual 6, for files that are a fifth larger."""
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """The date of every member, so that the same content gives the same bytes."""
 
@@ -37,30 +40,43 @@ class Ragged:
     rows: Sequence[NDArray[Any]]
     fill: Any
 
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the padded array."""
+        return (len(self.rows), max(len(row) for row in self.rows), *self.rows[0].shape[1:])
+
+    def padded(self) -> Iterator[NDArray[Any]]:
+        """Yield the padded array in blocks of rows: of some megabytes, however much padding there is."""
+        dtype = np.result_type(*self.rows)
+        longest, tail = self.shape[1], self.shape[2:]
+        step = max(1, _CHUNK // max(1, longest * math.prod(tail) * dtype.itemsize))
+        for start in range(0, len(self.rows), step):
+            rows = self.rows[start : start + step]
+            block = np.full((len(rows), longest, *tail), self.fill, dtype=dtype)
+            block[np.arange(longest) < np.array([len(row) for row in rows])[:, None]] = np.concatenate(rows)
+            yield block
+
 
 def write_npz(file: BinaryIO, arrays: Mapping[str, NDArray[Any] | Ragged]) -> None:
     """Write arrays as a compressed NPZ; the same arrays always give the same bytes."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=COMPRESSION) as archive:
         for name, array in arrays.items():
             member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
             member.compress_type = zipfile.ZIP_DEFLATED
+            member._compresslevel = COMPRESSION  # type: ignore[attr-defined]  # no argument of open() says it
             with archive.open(member, "w", force_zip64=True) as out:
                 _write(out, array)
 
 
 def _write(out: IO[bytes], array: NDArray[Any] | Ragged) -> None:
     if isinstance(array, Ragged):
-        dtype = np.result_type(*array.rows)
-        longest = max(len(row) for row in array.rows)
-        shape = (len(array.rows), longest, *array.rows[0].shape[1:])
-        padding = np.full(shape[1:], array.fill, dtype=dtype)
-        pieces = [piece for row in array.rows for piece in (row, padding[len(row) :])]
+        dtype, shape, pieces = np.result_type(*array.rows), array.shape, array.padded()
     else:
-        dtype, shape, pieces = array.dtype, array.shape, [array]
+        dtype, shape, pieces = array.dtype, array.shape, iter([array])
     header = {"descr": npy.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
     npy.write_array_header_1_0(out, header)
     for piece in pieces:
-        data = np.ascontiguousarray(piece, dtype=dtype).tobytes()
+        data = np.ascontiguousarray(piece, dtype=dtype).reshape(-1).view(np.uint8).data
         for start in range(0, len(data), _CHUNK):
             out.write(data[start : start + _CHUNK])
 
