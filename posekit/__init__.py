@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from posekit.formats.cameras import read_cameras as read_cameras
     from posekit.formats.keypoints import read_keypoints as read_keypoints
     from posekit.formats.motion import read_motion as read_motion
+    from posekit.formats.opening import open as open
     from posekit.formats.own import View as View
     from posekit.formats.own import read_postures as read_postures
     from posekit.formats.own import read_result as read_result
@@ -52,6 +53,7 @@ _HOMES = {
     ),
     "posekit.formats.keypoints": ("read_keypoints",),
     "posekit.formats.motion": ("read_motion",),
+    "posekit.formats.opening": ("open",),
     "posekit.recovery": ("Recovery", "recover", "result_of"),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from posekit.formats.keypoints import Given
+from posekit.formats.given_file import GivenFile
 from posekit.safe_io import open_file
 from posekit.safe_io.regular_file import unreadable
 
@@ -45,7 +45,7 @@ def of_input(path: Path) -> str:
     if not path.is_dir():
         return of_file(path)
     content = hashlib.sha256()
-    for file in Given(path).files:
+    for file in GivenFile(path).files:
         content.update(json.dumps([file.name, of_file(file)]).encode())
     return content.hexdigest()
 

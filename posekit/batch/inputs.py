@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Final
 
 from posekit.errors import InputError
-from posekit.formats.kinds import Kind, kind_of
+from posekit.formats.format import Content
+from posekit.formats.recognising import recognise
 from posekit.safe_io import cut, refusal
 from posekit.safe_io.regular_file import unreadable
 
@@ -127,6 +128,6 @@ def _of_folder(folder: Path, output: Path) -> Iterator[Path]:
 def _is_recording(folder: Path) -> bool:
     """Tell whether a folder's JSON files are the pictures of one recording, by the first of them."""
     try:
-        return kind_of(folder).kind is Kind.KEY_POINTS
+        return recognise(folder).holds is Content.KEY_POINTS
     except InputError:
         return False

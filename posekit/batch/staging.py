@@ -30,9 +30,10 @@ from posekit.batch.view_table import (
     write_rows,
 )
 from posekit.errors import InputError
+from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, swap
-from posekit.formats.kinds import Kind, kind_of
 from posekit.formats.own import CameraModel, ScaledOrthographicModel, View, read_view
+from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import LANDMARK, SkeletonMap
 from posekit.safe_io import read_json, refusal
 from posekit.skeleton import JOINTS, POINTS
@@ -204,12 +205,12 @@ def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
             _refuse_told(path, source)
             return VIEWS, [_laid_down(job, base, 0, _head(path, head), [rows])]
         return "key points: npz", [_of_rows(job, base, iter([rows]))]
-    what = kind_of(path, source.format)
-    if what.kind is Kind.VIEW:
+    what = recognise(path, source.format)
+    if what.holds is Content.VIEW:
         _refuse_told(path, source)
         view = read_view(path)
         return VIEWS, [_laid_down(job, base, 0, head_text(view), [ImageRows.of_view(view)])]
-    if what.kind is not Kind.KEY_POINTS:
+    if what.holds is not Content.KEY_POINTS:
         given_views(path, source)  # refuses it in its own words
     return _of_detections(job, base)
 

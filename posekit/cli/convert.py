@@ -17,7 +17,7 @@ from posekit.errors import PosekitError
 
 EXAMPLES = examples(
     "posekit convert keypoints/ view.json --camera calibration.toml:cam_01 --stature 175cm",
-    "posekit convert keypoints/ people.json --to coco",
+    "posekit convert predictions.json view.json --person largest --fov 60",
     "posekit convert postures.json walk.bvh",
     "posekit convert postures.json walk.trc --view view.json",
     "posekit convert postures.json survivors.csv --posture all",
@@ -42,8 +42,8 @@ def convert(
         typer.Option(
             "--to",
             metavar="NAME",
-            help="The format to write: view, postures, one of key points (openpose, coco, …) or of motion (trc, c3d, "
-            "csv, npz, parquet, mot, bvh, glb, urdf).",
+            help="The format to write: view, postures, or one of motion (trc, c3d, csv, npz, parquet, mot, bvh, glb, "
+            "urdf).",
         ),
     ] = "",
     posture: Annotated[

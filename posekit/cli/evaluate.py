@@ -197,21 +197,22 @@ def evaluate(
 
 def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capture | View:
     """Read motion, or a view."""
-    from posekit.formats.kinds import Kind, kind_of
+    from posekit.formats.format import Content
     from posekit.formats.own import read_view
+    from posekit.formats.recognising import recognise
     from posekit.formats.skeleton_maps import load_skeleton_map
     from posekit.synthesis import read_capture
 
-    what = kind_of(path, format)
-    if what.kind is Kind.VIEW:
+    what = recognise(path, format)
+    if what.holds is Content.VIEW:
         return read_view(path)
-    if what.kind is not Kind.MOTION:
+    if what.holds is not Content.MOTION:
         raise InputError(
-            f"{path}: {what.kind.value}, of which no truth is known; expected motion, or a view with truth"
+            f"{path}: {what.holds.value}, of which no truth is known; expected motion, or a view with truth"
         )
     return read_capture(
         path,
-        format=what.formats[0] if what.formats else None,
+        format=what.names[0] if what.names else None,
         unit=unit or None,
         up=up or None,
         layout=load_skeleton_map(skeleton) if skeleton else None,

@@ -18,14 +18,14 @@ from posekit.conversion.moving import moving, one_clip, read_clips
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
-from posekit.formats.keypoints import KeyPoints, formats, is_format, write_keypoints
-from posekit.formats.kinds import Kind, kind_of
+from posekit.formats.format import Content
+from posekit.formats.keypoints import is_format
 from posekit.formats.motion import UPS, motion_formats
 from posekit.formats.own import View
+from posekit.formats.recognising import recognise
 from posekit.safe_io import nearest, refusal, shown
-from posekit.views.opening import Opened, choose_person, open_views, read_detections
+from posekit.views.opening import Opened, open_views
 from posekit.views.source import Source
-from posekit.views.view_keypoints import view_keypoints
 
 OWN: Final = ("view", "postures")
 """Files of posekit that can be converted to."""
@@ -45,10 +45,10 @@ CAMERA_AND_PERSON: Final = (
     "--proportions",
 )
 TELLING: Final = {
-    Kind.MOTION: MOTION,
-    Kind.RESULT: ("--posture", "--view", "--up", "--input-up"),
-    Kind.VIEW: ("--skeleton", "--up", "--input-up"),
-    Kind.POSTURES: ("--up", "--input-up"),
+    Content.MOTION: MOTION,
+    Content.RESULT: ("--posture", "--view", "--up", "--input-up"),
+    Content.VIEW: ("--skeleton", "--up", "--input-up"),
+    Content.POSTURES: ("--up", "--input-up"),
 }
 """The options that say something about a kind of file."""
 
@@ -61,7 +61,7 @@ class Conversion:
     ----------
     given, output : Path
     to : str
-        The format to write: ``view``, ``postures``, one of key points or of motion; by the output's name if empty.
+        The format to write: ``view``, ``postures``, or one of motion; by the output's name if empty.
     source : Source
         How a detector's file is to be read.
     posture : str
@@ -93,14 +93,17 @@ class Conversion:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        if self.to and self.to not in (*OWN, *motion_formats()) and not is_format(self.to):
-            near = nearest(self.to, [*OWN, *formats(), *motion_formats()])
-            raise refusal("--to", "", shown(self.to), "a known format", near)
+        written = (*OWN, *(one.name for one in motion_formats().values() if one.writes))
+        if self.to and is_format(self.to):
+            got = f"{self.to}, which detectors write and posekit reads"
+            raise refusal("--to", "", got, ", ".join(written), "choose one of them")
+        if self.to and self.to not in written:
+            raise refusal("--to", "", shown(self.to), "a known format", nearest(self.to, written))
         for option, axis in (("--up", self.up), ("--input-up", self.input_up)):
             if axis not in ("", *UPS):
                 raise refusal(option, "", shown(axis), ", ".join(UPS), "name an axis")
 
-    def check_options(self, kind: Kind, telling: tuple[str, ...]) -> None:
+    def check_options(self, kind: Content, telling: tuple[str, ...]) -> None:
         """Refuse options that say nothing about such a file: whoever gave them expects something of them."""
         given = {
             **self.source.given,
@@ -129,20 +132,18 @@ def convert(job: Conversion) -> list[str]:
     InputError
         Where one of the two formats is not known, or cannot carry what the other has.
     """
-    what = kind_of(job.given, job.source.format)
-    if what.kind is Kind.KEY_POINTS:
+    what = recognise(job.given, job.source.format)
+    if what.holds is Content.KEY_POINTS:
         return _key_points(job)
-    job.check_options(what.kind, TELLING.get(what.kind, ()))
-    if what.kind is Kind.CAMERA:
+    job.check_options(what.holds, TELLING.get(what.holds, ()))
+    if what.holds is Content.CAMERAS:
         return _cameras(job)
-    if is_format(job.to):
-        return _view_as_key_points(job, what.kind)
     if job.to == "view":
         raise refusal(
-            job.given, "--to", f"view, of {what.kind.value}", "key points", "convert to postures or motion"
+            job.given, "--to", f"view, of {what.holds.value}", "key points", "convert to postures or motion"
         )
     output = Output(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
-    if what.kind is Kind.MOTION and carries_points(output.to):
+    if what.holds is Content.MOTION and carries_points(output.to):
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLES else one_clip(motion)
         return write_points(output, carried, job.source.skeleton)
@@ -165,24 +166,19 @@ def of_person(path: Path, one: Opened, *, alone: bool) -> Path:
 
 
 def _key_points(job: Conversion) -> list[str]:
-    """Write key points as a view, or in another detector's format."""
+    """Write the views of the people in key points: a file of one, or one a person."""
     to = job.to or ("view" if job.output.suffix.lower() == ".json" else "")
     if job.given.is_dir() and job.output.resolve().parent == job.given.resolve():
         raise refusal(
             job.output, "", "a place among the files that are read", "another folder", "name one beside it"
         )
-    if is_format(to):
-        job.check_options(Kind.KEY_POINTS, DETECTOR)
-        found = read_detections(job.given, job.source)
-        one = job.source.person not in ("", "all")
-        return _write_key_points(job, choose_person(found, job.source.person) if one else found)
-    job.check_options(Kind.KEY_POINTS, (*DETECTOR, *CAMERA_AND_PERSON))
+    job.check_options(Content.KEY_POINTS, (*DETECTOR, *CAMERA_AND_PERSON))
     if to != "view":
         raise refusal(
             job.output,
             "",
             to or f"a name that ends in {job.output.suffix or 'nothing'}",
-            f"--to view (.json), {', '.join(formats())}: key points are of a picture, and not yet in space",
+            "--to view (.json): key points are of a picture, and not yet in space",
             "recover the view, and convert the result",
         )
     people = open_views(job.given, job.source)
@@ -192,24 +188,6 @@ def _key_points(job: Conversion) -> list[str]:
         files.write_view(path, each.view)
         says.append(f"{path}: {len(each.view)} frames")
     return says
-
-
-def _view_as_key_points(job: Conversion, kind: Kind) -> list[str]:
-    """Write the image points of a view."""
-    if kind is not Kind.VIEW:
-        raise refusal(
-            job.given,
-            "--to",
-            f"{job.to}, of {kind.value}",
-            "a view or a detector's file: only they have points in a picture",
-            f"choose postures, {', '.join(motion_formats())}",
-        )
-    return _write_key_points(job, view_keypoints(files.read_view(job.given), job.to, job.source.skeleton))
-
-
-def _write_key_points(job: Conversion, found: KeyPoints) -> list[str]:
-    write_keypoints(job.output, found, job.to)
-    return [f"{len(found)} detections in {len(found.pictures)} pictures"]
 
 
 def _cameras(job: Conversion) -> list[str]:

@@ -15,11 +15,12 @@ from posekit.body.anthropometry import lengths_from_postures
 from posekit.errors import InputError
 from posekit.following import bridge
 from posekit.formats import own as files
-from posekit.formats.kinds import Kind, What
+from posekit.formats.format import Content
 from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import OpenCVModel, Result, View
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
+from posekit.formats.recognising import Recognised
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
@@ -132,7 +133,7 @@ class Moving:
         )
 
 
-def read_clips(path: Path, what: What, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
+def read_clips(path: Path, what: Recognised, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
     """Read motion: all of its clips, or the one that is named.
 
     Raises
@@ -140,7 +141,7 @@ def read_clips(path: Path, what: What, *, clip: str = "", unit: str = "", up: st
     InputError
         Where it cannot be read, or there is no such clip.
     """
-    motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None, up=up or None)
+    motion = read_motion(path, what.names[0] if what.names else None, unit=unit or None, up=up or None)
     return motion.of_clip(clip) if clip else motion
 
 
@@ -162,7 +163,7 @@ def one_clip(motion: Motion) -> Motion:
 
 def moving(
     path: Path,
-    what: What,
+    what: Recognised,
     *,
     posture: str = "first",
     view: View | None = None,
@@ -176,7 +177,7 @@ def moving(
     Parameters
     ----------
     path : path
-    what : What
+    what : Recognised
         What the file is.
     posture : str
         Of a result: ``first``, the number of a survivor from 1, ``path``, or ``all``.
@@ -195,22 +196,22 @@ def moving(
     InputError
         Where nothing in it moves, or it cannot be read.
     """
-    if what.kind is Kind.RESULT:
+    if what.holds is Content.RESULT:
         return _of_result(files.read_result(path), posture, view, up)
-    if what.kind is Kind.VIEW:
+    if what.holds is Content.VIEW:
         return _of_truth(files.read_view(path), str(path), up)
-    if what.kind is Kind.MOTION:
+    if what.holds is Content.MOTION:
         layout = load_skeleton_map(skeleton) if skeleton else None
         return _of_motion(one_clip(read_clips(path, what, clip=clip, unit=unit, up=up)), layout)
-    if what.kind is Kind.POSTURES:
+    if what.holds is Content.POSTURES:
         given = files.read_postures(path)
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
         points = np.concatenate([given.joints, head], axis=1)
         up = up or _guessed(given.joints, str(path))
         return _recorded(points, np.arange(len(points)) / RATE, up)
-    remedy = "; convert the result that it is of" if what.kind is Kind.SURVIVORS else ""
+    remedy = "; convert the result that it is of" if what.holds is Content.SURVIVORS else ""
     raise InputError(
-        f"{path}: {what.kind.value}, in which nothing moves; expected a result, postures or motion{remedy}"
+        f"{path}: {what.holds.value}, in which nothing moves; expected a result, postures or motion{remedy}"
     )
 
 

@@ -16,7 +16,7 @@ from posekit.batch.reading import FRAME_COLUMNS, shard_paths
 from posekit.batch.run_folder import ASKED, MANIFEST, MANIFEST_SCHEMA, RunFolder
 from posekit.batch.shard import KEY, SHARDS
 from posekit.errors import InputError
-from posekit.formats.motion.motion_checks import sniffed
+from posekit.formats.given_file import first_bytes
 from posekit.formats.motion.parquet import opened
 from posekit.inspection.telling import cut_long, histogram_line, plural, reason_lines, tally
 from posekit.safe_io import cut, extra, read_json, refusal
@@ -72,7 +72,7 @@ def run_lines(folder: Path) -> list[str]:
 
 def is_shard(path: Path) -> bool:
     """Tell whether a file is one of a batch's results."""
-    if path.suffix.lower() != ".parquet" or not path.is_file() or not sniffed(path).startswith(b"PAR1"):
+    if path.suffix.lower() != ".parquet" or not path.is_file() or not first_bytes(path).startswith(b"PAR1"):
         return False
     with opened(path) as file:
         return KEY in (file.schema_arrow.metadata or {}) or KEY in (file.metadata.metadata or {})

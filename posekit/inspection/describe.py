@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Final
 
 from posekit.formats import own as files
-from posekit.formats.kinds import Kind, kind_of
+from posekit.formats.format import Content
+from posekit.formats.recognising import recognise
 from posekit.inspection.batches import is_shard, run_lines, run_of, shard_lines
 from posekit.inspection.inspection import inspect
 from posekit.inspection.reports import evaluation_lines, report_lines
@@ -15,25 +16,13 @@ from posekit.inspection.results import result_lines
 from posekit.objects import object_lines
 from posekit.views.source import Source
 
-
-def _evaluation(path: Path) -> list[str]:
-    return evaluation_lines(path, files.read_json(path))
-
-
-def _report(path: Path) -> list[str]:
-    return report_lines(files.read_report(path))
-
-
-def _object(path: Path) -> list[str]:
-    return object_lines(files.read_object(path))
-
-
-OWN: Final[Mapping[str, tuple[str, Callable[[Path], list[str]]]]] = {
-    "posekit.evaluation": ("an evaluation", _evaluation),
-    "posekit.report": ("a report of validation", _report),
-    "posekit.object": ("objects", _object),
+OWN_LINES: Final[Mapping[Content, Callable[[Path], list[str]]]] = {
+    Content.RESULT: lambda path: result_lines(files.read_result(path)),
+    Content.EVALUATION: lambda path: evaluation_lines(path, files.read_json(path)),
+    Content.REPORT: lambda path: report_lines(files.read_report(path)),
+    Content.OBJECTS: lambda path: object_lines(files.read_object(path)),
 }
-"""What is told of files of some schemas, and what they are called."""
+"""What is told of posekit's own files, by what they hold."""
 
 
 def describe(path: Path, source: Source, *, unit: str = "") -> list[str]:
@@ -57,10 +46,7 @@ def describe(path: Path, source: Source, *, unit: str = "") -> list[str]:
         return [f"{path}: results of a batch (posekit.batch/1)", *run_lines(run)]
     if not source.format and is_shard(path):
         return [f"{path}: results of a batch, one shard (posekit.batch_shard/1)", *shard_lines(path)]
-    what = kind_of(path, source.format)
-    if what.kind is Kind.RESULT:
-        return [f"{path}: a result ({what.schema})", *result_lines(files.read_result(path))]
-    if what.kind is Kind.OTHER and what.schema.partition("/")[0] in OWN:
-        name, lines = OWN[what.schema.partition("/")[0]]
-        return [f"{path}: {name} ({what.schema})", *lines(path)]
+    what = recognise(path, source.format)
+    if what.holds in OWN_LINES:
+        return [f"{path}: {what.title}", *OWN_LINES[what.holds](path)]
     return inspect(path, source, unit=unit)

@@ -11,12 +11,13 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras
+from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people
-from posekit.formats.kinds import Kind, What, kind_of
 from posekit.formats.markdown import table_lines
 from posekit.formats.motion import Motion, guess_up, motion_format, postures_of, read_motion, read_survivors
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.own.postures_q import read_configurations
+from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import LANDMARKS, load_skeleton_map
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, POINTS
@@ -35,34 +36,29 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     InputError
         Where it cannot be read, or is of no format that is known.
     """
-    what = kind_of(path, source.format)
-    lines = [f"{path}: {_title(what)}"]
-    if what.kind is Kind.KEY_POINTS:
+    what = recognise(path, source.format)
+    lines = [f"{path}: {what.title}"]
+    if what.holds is Content.KEY_POINTS:
         return lines + _key_points(read_detections(path, source))
-    if what.kind is Kind.MOTION:
-        if what.formats and motion_format(what.formats[0]).read is None:
-            return [*lines, f"{motion_format(what.formats[0]).says}: written, and not read by itself"]
-        motion = read_motion(path, what.formats[0] if what.formats else None, unit=unit or None)
+    if what.holds is Content.MOTION:
+        if what.names and motion_format(what.names[0]).read is None:
+            return [*lines, f"{motion_format(what.names[0]).title}: written, and not read by itself"]
+        motion = read_motion(path, what.names[0] if what.names else None, unit=unit or None)
         return lines + _motion(motion, source.skeleton)
-    if what.kind is Kind.CAMERA:
+    if what.holds is Content.CAMERAS:
         return lines + [_camera(camera) for camera in read_cameras(path).values()]
-    if what.kind is Kind.VIEW:
+    if what.holds is Content.VIEW:
         return lines + _view(files.read_view(path))
-    if what.kind is Kind.POSTURES:
+    if what.holds is Content.POSTURES:
         return lines + _postures(files.read_postures(path).joints)
-    if what.kind is Kind.SURVIVORS:
+    if what.holds is Content.SURVIVORS:
         table = read_survivors(path)
         return [*lines, f"{len(np.unique(table.frame))} frames", *_postures(table.joints)]
-    if what.kind is Kind.CONFIGURATIONS:
+    if what.holds is Content.CONFIGURATIONS:
         found = read_configurations(path)
         named = f" of {_listed(found.names)}" if found.names else ""
         return [*lines, f"{len(found)} configurations{named}"]
     return lines
-
-
-def _title(what: What) -> str:
-    named = what.schema or " or ".join(what.formats)
-    return f"{what.kind.value} ({named})" if named else what.kind.value
 
 
 def _key_points(found: KeyPoints) -> list[str]:

@@ -10,9 +10,10 @@ from typing import Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.formats.kinds import Kind, kind_of
+from posekit.formats.format import Content
 from posekit.formats.motion import postures_of, read_motion
 from posekit.formats.own import read_view
+from posekit.formats.recognising import recognise
 from posekit.skeleton import JOINT
 from posekit.views.opening import Opened, open_views
 from posekit.views.source import Source
@@ -38,8 +39,8 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
     InputError
         Where the file is neither, cannot be read, or the truth does not belong to it.
     """
-    what = kind_of(path, source.format)
-    if what.kind is Kind.VIEW:
+    what = recognise(path, source.format)
+    if what.holds is Content.VIEW:
         said = [name for name, given in source.given.items() if given and name not in OF_VIEWS]
         if said:
             raise InputError(
@@ -51,13 +52,13 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
                 f"--proportions: {source.proportions!r}; expected figure or taylor: a view says lengths itself"
             )
         opened = [Opened(person=0, view=read_view(path), says=())]
-    elif what.kind is Kind.KEY_POINTS:
+    elif what.holds is Content.KEY_POINTS:
         if truth is not None and source.rate is None:
             source = replace(source, rate=read_motion(truth).rate)
         opened = open_views(path, source)
     else:
         raise InputError(
-            f"{path}: {what.kind.value}; expected a view or key points, which a posture can be recovered from; give "
+            f"{path}: {what.holds.value}; expected a view or key points, which a posture can be recovered from; give "
             "another file"
         )
     if truth is None:

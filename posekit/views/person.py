@@ -19,10 +19,11 @@ from posekit.body.anthropometry import (
     read_lengths,
 )
 from posekit.errors import InputError
+from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, choose, read_keypoints, swap
-from posekit.formats.kinds import Kind, kind_of
 from posekit.formats.motion import postures_of, read_motion
 from posekit.formats.own import CameraModel, OpenCVModel
+from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
@@ -96,12 +97,12 @@ def _lengths(source: Source, camera: CameraModel, given: Path | None) -> Segment
 
 def _from_recording(path: Path, source: Source, camera: CameraModel, given: Path | None) -> SegmentLengths:
     """Estimate the lengths from motion capture, or from key points of the same kind of camera."""
-    what = kind_of(path)
-    if what.kind is Kind.MOTION:
+    what = recognise(path)
+    if what.holds is Content.MOTION:
         return lengths_from_postures(postures_of(read_motion(path)).joints).lengths
-    if what.kind is not Kind.KEY_POINTS:
+    if what.holds is not Content.KEY_POINTS:
         raise InputError(
-            f"--calibrate: {path} is {what.kind.value}; expected motion capture or a detector's file of the same "
+            f"--calibrate: {path} is {what.holds.value}; expected motion capture or a detector's file of the same "
             "person; give another file"
         )
     if source.stature is None:

@@ -33,11 +33,10 @@ from posekit.batch.run_folder import run_folder
 from posekit.batch.staging import STAGED
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.keypoints import write_keypoints
 from posekit.formats.own import View, write_view
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints, write_keypoints
 
 RECIPE = Recipe(checks=("rigid-parts",), shard_frames=4, rank=False)
 

@@ -21,7 +21,6 @@ from posekit.batch.view_table import open_view_table, read_rows, write_rows
 from posekit.body import load_figure
 from posekit.cli.judging_options import Tolerances
 from posekit.errors import InputError
-from posekit.formats.keypoints import write_keypoints
 from posekit.formats.motion.survivors import COORDINATES
 from posekit.formats.motion.survivors_files import read_survivors
 from posekit.formats.own import View, parse_length, read_view, write_view
@@ -34,7 +33,7 @@ from posekit.synthesis import random_views
 from posekit.views.builtin import builtin_view, forget_camera, view_of
 from posekit.views.opening import open_views
 from posekit.views.source import Source
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints, write_keypoints
 
 
 def seen(count: int, seed: int = 0) -> View:

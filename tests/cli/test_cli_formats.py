@@ -17,7 +17,7 @@ from posekit.cameras import PinholeCamera
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.formats import own as files
 from posekit.formats.cameras import write_cameras
-from posekit.formats.keypoints import KeyPoints, write_keypoints
+from posekit.formats.keypoints import KeyPoints
 from posekit.formats.motion import Motion, write_motion
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
@@ -25,7 +25,7 @@ from posekit.recovery.conductor import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Walker, walker_scene
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints, write_keypoints
 
 SIZE = (1920, 1080)
 K = np.array([[1400.0, 0, 960], [0, 1400.0, 540], [0, 0, 1]])
@@ -120,8 +120,8 @@ def from_file(there: Path, text: str) -> str:
         ("convert /dev/zero OUT.csv", ["/dev/zero", "a pipe or a device"]),
         ("convert @pictures OUT.trc", ["ends in .trc", "not yet in space", "recover the view"]),
         ("convert @pictures OUT.bvh --to bvh", ["not yet in space", "recover the view"]),
-        ("convert @pictures OUT", ["ends in nothing", "openpose, coco"]),
-        ("convert @pictures OUT.json --to openpos", ["--to", "did you mean openpose"]),
+        ("convert @pictures OUT", ["ends in nothing", "--to view", "not yet in space"]),
+        ("convert @pictures OUT.json --to postues", ["--to", "did you mean postures"]),
         ("convert @pictures OUT.json --format coco", ["annotations", "check that it is COCO's"]),
         ("convert @pictures OUT.json --format opnpose", ["--format", "did you mean openpose"]),
         ("convert @coco.json OUT.json --to view --format alphapose-halpe_26", ["26", "17"]),
@@ -131,7 +131,7 @@ def from_file(there: Path, text: str) -> str:
         ("convert @result.npz OUT.csv --stature 1.8m", ["--stature", "says nothing of a result"]),
         ("convert @result.npz OUT.xyz", ["ends in .xyz", ".trc, .c3d"]),
         ("convert @result.npz OUT.trc --to tcr", ["--to", "did you mean trc"]),
-        ("convert @result.npz OUT.json --to coco", ["coco, of a result", "points in a picture"]),
+        ("convert @result.npz OUT.json --to coco", ["--to: got coco, which detectors write", "view, postures, trc"]),
         ("convert @result.npz OUT.json --to view", ["view, of a result"]),
         ("convert @result.npz OUT.trc --posture all", ["--posture: all", "one posture a frame", "csv, npz"]),
         ("convert @result.npz OUT.json --posture all", ["--posture: all", "one posture a frame", "csv, npz"]),

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
+from tests.detector_files import write_keypoints
 
 COCO = load_skeleton_map("coco_17")
 
@@ -291,45 +292,6 @@ def test_pictures_whose_names_are_no_numbers_are_counted(tmp_path: Path, rng: np
     assert read_keypoints(tmp_path / "r.json").pictures == ("0", "1")
     write_keypoints(tmp_path / "a.json", keypoints, "coco")
     assert read_keypoints(tmp_path / "a.json").pictures == ("x.jpg", "y.jpg")
-
-
-def test_what_is_written_has_what_evaluation_tools_ask_for(tmp_path: Path, rng: np.random.Generator) -> None:
-    keypoints = KeyPoints(
-        format="",
-        source="",
-        layout=COCO,
-        pictures=("000000000785.jpg",),
-        size=np.array([[640.0, 425.0]]),
-        frame=np.zeros(1, np.intp),
-        points=rng.uniform(5, 400, (1, 17, 2)),
-    )
-    write_keypoints(tmp_path / "a.json", keypoints, "coco")
-    content = json.loads((tmp_path / "a.json").read_text("utf-8"))
-    (one,) = content["annotations"]
-    assert content["images"] == [{"id": 785, "file_name": "000000000785.jpg", "width": 640, "height": 425}]
-    assert one["image_id"] == 785 and one["num_keypoints"] == 17 and one["iscrowd"] == 0 and one["id"] == 1
-    left, top, width, height = one["bbox"]
-    points = keypoints.points[0]
-    np.testing.assert_allclose([left, top], points.min(axis=0))
-    np.testing.assert_allclose([left + width, top + height], points.max(axis=0))
-    assert one["area"] == pytest.approx(width * height)
-    assert content["categories"][0]["keypoints"] == list(COCO.points)
-
-
-def test_fractions_are_not_written_as_pixels(tmp_path: Path) -> None:
-    keypoints = KeyPoints(
-        format="",
-        source="",
-        layout=COCO,
-        pictures=("0",),
-        frame=np.zeros(1, np.intp),
-        points=np.full((1, 17, 2), 0.5),
-        normalised=True,
-    )
-    for name in ("coco", "coco-results"):
-        with pytest.raises(InputError, match="--size"):
-            write_keypoints(tmp_path / "x.json", keypoints, name)
-    assert not list(tmp_path.iterdir())
 
 
 V = [1, 2, 2] * 17

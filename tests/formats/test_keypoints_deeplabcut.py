@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting
 from posekit.formats.skeleton_maps import load_skeleton_map, parse_skeleton_map
+from tests.detector_files import write_keypoints
 
 COCO = load_skeleton_map("coco_17")
 
@@ -154,17 +155,3 @@ def test_damage_is_told_in_one_line(case: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=told) as caught:
         read_keypoints(tmp_path / "v.csv", "deeplabcut")
     assert "\n" not in str(caught.value)
-
-
-def test_people_who_are_not_told_apart_are_not_written(tmp_path: Path) -> None:
-    there = KeyPoints(
-        format="t",
-        source="t",
-        layout=COCO,
-        pictures=("0",),
-        frame=np.zeros(2, int),
-        points=np.ones((2, 17, 2)),
-    )
-    with pytest.raises(InputError, match="not told apart; expected one person"):
-        write_keypoints(tmp_path / "v.csv", there, "deeplabcut")
-    assert not (tmp_path / "v.csv").exists()

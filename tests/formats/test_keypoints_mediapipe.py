@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_names import NAMES
-from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting
 from posekit.formats.skeleton_maps import load_skeleton_map
+from tests.detector_files import write_keypoints
 
 MEDIAPIPE = load_skeleton_map("mediapipe_33")
 PLACES = np.random.default_rng(33).uniform(-0.1, 1.2, (33, 4)).round(4)
@@ -247,20 +248,6 @@ def test_what_is_written_is_read_again(seed: int, ending: str, size: Any, tmp_pa
         np.testing.assert_array_equal(back.size, there.size)
     np.testing.assert_allclose(back.points, wanted, rtol=1e-15)
     np.testing.assert_array_equal(back.confidence, there.confidence)
-
-
-def test_pixels_without_size_cannot_be_written(tmp_path: Path) -> None:
-    there = KeyPoints(
-        format="t",
-        source="t",
-        layout=MEDIAPIPE,
-        pictures=("0",),
-        frame=np.zeros(1, int),
-        points=np.ones((1, 33, 2)) * 99,
-    )
-    with pytest.raises(InputError, match=r"whose size is not known.*--size"):
-        write_keypoints(tmp_path / "p.json", there, "mediapipe")
-    assert not list(tmp_path.iterdir())
 
 
 BAD: dict[str, tuple[object, str]] = {

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
-from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting
 from posekit.formats.skeleton_maps import load_skeleton_map, parse_skeleton_map
+from tests.detector_files import write_keypoints
 
 COCO, H36M, HALPE = map(load_skeleton_map, ("coco_17", "h36m_17", "halpe_26"))
 STANDING = {

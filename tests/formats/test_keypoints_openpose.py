@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.openpose_names import file_names
-from posekit.formats.keypoints.reading import read_keypoints, suiting, write_keypoints
+from posekit.formats.keypoints.reading import read_keypoints, suiting
 from posekit.formats.skeleton_maps import load_skeleton_map
+from tests.detector_files import write_keypoints
 
 BODY_25, BODY_25B, COCO_18 = map(load_skeleton_map, ("body_25", "body_25b", "coco_18"))
 FACES = {
@@ -124,8 +124,6 @@ def test_what_is_written_is_read_again(
     assert suiting(path) == ["openpose"]
     again = read_keypoints(path, layout=keypoints.layout)
     same(again, keypoints)
-    with pytest.raises(InputError, match="something that exists"):
-        write_keypoints(path, keypoints, "openpose")
 
 
 def test_a_picture_is_read_as_a_plain_loop_over_its_json_reads_it(
@@ -310,9 +308,7 @@ def test_scaled_points_are_fractions(tmp_path: Path, rng: np.random.Generator, s
     np.testing.assert_allclose(read.points, np.where(np.isnan(points), np.nan, fractions), atol=1e-12)
 
 
-def test_fractions_are_written_only_where_they_are_read_as_such(
-    tmp_path: Path, rng: np.random.Generator
-) -> None:
+def test_fractions_are_read_as_such(tmp_path: Path, rng: np.random.Generator) -> None:
     fractions = detections(rng, BODY_25, 1) / 2000
     keypoints = KeyPoints(
         format="",
@@ -325,18 +321,6 @@ def test_fractions_are_written_only_where_they_are_read_as_such(
     )
     write_keypoints(tmp_path / "a.json", keypoints, "openpose")
     np.testing.assert_array_equal(read_keypoints(tmp_path / "a.json", layout=BODY_25).points, fractions)
-    beyond = KeyPoints(
-        format="",
-        source="",
-        layout=BODY_25,
-        pictures=("a",),
-        frame=np.zeros(1, np.intp),
-        points=fractions + 0.9,
-        normalised=True,
-    )
-    with pytest.raises(InputError, match="--size"):
-        write_keypoints(tmp_path / "b.json", beyond, "openpose")
-    assert not (tmp_path / "b.json").exists()
 
 
 @pytest.mark.parametrize("name", ["openpose", "openpose-body_25", "openpose-body_25b", "openpose-coco_18"])
@@ -351,48 +335,6 @@ def test_another_layout_is_converted(tmp_path: Path, rng: np.random.Generator, n
     read = read_keypoints(tmp_path / "a", layout=layout)
     np.testing.assert_array_equal(read.landmarks, keypoints.landmarks)
     assert np.isnan(read.points[0, 19:]).all()
-
-
-def test_several_pictures_do_not_go_into_one_file(tmp_path: Path) -> None:
-    keypoints = KeyPoints(
-        format="",
-        source="",
-        layout=BODY_25,
-        pictures=("a", "b"),
-        frame=np.zeros(0, np.intp),
-        points=np.empty((0, 25, 2)),
-    )
-    with pytest.raises(InputError, match="name a folder"):
-        write_keypoints(tmp_path / "a.json", keypoints, "openpose")
-    (tmp_path / "empty").mkdir()
-    write_keypoints(tmp_path / "empty", keypoints, "openpose")  # an empty folder is filled
-    assert read_keypoints(tmp_path / "empty").pictures == ("a", "b")
-
-
-def test_a_folder_is_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    keypoints = KeyPoints(
-        format="",
-        source="",
-        layout=BODY_25,
-        pictures=("a", "b"),
-        frame=np.zeros(0, np.intp),
-        points=np.empty((0, 25, 2)),
-    )
-
-    def full(self: Path, target: Path) -> Path:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(InputError, match="No space left"):
-        write_keypoints(tmp_path / "out", keypoints, "openpose")
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    "pictures", [("b", "a"), ("x/y", "z"), ("same", "SAME"), ("..", "a"), ("l_1", "r_1"), ("é" * 3, "z")]
-)
-def test_pictures_that_are_no_names_of_files_are_counted(pictures: tuple[str, ...]) -> None:
-    assert file_names(pictures) == ["000000000000_keypoints.json", "000000000001_keypoints.json"]
 
 
 PEOPLE = [

@@ -11,19 +11,17 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
+from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints import KeyPoints, reading
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.reading import (
-    by_name,
     chosen,
-    formats,
     is_format,
+    key_point_formats,
     read_keypoints,
     suiting,
-    write_keypoints,
 )
-from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, skeleton_map_names
+from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_names
 
 COCO = load_skeleton_map("coco_17")
 PERSON = [40, 50, 2] * 17
@@ -57,21 +55,22 @@ def test_a_file_is_one_format_whatever_it_is_called(tmp_path: Path, name: str, f
 
 
 def test_every_format_says_what_it_is() -> None:
-    for name, one in formats().items():
-        assert one.name == name and one.says and "\n" not in one.says
+    for name, one in key_point_formats().items():
+        assert one.name == name and one.title and "\n" not in one.title
         assert set(one.skeletons) <= set(skeleton_map_names())
 
 
 def test_a_file_that_could_be_several_formats_names_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def never(given: Given, layout: object) -> KeyPoints:
+    def never(given: GivenFile, layout: object) -> KeyPoints:
         raise AssertionError("an ambiguous file was read")
 
     twins = {
-        name: Format(name=name, says=name, suits=lambda given: True, read=never) for name in ("left", "right")
+        name: KeyPointFormat(name=name, title=name, looks_like=lambda given: True, read=never)
+        for name in ("left", "right")
     }
-    monkeypatch.setattr(reading, "formats", lambda: twins)
+    monkeypatch.setattr(reading, "key_point_formats", lambda: twins)
     (tmp_path / "x.json").write_text("{}", encoding="utf-8")
     with pytest.raises(InputError, match=r"a file that is left or right.*--format"):
         read_keypoints(tmp_path / "x.json")
@@ -211,7 +210,7 @@ def test_a_format_may_be_named_with_a_layout() -> None:
     assert chosen("openpose")[1] is None
     one, layout = chosen("coco-results-h36m_17")
     assert one.name == "coco-results" and layout is not None and layout.name == "h36m_17"
-    assert by_name("coco-halpe_26").name == "coco"
+    assert chosen("coco-halpe_26")[0].name == "coco"
     assert is_format("coco-halpe_26") and is_format("coco") and not is_format("coco-halpe_27")
     for wrong, said in {
         "openpose-body25": "did you mean openpose-body_25",
@@ -228,54 +227,6 @@ def test_the_users_map_counts_before_the_one_named_with_the_format(tmp_path: Pat
     (tmp_path / "x.json").write_text(json.dumps(FILES["coco-results"]), encoding="utf-8")
     layout = load_skeleton_map("coco_17")
     assert read_keypoints(tmp_path / "x.json", "coco-results-h36m_17", layout).layout is layout
-
-
-def test_a_format_that_is_only_read_is_not_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    one = formats()["coco"]
-    only = Format(name="coco", says="", suits=one.suits, read=one.read)
-    monkeypatch.setattr(reading, "formats", lambda: {"coco": only})
-    with pytest.raises(InputError, match="is read, not written"):
-        write_keypoints(tmp_path / "x.json", made(), "coco")
-
-
-def test_a_layout_through_another_and_back_keeps_every_landmark(rng: np.random.Generator) -> None:
-    points = rng.uniform(0, 900, (3, 17, 2))
-    points[0, 5:9] = np.nan
-    confidence = np.where(np.isnan(points[..., 0]), np.nan, rng.random((3, 17)))
-    one = made(
-        points=points, confidence=confidence, occluded=~np.isnan(confidence) & (rng.random((3, 17)) < 0.3)
-    )
-    for name in (
-        "body_25",
-        "body_25b",
-        "coco_18",
-        "halpe_26",
-        "halpe_136",
-        "coco_wholebody_133",
-        "mediapipe_33",
-    ):
-        there = one.in_layout(load_skeleton_map(name))
-        assert there.layout.name == name
-        np.testing.assert_array_equal(there.landmarks, one.landmarks)
-        back = there.in_layout(COCO)
-        for field in ("points", "confidence", "occluded"):
-            np.testing.assert_array_equal(
-                getattr(back, field), getattr(one, field), err_msg=f"{name} {field}"
-            )
-    assert one.in_layout(COCO) is one
-
-
-def test_points_of_the_same_name_move_along_with_the_landmarks(rng: np.random.Generator) -> None:
-    whole, halpe = load_skeleton_map("coco_wholebody_133"), load_skeleton_map("halpe_26")
-    one = made(layout=whole, points=rng.uniform(0, 9, (3, 133, 2)))
-    there = one.in_layout(halpe)
-    heel = "left_heel"
-    np.testing.assert_array_equal(
-        there.points[:, halpe.points.index(heel)], one.points[:, whole.points.index(heel)]
-    )
-    shoulders = one.landmarks[:, LANDMARK["mid_shoulders"]]
-    np.testing.assert_array_equal(there.points[:, halpe.points.index("neck")], shoulders)
-    assert np.isnan(there.points[:, halpe.points.index("head")]).all()
 
 
 def test_what_is_not_given_is_not_known() -> None:

@@ -18,6 +18,7 @@ from posekit.formats.keypoints.side_gait import gait_evidence
 from posekit.formats.keypoints.sides import SURE
 from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, parse_skeleton_map
 from posekit.synthesis import SyntheticScene, Walker, random_views, walker_scene
+from tests.detector_files import scatter
 
 COCO = load_skeleton_map("coco_17")
 FACE = slice(0, 5)
@@ -30,7 +31,7 @@ def seen(scene: SyntheticScene, rng: np.random.Generator, *, head: bool, noise: 
     landmarks[:, :19] = np.concatenate([scene.image, scene.head_image], axis=1) * (
         1000 if scene.lee_chen_f else 1
     )
-    points = COCO.scatter(landmarks)
+    points = scatter(COCO, landmarks)
     points += rng.normal(0, noise * np.median(np.ptp(points[..., 1], axis=1)), points.shape)
     if not head:
         points[:, FACE] = np.nan

@@ -17,13 +17,13 @@ from scipy.spatial.transform import Rotation
 
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError
-from posekit.formats.motion.bvh import FORMAT, examine_bvh, read_bvh, write_bvh
+from posekit.formats.motion.bvh import BVH_FORMAT, examine_bvh, read_bvh, write_bvh
 from posekit.formats.motion.bvh_angles import continuous, euler_angles, euler_rotation
 from posekit.formats.motion.bvh_size import CMU
 from posekit.formats.motion.bvh_writing import NAMES
-from posekit.formats.motion.format import UNITS
 from posekit.formats.motion.motion import UPS, Motion
 from posekit.formats.motion.motion_axes import up_rotation
+from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.formats.motion.postures import layout_of, postures_of
 from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map
 from posekit.geometry import quaternion_from_rotation, rotation_from_quaternion
@@ -104,7 +104,7 @@ class TestWhatIsWritten:
         step = read_bvh(tmp_path / "b.bvh").points - motion.points
         assert np.abs(step - [0, 1, 0]).max() < EXACT
 
-    @pytest.mark.parametrize("unit", sorted(UNITS))
+    @pytest.mark.parametrize("unit", sorted(METRES_IN_UNIT))
     def test_any_unit_is_told_by_the_size_of_the_body(
         self, unit: str, rng: np.random.Generator, tmp_path: Path
     ) -> None:
@@ -242,9 +242,9 @@ class TestWhatIsWritten:
         assert read_bvh(tmp_path / "a.bvh").rate == pytest.approx(10)
 
     def test_registered(self) -> None:
-        assert FORMAT.suffixes == (".bvh",)
-        assert FORMAT.read is read_bvh
-        assert FORMAT.write_configurations is write_bvh
+        assert BVH_FORMAT.suffixes == (".bvh",)
+        assert BVH_FORMAT.read is read_bvh
+        assert BVH_FORMAT.write_configurations is write_bvh
 
 
 class TestAngles:

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats.motion.bvh_tree import NODES, known_nodes
-from posekit.formats.motion.glb import FORMAT, write_glb, write_postures_glb
+from posekit.formats.motion.glb import GLB_FORMAT, write_glb, write_postures_glb
 from posekit.formats.motion.glb_capsule import AROUND, capsule_mesh
 from posekit.formats.motion.glb_file import INDICES, UINT16, GlbFile
 from posekit.formats.motion.motion import UPS
@@ -230,9 +230,9 @@ class TestMotion:
         assert list(tmp_path.iterdir()) == []
 
     def test_registered(self) -> None:
-        assert FORMAT.suffixes == (".glb",)
-        assert FORMAT.read is None
-        assert FORMAT.write_configurations is write_glb
+        assert GLB_FORMAT.suffixes == (".glb",)
+        assert GLB_FORMAT.read is None
+        assert GLB_FORMAT.write_configurations is write_glb
 
 
 class TestPostures:

@@ -154,6 +154,6 @@ def test_clips_are_taken_by_name():
 def test_each_format_says_what_it_is():
     for name, one in motion_formats().items():
         assert one.name == name
-        assert one.says
+        assert one.title
         assert one.read or one.write_configurations or one.write_points
     assert set(POINTS) <= {name for name, one in motion_formats().items() if one.write_points}

@@ -17,10 +17,10 @@ from posekit.formats.motion.urdf_folder import (
     CSV,
     FIGURE,
     FILES,
-    FORMAT,
     LINK_OF,
     MUJOCO,
     NPZ,
+    URDF_FORMAT,
     read_urdf_folder,
     write_urdf_folder,
 )
@@ -220,8 +220,8 @@ class TestBadInput:
             read_urdf_folder(folder, "mm")
 
     def test_registered(self, folder: Path) -> None:
-        assert FORMAT.suffixes == ()
-        assert FORMAT.write_configurations is write_urdf_folder
+        assert URDF_FORMAT.suffixes == ()
+        assert URDF_FORMAT.write_configurations is write_urdf_folder
         shutil.rmtree(folder)
 
 

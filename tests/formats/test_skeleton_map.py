@@ -20,6 +20,7 @@ from posekit.formats.skeleton_maps import (
     parse_skeleton_map,
     skeleton_map_names,
 )
+from tests.detector_files import scatter
 
 NAMES = skeleton_map_names()
 SIDED = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle", "eye", "ear")
@@ -142,7 +143,7 @@ def test_gathering_undoes_scattering(name: str) -> None:
     for side in ("shoulders", "hips"):
         ends = [LANDMARK[f"{which}_{side[:-1]}"] for which in ("right", "left")]
         landmarks[:, LANDMARK[f"mid_{side}"]] = landmarks[:, ends].mean(axis=1)
-    back = layout.gather(layout.scatter(landmarks))
+    back = layout.gather(scatter(layout, landmarks))
     placed = [LANDMARK[landmark] for landmark in layout.landmarks]
     np.testing.assert_allclose(back[:, placed], landmarks[:, placed], atol=1e-15)
     assert np.isnan(np.delete(back, placed, axis=1)).all()

@@ -16,7 +16,6 @@ from posekit.body import load_figure
 from posekit.errors import HeadError, InputError
 from posekit.evaluate import Method, compare, evaluate
 from posekit.formats import own as files
-from posekit.formats.keypoints import write_keypoints
 from posekit.formats.own import LeeChenModel, OpenCVModel, View
 from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
@@ -25,7 +24,7 @@ from posekit.recovery.sequences import follow
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
 from posekit.views.builtin import builtin_view, view_of
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints, write_keypoints
 
 LOST = [0, 2]
 """The first frame among them: what is said of all frames is hardly said of that one."""

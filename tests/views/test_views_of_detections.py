@@ -20,7 +20,7 @@ from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 from posekit.views.person_view import pelvis_fraction, person_view
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints
 
 FIGURE = posekit.load_figure()
 LIMBS = [k for k, name in enumerate(JOINTS) if name not in ("neck", "pelvis")]

@@ -21,7 +21,7 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError, PosekitError
 from posekit.formats import own as files
 from posekit.formats.cameras import write_cameras
-from posekit.formats.keypoints import KeyPoints, swap, write_keypoints
+from posekit.formats.keypoints import KeyPoints, swap
 from posekit.formats.motion import Motion, write_motion
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.skeleton_maps import load_skeleton_map
@@ -30,7 +30,7 @@ from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
 from posekit.synthesis import Walker, walker_scene
 from posekit.views.person import DEFAULT_PROPORTIONS, middle_neck
 from posekit.views.person_view import person_view
-from posekit.views.view_keypoints import view_keypoints
+from tests.detector_files import view_keypoints, write_keypoints
 
 FIGURE = posekit.load_figure()
 PERSON = FIGURE.scaled(middle_neck(FIGURE.lengths))

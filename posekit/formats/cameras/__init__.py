@@ -5,6 +5,6 @@ A `CalibratedCamera` is what a file says; `pinhole_of` makes the camera that the
 """
 
 from posekit.formats.cameras.exif import read_exif as read_exif
-from posekit.formats.cameras.reading import FORMATS as FORMATS
+from posekit.formats.cameras.reading import camera_formats as camera_formats
 from posekit.formats.cameras.reading import read_cameras as read_cameras
 from posekit.formats.cameras.reading import write_cameras as write_cameras

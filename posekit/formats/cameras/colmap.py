@@ -16,6 +16,7 @@ import numpy as np
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.rotation import rotation_from_wxyz
 from posekit.errors import CameraError, InputError
+from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.formats.cameras.fields import MAX_CAMERAS, made, metres_of
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, one_line, read_text, refusal, shown
@@ -190,3 +191,13 @@ def _numbers(words: list[str], path: Path, place: str) -> list[float]:
             raise refusal(path, place, shown(word), "a finite number", "correct the file")
         values.append(value)
     return values
+
+
+COLMAP_FORMAT: Final = CameraFormat(
+    name="colmap",
+    title="COLMAP's cameras.txt, images.txt, or the folder of both",
+    suffixes=(".txt",),
+    folder=True,
+    looks_like=lambda given: not given.is_folder or (given.path / "cameras.txt").is_file(),
+    read=read_colmap,
+)

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.guesses import DEVIATION, FILM, camera_from_focal35
+from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.safe_io import extra, open_file, refusal
 
 MAX_BYTES: Final = 500_000_000
@@ -132,3 +133,17 @@ def _same_shape(size: tuple[int, int], taken: tuple[float, float]) -> bool:
     """Tell whether a picture has the shape of the one that was taken, lying or standing: then it was only resized."""
     shape, before = max(size) / min(size), max(taken) / min(taken)
     return abs(shape / before - 1) <= SAME_SHAPE
+
+
+def _read(path: Path, _unit: str | float | None = None) -> dict[str, CalibratedCamera]:
+    camera = read_exif(path)
+    return {camera.name: camera}
+
+
+EXIF_FORMAT: Final = CameraFormat(
+    name="exif",
+    title="a photograph, whose camera is guessed from its EXIF data",
+    suffixes=(".jpg", ".jpeg", ".tif", ".tiff", ".webp"),
+    looks_like=lambda given: True,
+    read=_read,
+)

@@ -6,6 +6,7 @@ JSON file storages"); the names are the writer's own, mostly those of OpenCV's c
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
@@ -14,8 +15,10 @@ import numpy as np
 
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError
+from posekit.formats.cameras.camera_format import CameraFormat, has_intrinsics
 from posekit.formats.cameras.fields import METRES, cameras_of, made, numbers
 from posekit.formats.cameras.yaml_subset import parse_yaml
+from posekit.formats.given_file import GivenFile
 from posekit.safe_io import one_line, read_json, read_text, read_xml, refusal, shown, write_text
 
 MAX_BYTES: Final = 10_000_000
@@ -135,3 +138,24 @@ def _text(text: str) -> str:
             f"camera {shown(text)}: a quote, a backslash or a line end in it; rename it to write it"
         )
     return text
+
+
+def _looks_like(given: GivenFile) -> bool:
+    return given.suffix != ".json" or has_intrinsics(given.document)
+
+
+def _write_one(path: Path, cameras: Mapping[str, CalibratedCamera]) -> None:
+    if len(cameras) > 1:
+        raise refusal(path, "", f"{len(cameras)} cameras", "one a YAML file", "write one each, or a .toml")
+    write_opencv(path, next(iter(cameras.values())))
+
+
+OPENCV_FORMAT: Final = CameraFormat(
+    name="opencv",
+    title="OpenCV's FileStorage (YAML, XML, JSON), ROS's camera_info, plain JSON of a camera",
+    suffixes=(".yaml", ".yml", ".xml", ".json"),
+    looks_like=_looks_like,
+    read=read_opencv,
+    write=_write_one,
+    write_suffixes=(".yaml", ".yml"),
+)

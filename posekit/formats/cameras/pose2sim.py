@@ -10,6 +10,7 @@ mostly millimetres.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,11 +19,13 @@ import numpy as np
 from posekit.cameras.calibrated import AXES, CALIBRATED, CalibratedCamera
 from posekit.cameras.rotation import rotation_from_given_vector
 from posekit.errors import CameraError, InputError
+from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.formats.cameras.fields import fitted, made, numbers, translation
 from posekit.geometry import vector_from_rotation
 from posekit.safe_io import cut, one_line, read_toml, refusal, shown, write_text
 
 MAX_BYTES: Final = 10_000_000
+ANIPOSE_UNIT: Final = "mm"
 NO_CAMERAS: Final = ("metadata", "capture_volume", "charuco", "checkerboard")
 """Tables that Pose2Sim and Caliscope write beside the cameras."""
 
@@ -117,7 +120,7 @@ def _size(value: Any, path: Path, field: str) -> tuple[int, int] | None:
     return int(sides[0]), int(sides[1])
 
 
-def write_pose2sim(path: Path, cameras: dict[str, CalibratedCamera]) -> None:
+def write_pose2sim(path: Path, cameras: Mapping[str, CalibratedCamera]) -> None:
     """Write cameras as Pose2Sim reads them, metres.
 
     A camera without a pose has no ``rotation`` and ``translation``, which Pose2Sim itself needs. What was guessed says
@@ -165,3 +168,25 @@ def _text(text: str) -> str:
 
 def _listed(values: Any) -> str:
     return "[ " + ", ".join(repr(float(value)) for value in values) + "]"
+
+
+def read_anipose(path: Path, unit: str | float | None = None) -> dict[str, CalibratedCamera]:
+    """Read the cameras of a TOML file of Anipose, whose translations are millimetres unless `unit` says otherwise."""
+    return read_pose2sim(path, ANIPOSE_UNIT if unit is None else unit)
+
+
+POSE2SIM_FORMAT: Final = CameraFormat(
+    name="pose2sim",
+    title="Pose2Sim's calibration: TOML, a table a camera, metres",
+    suffixes=(".toml",),
+    looks_like=lambda given: True,
+    read=read_pose2sim,
+    write=write_pose2sim,
+    write_suffixes=(".toml",),
+)
+ANIPOSE_FORMAT: Final = CameraFormat(
+    name="anipose",
+    title="Anipose's calibration: Pose2Sim's tables in millimetres; taken where it is named",
+    looks_like=lambda given: False,
+    read=read_anipose,
+)

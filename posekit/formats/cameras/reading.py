@@ -2,73 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, Final
 
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError
-from posekit.formats.cameras.colmap import read_colmap
-from posekit.formats.cameras.exif import read_exif
-from posekit.formats.cameras.fields import cameras_of, metres_of
-from posekit.formats.cameras.opencv_file import read_opencv, write_opencv
-from posekit.formats.cameras.pose2sim import read_pose2sim, write_pose2sim
-from posekit.safe_io import nearest, open_npz, refusal, shown
-
-MAX_BYTES: Final = 10_000_000
-ANIPOSE_UNIT: Final = "mm"
+from posekit.formats.cameras.camera_format import CameraFormat
+from posekit.formats.cameras.fields import metres_of
+from posekit.formats.format import Content
+from posekit.formats.registry import FOLDER_SUFFIX, formats, with_suffix
+from posekit.safe_io import nearest, refusal, shown
 
 
-def read_npz(path: Path, unit: str | float | None = None) -> dict[str, CalibratedCamera]:
-    """Read the arrays of an NPZ (``K``, ``dist``, ``R``, ``t``, … as `posekit.formats.cameras.fields` has them)."""
-    fields: dict[str, Any] = {}
-    with open_npz(path, limit=MAX_BYTES) as archive:
-        for name in archive.names:
-            values = archive.array(name, "iufU", None)
-            fields[name] = values.item() if values.size == 1 else values
-    return cameras_of(fields, path, path.stem, unit)
-
-
-def _read_anipose(path: Path, unit: str | float | None = None) -> dict[str, CalibratedCamera]:
-    return read_pose2sim(path, ANIPOSE_UNIT if unit is None else unit)
-
-
-def _read_exif(path: Path, _unit: str | float | None = None) -> dict[str, CalibratedCamera]:
-    camera = read_exif(path)
-    return {camera.name: camera}
-
-
-FORMATS: Final[Mapping[str, Callable[[Path, str | float | None], dict[str, CalibratedCamera]]]] = (
-    MappingProxyType(
-        {
-            "opencv": read_opencv,
-            "npz": read_npz,
-            "pose2sim": read_pose2sim,
-            "anipose": _read_anipose,
-            "colmap": read_colmap,
-            "exif": _read_exif,
-        }
-    )
-)
-"""Formats by name."""
-
-SUFFIXES: Final[Mapping[str, str]] = MappingProxyType(
-    {
-        ".yaml": "opencv",
-        ".yml": "opencv",
-        ".xml": "opencv",
-        ".json": "opencv",
-        ".npz": "npz",
-        ".toml": "pose2sim",
-        ".txt": "colmap",
-        ".jpg": "exif",
-        ".jpeg": "exif",
-        ".tif": "exif",
-        ".tiff": "exif",
-        ".webp": "exif",
-    }
-)
+def camera_formats() -> dict[str, CameraFormat]:
+    """Return the formats of cameras by name."""
+    return {one.name: one for one in formats(Content.CAMERAS) if isinstance(one, CameraFormat)}
 
 
 def read_cameras(
@@ -82,7 +30,7 @@ def read_cameras(
         OpenCV's YAML, XML or JSON, NPZ, a ``posekit.view/1``; Pose2Sim's or Anipose's TOML; COLMAP's ``cameras.txt`` or
         ``images.txt`` or their folder; a photograph, whose camera is guessed.
     format : str, optional
-        One of `FORMATS`; by the file's ending if not given.
+        One of `camera_formats`; by the file's ending if not given.
     unit : str or float, optional
         What translations are in: m, cm, mm, or metres as a number. By default metres, millimetres in the format
         ``anipose``; in COLMAP's model there is no default, and without it cameras have no translation.
@@ -100,16 +48,23 @@ def read_cameras(
     path = Path(path)
     if unit is not None:
         metres_of(unit)
-    if format is None:
-        format = "colmap" if path.is_dir() else SUFFIXES.get(path.suffix.lower())
-    if format is None:
-        expected = f"a camera's file: {', '.join(SUFFIXES)}, or COLMAP's folder"
-        raise refusal(
-            path, "", f"the ending {shown(path.suffix)}", expected, f"name the format: {', '.join(FORMATS)}"
-        )
-    if format not in FORMATS:
-        raise refusal("", "format", shown(format), "a known format", nearest(format, FORMATS))
-    return FORMATS[format](path, unit)
+    known = camera_formats()
+    if format is not None and format not in known:
+        raise refusal("", "format", shown(format), "a known format", nearest(format, known))
+    return (known[format] if format is not None else _by_suffix(path)).read(path, unit)
+
+
+def _by_suffix(path: Path) -> CameraFormat:
+    """Choose the format by the end of the name alone, so that the reader can say what is wrong with the file."""
+    suffix = FOLDER_SUFFIX if path.is_dir() else path.suffix.lower()
+    found = [one for one in with_suffix(suffix) if isinstance(one, CameraFormat)]
+    if not found:
+        known = camera_formats()
+        ends = ", ".join(end for one in known.values() for end in one.suffixes)
+        expected = f"a camera's file: {ends}, or COLMAP's folder"
+        got = f"the ending {shown(path.suffix)}"
+        raise refusal(path, "", got, expected, f"name the format: {', '.join(known)}")
+    return found[0]
 
 
 def write_cameras(path: str | Path, cameras: Mapping[str, CalibratedCamera]) -> None:
@@ -124,13 +79,7 @@ def write_cameras(path: str | Path, cameras: Mapping[str, CalibratedCamera]) -> 
     suffix = path.suffix.lower()
     if not cameras:
         raise InputError(f"{path}: no camera to write; give one or more")
-    if suffix == ".toml":
-        write_pose2sim(path, dict(cameras))
-    elif suffix in (".yaml", ".yml"):
-        if len(cameras) > 1:
-            raise refusal(
-                path, "", f"{len(cameras)} cameras", "one a YAML file", "write one each, or a .toml"
-            )
-        write_opencv(path, next(iter(cameras.values())))
-    else:
-        raise refusal(path, "", f"the ending {shown(suffix)}", ".toml, .yaml or .yml", "choose one of them")
+    for one in camera_formats().values():
+        if one.write is not None and suffix in one.write_suffixes:
+            return one.write(path, cameras)
+    raise refusal(path, "", f"the ending {shown(suffix)}", ".toml, .yaml or .yml", "choose one of them")

@@ -9,27 +9,24 @@ list where several detections were merged. Confidences of old COCO models go up 
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.keypoints.rows import Rows, number, numbers, whole
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
-from posekit.safe_io import cut, refusal, shown, write_text
+from posekit.safe_io import cut, refusal, shown
 
 BODIES = {"bodies": "joints", "people": "pose_keypoints_2d"}
 """Where the people of a picture are and where their points, by ``--format cmu`` and ``open``."""
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether it is one of AlphaPose's layouts; a file a picture of ``--format open`` is OpenPose's."""
     document = given.document
     if isinstance(document, list):
@@ -47,7 +44,7 @@ def _is_picture(entry: object, kinds: tuple[str, ...]) -> bool:
     return isinstance(entry, dict) and any(isinstance(entry.get(kind), list) for kind in kinds)
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read AlphaPose's results.
 
     Raises
@@ -121,43 +118,12 @@ def _add(rows: Rows, label: object, keypoints: object, field: str, person: dict[
     )
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write the flat list, one person a line.
-
-    Lost: pictures without people, sizes, times, which points were placed though hidden, and what the points are called.
-    Other points than AlphaPose's become COCO's 17, and those that COCO has not are lost. A missing point is (0, 0, 0);
-    a confidence that is not known is written as null.
-    """
-    usual = {layout.points: layout for layout in _usual().values()}
-    target = usual.get(keypoints.layout.points, load_skeleton_map("coco_17"))
-    write_text(path, _pieces(keypoints.in_layout(target)))
-
-
-def _pieces(keypoints: KeyPoints) -> Iterator[str]:
-    separator = "["
-    for row, frame in enumerate(keypoints.frame):
-        flat = np.concatenate([keypoints.points[row], keypoints.confidence[row][:, None]], axis=1)
-        flat[np.isnan(flat[:, 0])] = 0
-        values = [None if np.isnan(value) else float(value) for value in flat.ravel()]
-        person: dict[str, Any] = {
-            "image_id": keypoints.pictures[frame],
-            "category_id": 1,
-            "keypoints": values,
-        }
-        if not np.isnan(keypoints.score[row]):
-            person["score"] = float(keypoints.score[row])
-        if keypoints.person[row] >= 0:
-            person["idx"] = int(keypoints.person[row])
-        yield f"{separator}\n {json.dumps(person, allow_nan=False)}"
-        separator = ","
-    yield "[]\n" if separator == "[" else "\n]\n"
-
-
-FORMAT = Format(
+ALPHAPOSE_FORMAT: Final = KeyPointFormat(
     name="alphapose",
-    says="AlphaPose: a list of people with the picture's name, or an object by pictures (cmu, open)",
-    suits=suits,
+    title="AlphaPose: a list of people with the picture's name, or an object by pictures (cmu, open)",
+    suffixes=(".json",),
+    folder=True,
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("coco_17", "halpe_26", "halpe_136", "coco_18"),
 )

@@ -12,13 +12,14 @@ Not written: times, and confidences, for which there is `posekit.formats.keypoin
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of, check_pixels, write_annotations
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of
 from posekit.formats.keypoints.coco_layout import layout_of
 from posekit.formats.keypoints.coco_parts import is_wholebody
 from posekit.formats.keypoints.coco_people import (
@@ -28,16 +29,15 @@ from posekit.formats.keypoints.coco_people import (
     scores_of,
     tracks_of,
 )
-from posekit.formats.keypoints.coco_triples import flat, triples
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.coco_triples import triples
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap, find_by_names
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether a file has annotations with key points, or categories with names for them."""
     document = None if given.is_folder else given.document
     if not isinstance(document, dict) or not isinstance(document.get(FIELD), list):
@@ -48,7 +48,7 @@ def suits(given: Given) -> bool:
     return not is_wholebody(first)
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read a file.
 
     Raises
@@ -67,7 +67,7 @@ def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
     frame = pictures_of(source, FIELD, people, images)
     rows = by_picture(frame, points)
     return KeyPoints(
-        format=FORMAT.name,
+        format=COCO_FORMAT.name,
         source=str(source),
         layout=found,
         pictures=images.names,
@@ -125,7 +125,7 @@ def _hashable(value: Any) -> bool:
 
 def _places(source: Path, names: tuple[str, ...], layout: SkeletonMap) -> bool:
     try:
-        layout_of(source, FORMAT.name, len(names), names, layout)
+        layout_of(source, COCO_FORMAT.name, len(names), names, layout)
     except InputError:
         return False
     return True
@@ -133,7 +133,7 @@ def _places(source: Path, names: tuple[str, ...], layout: SkeletonMap) -> bool:
 
 def _layout(source: Path, values: Array, names: tuple[str, ...], layout: SkeletonMap | None) -> SkeletonMap:
     count = values.shape[1] or len(names) or (len(layout.points) if layout is not None else 0) or 17
-    return layout_of(source, FORMAT.name, count, names, layout)
+    return layout_of(source, COCO_FORMAT.name, count, names, layout)
 
 
 def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
@@ -150,25 +150,11 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
     return points, np.full(third.shape, np.nan), third == 1
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write a file; boxes are those of the points, and pictures are numbered by their names or from 1.
-
-    Raises
-    ------
-    InputError
-        Where points are fractions of pictures of unknown size, or the file cannot be written.
-    """
-    check_pixels(path, keypoints)
-    visible = np.where(keypoints.occluded, 1, 2)
-    rows = flat(keypoints.points, visible)
-    write_annotations(path, keypoints, keypoints.layout.points, [{"keypoints": row} for row in rows])
-
-
-FORMAT = Format(
+COCO_FORMAT: Final = KeyPointFormat(
     name="coco",
-    says="COCO annotations of people, and Halpe's: images, annotations, categories",
-    suits=suits,
+    title="COCO annotations of people, and Halpe's: images, annotations, categories",
+    suffixes=(".json",),
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("coco_17", "halpe_26", "halpe_136", "h36m_17", "body_25", "body_25b", "coco_18"),
 )

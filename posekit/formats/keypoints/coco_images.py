@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
@@ -83,23 +82,3 @@ def images_from(identities: Sequence[int | str]) -> Images:
         size=np.full((len(ordered), 2), np.nan),
         index={one: place for place, one in enumerate(ordered)},
     )
-
-
-def image_ids(keypoints: KeyPoints, first: int, *, ascending: bool) -> list[int]:
-    """Give the pictures ids: the numbers that they are called, as ``000000000785.jpg`` is 785, or from `first`.
-
-    Parameters
-    ----------
-    keypoints : KeyPoints
-        Its pictures' own numbers are taken where all have one, and none has another's.
-    first : int
-        The first number else.
-    ascending : bool
-        Whether their own numbers must ascend too, for a file whose pictures are read in the order of their ids.
-    """
-    stems = [PurePosixPath(name).stem for name in keypoints.pictures]
-    if all(stem.isascii() and stem.isdigit() and len(stem) <= 15 for stem in stems):
-        numbers = [int(stem) for stem in stems]
-        if len(set(numbers)) == len(numbers) and (not ascending or numbers == sorted(numbers)):
-            return numbers
-    return list(range(first, first + len(stems)))

@@ -62,18 +62,3 @@ def joined(source: Path, field: str, people: Sequence[dict[str, Any]]) -> Array:
             lists.append(values)
         columns.append(triples(source, lists, lambda k, name=name: f"{field}[{k}].{name}"))  # type: ignore[misc]
     return np.concatenate(columns, axis=1)
-
-
-def parted(rows: Sequence[list[float | int]]) -> list[dict[str, Any]]:
-    """Part flat lists of 133 points into the fields of annotations, with a flag for each part that has a point."""
-    people = []
-    for row in rows:
-        one: dict[str, Any] = {}
-        start = 0
-        for name, count, flag in PARTS:
-            one[name] = row[3 * start : 3 * (start + count)]
-            start += count
-            if flag:
-                one[flag] = any(one[name][2::3])
-        people.append(one)
-    return people

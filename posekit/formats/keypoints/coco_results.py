@@ -11,14 +11,12 @@ written as 1.
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import Any
+from typing import Final
 
 import numpy as np
 
-from posekit.formats.keypoints.coco_annotations import check_pixels
-from posekit.formats.keypoints.coco_images import image_ids, images_from
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.coco_images import images_from
 from posekit.formats.keypoints.coco_layout import layout_of
 from posekit.formats.keypoints.coco_parts import is_wholebody
 from posekit.formats.keypoints.coco_people import (
@@ -29,15 +27,14 @@ from posekit.formats.keypoints.coco_people import (
     scores_of,
     tracks_of,
 )
-from posekit.formats.keypoints.coco_triples import flat, triples
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.coco_triples import triples
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap
-from posekit.safe_io import refusal, shown, write_text
+from posekit.safe_io import refusal, shown
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether a file is a list of people with key points in pictures that are numbers.
 
     Pictures that are names are AlphaPose's.
@@ -52,7 +49,7 @@ def suits(given: Given) -> bool:
     )
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read a file; its pictures are those with people, by ascending number.
 
     Raises
@@ -73,9 +70,9 @@ def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
     frame = pictures_of(source, "", document, images)
     rows = by_picture(frame, points)
     return KeyPoints(
-        format=FORMAT.name,
+        format=COCO_RESULTS_FORMAT.name,
         source=str(source),
-        layout=layout_of(source, FORMAT.name, count, (), layout),
+        layout=layout_of(source, COCO_RESULTS_FORMAT.name, count, (), layout),
         pictures=images.names,
         frame=frame[rows],
         points=points[rows] if points.size else np.empty((0, count, 2)),
@@ -85,42 +82,11 @@ def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
     )
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write a file.
-
-    Raises
-    ------
-    InputError
-        Where points are fractions of pictures of unknown size, or the file cannot be written.
-    """
-    check_pixels(path, keypoints)
-    rows = flat(keypoints.points, np.where(np.isnan(keypoints.confidence), 1, keypoints.confidence))
-    numbers = image_ids(keypoints, 0, ascending=True)
-    people: list[dict[str, Any]] = []
-    for row in np.flatnonzero(~np.isnan(keypoints.points[..., 0]).all(axis=1)):
-        score = float(keypoints.score[row])
-        one: dict[str, Any] = {
-            "image_id": numbers[int(keypoints.frame[row])],
-            "category_id": 1,
-            "keypoints": rows[row],
-            "score": 1.0 if np.isnan(score) else score,
-        }
-        if keypoints.person[row] >= 0:
-            one["track_id"] = int(keypoints.person[row])
-        people.append(one)
-    write_text(path, _pieces(people))
-
-
-def _pieces(people: list[dict[str, Any]]) -> list[str]:
-    lines = [json.dumps(one, allow_nan=False) for one in people]
-    return ["[\n", ",\n".join(lines), "\n]\n"]
-
-
-FORMAT = Format(
+COCO_RESULTS_FORMAT: Final = KeyPointFormat(
     name="coco-results",
-    says="COCO results: a flat list of people with image_id, keypoints and score",
-    suits=suits,
+    title="COCO results: a flat list of people with image_id, keypoints and score",
+    suffixes=(".json",),
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("coco_17", "halpe_26", "halpe_136", "h36m_17", "body_25", "body_25b", "coco_18"),
 )

@@ -75,14 +75,3 @@ def _no_number(source: str | Path, lists: Sequence[Any], place: Callable[[int], 
     got = "a list inside the list" if isinstance(value, list) else shown(value)
     remedy = "write the points as one flat list" if isinstance(value, list) else "correct it"
     return refusal(source, f"{place(index)}[{column}]", got, "a number", remedy)
-
-
-def flat(points: Array, third: Array) -> list[list[float | int]]:
-    """Spell points (D, K, 2) and a number each (D, K) as flat lists; whole numbers without a point.
-
-    A missing point becomes (0, 0, 0).
-    """
-    values = np.concatenate([points, third[..., None]], axis=-1)
-    values[np.isnan(points[..., 0])] = 0
-    rows: list[list[float]] = values.reshape(len(values), points.shape[1] * 3).tolist()
-    return [[int(value) if value.is_integer() else value for value in row] for row in rows]

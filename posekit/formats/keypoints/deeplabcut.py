@@ -8,36 +8,35 @@ coords), coords x, y and, of a network, likelihood. An empty field is a point th
 from __future__ import annotations
 
 import csv
-import io
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_names
 from posekit.formats.keypoints.rows import LARGEST, Rows
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
-from posekit.safe_io import cut, refusal, shown, write_text
+from posekit.safe_io import cut, refusal, shown
 
 HDF5 = (".h5", ".hdf5", ".hdf")
 MAX_COLUMNS = 100_000
 LEVELS = ("scorer", "individuals", "bodyparts", "coords")
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether it is CSV with DeepLabCut's header, or HDF5, which has to be saved as CSV first."""
     if given.suffix in HDF5:
         return True
     return given.suffix == ".csv" and given.text.lstrip().startswith(("scorer,", '"scorer",'))
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read DeepLabCut's CSV.
 
     Raises
@@ -210,58 +209,10 @@ def _columns(table: Array, parts: dict[str, dict[str, int]], names: tuple[str, .
     return points, padded[:, pick["likelihood"]]
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write a table of one person, or of several by individuals, for every picture.
-
-    Lost: scores, sizes, times, and which points were placed though hidden; the numbers of people become the names of
-    individuals in their order.
-
-    Raises
-    ------
-    InputError
-        Where somebody is in a picture twice: who is who must be known.
-    """
-    people = np.unique(keypoints.person)
-    taken = keypoints.frame * (len(people) + 1) + np.searchsorted(people, keypoints.person)
-    if len(np.unique(taken)) < len(taken):
-        raise refusal(
-            path,
-            "",
-            "several people in a picture, not told apart",
-            "one person, or tracked ones",
-            "choose one with --person",
-        )
-    write_text(path, _table(keypoints, people))
-
-
-def _table(keypoints: KeyPoints, people: NDArray[np.intp]) -> Iterator[str]:
-    names = keypoints.layout.points
-    several = len(people) > 1 or bool(people.size and people[0] >= 0)
-    count = max(len(people), 1)
-    levels = [["scorer", *["posekit"] * (3 * len(names) * count)]]
-    if several:
-        levels.append(["individuals", *[f"person{who}" for who in people for _ in range(3 * len(names))]])
-    levels.append(["bodyparts", *[name for _ in range(count) for name in names for _ in range(3)]])
-    levels.append(["coords", *["x", "y", "likelihood"] * (len(names) * count)])
-    values = np.full((len(keypoints.pictures), count, len(names), 3), np.nan)
-    place = np.searchsorted(people, keypoints.person)
-    values[keypoints.frame, place, :, :2] = keypoints.points
-    values[keypoints.frame, place, :, 2] = keypoints.confidence
-    yield _line(*levels)
-    for label, row in zip(keypoints.pictures, values.reshape(len(values), -1).tolist(), strict=True):
-        yield _line([label, *["" if np.isnan(value) else repr(value) for value in row]])
-
-
-def _line(*rows: list[str]) -> str:
-    lines = io.StringIO()
-    csv.writer(lines, lineterminator="\n").writerows(rows)
-    return lines.getvalue()
-
-
-FORMAT = Format(
+DEEPLABCUT_FORMAT: Final = KeyPointFormat(
     name="deeplabcut",
-    says="DeepLabCut's CSV: scorer, (individuals,) bodyparts, coords",
-    suits=suits,
+    title="DeepLabCut's CSV: scorer, (individuals,) bodyparts, coords",
+    suffixes=(".csv", *HDF5),
+    looks_like=looks_like,
     read=read,
-    write=write,
 )

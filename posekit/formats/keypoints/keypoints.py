@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.skeleton_maps import LANDMARKS, SkeletonMap
-from posekit.formats.skeleton_maps.skeleton_map import plain
+from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
@@ -151,36 +150,3 @@ class KeyPoints:
     def landmark_confidence(self) -> Array:
         """How sure the landmarks are (D, 21); a mean's is the mean of its points'."""
         return self.layout.gather(self.confidence[..., None])[..., 0]
-
-    def in_layout(self, layout: SkeletonMap) -> KeyPoints:
-        """Put the points into another format's layout.
-
-        Points of the layout that are a landmark, or have the same name here, are filled; the others are missing, and
-        points that the layout has not are lost.
-
-        Parameters
-        ----------
-        layout : SkeletonMap
-            With points of its own.
-        """
-        if layout.points == self.layout.points and layout.landmarks == self.layout.landmarks:
-            return self
-        values = np.concatenate(
-            [self.points, self.confidence[..., None], self.occluded[..., None].astype(np.float64)], axis=-1
-        )
-        own = {plain(name): k for k, name in enumerate(self.layout.points)}
-        moved = np.full((len(self), len(layout.points), 4), np.nan)
-        for k, name in enumerate(layout.points):
-            if plain(name) in own:
-                moved[:, k] = values[:, own[plain(name)]]
-        landmarks = layout.scatter(self.layout.gather(values))
-        placed = layout.scatter(np.ones((1, len(LANDMARKS), 1)))[0, :, 0] == 1
-        moved[:, placed] = landmarks[:, placed]
-        moved[np.isnan(moved[..., 0])] = np.nan
-        return replace(
-            self,
-            layout=layout,
-            points=moved[..., :2],
-            confidence=moved[..., 2],
-            occluded=moved[..., 3] > 0,
-        )

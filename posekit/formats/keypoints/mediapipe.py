@@ -11,16 +11,15 @@ picture: they are skipped, and a file of nothing else is refused.
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_json import add_document, looks_like_landmarks
 from posekit.formats.keypoints.mediapipe_table import add_table, looks_like_table
-from posekit.formats.keypoints.mediapipe_write import write_json_of, write_table_of
 from posekit.formats.keypoints.rows import Rows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import refusal
@@ -33,14 +32,25 @@ HIPS = (23, 24)
 POINTS = 33
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether it is JSON with MediaPipe's landmarks, or a table with their names or numbers."""
     if given.suffix == ".csv":
-        return looks_like_table(given.text[:20_000])
+        return looks_like_table(given.text[:20_000]) and not _is_in_space(given.columns)
     return given.document is not None and looks_like_landmarks(given.document)
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def _is_in_space(columns: frozenset[str]) -> bool:
+    """Tell whether a table of points is of points in space: z is there, and nothing that only detectors write.
+
+    Landmarks of MediaPipe in a table have the same names as other points, and a z too.
+    """
+    words = {name.casefold() for name in columns}
+    deep = any(name == "z" or name.endswith("_z") for name in words)
+    detected = ("visibility", "presence", "confidence", "score", "likelihood", "eye_inner", "foot_index")
+    return deep and not any(part in name for name in words for part in detected)
+
+
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read MediaPipe's landmarks; of a folder, each JSON file is a picture.
 
     Returns
@@ -96,40 +106,12 @@ def _in_pixels(found: KeyPoints) -> KeyPoints:
     return replace(found, points=found.points * size[:, None], normalised=False)
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write fractions: a table, a row a landmark, where the name ends in .csv; JSON of frames else.
-
-    Lost: which points were placed though hidden, scores, and points that MediaPipe has not. In a table also who is who,
-    pictures without people, and the size.
-
-    Raises
-    ------
-    InputError
-        Where the points are pixels and the picture's size is not known.
-    """
-    size = keypoints.size[keypoints.frame]
-    if not keypoints.normalised and np.isnan(size).any():
-        raise refusal(
-            path,
-            "",
-            "pixels of pictures whose size is not known",
-            "the size: MediaPipe's points are fractions of it",
-            "give it with --size, or write another format",
-        )
-    fitted = keypoints.in_layout(load_skeleton_map("mediapipe_33"))
-    if not keypoints.normalised:
-        fitted = replace(fitted, points=fitted.points / size[:, None], normalised=True)
-    if path.suffix.lower() == ".csv":
-        write_table_of(path, fitted)
-    else:
-        write_json_of(path, fitted)
-
-
-FORMAT = Format(
+MEDIAPIPE_FORMAT: Final = KeyPointFormat(
     name="mediapipe",
-    says="MediaPipe Pose: 33 landmarks as JSON of frames, or as CSV",
-    suits=suits,
+    title="MediaPipe Pose: 33 landmarks as JSON of frames, or as CSV",
+    suffixes=(".json", ".csv"),
+    folder=True,
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("mediapipe_33",),
 )

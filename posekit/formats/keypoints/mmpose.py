@@ -8,28 +8,27 @@ list of pictures ``{frame_id, instances}`` counted from 1; of a picture, the lis
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Final
 
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
-from posekit.formats.keypoints.mmpose_instances import add_frames, add_instances, is_frame, written_frames
+from posekit.formats.keypoints.mmpose_instances import add_frames, add_instances, is_frame
 from posekit.formats.keypoints.named_layout import by_names
 from posekit.formats.keypoints.rows import Rows, whole
 from posekit.formats.skeleton_maps import SkeletonMap
-from posekit.safe_io import refusal, shown, write_text
-from posekit.safe_io.writing import json_pieces
+from posekit.safe_io import refusal, shown
 
 MAX_POINTS = 1000
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether it is an object with `meta_info` and `instance_info`."""
     document = given.document
     return isinstance(document, dict) and "instance_info" in document and "meta_info" in document
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read predictions that a demo of MMPose saved; of a folder, each file is a picture.
 
     Raises
@@ -75,27 +74,12 @@ def _names(path: Path, meta: object) -> list[str]:
     return [str(name) for name in names]
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write the demos' layout of a video, one picture a line.
-
-    Lost: pictures' names that are no numbers, sizes, times, and which points were placed though hidden. A confidence
-    that is not known is written as 1; a point with one that is not positive comes back as missing.
-    """
-    names = keypoints.layout.points
-    meta: dict[str, Any] = {
-        "dataset_name": keypoints.layout.name,
-        "num_keypoints": len(names),
-        "keypoint_id2name": {str(k): name for k, name in enumerate(names)},
-        "keypoint_name2id": {name: k for k, name in enumerate(names)},
-    }
-    write_text(path, json_pieces({"meta_info": meta}, "instance_info", written_frames(keypoints, 1)))
-
-
-FORMAT = Format(
+MMPOSE_FORMAT: Final = KeyPointFormat(
     name="mmpose",
-    says="MMPose's demos: meta_info with the points' names, instance_info with pictures or people",
-    suits=suits,
+    title="MMPose's demos: meta_info with the points' names, instance_info with pictures or people",
+    suffixes=(".json",),
+    folder=True,
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("coco_17", "halpe_26", "coco_wholebody_133", "h36m_17"),
 )

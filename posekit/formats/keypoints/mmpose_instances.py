@@ -13,13 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.rows import Rows, number, numbers, pairs, whole
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
-
-CERTAIN = 1.0
-"""What is written for a point whose confidence is not known."""
 
 
 def is_instance(entry: object) -> bool:
@@ -83,27 +79,3 @@ def _scores(source: str | Path, field: str, scores: object, count: int) -> Array
     if len(array) != count:
         raise refusal(source, field, f"{len(array)} scores", f"{count}, one a point", "save the file again")
     return array
-
-
-def written_frames(keypoints: KeyPoints, first: int) -> list[dict[str, Any]]:
-    """Make the pictures ``{frame_id, instances}`` of key points.
-
-    The number of a picture is its label where all labels are numbers, else it counts from `first`.
-    """
-    told = [whole(label) for label in keypoints.pictures]
-    ids = [first + k if None in told else told[k] for k in range(len(told))]
-    frames: list[dict[str, Any]] = [{"frame_id": id_, "instances": []} for id_ in ids]
-    missing = np.isnan(keypoints.points[..., 0])
-    points = np.where(missing[..., None], 0.0, keypoints.points).tolist()
-    sure = np.where(np.isnan(keypoints.confidence), CERTAIN, keypoints.confidence)
-    scores = np.where(missing, 0.0, sure).tolist()
-    for row, frame in enumerate(keypoints.frame):
-        seen = keypoints.points[row][~missing[row]]
-        box = [*seen.min(axis=0).tolist(), *seen.max(axis=0).tolist()] if len(seen) else [0.0] * 4
-        instance: dict[str, Any] = {"keypoints": points[row], "keypoint_scores": scores[row], "bbox": [box]}
-        if not np.isnan(keypoints.score[row]):
-            instance["bbox_score"] = float(keypoints.score[row])
-        if keypoints.person[row] >= 0:
-            instance["track_id"] = int(keypoints.person[row])
-        frames[frame]["instances"].append(instance)
-    return frames

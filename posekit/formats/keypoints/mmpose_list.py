@@ -8,32 +8,29 @@ places of the head tells which.
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
-from pathlib import Path
+from typing import Final
 
 import numpy as np
 
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.mmpose_instances import (
     add_frames,
     add_instances,
     is_frame,
     is_instance,
-    written_frames,
 )
 from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.keypoints.rows import Rows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
-from posekit.safe_io import refusal, shown, write_text
+from posekit.safe_io import refusal, shown
 
 BY_COUNT = {17: "coco_17", 26: "halpe_26", 133: "coco_wholebody_133", 136: "halpe_136"}
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether it is a list of MMPose's people or pictures."""
     document = given.document
     return (
@@ -41,7 +38,7 @@ def suits(given: Given) -> bool:
     )
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read what the Inferencer saved; of a folder, each file is a picture.
 
     Raises
@@ -84,31 +81,12 @@ def _layout(rows: Rows, layout: SkeletonMap | None) -> SkeletonMap:
     return by_count(count, layout, rows.source, usual)
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write the Inferencer's layout of a video, one picture a line.
-
-    Lost, besides what `posekit.formats.keypoints.mmpose.write` loses: what the points are called. Other points than
-    those that are told by their number when it is read become COCO's 17, and those that COCO has not are lost.
-    """
-    tellable = [load_skeleton_map(name) for name in (*BY_COUNT.values(), "h36m_17")]
-    layouts = {layout.points: layout for layout in tellable}
-    target = layouts.get(keypoints.layout.points, load_skeleton_map("coco_17"))
-    write_text(path, _pieces(keypoints.in_layout(target)))
-
-
-def _pieces(keypoints: KeyPoints) -> Iterator[str]:
-    separator = "["
-    for frame in written_frames(keypoints, 0):
-        yield f"{separator}\n {json.dumps(frame, allow_nan=False)}"
-        separator = ","
-    yield "[]\n" if separator == "[" else "\n]\n"
-
-
-FORMAT = Format(
+MMPOSE_LIST_FORMAT: Final = KeyPointFormat(
     name="mmpose-list",
-    says="MMPose's Inferencer: a list of people or of pictures, points without names",
-    suits=suits,
+    title="MMPose's Inferencer: a list of people or of pictures, points without names",
+    suffixes=(".json",),
+    folder=True,
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=("coco_17", "h36m_17", "halpe_26", "coco_wholebody_133", "halpe_136"),
 )

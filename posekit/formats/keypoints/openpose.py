@@ -12,33 +12,27 @@ points are occluded.
 
 from __future__ import annotations
 
-import secrets
-import shutil
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from posekit.errors import InputError
-from posekit.formats.keypoints.coco_triples import flat, triples
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.coco_triples import triples
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.openpose_layout import tell_apart
-from posekit.formats.keypoints.openpose_names import check_one_camera, file_names, picture_name
+from posekit.formats.keypoints.openpose_names import check_one_camera, picture_name
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
-from posekit.safe_io import cut, refusal, shown, write_text
-from posekit.safe_io.writing import json_pieces, make_folder
+from posekit.safe_io import cut, refusal, shown
 
 POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
 """Where a person's points are; the second in files older than 2018."""
 LAYOUTS: Final = ("body_25", "body_25b", "coco_18")
-NUDGE: Final = 1e-6
-"""Pixels: a point at exactly (0, 0) would be a missing one, and is written here instead."""
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether a file, or a folder's first one, has people with ``pose_keypoints_2d``."""
     document = given.document
     if not isinstance(document, dict) or not isinstance(document.get("people"), list):
@@ -46,7 +40,7 @@ def suits(given: Given) -> bool:
     return all(isinstance(one, dict) and _points(one) is not None for one in document["people"])
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read a folder, or one file.
 
     Raises
@@ -91,7 +85,7 @@ def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
     found = _layout(given.path, points, layout)
     some = ~np.isnan(points[..., 0]).all(axis=1)
     return KeyPoints(
-        format=FORMAT.name,
+        format=OPENPOSE_FORMAT.name,
         source=str(given.path),
         layout=found,
         pictures=tuple(pictures),
@@ -178,89 +172,18 @@ def _layout(source: Path, points: Array, layout: SkeletonMap | None) -> Skeleton
             source,
             "format",
             "25 points that could be of either order",
-            " or ".join(f"{FORMAT.name}-{one.name}" for one in candidates),
+            " or ".join(f"{OPENPOSE_FORMAT.name}-{one.name}" for one in candidates),
             "say which with --format",
         )
     return candidates[0]
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write a new folder of one file a picture; one file, if the name ends so and there is one picture.
-
-    Key points of a layout that OpenPose has not are brought into BODY_25. A confidence that is not known is written as
-    1, and people without points are left out.
-
-    Raises
-    ------
-    InputError
-        Where points are fractions beyond the picture, or the folder exists and has something in it.
-    """
-    if keypoints.layout.points not in [load_skeleton_map(name).points for name in LAYOUTS]:
-        keypoints = keypoints.in_layout(load_skeleton_map(LAYOUTS[0]))
-    documents = _documents(path, keypoints)
-    if path.suffix.lower() == ".json":
-        if len(documents) != 1:
-            raise refusal(
-                path, "", f"{len(documents)} pictures", "one for one file", "name a folder, without .json"
-            )
-        write_text(path, documents[0])
-        return
-    _write_folder(path, dict(zip(file_names(keypoints.pictures), documents, strict=True)))
-
-
-def _documents(path: Path, keypoints: KeyPoints) -> list[list[str]]:
-    """Spell each picture's file."""
-    points = keypoints.points.copy()
-    points[(points == 0).all(axis=-1)] = NUDGE
-    if keypoints.normalised and not (np.isnan(points) | ((points >= 0) & (points <= 1))).all():
-        raise refusal(
-            path, "points", "fractions beyond the picture", "pixels", "give the picture's size with --size"
-        )
-    confidence = np.where(np.isnan(keypoints.confidence), 1, keypoints.confidence)
-    rows = flat(points, confidence)
-    some = ~np.isnan(points[..., 0]).all(axis=1)
-    pictures: list[list[dict[str, Any]]] = [[] for _ in keypoints.pictures]
-    for index in np.flatnonzero(some):
-        person = {"person_id": [int(keypoints.person[index])], POINTS[0]: rows[index]}
-        others = ("face", "hand_left", "hand_right")
-        person |= {f"{name}_keypoints_2d": [] for name in others}
-        person |= {f"{name}_keypoints_3d": [] for name in ("pose", *others)}
-        pictures[int(keypoints.frame[index])].append(person)
-    return [list(json_pieces({"version": 1.3}, "people", people)) for people in pictures]
-
-
-def _write_folder(path: Path, files: dict[str, list[str]]) -> None:
-    """Write a folder whole or not at all: beside its place first."""
-    try:
-        taken = path.exists() and (not path.is_dir() or any(path.iterdir()))
-    except OSError as error:
-        raise _not_written(path, error) from None
-    if taken:
-        raise refusal(path, "", "something that exists", "a new or an empty folder", "choose another name")
-    target = path.absolute()
-    make_folder(target.parent)
-    beside = target.with_name(f".{secrets.token_hex(8)}.part")
-    try:
-        make_folder(beside)
-        for name, pieces in files.items():
-            write_text(beside / name, pieces)
-        beside.replace(target)
-    except OSError as error:
-        raise _not_written(path, error) from None
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-
-
-def _not_written(path: Path, error: OSError) -> InputError:
-    reason = cut(error.strerror or str(error))
-    return refusal(path, "", reason, "a folder that can be written", "check permissions and free space")
-
-
-FORMAT = Format(
+OPENPOSE_FORMAT: Final = KeyPointFormat(
     name="openpose",
-    says="OpenPose: a folder of one JSON file a picture (BODY_25, BODY_25B, COCO-18)",
-    suits=suits,
+    title="OpenPose: a folder of one JSON file a picture (BODY_25, BODY_25B, COCO-18)",
+    suffixes=(".json",),
+    folder=True,
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=LAYOUTS,
 )

@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-from posekit.formats.keypoints.given import counted
 from posekit.safe_io import cut, refusal
 
 ENDING: Final = "_keypoints"
 _NUMBER = re.compile(r"[0-9]+")
-_PLAIN = re.compile(r"[\w.+=@ -]{1,200}", re.ASCII)
 
 
 def picture_name(path: Path) -> str:
@@ -61,18 +59,3 @@ def _counted_twice(names: Sequence[str]) -> tuple[str, str] | None:
             twice.append((first[found[-1]], name))
     enough = 1 if len({len(found) for found in numbers}) == 1 else 2  # odd names may share a number by chance
     return twice[0] if len(twice) >= enough else None
-
-
-def file_names(pictures: Sequence[str]) -> list[str]:
-    """Name a file for each picture, so that reading them gives the pictures' names and order again.
-
-    Pictures whose names are no names of files, or would be read in another order, are counted from 0 instead.
-    """
-    names = [f"{picture}{ENDING}.json" for picture in pictures]
-    fit = (
-        all(_PLAIN.fullmatch(picture) and not picture.startswith(".") for picture in pictures)
-        and len({name.casefold() for name in names}) == len(names)
-        and sorted(names, key=lambda name: counted(Path(name))) == names
-        and _counted_twice(pictures) is None
-    )
-    return names if fit else [f"{index:012d}{ENDING}.json" for index in range(len(pictures))]

@@ -2,40 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 
 from posekit.errors import InputError
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.format import Content
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.registry import formats
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
-from posekit.safe_io import cut, nearest, one_line, refusal, shown
-
-_MODULES = (
-    "openpose",
-    "coco",
-    "coco_results",
-    "wholebody",
-    "mediapipe",
-    "mmpose",
-    "mmpose_list",
-    "alphapose",
-    "deeplabcut",
-)
+from posekit.safe_io import cut, nearest, refusal, shown
 
 
-@cache
-def formats() -> dict[str, Format]:
-    """Return the formats by name; each module has its own as `FORMAT`."""
-    found = [import_module(f"posekit.formats.keypoints.{name}").FORMAT for name in _MODULES]
-    return {one.name: one for one in found}
+def key_point_formats() -> dict[str, KeyPointFormat]:
+    """Return the formats of key points by name."""
+    return {one.name: one for one in formats(Content.KEY_POINTS) if isinstance(one, KeyPointFormat)}
 
 
 def suiting(path: str | Path) -> list[str]:
     """List the formats that a file or folder looks like."""
-    return [one.name for one in _candidates(Given(Path(path)))]
+    return [one.name for one in _candidates(GivenFile(Path(path)))]
 
 
 def read_keypoints(
@@ -48,7 +34,8 @@ def read_keypoints(
     path : path
         A file, or a folder of one JSON file a picture.
     format : str, optional
-        One of `formats`, or one with a layout as ``openpose-body_25b``; recognised by the structure if not given.
+        One of `key_point_formats`, alone or with a layout as ``openpose-body_25b``; recognised by the structure if
+        not given.
     layout : SkeletonMap, optional
         What the points are; the format's own if not given.
 
@@ -57,7 +44,7 @@ def read_keypoints(
     InputError
         Where it cannot be read, is in no format that is known, or in several: the candidates are named.
     """
-    given = Given(Path(path))
+    given = GivenFile(Path(path))
     if format is not None:
         one, named = chosen(format)
         return one.read(given, layout if layout is not None else named)
@@ -71,17 +58,17 @@ def read_keypoints(
         path,
         "format",
         _described(given),
-        f"key points as {', '.join(formats())}",
+        f"key points as {', '.join(key_point_formats())}",
         "say which with --format to learn what does not fit",
     )
 
 
-def _candidates(given: Given) -> list[Format]:
+def _candidates(given: GivenFile) -> list[KeyPointFormat]:
     """List the formats that a file looks like; the file is parsed here, so that damage is told first."""
-    return [one for one in formats().values() if one.suits(given)]
+    return [one for one in key_point_formats().values() if one.looks_like(given)]
 
 
-def _described(given: Given) -> str:
+def _described(given: GivenFile) -> str:
     """Say what a file of no known format is: its top level, or its first line."""
     if given.is_folder:
         document = given.document
@@ -101,41 +88,14 @@ def _entry(document: object) -> str:
     return shown(document)
 
 
-def write_keypoints(path: str | Path, keypoints: KeyPoints, format: str) -> None:
-    """Write key points in a format by name.
-
-    Parameters
-    ----------
-    path : path
-        The file, or a new folder where the format is one.
-    keypoints : KeyPoints
-    format : str
-        One of `formats`, or one with a layout to convert to, as ``openpose-body_25``.
-
-    Raises
-    ------
-    InputError
-        Where there is no such format, it is only read, or the file cannot be written.
-    """
-    one, layout = chosen(format)
-    if one.write is None:
-        raise InputError(one_line(f"{path}: format {one.name} is read, not written; choose another"))
-    one.write(Path(path), keypoints if layout is None else keypoints.in_layout(layout))
-
-
 def is_format(name: str) -> bool:
     """Tell whether a name is a format's, alone or with one of its layouts; see `chosen`."""
-    return name in formats() or any(
-        name == f"{one.name}-{layout}" for one in formats().values() for layout in one.skeletons
+    return name in key_point_formats() or any(
+        name == f"{one.name}-{layout}" for one in key_point_formats().values() for layout in one.skeletons
     )
 
 
-def by_name(name: str) -> Format:
-    """Return a format by its name, which may have a layout's behind it; see `chosen`."""
-    return chosen(name)[0]
-
-
-def chosen(name: str) -> tuple[Format, SkeletonMap | None]:
+def chosen(name: str) -> tuple[KeyPointFormat, SkeletonMap | None]:
     """Return a format by its name, and the layout that is named with it.
 
     Parameters
@@ -154,9 +114,9 @@ def chosen(name: str) -> tuple[Format, SkeletonMap | None]:
     >>> one.name, layout.name
     ('coco-results', 'h36m_17')
     """
-    if name in formats():
-        return formats()[name], None
-    for one in formats().values():
+    if name in key_point_formats():
+        return key_point_formats()[name], None
+    for one in key_point_formats().values():
         layout = name.removeprefix(f"{one.name}-")
         if layout != name and layout in one.skeletons:
             return one, load_skeleton_map(layout)
@@ -165,5 +125,5 @@ def chosen(name: str) -> tuple[Format, SkeletonMap | None]:
 
 def _all_names(name: str) -> list[str]:
     """List what a name could have been: the formats, and those with a layout where one was tried."""
-    tried = [one for one in formats().values() if name.startswith(f"{one.name}-")]
-    return [*formats(), *(f"{one.name}-{layout}" for one in tried for layout in one.skeletons)]
+    tried = [one for one in key_point_formats().values() if name.startswith(f"{one.name}-")]
+    return [*key_point_formats(), *(f"{one.name}-{layout}" for one in tried for layout in one.skeletons)]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.formats.keypoints.given import counted
+from posekit.formats.given_file import counted
 from posekit.formats.keypoints.keypoints import FARTHEST, KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array

@@ -17,9 +17,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of, check_pixels, write_annotations
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of
 from posekit.formats.keypoints.coco_images import images_from
-from posekit.formats.keypoints.coco_parts import COUNT, PARTS, SEEN, is_wholebody, joined, parted
+from posekit.formats.keypoints.coco_parts import COUNT, PARTS, SEEN, is_wholebody, joined
 from posekit.formats.keypoints.coco_people import (
     as_confidences,
     by_picture,
@@ -28,9 +29,7 @@ from posekit.formats.keypoints.coco_people import (
     scores_of,
     tracks_of,
 )
-from posekit.formats.keypoints.coco_triples import flat
-from posekit.formats.keypoints.format import Format
-from posekit.formats.keypoints.given import Given
+from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
@@ -39,7 +38,7 @@ from posekit.safe_io import cut, refusal, shown
 LAYOUT: Final = "coco_wholebody_133"
 
 
-def suits(given: Given) -> bool:
+def looks_like(given: GivenFile) -> bool:
     """Tell whether the first person with key points has the parts, or 133 points."""
     document = None if given.is_folder else given.document
     people = document.get(FIELD) if isinstance(document, dict) else document
@@ -54,7 +53,7 @@ def is_person(entry: dict[str, Any]) -> bool:
     return any(name in entry for name, *_ in PARTS)
 
 
-def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
+def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """Read annotations, or a flat list of results.
 
     Raises
@@ -91,7 +90,7 @@ def read(given: Given, layout: SkeletonMap | None) -> KeyPoints:
         points, confidence, occluded = _flagged(source, values)
     rows = by_picture(frame, points)
     return KeyPoints(
-        format=FORMAT.name,
+        format=WHOLEBODY_FORMAT.name,
         source=str(source),
         sequence=False,
         layout=found,
@@ -123,27 +122,11 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
     return points, confidence, occluded
 
 
-def write(path: Path, keypoints: KeyPoints) -> None:
-    """Write annotations in parts; key points of another layout are brought into this one.
-
-    Raises
-    ------
-    InputError
-        Where points are fractions of pictures of unknown size, or the file cannot be written.
-    """
-    keypoints = keypoints.in_layout(load_skeleton_map(LAYOUT))
-    check_pixels(path, keypoints)
-    visible = np.where(keypoints.occluded, 1.0, 2.0)
-    sure = keypoints.confidence[:, SEEN:]
-    visible[:, SEEN:] = np.where((sure > 0) & (sure < 1), sure, 1)
-    write_annotations(path, keypoints, keypoints.layout.points[:17], parted(flat(keypoints.points, visible)))
-
-
-FORMAT = Format(
+WHOLEBODY_FORMAT: Final = KeyPointFormat(
     name="coco-wholebody",
-    says="COCO-WholeBody annotations or results: 133 points, in parts or in one list",
-    suits=suits,
+    title="COCO-WholeBody annotations or results: 133 points, in parts or in one list",
+    suffixes=(".json",),
+    looks_like=looks_like,
     read=read,
-    write=write,
     skeletons=(LAYOUT,),
 )

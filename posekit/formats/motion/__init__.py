@@ -1,10 +1,10 @@
 """Motion: points in space over time, in the formats of motion capture, biomechanics and animation."""
 
-from posekit.formats.motion.format import UNITS as UNITS
-from posekit.formats.motion.format import MotionFormat as MotionFormat
 from posekit.formats.motion.motion import UPS as UPS
 from posekit.formats.motion.motion import Motion as Motion
 from posekit.formats.motion.motion_axes import with_up as with_up
+from posekit.formats.motion.motion_format import METRES_IN_UNIT as METRES_IN_UNIT
+from posekit.formats.motion.motion_format import MotionFormat as MotionFormat
 from posekit.formats.motion.postures import MotionPostures as MotionPostures
 from posekit.formats.motion.postures import postures_of as postures_of
 from posekit.formats.motion.postures_up import guess_up as guess_up

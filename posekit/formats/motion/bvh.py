@@ -12,14 +12,15 @@ from typing import Final
 
 from posekit.formats.motion.bvh_reading import BvhReading, examine_bvh, read_bvh
 from posekit.formats.motion.bvh_writing import write_bvh
-from posekit.formats.motion.format import MotionFormat
+from posekit.formats.motion.motion_format import MotionFormat
 
-__all__ = ["FORMAT", "BvhReading", "examine_bvh", "read_bvh", "write_bvh"]
+__all__ = ["BVH_FORMAT", "BvhReading", "examine_bvh", "read_bvh", "write_bvh"]
 
-FORMAT: Final = MotionFormat(
+BVH_FORMAT: Final = MotionFormat(
     name="bvh",
-    says="BVH: a skeleton's joint angles over time, for Blender and other animation programs",
+    title="BVH: a skeleton's joint angles over time, for Blender and other animation programs",
     suffixes=(".bvh",),
+    looks_like=lambda given: given.start.lstrip().startswith(b"HIERARCHY"),
     read=read_bvh,
     write_configurations=write_bvh,
 )

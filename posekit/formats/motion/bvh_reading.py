@@ -10,8 +10,8 @@ import numpy as np
 from posekit.formats.motion.bvh_file import open_bvh
 from posekit.formats.motion.bvh_kinematics import points_of, positions_are_absolute
 from posekit.formats.motion.bvh_size import Unit, guessed_unit, guessed_up
-from posekit.formats.motion.format import UNITS
 from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.safe_io import refusal, shown
 
 
@@ -47,7 +47,8 @@ def examine_bvh(
     ----------
     path : path
     unit : str, optional
-        The file's, one of `posekit.formats.motion.format.UNITS`; told by the size of the body if not given.
+        The file's, one of `posekit.formats.motion.motion_format.METRES_IN_UNIT`; told by the size of the body if not
+        given.
     up : str, optional
         ``+x`` … ``-z``; y if not given, unless the body stands along another axis.
     absolute : bool, optional
@@ -63,7 +64,7 @@ def examine_bvh(
     InputError
         Where the file is no BVH file or damaged (with the line), or its skeleton has a body's size in no unit.
     """
-    for given, valid, what in ((unit, UNITS, "unit"), (up, UPS, "up")):
+    for given, valid, what in ((unit, METRES_IN_UNIT, "unit"), (up, UPS, "up")):
         if given is not None and given not in valid:
             raise refusal(path, what, shown(given), " or ".join(valid), "state one of them")
     file = open_bvh(path)
@@ -73,7 +74,7 @@ def examine_bvh(
     if unit is None:
         scale = guessed_unit(file, points)
     else:
-        scale = Unit(unit, UNITS[unit], "stated")
+        scale = Unit(unit, METRES_IN_UNIT[unit], "stated")
     tree = file.hierarchy
     kept = [k for k, site in enumerate(tree.sites) if not site or tree.offsets[k].any()]
     names = tuple(tree.names[k] for k in kept)

@@ -7,14 +7,14 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.formats.motion.bvh_file import BvhFile
-from posekit.formats.motion.format import UNITS
+from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.formats.skeleton_maps import LANDMARK, find_by_names
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
 CMU: Final = 0.0254 / 0.45
 """Metres in a unit of the CMU database, inches times 0.45 (mocap.cs.cmu.edu, FAQs): also in its BVH conversions."""
-SCALES: Final = {**UNITS, "0.45 in": CMU}
+SCALES: Final = {**METRES_IN_UNIT, "0.45 in": CMU}
 BODY: Final = 2.0
 """Metres along the bones from a hand to a foot, or between the two ends of the body that are farthest: what the
 figure of Lee & Chen 1985 has; skeletons of CMU, LaFAN1 and Bandai-Namco have 1.9 to 2.3."""

@@ -11,7 +11,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.formats.motion.bvh_angles import ORDER, continuous
 from posekit.formats.motion.bvh_tree import LEAVES, NODES, checked, filled, offsets, place
-from posekit.formats.motion.format import UNITS
+from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.geometry import Array
 from posekit.safe_io import refusal, replacing, shown
 
@@ -75,7 +75,7 @@ def write_bvh(
     up : str
         The axis of q's world that points up; in the file y does.
     unit : str
-        One of `posekit.formats.motion.format.UNITS`.
+        One of `posekit.formats.motion.motion_format.METRES_IN_UNIT`.
     unknown : str
         ``refuse`` or ``hold`` angles that are not known: see `posekit.formats.motion.bvh_tree.filled`.
 
@@ -84,12 +84,12 @@ def write_bvh(
     InputError
         Where q or time are not what is said above, or the file cannot be written.
     """
-    if unit not in UNITS:
-        raise refusal(path, "unit", shown(unit), " or ".join(UNITS), "state one of them")
+    if unit not in METRES_IN_UNIT:
+        raise refusal(path, "unit", shown(unit), " or ".join(METRES_IN_UNIT), "state one of them")
     q = checked(path, figure, q, time, up)
     frame_time = even_step(path, np.asarray(time, dtype=np.float64))
     placed = place(figure, filled(path, figure, q, unknown), up)
-    scale = 1.0 / UNITS[unit]
+    scale = 1.0 / METRES_IN_UNIT[unit]
     angles = np.degrees(continuous(placed.angles)).reshape(len(q), -1)
     values = np.hstack([placed.root * scale, angles])
     with replacing(path) as file:

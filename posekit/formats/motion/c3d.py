@@ -16,11 +16,12 @@ from typing import Final
 
 import numpy as np
 
+from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.c3d_content import MAX_VALUES, C3dContent, decode_c3d
 from posekit.formats.motion.c3d_parameters import Parameter
-from posekit.formats.motion.format import UNITS, MotionFormat
 from posekit.formats.motion.motion import UPS, Motion
-from posekit.formats.motion.motion_checks import sniffed, the_one_clip
+from posekit.formats.motion.motion_checks import the_one_clip
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.safe_io import cut, extra, one_line, read_bytes, refusal, replacing, shown
 
 MAX_BYTES: Final = 500_000_000
@@ -50,7 +51,7 @@ def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
     frames, count, _ = content.points.shape
     return Motion(
         names=_names(path, content.parameters, count),
-        points=UNITS[unit or _unit(path, content.parameters)] * content.points,
+        points=METRES_IN_UNIT[unit or _unit(path, content.parameters)] * content.points,
         time=np.arange(frames) / rate,
         rate=rate,
         up=_up(content.parameters),
@@ -166,9 +167,13 @@ def _unit(path: str | Path, parameters: Mapping[str, Parameter]) -> str:
     found = next(iter(_texts(parameters, "UNITS")), "")
     plain = found.casefold()
     name = {"meters": "m", "metres": "m", "millimeters": "mm", "centimeters": "cm"}.get(plain, plain)
-    if name not in UNITS:
+    if name not in METRES_IN_UNIT:
         raise refusal(
-            path, "POINT:UNITS", shown(found), f"one of {', '.join(UNITS)}", "state the unit yourself"
+            path,
+            "POINT:UNITS",
+            shown(found),
+            f"one of {', '.join(METRES_IN_UNIT)}",
+            "state the unit yourself",
         )
     return name
 
@@ -185,16 +190,16 @@ def _texts(parameters: Mapping[str, Parameter], name: str) -> list[str]:
     return [] if found is None else found.texts
 
 
-def _suits(path: Path) -> bool:
-    first = sniffed(path)
+def _looks_like(given: GivenFile) -> bool:
+    first = given.start
     return len(first) > 512 and first[1] == 0x50 and first[0] >= 2 and not first[:2].isalnum()
 
 
-FORMAT = MotionFormat(
+C3D_FORMAT: Final = MotionFormat(
     name="c3d",
-    says="C3D, binary files of motion capture (written with the extra c3d)",
+    title="C3D, binary files of motion capture (written with the extra c3d)",
     suffixes=(".c3d",),
     read=read_c3d,
     write_points=write_c3d,
-    suits=_suits,
+    looks_like=_looks_like,
 )

@@ -16,9 +16,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.motion.format import MotionFormat
+from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import Motion
-from posekit.formats.motion.motion_checks import sniffed
+from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.motion_table import (
     Column,
     is_motion,
@@ -183,17 +183,17 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _suits(path: Path) -> bool:
+def _looks_like(given: GivenFile) -> bool:
     """Look at the names in the first line; of a first line that is long, at the part that was read."""
-    first = sniffed(path).partition(b"\n")[0].decode("utf-8", "replace").lstrip("\ufeff")
+    first = given.start.partition(b"\n")[0].decode("utf-8", "replace").lstrip("\ufeff")
     return is_motion([name.strip().strip('"') for name in first.split(_delimiter(first))])
 
 
-FORMAT = MotionFormat(
+CSV_FORMAT: Final = MotionFormat(
     name="csv",
-    says="CSV, a row a frame (time, neck_x, …) or a row a point (frame, time, name, x, y, z)",
+    title="CSV, a row a frame (time, neck_x, …) or a row a point (frame, time, name, x, y, z)",
     suffixes=(".csv",),
     read=read_csv_motion,
     write_points=write_csv_motion,
-    suits=_suits,
+    looks_like=_looks_like,
 )

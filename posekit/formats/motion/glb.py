@@ -31,9 +31,9 @@ from posekit.formats.motion.bvh_tree import (
     offsets,
     place,
 )
-from posekit.formats.motion.format import MotionFormat
 from posekit.formats.motion.glb_capsule import capsule_mesh
 from posekit.formats.motion.glb_file import INDICES, UINT16, VERTICES, GlbFile
+from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.safe_io import refusal, shown
 
@@ -247,9 +247,10 @@ def _colours(path: str | Path, colours: Array | None, count: int) -> Array:
     return rgb
 
 
-FORMAT: Final = MotionFormat(
+GLB_FORMAT: Final = MotionFormat(
     name="glb",
-    says="GLB: the moving body as glTF 2.0, for Blender, browsers and game engines",
+    title="GLB: the moving body as glTF 2.0, for Blender, browsers and game engines",
     suffixes=(".glb",),
+    looks_like=lambda given: given.start.startswith(b"glTF"),
     write_configurations=write_glb,
 )

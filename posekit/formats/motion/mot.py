@@ -24,8 +24,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from posekit.formats.motion.format import MotionFormat
-from posekit.formats.motion.motion_checks import sniffed
+from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, rotation_from_quaternion
 from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_text
 
@@ -198,10 +197,10 @@ def _number(cell: str) -> float | None:
     return None if math.isinf(value) or "_" in cell else value
 
 
-FORMAT = MotionFormat(
+MOT_FORMAT: Final = MotionFormat(
     name="mot",
-    says="MOT, joint angles of OpenSim; read with the figure whose angles they are",
+    title="MOT, joint angles of OpenSim; read with the figure whose angles they are",
     suffixes=(".mot", ".sto"),
     write_configurations=write_mot,
-    suits=lambda path: b"endheader" in sniffed(path),
+    looks_like=lambda given: b"endheader" in given.start,
 )

@@ -1,29 +1,16 @@
-"""What readers and writers of motion ask alike: the first bytes of a file, one clip, the size of what moves."""
+"""What readers and writers of motion ask alike: one clip, and the size of what moves."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
-from posekit.errors import InputError
 from posekit.formats.motion.motion import Motion
-from posekit.safe_io import open_file, refusal, shown
+from posekit.safe_io import refusal, shown
 
-_FIRST: Final = 4096
-_LARGEST: Final = 1 << 62
 SMALLEST, WIDEST = 0.1, 20.0
 """Metres that the points of one frame span: a hand is larger, people on one stage are nearer to each other."""
-
-
-def sniffed(path: Path) -> bytes:
-    """Return the first bytes of a file; none where it cannot be read."""
-    try:
-        with open_file(path, limit=_LARGEST) as file:
-            return file.read(_FIRST)
-    except (InputError, OSError):
-        return b""
 
 
 def the_one_clip(path: str | Path, motion: Motion, format: str) -> Motion:

@@ -13,8 +13,8 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.motion.format import UNITS
 from posekit.formats.motion.motion import Motion
+from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
@@ -85,7 +85,7 @@ def motion_of(
     rates = np.array([rate or rate_of(time[clip == index]) for index in range(len(clips))])
     return Motion(
         names=names,
-        points=UNITS[unit or "m"] * points,
+        points=METRES_IN_UNIT[unit or "m"] * points,
         time=time,
         rate=float(rates[0]),
         up=up,

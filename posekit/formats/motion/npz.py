@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.motion.format import UNITS, MotionFormat
+from posekit.formats.cameras.camera_format import is_intrinsics
+from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import UPS, Motion
-from posekit.formats.motion.motion_checks import sniffed
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.motion.motion_table import rate_of
 from posekit.geometry import Array
 from posekit.safe_io import open_npz, refusal, replacing, shown
@@ -57,7 +58,7 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
         others = ", ".join(archive.names)[:200]
     schema = _word(path, arrays, "schema", "", ("", POSTURES))
     points, names = _points(path, arrays, schema, others)
-    scale = UNITS[unit or _word(path, arrays, "unit", "m", tuple(UNITS))]
+    scale = METRES_IN_UNIT[unit or _word(path, arrays, "unit", "m", tuple(METRES_IN_UNIT))]
     up = _word(path, arrays, "up", "+y" if "clip_fps" in arrays else "", ("", *UPS))
     clip, clips, actions = _clips(path, arrays, len(points))
     time, rates = _time(path, arrays, clip, len(clips), schema)
@@ -204,11 +205,17 @@ def _kind(array: NDArray[Any]) -> str:
     return f"{array.dtype} of shape {array.shape}" if size else f"{array.dtype} of shape {array.shape}, empty"
 
 
-FORMAT = MotionFormat(
+def _looks_like(given: GivenFile) -> bool:
+    """Take every archive for motion that is not a camera's: the reader says which arrays it misses."""
+    is_archive = given.start.startswith(b"PK\x03\x04")
+    return is_archive and ("joints" in given.arrays or not any(map(is_intrinsics, given.arrays)))
+
+
+NPZ_FORMAT: Final = MotionFormat(
     name="npz",
-    says="NPZ, NumPy arrays: captures in clips, posekit's postures, plain points with names",
+    title="NPZ, NumPy arrays: captures in clips, posekit's postures, plain points with names",
     suffixes=(".npz",),
     read=read_npz,
     write_points=write_npz,
-    suits=lambda path: sniffed(path).startswith(b"PK\x03\x04"),
+    looks_like=_looks_like,
 )

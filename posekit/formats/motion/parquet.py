@@ -14,9 +14,8 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from posekit.formats.motion.format import MotionFormat
 from posekit.formats.motion.motion import UPS, Motion
-from posekit.formats.motion.motion_checks import sniffed
+from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.motion_table import (
     MAX_VALUES,
     Column,
@@ -208,11 +207,11 @@ def _refuse_survivors(path: str | Path, columns: Mapping[str, Column]) -> None:
         )
 
 
-FORMAT = MotionFormat(
+PARQUET_FORMAT: Final = MotionFormat(
     name="parquet",
-    says="Parquet, a row a frame or a row a point (needs the extra parquet)",
+    title="Parquet, a row a frame or a row a point (needs the extra parquet)",
     suffixes=(".parquet", ".pq"),
     read=read_parquet,
     write_points=write_parquet,
-    suits=lambda path: sniffed(path).startswith(b"PAR1"),
+    looks_like=lambda given: given.start.startswith(b"PAR1"),
 )

@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from posekit.formats.motion.format import UNITS, MotionFormat
+from posekit.formats.format import Content
+from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import UPS, Motion
 from posekit.formats.motion.motion_checks import check_size
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
+from posekit.formats.registry import formats
 from posekit.geometry import Array
 from posekit.safe_io import nearest, refusal, shown
 
 if TYPE_CHECKING:
     from posekit.body import Figure
 
-_MODULES = ("trc", "c3d", "csv_table", "npz", "parquet", "mot", "bvh", "glb", "urdf_folder")
 
-
-@cache
 def motion_formats() -> dict[str, MotionFormat]:
-    """Return the formats by name; each module has its own as `FORMAT`."""
-    found = [import_module(f"posekit.formats.motion.{name}").FORMAT for name in _MODULES]
-    return {one.name: one for one in found}
+    """Return the formats of motion by name."""
+    return {one.name: one for one in formats(Content.MOTION) if isinstance(one, MotionFormat)}
 
 
 def read_motion(
@@ -48,13 +45,13 @@ def read_motion(
         Where it cannot be read, is in no format that is known, or in several (the candidates are named); where its
         points span so little or so much that the unit must be another, unless it is stated.
     """
-    if unit is not None and unit not in UNITS:
-        raise refusal("--unit", "", shown(unit), "a known unit", nearest(unit, UNITS))
+    if unit is not None and unit not in METRES_IN_UNIT:
+        raise refusal("--unit", "", shown(unit), "a known unit", nearest(unit, METRES_IN_UNIT))
     if up is not None and up not in UPS:
         raise refusal("--up", "", shown(up), "an axis", nearest(up, UPS))
     chosen = motion_format(format) if format is not None else format_of(path)
     if chosen.read is None:
-        got = f"{chosen.name}: {chosen.says}"
+        got = f"{chosen.name}: {chosen.title}"
         expected = f"points: {', '.join(one.name for one in motion_formats().values() if one.read)}"
         raise refusal(path, "format", got, expected, "choose a file of points")
     motion = chosen.read(Path(path), unit)
@@ -83,7 +80,7 @@ def write_motion(path: str | Path, motion: Motion, format: str | None = None) ->
 def write_configurations(
     path: str | Path, figure: Figure, q: Array, time: Array, format: str | None = None
 ) -> None:
-    """Write joint angles of a figure, whole or not at all; see `posekit.formats.motion.format.MotionFormat`.
+    """Write joint angles of a figure, whole or not at all; see `posekit.formats.motion.motion_format.MotionFormat`.
 
     Raises
     ------
@@ -121,10 +118,10 @@ def format_of(path: str | Path) -> MotionFormat:
     path = Path(path)
     if path.is_dir():
         return _of_folders(path)
-    named = [one for one in motion_formats().values() if path.suffix.lower() in one.suffixes]
-    looks = [one for one in motion_formats().values() if one.suits is not None and one.suits(path)]
-    both = [one for one in named if one in looks] or [one for one in named if not looks or one.suits is None]
-    candidates = both or [*named, *looks]
+    given = GivenFile(path)
+    named = [one for one in motion_formats().values() if given.suffix in one.suffixes]
+    looks = [one for one in motion_formats().values() if one.suffixes and one.looks_like(given)]
+    candidates = [one for one in named if one in looks] or [*named, *looks]
     if len(candidates) == 1:
         return candidates[0]
     if candidates:
@@ -137,7 +134,7 @@ def format_of(path: str | Path) -> MotionFormat:
 
 
 def _of_folders(path: Path) -> MotionFormat:
-    folders = [one for one in motion_formats().values() if not one.suffixes]
+    folders = [one for one in motion_formats().values() if one.folder]
     if len(folders) != 1:
         names = " or ".join(one.name for one in folders) or "a file"
         raise refusal(path, "format", "a folder", names, "say which with --format")

@@ -8,9 +8,10 @@ from typing import Final
 
 import numpy as np
 
+from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.csv_table import read_columns, write_columns
 from posekit.formats.motion.parquet import check_rows, numpy_columns, opened, write_tables
-from posekit.formats.motion.survivors import SurvivorTable, number_columns
+from posekit.formats.motion.survivors import COORDINATES, KEYS, SurvivorTable, number_columns
 from posekit.safe_io import open_npz, refusal, replacing, shown
 from posekit.skeleton import JOINTS
 
@@ -108,3 +109,21 @@ def _kind(path: str | Path) -> str:
     if suffix not in _SUFFIXES:
         raise refusal(path, "format", shown(suffix), f"one of {', '.join(_SUFFIXES)}", "name the file so")
     return _SUFFIXES[suffix]
+
+
+def is_survivors(given: GivenFile) -> bool:
+    """Tell whether a table has all the columns of a table of survivors, or an NPZ its schema.
+
+    Parameters
+    ----------
+    given : GivenFile
+        A file whose name ends as those of tables do.
+    """
+    if given.suffix == ".npz":
+        return given.schema == SCHEMA
+    if given.suffix == ".csv":
+        return {*KEYS, *COORDINATES} <= given.columns
+    if not given.start.startswith(b"PAR1"):
+        return False
+    with opened(given.path) as file:
+        return {*KEYS, *COORDINATES} <= set(file.schema_arrow.names)

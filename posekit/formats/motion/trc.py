@@ -17,10 +17,10 @@ from typing import Final
 
 import numpy as np
 
-from posekit.formats.motion.format import UNITS, MotionFormat
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_axes import with_up
-from posekit.formats.motion.motion_checks import sniffed, the_one_clip
+from posekit.formats.motion.motion_checks import the_one_clip
+from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.geometry import Array
 from posekit.safe_io import read_text, refusal, shown, write_text
 
@@ -58,7 +58,7 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
     text = read_text(path, limit=MAX_BYTES, too_large="split it by frames")
     lines = text.splitlines()
     header = _header(path, lines)
-    scale = UNITS[unit or header.unit]
+    scale = METRES_IN_UNIT[unit or header.unit]
     body = [
         (number, line) for number, line in enumerate(lines[header.rows :], header.rows + 1) if line.strip()
     ]
@@ -246,11 +246,11 @@ def _number(value: float) -> str:
     return str(int(value)) if value == int(value) else repr(value)
 
 
-FORMAT = MotionFormat(
+TRC_FORMAT: Final = MotionFormat(
     name="trc",
-    says="TRC, marker positions of OpenSim, Pose2Sim and Motion Analysis",
+    title="TRC, marker positions of OpenSim, Pose2Sim and Motion Analysis",
     suffixes=(".trc",),
     read=read_trc,
     write_points=write_trc,
-    suits=lambda path: sniffed(path).startswith(b"PathFileType"),
+    looks_like=lambda given: given.start.startswith(b"PathFileType"),
 )

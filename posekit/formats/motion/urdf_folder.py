@@ -26,8 +26,8 @@ from posekit.body import Figure, load_figure
 from posekit.body.figure import FRAMES
 from posekit.body.urdf import parse
 from posekit.formats.motion.bvh_tree import POINT_NODES, checked, known_nodes
-from posekit.formats.motion.format import MotionFormat
 from posekit.formats.motion.motion import Motion
+from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array
 from posekit.safe_io import cut, open_npz, refusal, replacing, shown, write_text
 from posekit.skeleton import POINTS
@@ -175,10 +175,11 @@ def _filling(folder: Path) -> Iterator[Path]:
         shutil.rmtree(beside, ignore_errors=True)
 
 
-FORMAT: Final = MotionFormat(
+URDF_FORMAT: Final = MotionFormat(
     name="urdf",
-    says="a folder with the person's URDF and q, for Pinocchio, yourdfpy and MuJoCo",
-    suffixes=(),
+    title="a folder with the person's URDF and q, for Pinocchio, yourdfpy and MuJoCo",
+    folder=True,
+    looks_like=lambda given: (given.path / FIGURE).is_file() and (given.path / NPZ).is_file(),
     read=read_urdf_folder,
     write_configurations=write_urdf_folder,
 )

@@ -71,14 +71,6 @@ class SkeletonMap:
                 found[..., LANDMARK[landmark], :] = values[..., columns, :].mean(axis=-2)
         return found
 
-    def scatter(self, landmarks: Array) -> Array:
-        """Put landmarks (..., 21, n) into the format's points (..., K, n): those that are one point; NaN else."""
-        values = np.full((*landmarks.shape[:-2], len(self.points), landmarks.shape[-1]), np.nan)
-        for landmark, parts in self.landmarks.items():
-            if len(parts) == 1 and parts[0] in self.points:
-                values[..., self.points.index(parts[0]), :] = landmarks[..., LANDMARK[landmark], :]
-        return values
-
     def over(self, names: Sequence[str]) -> SkeletonMap:
         """Lay the map over the points of a file that names them itself, in the file's order.
 

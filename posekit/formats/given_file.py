@@ -1,30 +1,41 @@
-"""What was given to be read: a file or a folder, opened once for all formats that look at it."""
+"""A file or folder that was given to be read, opened once for all formats that look at it."""
 
 from __future__ import annotations
 
 import re
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from posekit.safe_io import cut, open_file, parse_json, read_bytes, refusal
+from posekit.errors import InputError
+from posekit.safe_io import cut, open_file, open_npz, parse_json, read_bytes, read_toml, refusal
 from posekit.safe_io.text_file import decode
 
 MAX_BYTES = 500_000_000
 """The largest file that is read whole: twice COCO's largest annotations."""
 MAX_FILES = 1_000_000
-"""Files in a folder."""
+"""The largest number of files in a folder."""
+MAX_DECLARED = 16_000_000_000
+"""Bytes that an NPZ may declare when the names of its arrays are read: what is too large is for its reader to say."""
+ANY_SIZE = 1 << 62
+"""Bytes: how large a file may be is for its reader to say."""
+FIRST_BYTES = 4096
+"""Bytes of a file by which binary formats are told."""
+FIRST_LINE_BYTES = 100_000
+"""Bytes of a table in which its first line is looked for."""
 
 
 @dataclass(frozen=True)
-class Given:
+class GivenFile:
     """A file, or a folder of one JSON file a picture.
 
     Parameters
     ----------
     path : Path
+        Where it is; whether it is there is found out by reading it.
 
     Raises
     ------
@@ -99,11 +110,64 @@ class Given:
             yield path, self.document if index == 0 else _parsed(path)
 
     @cached_property
+    def start(self) -> bytes:
+        """The first bytes of the file; none of a folder, or where it cannot be read."""
+        return first_bytes(self.path)
+
+    @cached_property
+    def columns(self) -> frozenset[str]:
+        """The names in the first line of a table of text."""
+        with open_file(self.path, limit=ANY_SIZE) as file:
+            line = file.read(FIRST_LINE_BYTES).partition(b"\n")[0].decode("utf-8", "replace").lstrip("\ufeff")
+        return frozenset(name.strip().strip('"') for name in re.split("[,;\t]", line))
+
+    @cached_property
+    def arrays(self) -> frozenset[str]:
+        """The names of the arrays in an NPZ; none where the file is no archive."""
+        if not self._is_archive:
+            return frozenset()
+        with open_npz(self.path, limit=MAX_DECLARED) as archive:
+            return frozenset(archive.names)
+
+    @cached_property
+    def schema(self) -> str:
+        """The schema that a JSON, NPZ or TOML file names, as ``posekit.view/1``; empty where it names none."""
+        if self.suffix == ".npz" and "schema" in self.arrays:
+            with open_npz(self.path, limit=MAX_DECLARED) as archive:
+                return str(archive.array("schema", "U", ()))
+        if self.suffix == ".toml":
+            return str(read_toml(self.path, limit=MAX_TOML_BYTES).get("schema", ""))
+        if self.suffix == ".json":
+            return str(self.document.get("schema", "")) if isinstance(self.document, dict) else ""
+        return ""
+
+    @cached_property
+    def _is_archive(self) -> bool:
+        return self.suffix == ".npz" and zipfile.is_zipfile(self.path)
+
+    @cached_property
     def _bytes(self) -> bytes:
         return read_bytes(self.path, limit=MAX_BYTES, too_large=TOO_LARGE)
 
 
+def first_bytes(path: Path) -> bytes:
+    """Return the first bytes of a file; none where it cannot be read.
+
+    Parameters
+    ----------
+    path : Path
+        A file or folder.
+    """
+    try:
+        with open_file(path, limit=ANY_SIZE) as file:
+            return file.read(FIRST_BYTES)
+    except (InputError, OSError):
+        return b""
+
+
 TOO_LARGE = "split it by pictures"
+MAX_TOML_BYTES = 10_000_000
+"""The largest TOML file whose schema is looked for."""
 _JSON = re.compile(rb'\s*(\{\s*["}]|\[\s*(\{|\]|\[\s*[\[{\d-]))')
 """How JSON begins, and TOML, whose tables have names in brackets, does not."""
 
