@@ -6,18 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.compiled import check_kernels as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HIPS, JOINT, TORSO
-from posekit.tree import Findings, Rule
+from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
 from posekit.validators.anatomical_screen import limb_numbers
-from posekit.validators.screening import screened
 
 UNSEEN = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
@@ -27,7 +25,7 @@ HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class AnatomicalLimb:
+class AnatomicalLimb(Check):
     """Shoulder and elbow, or hip and knee; with two joints only what the upper segment's direction tells.
 
     All ways to write the limb are tried: both branches of the ball joint, both signs of the hinge. The limb is legal
@@ -53,13 +51,15 @@ class AnatomicalLimb:
     tolerance: float
     name: str = "joint_range"
     unit: str = "deg"
+    noise = Loosening.DIRECTIONS
+    pulls = True
 
     @cached_property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The angles judged."""
         names = judged_names(self.anatomy, self._joint, 2 if len(self.limb) == 2 else 4)
         side = self.limb[0].split("_")[0]
-        return tuple(f"{side}_{name}" for name in names)
+        return Place.of_angles(*(f"{side}_{name}" for name in names))
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -100,10 +100,6 @@ class AnatomicalLimb:
         )
         return Findings(value=value, lower=lower, upper=upper, tolerance=tolerance[:, judged])
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: what the limb hangs on, whether it is whole, ranges, couplings and tolerances."""
@@ -116,4 +112,4 @@ class AnatomicalLimb:
             tolerance=self.tolerance,
             unseen=UNSEEN,
         )
-        return Rule(kernels=kernels, kind=kernels.ANATOMICAL, numbers=numbers)
+        return Rule(kind=kernels.ANATOMICAL, numbers=numbers)

@@ -19,8 +19,8 @@ from posekit.body.capsules import Capsule
 from posekit.body.pool import collides, make_pool
 from posekit.compiled import check_kernels as kernels
 from posekit.geometry import Array, cross
-from posekit.tree import Check, Findings, Rule
-from posekit.validators.screening import screened
+from posekit.skeleton import JOINTS
+from posekit.tree import Check, Findings, Place, Rule
 
 CONTACT_TOLERANCE = 1e-9
 """Metres of penetration below which the verdict would be rounding noise: not a collision."""
@@ -47,7 +47,7 @@ def collision(figure: Figure, *, contact_margin: float = 0.0, exact: bool = Fals
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PairCollision:
+class PairCollision(Check):
     """The distance between two capsules of the figure."""
 
     a: Capsule
@@ -56,11 +56,18 @@ class PairCollision:
     exact: bool
     name: str = "collision"
     unit: str = "m"
+    slow = True
+    of_configuration = True
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The two links."""
-        return (f"{self.a.link}-{self.b.link}",)
+        return (Place(bodies=(self.a.link, self.b.link)),)
+
+    @property
+    def needs_head(self) -> bool:
+        """Whether one of the two is the head: how near an arm comes to it, a detector's points cannot tell."""
+        return max(self.points) >= len(JOINTS)
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -98,12 +105,8 @@ class PairCollision:
             rejects=rejects[:, None],
         )
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell which pairs are clear of contact, and which seem to penetrate; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     def confirm(self, presumed: Array) -> bool:
-        """Ask coal whether pairs that seem to penetrate do; see `posekit.tree.Screened`."""
+        """Ask coal whether pairs that seem to penetrate do; see `posekit.tree.Check.confirm`."""
         return bool(collides(self._pool, presumed.T).all())
 
     @cached_property
@@ -113,7 +116,6 @@ class PairCollision:
         reach = a.radius + b.radius + self.contact_margin
         sizes = len(a.start), len(a.end), len(b.start), len(b.end)
         return Rule(
-            kernels=kernels,
             kind=kernels.CAPSULES,
             numbers=np.array(
                 [a.center, a.half_length, b.center, b.half_length, reach, *sizes], dtype=np.float64

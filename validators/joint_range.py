@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.angles import Limits
@@ -19,11 +18,10 @@ from posekit.body.frames import hips_frame, torso_frame
 from posekit.compiled import check_kernels as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
-from posekit.tree import Check, Findings, Rule
+from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges
-from posekit.validators.screening import screened
 
 TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
@@ -52,9 +50,9 @@ def joint_range(
         Its limits are the ranges where `ranges` gives none.
     ranges : Ranges
     tolerance : float
-        Degrees by which the direction of a segment may be off; see `Limb` for what follows for axial rotations.
+        Degrees by which the direction of a segment may be off; see `LimbRange` for what follows for axial rotations.
     directions : bool
-        Whether the same follows for the first angles of shoulder and hip: see `Limb`.
+        Whether the same follows for the first angles of shoulder and hip: see `LimbRange`.
     """
     if ranges.kind == "projected":
         return projected_angles(figure, ranges, tolerance=tolerance)
@@ -67,13 +65,19 @@ def joint_range(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
         )
         ik = figure.ik
-    checks: list[Check] = [Neck(ik=ik, tolerance=tolerance), Pelvis(ik=ik, tolerance=tolerance)]
+    limits_alone = ranges.anatomy is None
+    checks: list[Check] = [
+        Neck(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
+        Pelvis(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
+    ]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             joints = tuple(f"{side}_{joint}" for joint in limb)
             for part in (joints[:2], joints):
                 if ranges.anatomy is None:
-                    checks.append(Limb(figure=figure, limb=part, tolerance=tolerance, directions=directions))
+                    checks.append(
+                        LimbRange(figure=figure, limb=part, tolerance=tolerance, directions=directions)
+                    )
                 else:
                     checks.append(
                         AnatomicalLimb(figure=figure, anatomy=ranges.anatomy, limb=part, tolerance=tolerance)
@@ -91,7 +95,7 @@ def _rule(ik: ClosedForm, where: tuple[str, ...], kind: int, more: Sequence[floa
     rows = [DOFS.index(dof) for dof in where]
     limits = ik.limits
     numbers = np.concatenate([limits.sign[rows], limits.lower[rows], limits.upper[rows], more])
-    return Rule(kernels=kernels, kind=kind, numbers=numbers)
+    return Rule(kind=kind, numbers=numbers)
 
 
 def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: float | Array) -> Findings:
@@ -105,25 +109,23 @@ def _findings(ik: ClosedForm, where: tuple[str, ...], angles: Array, tolerance: 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Neck:
+class Neck(Check):
     """Flexion, bending and rotation of the head on the torso; undecided where the head was not seen."""
 
     ik: ClosedForm
     tolerance: float
     name: str = "joint_range"
-    where: tuple[str, ...] = ("neck.flexion", "neck.bending", "neck.rotation")
+    places: tuple[Place, ...] = Place.of_angles("neck.flexion", "neck.bending", "neck.rotation")
     unit: str = "deg"
     points: tuple[int, ...] = TORSO_POINTS + HEAD
+    of_configuration: bool = True
+    noise = Loosening.DIRECTIONS
 
     def judge(self, points: Array) -> Findings:
         """Judge the neck's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         angles = self.ik.neck(R_torso, points[:, 0], points[:, 4:])
         return _findings(self.ik, self.where, angles, self.tolerance)
-
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
 
     @cached_property
     def rule(self) -> Rule:
@@ -134,15 +136,17 @@ class Neck:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pelvis:
+class Pelvis(Check):
     """Flexion, bending and rotation of the hips under the torso."""
 
     ik: ClosedForm
     tolerance: float
     name: str = "joint_range"
-    where: tuple[str, ...] = ("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
+    places: tuple[Place, ...] = Place.of_angles("pelvis.flexion", "pelvis.bending", "pelvis.rotation")
     unit: str = "deg"
     points: tuple[int, ...] = TORSO_POINTS + HIPS_POINTS[1:]
+    of_configuration: bool = True
+    noise = Loosening.DIRECTIONS
 
     def judge(self, points: Array) -> Findings:
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
@@ -151,10 +155,6 @@ class Pelvis:
         angles = self.ik.pelvis(R_torso, R_hips)
         return _findings(self.ik, self.where, angles, self.tolerance)
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: limits and tolerance."""
@@ -162,7 +162,7 @@ class Pelvis:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Limb:
+class LimbRange(Check):
     """Shoulder and elbow, or hip and knee; with two joints only the first two angles.
 
     A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
@@ -184,12 +184,19 @@ class Limb:
     directions: bool = False
     name: str = "joint_range"
     unit: str = "deg"
+    noise = Loosening.DIRECTIONS
+    of_configuration = True
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The angles judged."""
+        return Place.of_angles(*(self._angles[:2] if len(self.limb) == 2 else self._angles))
+
+    @cached_property
+    def _angles(self) -> tuple[str, ...]:
+        """The four angles of the whole limb."""
         first = DOFS.index(f"{self.limb[0]}.flexion")
-        return DOFS[first : first + (2 if len(self.limb) == 2 else 4)]
+        return DOFS[first : first + 4]
 
     @property
     def _parent(self) -> tuple[int, ...]:
@@ -206,7 +213,7 @@ class Limb:
         R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
-        angles = angles[:, : len(self.where)].copy()
+        angles = angles[:, : 2 if end is None else 4].copy()
         tolerance = np.full(angles.shape, self.tolerance, dtype=np.float64)
         if end is not None:
             bend = np.abs(np.sin(angles[:, 3]))
@@ -219,22 +226,18 @@ class Limb:
             if end is not None:
                 tolerance[:, 2] = self._turn(np.where(np.isnan(bend), 1.0, bend))
             angles[tolerance > UNSEEN] = np.nan
-        return _findings(self.figure.ik, self.where, angles, tolerance)
+        return _findings(self.figure.ik, self._angles[: angles.shape[1]], angles, tolerance)
 
     def _turn(self, sine: Array) -> Array:
         """Return by how many degrees a direction may turn about an axis to which it has an angle of that sine (N,)."""
         share = np.radians(self.tolerance) / np.maximum(sine, np.finfo(np.float64).tiny)
         return np.asarray(np.degrees(np.tan(np.arcsin(np.minimum(share, 1.0)))))
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     @cached_property
-    def rule(self) -> Rule:
+    def rule(self) -> Rule | None:
         """The screen as numbers: what the limb hangs on, whether it is whole, limits and tolerances."""
-        first = DOFS.index(f"{self.limb[0]}.flexion")
+        if self.directions:
+            return None  # tolerances of their own for each angle, which the screen does not know
         sizes = len(self._parent), len(self.limb) == 3
-        kind = kernels.JUDGED if self.directions else kernels.LIMB
         more = [np.radians(self.tolerance), np.radians(UNSEEN), *sizes]
-        return _rule(self.figure.ik, DOFS[first : first + 4], kind, more)
+        return _rule(self.figure.ik, self._angles, kernels.LIMB, more)

@@ -13,7 +13,7 @@ from posekit.geometry import Array
 from posekit.linkages import SpanningTree
 from posekit.linkages.naming import meant
 from posekit.safe_io.refusal import shown
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Place
 
 
 def closure(spanned: SpanningTree, *, tolerance: float = 1e-6) -> list[Check]:
@@ -38,12 +38,13 @@ def closure(spanned: SpanningTree, *, tolerance: float = 1e-6) -> list[Check]:
         if node in spanned.nodes:
             joints = (spanned.joint(node), *(spanned.joint(end) for end in midpoint.ends))
             whole = linkage.segment("-".join(linkage.nodes[end] for end in midpoint.ends))
-            checks.append(Middle(where=(midpoint.name,), points=joints, length=float(linkage.lengths[whole])))
+            place = Place(name=midpoint.name)
+            checks.append(MiddleOfEnds(places=(place,), points=joints, length=float(linkage.lengths[whole])))
     for chord in spanned.chords:
         a, b = linkage.segments[chord]
         checks.append(
             Chord(
-                where=(linkage.segment_names[chord],),
+                places=(Place(segment=linkage.segment_names[chord]),),
                 points=(spanned.joint(a), spanned.joint(b)),
                 length=float(linkage.lengths[chord]),
                 tolerance=tolerance,
@@ -81,7 +82,8 @@ def nearer(
                 f"nearer {name}: {shown(end)} is not one of its ends; expected {pair[0]} or {pair[1]}"
             )
         other = pair[1] if end == pair[0] else pair[0]
-        checks.append(Nearer(where=(name,), points=(joints.index(end), joints.index(other)), nothing=nothing))
+        points = joints.index(end), joints.index(other)
+        checks.append(NearerEnd(places=(Place(segment=name),), points=points, nothing=nothing))
     return checks
 
 
@@ -99,10 +101,10 @@ def _ends(name: str, joints: Sequence[str], segments: Sequence[str]) -> tuple[st
 
 
 @dataclass(frozen=True, kw_only=True)
-class Chord:
+class Chord(Check):
     """The length of a segment that lifts nothing: its loop closes where it is right."""
 
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     length: float
     tolerance: float
@@ -121,14 +123,14 @@ class Chord:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Middle:
+class MiddleOfEnds(Check):
     """The distance of a midpoint from the middle of its ends.
 
     The image of the midpoint is the middle of theirs, so that only the depth can be off: not at all, or by the whole
     foreshortening where the two halves were flipped apart.
     """
 
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     length: float
     name: str = "midpoint"
@@ -144,10 +146,10 @@ class Middle:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Nearer:
+class NearerEnd(Check):
     """How much nearer the end is that was said to be nearer."""
 
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     nothing: float
     name: str = "nearer"

@@ -15,7 +15,7 @@ from posekit.body import Figure
 from posekit.body.frames import torso_frame
 from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Loosening, Place
 from posekit.validators.ranges import Ranges
 
 ROUNDING = 1e-3
@@ -33,8 +33,8 @@ def projected_angles(figure: Figure, ranges: Ranges, *, tolerance: float) -> lis
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             checks += [
-                BallJoint(ranges=ranges, tolerance=tolerance, side=side, limb=limb[:2]),
-                Hinge(ranges=ranges, tolerance=tolerance, side=side, limb=limb),
+                ProjectedBall(ranges=ranges, tolerance=tolerance, side=side, limb=limb[:2]),
+                ProjectedHinge(ranges=ranges, tolerance=tolerance, side=side, limb=limb),
             ]
     return checks
 
@@ -57,7 +57,7 @@ def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class BallJoint:
+class ProjectedBall(Check):
     """Shoulder or hip: flexion in the xy plane, abduction in the yz plane (§3.2.A i).
 
     Flexion is the angle from y to the projection of the limb's upper segment, towards x; abduction the one
@@ -71,11 +71,14 @@ class BallJoint:
     limb: tuple[str, ...]
     name: str = "joint_range"
     unit: str = "deg"
+    noise = Loosening.DIRECTIONS
+    pulls = True
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """Flexion and abduction."""
-        return tuple(f"{self.side}_{self.limb[0]}.{angle}" for angle in ("flexion", "abduction"))
+        joint = f"{self.side}_{self.limb[0]}"
+        return Place.of_angles(f"{joint}.flexion", f"{joint}.abduction")
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -96,7 +99,7 @@ class BallJoint:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hinge:
+class ProjectedHinge(Check):
     r"""Elbow or knee: the angle between the two segments, signed (§3.2.A ii); the hip's range goes with it.
 
     With u the upper and v the lower segment, elbow flexion has :math:`(v \times u)_z \ge 0`. The paper says
@@ -110,12 +113,16 @@ class Hinge:
     limb: tuple[str, ...]
     name: str = "joint_range"
     unit: str = "deg"
+    noise = Loosening.DIRECTIONS
+    pulls = True
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The hinge's flexion; at the knee, the hip's too."""
         hinge = f"{self.side}_{self.limb[1]}.flexion"
-        return (hinge,) if self.limb[1] == "elbow" else (hinge, f"{self.side}_hip.flexion")
+        return Place.of_angles(
+            *((hinge,) if self.limb[1] == "elbow" else (hinge, f"{self.side}_hip.flexion"))
+        )
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -173,7 +180,7 @@ def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HipPlane:
+class HipPlane(Check):
     """Pelvis: the hips' plane against the torso's (§3.2.A iii).
 
     Signs are the URDF's: what is above the pelvis bends and turns to the left.
@@ -182,9 +189,11 @@ class HipPlane:
     ranges: Ranges
     tolerance: float
     name: str = "joint_range"
-    where: tuple[str, ...] = ("pelvis.flexion", "pelvis.rotation", "pelvis.bending")
+    places: tuple[Place, ...] = Place.of_angles("pelvis.flexion", "pelvis.rotation", "pelvis.bending")
     unit: str = "deg"
     points: tuple[int, ...] = (*TORSO_POINTS, JOINT["right_hip"], JOINT["left_hip"])
+    noise = Loosening.DIRECTIONS
+    pulls = True
 
     def judge(self, points: Array) -> Findings:
         """Judge the pelvis; see `posekit.tree.Check`."""
@@ -197,7 +206,7 @@ class HipPlane:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HeadPlane:
+class HeadPlane(Check):
     """Neck: the head's plane against the torso's (§3.2.A iv); undecided where the head was not seen.
 
     The head plane's normal is the facing direction; flexion lowers the chin; the head bends and turns to the left.
@@ -207,9 +216,11 @@ class HeadPlane:
     ranges: Ranges
     tolerance: float
     name: str = "joint_range"
-    where: tuple[str, ...] = ("neck.flexion", "neck.rotation", "neck.bending")
+    places: tuple[Place, ...] = Place.of_angles("neck.flexion", "neck.rotation", "neck.bending")
     unit: str = "deg"
     points: tuple[int, ...] = TORSO_POINTS + HEAD
+    noise = Loosening.DIRECTIONS
+    pulls = True
 
     def judge(self, points: Array) -> Findings:
         """Judge the neck; see `posekit.tree.Check`."""

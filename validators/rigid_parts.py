@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
@@ -15,8 +14,7 @@ from posekit.compiled import check_kernels as kernels
 from posekit.geometry import Array
 from posekit.settings import RigidTolerance
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
-from posekit.tree import Check, Findings, Rule
-from posekit.validators.screening import screened
+from posekit.tree import Check, Findings, Place, Rule
 
 Mode = Literal["distances", "placement"]
 
@@ -46,8 +44,8 @@ def rigid_parts(
     """
     allowed = tolerance if isinstance(tolerance, RigidTolerance) else RigidTolerance.uniform(tolerance)
     checks: list[Check] = [
-        Distance(
-            where=(segment_name(segment),),
+        SegmentLength(
+            places=(Place(segment=segment_name(segment)),),
             points=segment,
             length=figure.lengths[segment_name(segment)],
             tolerance=allowed.of(segment),
@@ -55,20 +53,24 @@ def rigid_parts(
         for segment in (SEGMENTS if limbs else RIGID_SEGMENTS)
     ]
     if mode == "placement":
-        checks.append(Placement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=allowed.widest))
+        checks.append(
+            TorsoPlacement(torso=figure.neutral_points[list(TORSO_POINTS)], tolerance=allowed.widest)
+        )
     return checks
 
 
 @dataclass(frozen=True, kw_only=True)
-class Distance:
+class SegmentLength(Check):
     """The distance between two joints of one rigid part."""
 
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     length: float
     tolerance: float
     name: str = "rigid_parts"
     unit: str = "m"
+    rigid = True
+    of_configuration = True
 
     def judge(self, points: Array) -> Findings:
         """Compare the distance with the figure's; see `posekit.tree.Check`."""
@@ -79,30 +81,28 @@ class Distance:
             upper=np.array([self.length + self.tolerance]),
         )
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: the bounds."""
         bounds = np.array([self.length - self.tolerance, self.length + self.tolerance])
-        return Rule(kernels=kernels, kind=kernels.DISTANCE, numbers=bounds)
+        return Rule(kind=kernels.DISTANCE, numbers=bounds)
 
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Placement:
+class TorsoPlacement(Check):
     """The largest distance between the torso's joints and those of the figure's torso laid onto them."""
 
     torso: Array
     tolerance: float
     name: str = "rigid_parts"
-    where: tuple[str, ...] = ("torso",)
+    places: tuple[Place, ...] = (Place(name="torso"),)
     unit: str = "m"
     points: tuple[int, ...] = TORSO_POINTS
+    rigid = True
+    of_configuration = True
 
     def judge(self, points: Array) -> Findings:
         """Lay the figure's torso onto the posture's; see `posekit.tree.Check`."""
@@ -111,12 +111,8 @@ class Placement:
         value = np.linalg.norm(placed - points, axis=-1).max(axis=1)[:, None]
         return Findings(value=value, lower=np.array([-np.inf]), upper=np.array([self.tolerance]))
 
-    def screen(self, points: Array) -> tuple[NDArray[np.int8], Array | None]:
-        """Tell what is clear; see `posekit.tree.Screened`."""
-        return screened(self.rule, points)
-
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: the tolerance, and the figure's torso."""
         numbers = np.concatenate([[self.tolerance], np.ravel(self.torso)])
-        return Rule(kernels=kernels, kind=kernels.PLACEMENT, numbers=numbers)
+        return Rule(kind=kernels.PLACEMENT, numbers=numbers)

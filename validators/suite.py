@@ -1,84 +1,16 @@
-"""Suites of checks by name, and what they say about whole postures."""
+"""What suites of checks say about whole postures."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure
 from posekit.body.closed_form import Alike
-from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.settings import RigidTolerance
 from posekit.tree import Check
-from posekit.validators.collision import collision
-from posekit.validators.joint_range import TOLERANCE, joint_range
-from posekit.validators.ranges import Ranges
-from posekit.validators.rigid_parts import Mode, rigid_parts
-from posekit.validators.walking import DEFAULT_RULES, WalkingThresholds, walking
-
-CHECKS = ("rigid-parts", "joint-range", "collision", "walking")
-PHYSICAL = CHECKS[:3]
-
-
-def check_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Refuse names that are no checks; return them in the order in which they are applied."""
-    chosen = tuple(names)
-    unknown = [name for name in chosen if name not in CHECKS]
-    if unknown:
-        raise InputError(f"--checks: {unknown[0]!r} is not a check; expected some of {', '.join(CHECKS)}")
-    return tuple(name for name in CHECKS if name in chosen)
-
-
-def make_checks(
-    figure: Figure,
-    names: Iterable[str],
-    *,
-    ranges: Ranges,
-    rigid_tolerance: float | RigidTolerance,
-    rigid_mode: Mode = "placement",
-    limbs: bool = False,
-    angle_tolerance: float = TOLERANCE,
-    directions: bool = False,
-    rules: Iterable[int] = DEFAULT_RULES,
-    thresholds: WalkingThresholds | None = None,
-    contact_margin: float = 0.0,
-    exact: bool = False,
-) -> list[Check]:
-    """Make the checks of some validators by name; `limbs` judges lifted segments, `exact` every distance.
-
-    Distances inside torso and hips may be off by `rigid_tolerance` metres: all the same, or each its own. Rules of
-    walking have the paper's `thresholds` unless others are given. Of `directions` see `joint_range`.
-
-    Raises
-    ------
-    InputError
-        Where a check or a rule is unknown, or a tolerance or margin is not finite: nothing compares with NaN, and
-        every posture would pass.
-    """
-    for what, value in (("rigid tolerance", rigid_tolerance), ("angle tolerance", angle_tolerance)):
-        if isinstance(value, RigidTolerance):
-            continue  # it has checked itself
-        if not (math.isfinite(value) and value >= 0):
-            raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
-    if not math.isfinite(contact_margin):
-        raise InputError(f"the contact margin is {contact_margin!r} m; expected a finite length")
-    motion = walking(figure, rules, thresholds)  # made even where it is not wanted: it refuses unknown rules
-    checks: list[Check] = []
-    for name in check_names(names):
-        if name == "rigid-parts":
-            checks += rigid_parts(figure, tolerance=rigid_tolerance, mode=rigid_mode, limbs=limbs)
-        elif name == "joint-range":
-            checks += joint_range(figure, ranges, tolerance=angle_tolerance, directions=directions)
-        elif name == "collision":
-            checks += collision(figure, contact_margin=contact_margin, exact=exact)
-        else:
-            checks += motion
-    return checks
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,16 +16,18 @@ from posekit.geometry import Array
 from posekit.robots import Robot
 from posekit.robots.joint_map import JointMap
 from posekit.robots.scaling import segment_lengths
+from posekit.settings.check import check_settings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
 from posekit.validators.joint_range import TOLERANCE
 from posekit.validators.ranges import load_ranges
+from posekit.validators.registry import PHYSICAL, AnyCheck, chosen_checks, make_checks
 from posekit.validators.robot.figure import FigureConfigurations
 from posekit.validators.robot.load import STICK_FIGURE, load_subject
 from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
 from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, Bodies, Lengths, RobotSettings
-from posekit.validators.suite import PHYSICAL, check_names, judge, make_checks
+from posekit.validators.suite import judge
 from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 RIGID_TOLERANCE = 0.03
@@ -44,10 +46,10 @@ class Validator:
         ``"stick_figure"`` (the default), the built-in figure; the path of a figure's URDF; or a figure: these are
         judged in closed form. Or the name of a robot of example-robot-data (``"human"``, ``"g1"``, …), the path of its
         URDF, or a `posekit.robots.Robot`: these are judged by inverse kinematics (docs, "Validate").
-    checks : sequence of str, optional
+    checks : sequence of str, Check or CheckSettings, optional
         Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
-        otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
-        first four.
+        otherwise, and your own (docs, "Write your own check"); of a robot some of ``reach``, ``rigid-parts``,
+        ``joint-range``, ``collision``, ``balance``, the first four.
     ranges : str
         ``urdf``, ``table1`` (figures alone) or the path of a TOML table.
     rules : sequence of int
@@ -87,7 +89,7 @@ class Validator:
         self,
         urdf: str | Path | Figure | Robot | None = None,
         *,
-        checks: Sequence[str] | None = None,
+        checks: Sequence[AnyCheck] | None = None,
         ranges: str = "urdf",
         rules: Sequence[int] = DEFAULT_RULES,
         walkers: str = "paper",
@@ -114,7 +116,9 @@ class Validator:
         self._figure = subject if isinstance(subject, Figure) else None
         if isinstance(subject, Robot):
             settings = RobotSettings(
-                checks=tuple(ROBOT_DEFAULT if checks is None else checks),
+                checks=tuple(
+                    ROBOT_DEFAULT if checks is None else (check_settings(one).name for one in checks)
+                ),
                 ranges=ranges,
                 joint_map=joint_map,
                 lengths=lengths or "median",
@@ -138,7 +142,8 @@ class Validator:
                 raise InputError(
                     f"{option} {given}: the stick figure has its own; expected a robot, as --urdf human"
                 )
-        self.checks = check_names(PHYSICAL if checks is None else checks)
+        self._chosen = chosen_checks(PHYSICAL if checks is None else checks)
+        self.checks = tuple(one.name for one in self._chosen)
         if not self.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
         self._options: dict[str, Any] = {
@@ -148,6 +153,7 @@ class Validator:
             "rules": rules,
             "thresholds": thresholds,
             "contact_margin": contact_margin,
+            "up": tuple(np.asarray(up, dtype=np.float64).tolist()),
         }
         self._suite = self._make_suite(subject)
 
@@ -265,7 +271,7 @@ class Validator:
     def _make_suite(self, figure: Figure) -> list[Check]:
         return make_checks(
             figure,
-            self.checks,
+            self._chosen,
             rigid_mode="distances",
             limbs=True,
             exact=True,

@@ -19,8 +19,9 @@ from posekit.body import Figure
 from posekit.body.frames import torso_frame
 from posekit.errors import InputError
 from posekit.geometry import Array, cross, unit
+from posekit.settings.recover import checked_rules
 from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Place, Scope
 
 RULES = (1, 2, 3, 4, 5)
 DEFAULT_RULES = (1, 2)
@@ -91,16 +92,13 @@ def walking(
     InputError
         Where a rule is not one of 1 to 5.
     """
-    chosen = tuple(rules)
-    unknown = [rule for rule in chosen if rule not in RULES]
-    if unknown:
-        raise InputError(f"--rules: {unknown[0]} is not a rule; expected some of 1, 2, 3, 4, 5")
+    chosen = checked_rules(rules)
     makers = {1: _rule_1, 2: _rule_2, 3: _rule_3, 4: _rule_4, 5: _rule_5}
     body = thresholds or WalkingThresholds()
     return [check for rule in RULES if rule in chosen for check in makers[rule](figure, body)]
 
 
-class Body(NamedTuple):
+class WalkingAxes(NamedTuple):
     """Axes of the walking body (N, 3): where it moves, its left and its down."""
 
     forward: Array
@@ -109,35 +107,36 @@ class Body(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Rule:
+class WalkingRule(Check):
     """What the rules share: the body's axes and the swings of joints."""
 
     figure: Figure
     thresholds: WalkingThresholds
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     joints: tuple[int, ...]
     name: str = "walking"
     unit: str = "m"
+    scope = Scope.MOTION
 
     @property
     def points(self) -> tuple[int, ...]:
         """The torso, the head, then the rule's own joints."""
         return (*(JOINT[name] for name in TORSO), *HEAD, *self.joints)
 
-    def body(self, points: Array) -> Body:
+    def body(self, points: Array) -> WalkingAxes:
         """Find the axes of the body plane."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:9])
         down = -R_torso[:, :, 2]
         facing = np.where(np.isnan(R_head[:, :, 0]), R_torso[:, :, 0], R_head[:, :, 0])
         forward = unit(facing - np.einsum("ni,ni->n", facing, down)[:, None] * down)
-        return Body(forward, cross(forward, down), down)
+        return WalkingAxes(forward, cross(forward, down), down)
 
     def joint(self, points: Array, k: int) -> Array:
         """Return the k-th of the rule's own joints (N, 3)."""
         return points[:, 9 + k]
 
-    def swing(self, points: Array, body: Body, k: int) -> Array:
+    def swing(self, points: Array, body: WalkingAxes, k: int) -> Array:
         """Return the swing of the k-th joint (N,), metres; NaN where it is not clearly other than zero."""
         index = self.joints[k]
         limits = self.thresholds
@@ -150,7 +149,7 @@ class _Rule:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SwingTogether(_Rule):
+class SwingTogether(WalkingRule):
     """Whether two joints swing to the same side: required (Rule 3) or forbidden (Rules 1 and 2).
 
     The value is the smaller of the two swings, positive where they agree.
@@ -173,7 +172,7 @@ class SwingTogether(_Rule):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SwingPlane(_Rule):
+class SwingPlane(WalkingRule):
     """Rule 4: both segments of a limb lie parallel to the plane of moving direction and body axis."""
 
     def judge(self, points: Array) -> Findings:
@@ -191,7 +190,7 @@ class SwingPlane(_Rule):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class OneKnee(_Rule):
+class OneKnee(WalkingRule):
     """Rule 5: at most one knee is flexed, and then the other leg stands nearly vertically.
 
     The value is the lean of the leg that is not (or less) flexed, where the other is; where both are
@@ -235,7 +234,7 @@ def _rule_1(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
         SwingTogether(
             figure=figure,
             thresholds=thresholds,
-            where=(f"rule1.{limb}",),
+            places=(Place(name=f"rule1.{limb}"),),
             joints=_indices(f"right_{middle}", f"left_{middle}"),
             wanted=False,
         )
@@ -249,7 +248,7 @@ def _rule_2(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
         SwingTogether(
             figure=figure,
             thresholds=thresholds,
-            where=(f"rule2.{side}",),
+            places=(Place(name=f"rule2.{side}"),),
             joints=_indices(f"{side}_elbow", f"{side}_knee"),
             wanted=False,
         )
@@ -263,7 +262,7 @@ def _rule_3(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
         SwingTogether(
             figure=figure,
             thresholds=thresholds,
-            where=(f"rule3.{side}_{limb[:-1]}",),
+            places=(Place(name=f"rule3.{side}_{limb[:-1]}"),),
             joints=_indices(f"{side}_{girdle}", f"{side}_{middle}"),
             wanted=True,
         )
@@ -278,7 +277,7 @@ def _rule_4(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
         SwingPlane(
             figure=figure,
             thresholds=thresholds,
-            where=(f"rule4.{side}_{limb[:-1]}",),
+            places=(Place(name=f"rule4.{side}_{limb[:-1]}"),),
             joints=_indices(*(f"{side}_{name}" for name in joints)),
             unit="deg",
         )
@@ -293,7 +292,7 @@ def _rule_5(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
         OneKnee(
             figure=figure,
             thresholds=thresholds,
-            where=("rule5.knees", "rule5.standing_leg"),
+            places=(Place(name="rule5.knees"), Place(name="rule5.standing_leg")),
             joints=_indices(*(f"{side}_{name}" for side in SIDES for name in ("hip", "knee", "ankle"))),
             unit="deg",
         )

@@ -1,7 +1,7 @@
 """The checks' screens as plain loops, for `posekit.compiled.compiling`: they tell what is clear.
 
 A screen says of a posture that it passes, or which place it violates first, where that is clear by more than any
-rounding; else that it is unsure, and the check's own `judge` is asked (`posekit.tree.Screened`). So these formulas
+rounding; else that it is unsure, and the check's own `judge` is asked (`posekit.tree.Rule`). So these formulas
 decide nothing that the judge would decide otherwise, and need no care at singularities: there they are unsure.
 
 `screen` knows every kind: trees are grown with it in one go (`posekit.compiled.frame_kernels`). This file has the
@@ -35,8 +35,7 @@ NECK: Final = 3
 LIMB: Final = 4
 CAPSULES: Final = 5
 ANATOMICAL: Final = 6
-JUDGED: Final = 7
-"""Kinds of screens; the last is never sure."""
+"""Kinds of screens."""
 
 CLEAR_GAP = 1e-6
 """Metres between two capsules from which they are clear of contact: a thousand times what the judge cares for."""

@@ -1,7 +1,7 @@
 """Whole trees as one plain loop, for `posekit.compiled.compiling`: a frame's nodes never leave a core's cache.
 
 Every function here also runs as it is, slowly. `screen` is left to be filled in: by the kernels of the checks' rules
-(`posekit.tree.Rule`). What it is not sure of ends the frame, which is then grown step by step (`posekit.tree.steps`).
+(`posekit.tree.Rule`). What it is not sure of ends the frame, which is then grown by NumPy (`posekit.tree.plain`).
 
 A node is a row of integers: its code, then which of its candidates each joint has (the branches of the joint's path,
 the last the lowest bit).
@@ -36,7 +36,7 @@ ALIVE, GONE, ASKED, UNKNOWN = range(4)
 Table = NDArray[np.int64]
 
 
-MOST_POINTS, MOST_PRESUMED = 16, 16
+MAX_POINTS, MAX_PRESUMED = 16, 16
 """Points that a rule may read, and numbers that it may presume."""
 
 PRESUMED, ROOM, NUMBERS = 48, 64, 128
@@ -110,6 +110,10 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
     places: Table,
     w: Array,
     memory: Table,
+    base: int,
+    starts: Table,
+    stems: Ints,
+    span: Table,
     nodes: Ints,
     alive: Ints,
     lost: Ints,
@@ -120,6 +124,8 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
 ) -> Any:
     """Grow the trees of the frames from one to before another, as far as there is room for what becomes of them.
 
+    They are grown from any level to any other, and the first and the last may be asked about by some of their checks.
+
     Parameters
     ----------
     begin, end : int
@@ -129,9 +135,9 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
         As `posekit.compiled.tree_kernels.lift` takes them.
     levels : int array (J + 1,)
         Which checks are of which level: from one entry to before the next.
-    checks : int array (C, 6)
+    checks : int array (C, 7)
         Of each check: kind of its screen; how many numbers it presumes; how many tips and points; where its verdicts
-        are remembered; where its numbers begin.
+        are remembered; where its numbers begin; its number among all, those without a screen too.
     tips : int array (C, S, 3)
         What decides what a check says: columns of a node, the bits of each that count, and by how many these are
         shifted, so that their sum tells all choices apart.
@@ -141,6 +147,11 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
         As `screen` takes it, with the numbers of all rules.
     memory : int array
         Room for verdicts. Not to be used again for other frames of the same numbers.
+    base, starts, stems : int, int array (B + 1,), int array (S,)
+        Codes of the nodes to begin with: those of the frame f begin at ``starts[f - base]``.
+    span : int array (4,)
+        The level of those nodes, and the check that they are first asked about; the level of the nodes to end with, and
+        the check before which they are done.
     nodes : int array (2 * N * (1 + J),)
         Room for the nodes of two levels, row by row.
     alive : int array (A, 2)
@@ -166,27 +177,46 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
     for f in range(begin, end):
         if lifts:
             lift(f, f + 1, rays, unseen, parents, first, lengths, tolerance, table, states, reach)
-        here, there, count, status = 0, half, 1, SURE
-        for k in range(wide):
-            nodes[k] = 0
-        for level in range(1, n_joints):
-            if 2 * count * wide > half or n_lost + 2 * count > lost.shape[0]:
+        here, there, status = 0, half, SURE
+        stem, count = starts[f - base], starts[f - base + 1] - starts[f - base]
+        if count * wide > half:
+            return f
+        for i in range(count):
+            node, code = here + i * wide, stems[stem + i]
+            nodes[node + CODE], nodes[node + PATHS] = code, 0
+            for k in range(1, n_joints):
+                nodes[node + PATHS + k] = 0
+                if k <= span[0]:
+                    nodes[node + PATHS + k] = nodes[node + PATHS + parents[k]] << 1 | (
+                        code >> (span[0] - k) & 1
+                    )
+        for level in range(span[0], span[2] + 1):
+            begins = level == span[0]
+            fork = 0 if begins else 1
+            first_check = span[1] if begins else levels[level]
+            last_check = span[3] if level == span[2] else levels[level + 1]
+            many = count << fork
+            if many * wide > half or n_lost + many > lost.shape[0]:
                 status = FULL
                 break
             child, kept = there, 0
             parent = PATHS + parents[level]
-            for i in range(2 * count):
-                node, side = here + (i >> 1) * wide, i & 1
-                path, code = nodes[node + parent] << 1 | side, nodes[node + CODE] << 1 | side
+            for i in range(many):
+                node, side = here + (i >> fork) * wide, i & 1
+                path, code, state = 0, nodes[node + CODE], OPEN
+                if not begins:
+                    path, code = nodes[node + parent] << 1 | side, code << 1 | side
+                    state = states[f, first[level] + path]
                 where, group = PASSED, 0
-                state = states[f, first[level] + path]
                 if state != OPEN:
                     where, group = 0, (level - 1) * REASONS + state - 1
                 else:
-                    for k in range(PATHS, PATHS + level):
+                    for k in range(PATHS, PATHS + level + 1):
                         nodes[child + k] = nodes[node + k]
-                    nodes[child + CODE], nodes[child + PATHS + level] = code, path
-                    for c in range(levels[level], levels[level + 1]):
+                    nodes[child + CODE] = code
+                    if not begins:
+                        nodes[child + PATHS + level] = path
+                    for c in range(first_check, last_check):
                         choice = checks[c, 4]
                         for s in range(checks[c, 2]):
                             tip = nodes[child + tips[c, s, 0]]
@@ -214,7 +244,7 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
                                 status = NOT_SURE
                                 break
                         if where >= 0:
-                            group = (n_joints - 1) * REASONS + c
+                            group = (n_joints - 1) * REASONS + checks[c, 6]
                             break
                 if status != SURE:
                     break
@@ -250,8 +280,8 @@ COMPILED = {
     "screens": "(i8, f8[:, :, ::1], f8[::1], i1[::1], f8[:, ::1])",
     "grow": (
         "(i8, i8, b1, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, f8[:, :, ::1], i1[:, ::1], "
-        "f8[:, ::1], i8[::1], i8[:, ::1], i8[:, :, ::1], i8[:, :, ::1], f8[::1], i8[::1], i4[::1], "
-        "i4[:, ::1], i4[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1])"
+        "f8[:, ::1], i8[::1], i8[:, ::1], i8[:, :, ::1], i8[:, :, ::1], f8[::1], i8[::1], i8, i8[::1], i4[::1], "
+        "i8[::1], i4[::1], i4[:, ::1], i4[:, ::1], f8[:, ::1], i8[::1], i8[::1], i8[::1])"
     ),
 }
 """The kernels, in the order in which they need each other, with the types they take."""

@@ -1,7 +1,6 @@
 """The tree's bookkeeping as plain loops: they read, count and move, and calculate nothing of bodies.
 
-Every function here also runs as it is, slowly. A node is a column of integers: its frame, its code, and which of its
-candidates each joint has (the branches of the joint's path, the last the lowest bit; 0 for a point that was given).
+Every function here also runs as it is, slowly.
 """
 
 from __future__ import annotations
@@ -15,14 +14,8 @@ from posekit.geometry import Array
 OPEN, NO_SOLUTION, COINCIDENT_ENDS, BEHIND_CAMERA, MISSING = range(5)
 """The values of `posekit.tree.candidates.Branch`, as plain numbers."""
 
-FRAME, CODE, PATHS = range(3)
-"""Rows of a node's column."""
-
-WHY = 2
-"""Column of a lost node, after frame and code: its state, or the place of the check that rejected it."""
-
 GROUP, OF_FRAME, LOST, PLACE = range(4)
-"""Columns of a lost node in the end: who rejected it, frame, code and place."""
+"""Columns of a lost node: who rejected it, its frame and code, and the place of the check."""
 
 Ints = NDArray[np.int32]
 Bytes = NDArray[np.int8]
@@ -95,124 +88,6 @@ def lift(
                     reach[f, a + b] = excess
 
 
-def branch(nodes: Ints, joint: int, parent: int, states: Bytes, first: int) -> tuple[Ints, Ints]:
-    """Give nodes their two successors and part the open ones from the rest.
-
-    Parameters
-    ----------
-    nodes : int array (2 + J + 1, N)
-    joint, parent : int
-        The new joint, and the one it hangs on.
-    states : int array (F, T)
-        What became of each candidate.
-    first : int
-        The column of the new joint's first candidate.
-
-    Returns
-    -------
-    nodes : int array (2 + J + 1, M)
-        The open ones.
-    shut : int array (2N - M, 3)
-        Frame, code and state of the others.
-    """
-    n = nodes.shape[1]
-    source, shut = np.empty(2 * n, np.int32), np.empty((2 * n, 3), np.int32)
-    alive = dead = 0
-    for i in range(n):
-        for b in range(2):
-            state = states[nodes[FRAME, i], first + (nodes[PATHS + parent, i] << 1 | b)]
-            if state == OPEN:
-                source[alive] = i << 1 | b
-                alive += 1
-            else:
-                shut[dead, FRAME], shut[dead, CODE], shut[dead, WHY] = (
-                    nodes[FRAME, i],
-                    nodes[CODE, i] << 1 | b,
-                    state,
-                )
-                dead += 1
-    longer = np.empty((nodes.shape[0], alive), np.int32)
-    for k in range(PATHS + joint):
-        for i in range(alive):
-            longer[k, i] = nodes[k, source[i] >> 1]
-    for i in range(alive):
-        longer[CODE, i] = longer[CODE, i] << 1 | (source[i] & 1)
-        longer[PATHS + joint, i] = longer[PATHS + parent, i] << 1 | (source[i] & 1)
-    for k in range(PATHS + joint + 1, nodes.shape[0]):
-        for i in range(alive):
-            longer[k, i] = 0
-    return longer, shut[:dead]
-
-
-def pose(nodes: Ints, tips: Ints, bits: Ints, joints: Ints, first: Ints, table: Array) -> tuple[Array, Ints]:
-    """Find the distinct choices of some branches among nodes that are sorted by frame, and place points in each.
-
-    Parameters
-    ----------
-    nodes : int array (2 + J + 1, N)
-    tips, bits : int array (S,)
-        Joints whose paths, of each so many last branches, together are the branches in question.
-    joints, first : int array (P,)
-        Each point's joint, and the column of its first candidate.
-    table : array (F, T, 3)
-        All candidates.
-
-    Returns
-    -------
-    points : array (R, P, 3)
-    row : int array (N,)
-        Which choice each node has.
-    """
-    n, width = nodes.shape[1], 1
-    row = np.zeros(n, np.int32)
-    for k in range(len(tips)):
-        width <<= bits[k]
-        mask = (1 << bits[k]) - 1
-        for i in range(n):
-            row[i] = row[i] << bits[k] | nodes[PATHS + tips[k], i] & mask
-    chosen = np.empty(n, np.int32)
-    last, at = np.full(width, -1, np.int32), np.empty(width, np.int32)
-    count = 0
-    for i in range(n):
-        choice, f = row[i], nodes[FRAME, i]
-        if last[choice] != f:
-            last[choice], at[choice] = f, count
-            chosen[count] = i
-            count += 1
-        row[i] = at[choice]
-    points = np.empty((count, len(joints), 3))
-    for k in range(count):
-        i = chosen[k]
-        f = nodes[FRAME, i]
-        for p in range(len(joints)):
-            column = first[p] + nodes[PATHS + joints[p], i]
-            points[k, p, 0] = table[f, column, 0]
-            points[k, p, 1] = table[f, column, 1]
-            points[k, p, 2] = table[f, column, 2]
-    return points, row
-
-
-def part(nodes: Ints, row: Ints, places: Bytes) -> tuple[Ints, Ints]:
-    """Part nodes by the verdict on their choice: those that passed, and frame, code and place of the others (M, 3)."""
-    n = nodes.shape[1]
-    source = np.empty(n, np.int32)
-    lost = np.empty((n, 3), np.int32)
-    alive = dead = 0
-    for i in range(n):
-        where = places[row[i]]
-        if where < 0:
-            source[alive] = i
-            alive += 1
-        else:
-            lost[dead, FRAME], lost[dead, CODE], lost[dead, WHY] = nodes[FRAME, i], nodes[CODE, i], where
-            dead += 1
-    kept = np.empty((nodes.shape[0], alive), np.int32)
-    for k in range(nodes.shape[0]):
-        for i in range(alive):
-            kept[k, i] = nodes[k, source[i]]
-    return kept, lost[:dead]
-
-
 def sort(lost: Ints, groups: int) -> tuple[Ints, Ints, Bytes, NDArray[np.int64]]:
     """Sort lost nodes (M, 4) by who rejected them, else left in order.
 
@@ -242,9 +117,6 @@ COMPILED = {
         "(i8, i8, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, "
         "f8[:, :, ::1], i1[:, ::1], f8[:, ::1])"
     ),
-    "branch": "(i4[:, ::1], i8, i8, i1[:, ::1], i8)",
-    "pose": "(i4[:, ::1], i4[::1], i4[::1], i4[::1], i4[::1], f8[:, :, ::1])",
-    "part": "(i4[:, ::1], i4[::1], i1[::1])",
     "sort": "(i4[:, ::1], i8)",
 }
 """The kernels, in the order in which they need each other, with the types they take."""

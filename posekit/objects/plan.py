@@ -114,7 +114,8 @@ class ObjectPlan:
         if spread is not None:
             # A midpoint has the depths of its halves' ends, however far these are off.
             closing = [
-                check if check.name == "midpoint" else Loose(check=check, spread=spread) for check in closing
+                check if isinstance(check, validators.MiddleOfEnds) else Loose(check=check, spread=spread)
+                for check in closing
             ]
             others = [Loose(check=check, spread=spread) for check in others]
             off = spread.off

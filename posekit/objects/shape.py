@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.geometry import Array
 from posekit.linkages import SpanningTree
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Place
 
 
 def shape_checks(spanned: SpanningTree, *, tolerance: float) -> list[Check]:
@@ -31,22 +31,24 @@ def shape_checks(spanned: SpanningTree, *, tolerance: float) -> list[Check]:
         if set(group) <= set(spanned.nodes):
             where = "-".join(linkage.nodes[node] for node in group)
             points = tuple(spanned.joint(node) for node in group)
-            found.append(Flat(name=name, where=(where,), points=points, rank=rank, tolerance=tolerance))
+            found.append(
+                Flat(name=name, places=(Place(name=where),), points=points, rank=rank, tolerance=tolerance)
+            )
     for first, second in linkage.perpendicular:
         nodes = (*linkage.segments[first], *linkage.segments[second])
         if set(nodes) <= set(spanned.nodes):
             where = f"{linkage.segment_names[first]}_{linkage.segment_names[second]}"
             points = tuple(spanned.joint(node) for node in nodes)
-            found.append(Perpendicular(where=(where,), points=points, tolerance=tolerance))
+            found.append(Perpendicular(places=(Place(name=where),), points=points, tolerance=tolerance))
     return found
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flat:
+class Flat(Check):
     """Root mean square distance of points from their best plane (rank 2) or line (rank 1)."""
 
     name: str
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     rank: int
     tolerance: float
@@ -65,10 +67,10 @@ class Flat:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Perpendicular:
+class Perpendicular(Check):
     """The shorter of two segments projected on the other: zero where they are at right angles."""
 
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     tolerance: float
     name: str = "perpendicular"

@@ -14,7 +14,9 @@ import numpy as np
 
 from posekit.geometry import Array
 from posekit.linkages import SpanningTree
-from posekit.tree import Check, Findings
+from posekit.objects.shape import Perpendicular
+from posekit.tree import Check, Findings, Place
+from posekit.validators.linkage import Chord, NearerEnd
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,7 +69,7 @@ class ImageSpread:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Loose:
+class Loose(Check):
     """A check of points that may be off: its tolerance grows by what that changes.
 
     Parameters
@@ -86,9 +88,9 @@ class Loose:
         return self.check.name
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The check's."""
-        return self.check.where
+        return self.check.places
 
     @property
     def unit(self) -> str:
@@ -108,7 +110,7 @@ class Loose:
     def _more(self, points: Array) -> Array:
         """Return by how much the judged value may be off (N, 1)."""
         spread, joints = self.spread, self.points
-        if self.name == "closure":
+        if isinstance(self.check, Chord):
             apart = points[:, 1] - points[:, 0]
             beside, depth = np.hypot(apart[:, 0], apart[:, 1]), np.abs(apart[:, 2])
             off = spread.between(*joints)
@@ -116,11 +118,11 @@ class Loose:
             nearest = np.hypot(np.maximum(beside - 2 * spread.beside, 0.0), np.maximum(depth - off, 0.0))
             now = np.hypot(beside, depth)
             return np.asarray(np.maximum(farthest - now, now - nearest)[:, None])
-        if self.name == "nearer":
+        if isinstance(self.check, NearerEnd):
             # Which end of a segment of the tree is nearer was chosen, not measured.
             chosen = spread.parents[joints[0]] == joints[1] or spread.parents[joints[1]] == joints[0]
             return np.array([[0.0 if chosen else spread.between(*joints)]])
-        if self.name == "perpendicular":
+        if isinstance(self.check, Perpendicular):
             a, b, c, d = joints
             return np.array([[spread.between(a, b) + spread.between(c, d) + 4 * spread.beside]])
         # The distance from the best plane or line, a root mean square, changes by no more than that of the shifts.

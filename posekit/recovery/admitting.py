@@ -107,10 +107,10 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
         return None
     points = grower.body.points(leaves)
     short = np.maximum(leaves.length_residual() - allowed.tangent, 0.0)
-    plain = judge([check for check in checks if check.name != "collision"], points)
+    plain = judge([check for check in checks if not check.slow], points)
     weight = short / SMALL["m"] + sum(_weight(each) for each in plain)
     best = np.argsort(weight, kind="stable")[:LOOKED_AT]
-    bodies = judge([check for check in checks if check.name == "collision"], points[best])
+    bodies = judge([check for check in checks if check.slow], points[best])
     chosen = int(np.argmin(weight[best] + sum(_weight(each) for each in bodies)))
     row = int(best[chosen])
     excesses = [

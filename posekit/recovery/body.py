@@ -15,7 +15,8 @@ from posekit.linkages import Linkage
 from posekit.settings import Tolerance
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
-from posekit.validators import Ranges, make_checks
+from posekit.validators import AnyCheck, CheckOptions, Ranges, make_checks
+from posekit.validators.options import LEVEL_CAMERA_UP
 from posekit.validators.walking import WalkingThresholds
 
 
@@ -25,8 +26,7 @@ class Judges:
 
     Parameters
     ----------
-    checks : tuple of str
-        Names of validators.
+    checks : sequence of CheckSettings
     ranges : Ranges
     rules : tuple of int
         Rules of walking.
@@ -36,7 +36,7 @@ class Judges:
         Of the rules of walking.
     """
 
-    checks: tuple[str, ...]
+    checks: Sequence[AnyCheck]
     ranges: Ranges
     rules: tuple[int, ...]
     contact_margin: float
@@ -44,9 +44,7 @@ class Judges:
 
     def suite(self, figure: Figure, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
         """Make the checks of a figure, with every distance measured where `exact`."""
-        return make_checks(
-            figure,
-            self.checks,
+        options = CheckOptions(
             ranges=self.ranges,
             rigid_tolerance=tolerance.distances,
             rigid_mode="placement" if tolerance.placement else "distances",
@@ -55,7 +53,9 @@ class Judges:
             thresholds=self.thresholds,
             contact_margin=self.contact_margin,
             exact=exact,
+            up=LEVEL_CAMERA_UP,
         )
+        return make_checks(figure, self.checks, options)
 
 
 class Body(Protocol):

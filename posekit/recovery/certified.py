@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +19,9 @@ from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.sight import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.settings import Tolerance
-from posekit.tree import Check, Screened
-from posekit.validators import Judgement, judge, make_checks
+from posekit.tree import Check, Scope, screened
+from posekit.validators import CheckOptions, Judgement, judge, make_checks
+from posekit.validators.options import LEVEL_CAMERA_UP
 from posekit.validators.validator import RIGID_TOLERANCE
 
 
@@ -39,9 +39,7 @@ def certified_within(noise: Noise) -> Tolerance:
 
 def certifying_checks(figure: Figure, judges: Judges, tolerance: Tolerance) -> list[Check]:
     """Make those of the checks that judge a posture by itself, as `posekit.Validator` makes them."""
-    return make_checks(
-        figure,
-        [name for name in judges.checks if name != "walking"],
+    options = CheckOptions(
         ranges=judges.ranges,
         rigid_tolerance=tolerance.distances,
         rigid_mode="distances",
@@ -49,12 +47,10 @@ def certifying_checks(figure: Figure, judges: Judges, tolerance: Tolerance) -> l
         angle_tolerance=tolerance.angle,
         directions=True,
         contact_margin=contact_under_noise(judges.contact_margin),
-        exact=False,
+        up=LEVEL_CAMERA_UP,
     )
-
-
-FIRST: Final = ("rigid_parts", "joint_range")
-"""Checks that are asked before those that take longer."""
+    made = make_checks(figure, judges.checks, options)
+    return [check for check in made if check.scope is not Scope.MOTION]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,8 +83,8 @@ class Contradiction:
 def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.intp]) -> list[Contradiction]:
     """Judge some postures (N, 19, 3); `asked` (N,) are their numbers. Each is contradicted once at most."""
     found = []
-    quick = [check for check in checks if check.name in FIRST]
-    slow = [check for check in checks if check.name not in FIRST]
+    quick = [check for check in checks if not check.slow]
+    slow = [check for check in checks if check.slow]
     for part, doubtful in ((quick, _doubtful(quick, points)), (slow, None)):
         rows = np.arange(len(asked)) if doubtful is None else np.flatnonzero(doubtful)
         if not (part and len(rows)):
@@ -104,19 +100,13 @@ def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.int
 
 
 def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
-    """Return which postures (N,) are not clearly valid by all checks; all of them where loops are not compiled.
-
-    A screen that passes a limb does so with less tolerance than the check has: some directions are allowed more.
-    """
+    """Return which postures (N,) are not clearly valid by all checks, their screens asked where loops are compiled."""
     doubtful = np.zeros(len(points), dtype=np.bool_)
     fast = is_fast(0)
     for check in checks:
         own = points[:, list(check.points)]
-        if check.name == "joint_range" and not (fast and hasattr(check, "screen")):
-            return np.ones(len(points), dtype=np.bool_)
-        if check.name == "joint_range":
-            places, _ = cast(Screened, check).screen(np.ascontiguousarray(own))
-            doubtful |= places != PASSED
+        if fast and check.rule is not None:
+            doubtful |= screened(check.rule, own)[0] != PASSED
         else:
             doubtful |= check.judge(own).violated.any(axis=1)
     return doubtful

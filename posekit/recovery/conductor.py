@@ -32,7 +32,7 @@ from posekit.recovery.seen import lost_to, neckless, trunkless, with_reasons
 from posekit.recovery.taylor_figure.body import TaylorBody
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Rooting, Tolerance
 from posekit.settings.scale import Scale
-from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
+from posekit.validators import PHYSICAL, AnyCheck, Ranges, chosen_checks, load_ranges
 from posekit.validators.walking import DEFAULT_RULES, thresholds_of
 
 Proportions = Literal["figure", "taylor"]
@@ -51,7 +51,7 @@ def recover(
     view: View,
     *,
     figure: Figure | None = None,
-    checks: Sequence[str] = PHYSICAL,
+    checks: Sequence[AnyCheck] = PHYSICAL,
     ranges: str | Ranges = "urdf",
     rules: Sequence[int] = DEFAULT_RULES,
     walkers: str = "paper",
@@ -74,8 +74,9 @@ def recover(
     view : View
     figure : Figure, optional
         The built-in one if not given; the view's own lengths, stature and head points are applied to it.
-    checks : sequence of str
-        Some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``.
+    checks : sequence of str, Check or CheckSettings
+        Some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, and others, by name or as they are (docs,
+        "Write your own check").
     ranges : str or Ranges
         ``urdf``, ``table1``, the path of a TOML table, or ranges.
     rules : sequence of int
@@ -128,13 +129,14 @@ def recover(
     >>> len(recovery.frames)
     5
     """
-    names = check_names(checks)
+    chosen = chosen_checks(checks)
+    names = [one.name for one in chosen]
     if group is not None and not (math.isfinite(group) and group >= 0):
         raise InputError(f"--group: {group!r} m; expected zero or a positive length")
     table = load_ranges(ranges) if isinstance(ranges, str) else ranges
     body = body_of(view, figure or load_figure(), proportions)
     judges = Judges(
-        checks=names,
+        checks=chosen,
         ranges=table,
         rules=tuple(rules),
         contact_margin=contact_margin,
@@ -184,7 +186,7 @@ def recover(
         )
     _refuse_impossible(frames)
     settings = {
-        "checks": list(names),
+        "checks": [one.to_json() if one.parameters else one.name for one in chosen],
         "ranges": table.name,
         "range_limits": {where: list(bounds) for where, bounds in table.limits.items()},
         "rules": list(rules) if "walking" in names else [],

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
 from posekit.settings import EXACT_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, TORSO
-from posekit.tree import Check, InterpretationTree, Leaves
+from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
 MOST_HIDDEN = 1000
 """Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
@@ -60,19 +60,24 @@ class Grower:
         image = self.body.image(self.view.image[self.fit.frame[chosen]])
         tree = self.body.tree
         camera = self.fit.cameras(chosen)
-        motion = [check for check in suite if check.name == "walking"]
+        motion = [check for check in suite if check.scope is Scope.MOTION]
         with np.errstate(over="ignore"):  # nothing reaches the ray of an image point at 1e300
             leaves = tree.grow(
                 camera,
                 self.fit.root[chosen],
                 image,
-                [check for check in suite if check.name != "walking"],
+                [check for check in suite if check.scope is not Scope.MOTION],
                 given=self.fit.head[chosen],
                 tolerance=tolerance.tangent,
             )
         exact = np.zeros(leaves.n_frames, dtype=np.bool_)
         if tolerance == EXACT_TOLERANCE:
-            exact = is_exact(leaves, self.body, fitted=self.fit.closed)
+            exact = is_exact(
+                leaves,
+                self.body,
+                {check.name for check in suite if not check.rigid},
+                fitted=self.fit.closed,
+            )
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
@@ -114,7 +119,7 @@ class Grower:
                 self.fit.cameras(chosen),
                 self.fit.root[chosen],
                 self.body.image(self.view.image[self.fit.frame[chosen]])[:, :n],
-                [check for check in suite if check.name == "rigid_parts" and max(check.points) < n],
+                [check for check in suite if check.rigid and max(check.points) < n],
                 tolerance=EXACT_TOLERANCE.tangent,
             )
         return np.bincount(leaves.frame, minlength=len(chosen)) > 0
@@ -170,11 +175,14 @@ class Grower:
         return {}
 
 
-def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.bool_]:
+def is_exact(
+    leaves: Leaves, body: Body, judged_by: Collection[str], *, fitted: bool = False
+) -> NDArray[np.bool_]:
     """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
 
     Some distances are not used to lift anything: four inside torso and hips. That they come out right to 1e-8 m
-    is no accident: in a survivor, or in a branch whose pelvis or limbs were then judged. Where none is visible
+    is no accident: in a survivor, or in a branch whose pelvis or limbs were then `judged_by` other checks (their names)
+    than those of rigid parts. Where none is visible
     there is no evidence, and a branch that happens to reach its rays must not stand for the truth. Where the scale was
     `fitted` to close them, one of them alone is no evidence either.
     """
@@ -198,6 +206,6 @@ def is_exact(leaves: Leaves, body: Body, *, fitted: bool = False) -> NDArray[np.
     exact[leaves.frame[nodes[fits & (seen > int(fitted))]]] = True
     empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
     for group in leaves.pruned:
-        if group.level >= JOINT["left_hip"] and group.check in ("joint_range", "collision"):
+        if group.level >= JOINT["left_hip"] and group.check in judged_by:
             exact[group.frame[empty[group.frame]]] = True
     return exact

@@ -14,8 +14,7 @@ from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array
 from posekit.refinement.anatomy import LEG_LIMBS, LIMB_JOINTS
 from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
-from posekit.tree import Check
-from posekit.validators import Ranges
+from posekit.tree import Check, Place
 
 ANGLES: Final = 4
 """The most angles of a limb that are judged."""
@@ -50,23 +49,24 @@ class LimbWalls:
     on_torso: bool
 
     @staticmethod
-    def of(figure: Figure, ranges: Ranges, checks: Sequence[Check], tolerance: float) -> LimbWalls | None:
-        """Gather those of some checks that judge limbs by such ranges; None where there are none."""
-        if ranges.kind == "configuration" and ranges.anatomy is None:
-            return None
+    def of(figure: Figure, checks: Sequence[Check], tolerance: float) -> LimbWalls | None:
+        """Gather those of some checks that refinement keeps to; None where there are none."""
+        pulling = [check for check in checks if check.pulls]
         mine = {
-            limb: [check for check in checks if check.name == "joint_range" and joints[1] in check.points]
+            limb: [check for check in pulling if joints[1] in check.points]
             for limb, joints in enumerate(LIMB_JOINTS)
         }
         if not any(mine.values()):
             return None
-        projected = ranges.kind == "projected"
         balls = {
-            check.where[0].split(".")[0]: check
-            for check in checks
-            if projected and check.name == "joint_range" and check.where[0].startswith(("pelvis", "neck"))
+            check.places[0].joint: check for check in pulling if check.places[0].joint in ("pelvis", "neck")
         }
-        return LimbWalls(figure=figure, checks=mine, balls=balls, tolerance=tolerance, on_torso=projected)
+        on_torso = any(
+            JOINT["neck"] in check.points
+            for limb in range(len(LIMB_JOINTS))[LEG_LIMBS]
+            for check in mine[limb]
+        )
+        return LimbWalls(figure=figure, checks=mine, balls=balls, tolerance=tolerance, on_torso=on_torso)
 
     def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
         """Say how far limbs are beyond their limits; see `posekit.refinement.walls.Walls`."""
@@ -76,13 +76,13 @@ class LimbWalls:
         points[:, middle] = points[:, start] + upper @ part.T
         points[:, end] = points[:, middle] + lower @ part.T
         above, below = np.full((2, ANGLES, len(upper)), -np.inf)
-        place: dict[str, int] = {}
+        rows: dict[Place, int] = {}
         for check in self.checks[limb]:
             findings = check.judge(points[:, list(check.points)])
             # A rotation of an almost straight limb has its tolerance over the sine of the bend: its weight is that.
             weight = np.radians(self.tolerance / np.broadcast_to(findings.tolerance, findings.value.shape))
-            for k, where in enumerate(check.where):
-                row = place.setdefault(where, len(place))
+            for k, place in enumerate(check.places):
+                row = rows.setdefault(place, len(rows))
                 value = findings.value[:, k]
                 lower_, upper_ = (
                     np.broadcast_to(limit, findings.value.shape)[:, k]

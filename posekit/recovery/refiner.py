@@ -35,7 +35,7 @@ from posekit.refinement.tolerance import DEVIATIONS
 from posekit.refinement.trunk import N_TRUNK_JOINTS
 from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree, Leaves
+from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
 ANGLE: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
@@ -169,12 +169,11 @@ class Refiner:
         """The limits of limbs that no box of angles can say."""
         figure, judges = self.grower.body.figure, self.grower.judges
         suite = judges.suite(figure, replace(self.tolerance, angle=ANGLE))
-        return LimbWalls.of(figure, judges.ranges, suite, ANGLE)
+        return LimbWalls.of(figure, suite, ANGLE)
 
     def _can_be_told(self, check: Check) -> bool:
         """Whether the noise says enough of its points: not of a detector's head, which no arm can be said to touch."""
-        heads = check.name == "collision" and max(check.points) >= len(JOINTS)
-        return not (heads and self.grower.view.derived)
+        return not (check.needs_head and self.grower.view.derived)
 
     def lift(self, chosen: NDArray[np.intp]) -> Lifted:
         """Find the trunks of some hypotheses of the fit, and put limbs on them."""
@@ -189,7 +188,9 @@ class Refiner:
             leaves = self.grower.nearer.prune(leaves, fit.frame[own])
         physical = leaves.counts()
         suite, _ = self.grower.suites_of(tolerance)
-        leaves = self.grower.body.tree.prune(leaves, [check for check in suite if check.name == "walking"])
+        leaves = self.grower.body.tree.prune(
+            leaves, [check for check in suite if check.scope is Scope.MOTION]
+        )
         leaves, completion = self.grower.complete(
             leaves, fit.cameras(own), trunks.image, suite, tolerance, fit.frame[own]
         )
@@ -280,7 +281,7 @@ class Refiner:
                 fit.cameras(chosen[trunks.frame]),
                 trunks.root,
                 trunks.image,
-                [check for check in suite if check.name != "walking"],
+                [check for check in suite if check.scope is not Scope.MOTION],
                 given=given,
                 tolerance=tolerance.tangent,
             )

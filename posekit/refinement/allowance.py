@@ -18,7 +18,7 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, PARENTS, TORSO
-from posekit.tree import Check, Findings
+from posekit.tree import Check, Findings, Loosening, Place
 
 LEAST = 0.02
 """Cosine of the abduction down to which the other angles' allowance is reckoned."""
@@ -28,7 +28,7 @@ TRUNK = len(TORSO) + 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class NoisyRange:
+class NoisyRange(Check):
     """A check of joint ranges that allows for the noise of the points that it reads.
 
     Parameters
@@ -57,9 +57,19 @@ class NoisyRange:
         return self.inner.name
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """Its places."""
-        return self.inner.where
+        return self.inner.places
+
+    @property
+    def slow(self) -> bool:
+        """Whether it is."""
+        return self.inner.slow
+
+    @property
+    def needs_head(self) -> bool:
+        """Whether it does."""
+        return self.inner.needs_head
 
     @property
     def unit(self) -> str:
@@ -75,12 +85,12 @@ class NoisyRange:
         """Judge postures; see `posekit.tree.Check`."""
         findings = self.inner.judge(points)
         tolerance = np.broadcast_to(findings.tolerance, findings.value.shape).copy()
-        if len(self.where) > 1 and self.where[1].endswith(".abduction"):
+        if len(self.places) > 1 and self.places[1].angle == "abduction":
             # Beside the abduction axis the first angle turns faster than the direction, and the rotation with it.
             abduction = np.radians(findings.value[:, 1])
             level = np.maximum(np.abs(np.cos(abduction)), LEAST)
             tolerance[:, 0] /= level
-            if len(self.where) > 2:
+            if len(self.places) > 2:
                 tolerance[:, 2] += np.abs(np.sin(abduction)) / level
         allowed = np.maximum(np.degrees(self.allowance(points)), 1e-3)[:, None]
         return replace(findings, tolerance=tolerance * allowed)
@@ -130,10 +140,13 @@ class NoisyRange:
 
 
 def under_noise(checks: Sequence[Check], bound: float, *, perspective: bool = True) -> list[Check]:
-    """Let those of some checks that judge joint ranges allow for the noise: they must have a tolerance of a degree."""
+    """Let those of some checks that noise loosens by `Loosening.DIRECTIONS` allow for it.
+
+    They must have a tolerance of a degree.
+    """
     return [
         NoisyRange(inner=check, bound=bound, perspective=perspective)
-        if check.name == "joint_range"
+        if check.noise is Loosening.DIRECTIONS
         else check
         for check in checks
     ]

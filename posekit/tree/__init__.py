@@ -3,11 +3,13 @@
 from posekit.tree.candidates import Branch as Branch
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
+from posekit.tree.check import Loosening as Loosening
+from posekit.tree.check import Place as Place
 from posekit.tree.check import Rule as Rule
-from posekit.tree.check import Ruled as Ruled
-from posekit.tree.check import Screened as Screened
+from posekit.tree.check import Scope as Scope
 from posekit.tree.enumeration import enumerate_leaves as enumerate_leaves
 from posekit.tree.interpretation_tree import InterpretationTree as InterpretationTree
 from posekit.tree.leaves import Leaves as Leaves
 from posekit.tree.leaves import Losses as Losses
 from posekit.tree.leaves import Pruned as Pruned
+from posekit.tree.screening import screened as screened

@@ -21,7 +21,7 @@ Sorted = tuple[Indices, Indices, NDArray[np.int8], NDArray[np.int64]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Block:
+class FrameBlock:
     """What became of the trees of some frames.
 
     Parameters
@@ -44,7 +44,7 @@ class Block:
 
 
 def merged(
-    roots: Leaves, checks: Sequence[Sequence[Check]], grown: Sequence[Block], *, ordered: bool
+    roots: Leaves, checks: Sequence[Sequence[Check]], grown: Sequence[FrameBlock], *, ordered: bool
 ) -> Leaves:
     """Put blocks together: leaves and losses in the order of the plain path, of blocks `ordered` by frame or not."""
     if not grown:
@@ -71,7 +71,7 @@ def merged(
 
 
 def _lost(
-    roots: Leaves, level: int, grown: Sequence[Block], group: int, ordered: bool
+    roots: Leaves, level: int, grown: Sequence[FrameBlock], group: int, ordered: bool
 ) -> Iterator[tuple[Leaves, NDArray[np.int8]]]:
     """Yield the nodes that one group lost, and the places, if there are any."""
     parts = []

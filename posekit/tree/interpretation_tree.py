@@ -9,16 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 from posekit.cameras import Camera
 from posekit.compiled.compiling import is_fast
 from posekit.geometry import Array
 from posekit.tree import fast, plain
-from posekit.tree.candidates import lift_all
 from posekit.tree.check import Check
 from posekit.tree.leaves import Leaves
+from posekit.tree.lifting import Lifting
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,18 +74,20 @@ class InterpretationTree:
             level = self._level(check)
             if level < len(by_level):
                 by_level[level].append(check)
-        start = partial(Leaves.start, self.joints, self.parents, given=given, root=root)
-        settings: Any = {
-            "lengths": self.lengths,
-            "parents": self.parents,
-            "given": given,
-            "tolerance": tolerance,
-        }
-        if is_fast(len(root)):
-            grown = fast.grow(start, camera, root, image, by_level, **settings)
-            if grown is not None:
-                return grown
-        leaves = start(lift_all(camera, root, image, **settings))
+        lifting = Lifting(
+            joints=self.joints,
+            parents=self.parents,
+            camera=camera,
+            root=root,
+            image=image,
+            lengths=self.lengths,
+            given=given,
+            tolerance=tolerance,
+        )
+        grown = fast.grow(lifting, by_level) if is_fast(len(root)) else None
+        if grown is not None:
+            return grown
+        leaves = lifting.roots()
         for joint in range(1, len(self.joints)):
             leaves = plain.branch(leaves, joint)
             for check in by_level[joint]:

@@ -4,25 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
-from types import ModuleType
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled.frame_kernels import MOST_POINTS, MOST_PRESUMED, NUMBERS, PATHS
+from posekit.compiled.frame_kernels import MAX_POINTS, MAX_PRESUMED, NUMBERS, PATHS
 from posekit.geometry import Array
 from posekit.tree.bits import path_of, support_of
-from posekit.tree.check import Check, Rule, Ruled
+from posekit.tree.check import Check, Rule
 
-Indices = NDArray[np.int32]
 Table = NDArray[np.int64]
 
-MOST_VERDICTS = 1 << 16
+MAX_VERDICTS = 1 << 16
 """Verdicts that are remembered of a frame: of more the memory is not worth it."""
 
 
-class Places(NamedTuple):
+class PointTables(NamedTuple):
     """Where the points of a check are.
 
     Attributes
@@ -33,32 +31,64 @@ class Places(NamedTuple):
         Each point's joint, and the column of its first candidate.
     """
 
-    tips: Indices
-    bits: Indices
-    joints: Indices
-    first: Indices
+    tips: Table
+    bits: Table
+    joints: Table
+    first: Table
+
+    @property
+    def choices(self) -> int:
+        """How many choices of branches there are."""
+        return 1 << int(self.bits.sum())
 
 
-class Programme(NamedTuple):
-    """Rules as `posekit.compiled.frame_kernels.grow` takes them.
+class Stretch(NamedTuple):
+    """A part of the way from the root to the leaves on which only checks with a compiled form are asked.
 
     Attributes
     ----------
-    kernels : module
-        The rules' own.
-    levels, checks, tips, places, numbers
-        As told there; the numbers are w.
-    verdicts : int
-        How many are to be remembered.
+    span : int array (4,)
+        The level at whose nodes it begins, and the compiled check that is asked first; the level at whose nodes it
+        ends, and the compiled check before which it does.
+    level : int
+        Where it ends.
+    number : int
+        Which of all checks is asked then.
+    check : Check or None
+        That check, which has no compiled form; None at the leaves.
     """
 
-    kernels: ModuleType
+    span: Table
+    level: int
+    number: int
+    check: Check | None
+
+    @property
+    def empty(self) -> bool:
+        """Whether it ends where it begins."""
+        return bool((self.span[:2] == self.span[2:]).all())
+
+
+class Programme(NamedTuple):
+    """Checks as `posekit.compiled.frame_kernels.grow` takes them.
+
+    Attributes
+    ----------
+    levels, checks, tips, places, numbers
+        As described there; `numbers` is its w.
+    verdicts : int
+        How many verdicts are to be remembered.
+    stretches : tuple of Stretch
+        From the roots to the leaves: between them those checks are asked that have no compiled form.
+    """
+
     levels: Table
     checks: Table
     tips: Table
     places: Table
     numbers: Array
     verdicts: int
+    stretches: tuple[Stretch, ...]
 
     @property
     def arrays(self) -> tuple[Array, ...]:
@@ -67,9 +97,9 @@ class Programme(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def places_of(
+def point_tables(
     points: tuple[int, ...], parents: tuple[int, ...], first: tuple[int, ...], columns: int
-) -> Places:
+) -> PointTables:
     """Find the points of a check among so many columns of candidates; the last is a point that is not known."""
     joints = len(parents)
     tips: list[tuple[int, int]] = []
@@ -82,36 +112,59 @@ def places_of(
     found = [
         (p, first[p]) if p < joints else (joints, min(first[-1] + p - joints, columns - 1)) for p in points
     ]
-    return Places(
-        *(np.array([pair[k] for pair in tips], dtype=np.int32) for k in (0, 1)),
-        *(np.array([pair[k] for pair in found], dtype=np.int32) for k in (0, 1)),
+    return PointTables(
+        *(np.array([pair[k] for pair in tips], dtype=np.int64) for k in (0, 1)),
+        *(np.array([pair[k] for pair in found], dtype=np.int64) for k in (0, 1)),
     )
 
 
-def programme_of(checks: Sequence[Sequence[Check]], places: Sequence[Sequence[Places]]) -> Programme | None:
-    """Lay out checks by level, and where their points are; None where one has no rule, or another's kernels."""
-    flat = [check for at in checks for check in at]
-    if not flat or not all(hasattr(check, "rule") for check in flat):
-        return None
-    rules: list[Rule] = [cast(Ruled, check).rule for check in flat]
-    if any(rule.kernels is not rules[0].kernels for rule in rules):
-        return None
-    where = [each for at in places for each in at]
-    count, joints = len(rules), len(checks)
-    table = np.zeros((count, 6), dtype=np.int64)
-    tips = np.zeros((count, max(len(each.tips) for each in where), 3), dtype=np.int64)
-    points = np.zeros((count, max(len(each.joints) for each in where), 2), dtype=np.int64)
+def programme_of(
+    checks: Sequence[Sequence[Check]], parents: tuple[int, ...], first: tuple[int, ...], columns: int
+) -> Programme:
+    """Lay out checks by level, for candidates whose joints begin in their `first` of so many columns."""
+    rules: list[tuple[int, Rule, PointTables]] = []
+    stretches: list[Stretch] = []
+    levels, begin, number, verdicts = [0], (0, 0), 0, 0
+    for level, at in enumerate(checks):
+        for check in at:
+            tables = point_tables(tuple(check.points), parents, first, columns)
+            rule = check.rule
+            if (
+                rule is not None
+                and verdicts + tables.choices <= MAX_VERDICTS
+                and len(tables.joints) <= MAX_POINTS
+                and rule.presumed <= MAX_PRESUMED
+            ):
+                rules.append((number, rule, tables))
+                verdicts += tables.choices
+            else:
+                stretches.append(_stretch(begin, (level, len(rules)), number, check))
+                begin = (level, len(rules))
+            number += 1
+        levels.append(len(rules))
+    stretches.append(_stretch(begin, (len(checks) - 1, len(rules)), number, None))
+    return _laid_out(rules, len(checks), np.array(levels, dtype=np.int64), tuple(stretches))
+
+
+def _stretch(begin: tuple[int, int], end: tuple[int, int], number: int, check: Check | None) -> Stretch:
+    return Stretch(np.array([*begin, *end], dtype=np.int64), end[0], number, check)
+
+
+def _laid_out(
+    rules: Sequence[tuple[int, Rule, PointTables]], joints: int, levels: Table, stretches: tuple[Stretch, ...]
+) -> Programme:
+    count = len(rules)
+    table = np.zeros((count, 7), dtype=np.int64)
+    tips = np.zeros((count, max((len(each.tips) for *_, each in rules), default=1), 3), dtype=np.int64)
+    points = np.zeros((count, max((len(each.joints) for *_, each in rules), default=1), 2), dtype=np.int64)
     verdicts, at = 0, NUMBERS
-    for c, (rule, each) in enumerate(zip(rules, where, strict=True)):
-        table[c] = rule.kind, rule.presumed, len(each.tips), len(each.joints), verdicts, at
+    for c, (number, rule, each) in enumerate(rules):
+        table[c] = rule.kind, rule.presumed, len(each.tips), len(each.joints), verdicts, at, number
         below = np.cumsum(each.bits[::-1])[::-1] - each.bits
         tips[c, : len(each.tips)] = np.stack([PATHS + each.tips, (1 << each.bits) - 1, below], axis=-1)
         points[c, : len(each.joints), 0] = np.where(each.joints < joints, each.joints, -1)
         points[c, : len(each.joints), 1] = each.first
         at += len(rule.numbers)
-        verdicts += 1 << int(each.bits.sum())
-    levels = np.cumsum([0, *(len(at) for at in checks)], dtype=np.int64)
-    if verdicts > MOST_VERDICTS or points.shape[1] > MOST_POINTS or table[:, 1].max() > MOST_PRESUMED:
-        return None
-    numbers = np.concatenate([np.zeros(NUMBERS), *(rule.numbers for rule in rules)])
-    return Programme(rules[0].kernels, levels, table, tips, points, numbers, verdicts)
+        verdicts += each.choices
+    numbers = np.concatenate([np.zeros(NUMBERS), *(rule.numbers for _, rule, _ in rules)])
+    return Programme(levels, table, tips, points, numbers, verdicts, stretches)

@@ -19,6 +19,12 @@ UNJUDGED = {
 """How the reasons of branches that no check judged are named, before the joint's name."""
 
 
+SPARSE = 32
+"""Choices a node from which they are sorted: to look through a table of all that there might be would take longer."""
+
+Indices = NDArray[np.int32]
+
+
 def branch(leaves: Leaves, joint: int) -> Leaves:
     """Give every node its near and far successor and drop those that the lift already excludes."""
     frame = np.repeat(leaves.frame, 2)
@@ -58,21 +64,12 @@ def apply(leaves: Leaves, check: Check) -> Leaves:
     """Ask a check about every distinct choice of its own branches, and drop the nodes it rejects."""
     if not len(leaves.code):
         return leaves
-    support = leaves.support(check.points)
-    choice = select(leaves.level, support)[leaves.code]
-    key = leaves.frame.astype(np.int64) << len(support) | choice
-    representative = np.full(leaves.n_frames << len(support), -1, dtype=np.int32)
-    representative[key] = np.arange(len(key), dtype=np.int32)
-    asked = np.flatnonzero(representative >= 0)
-    nodes = representative[asked]
+    nodes, row = choices(leaves, check)
     findings = check.judge(leaves.positions(check.points, nodes))
     violated = findings.violated
     rejected: NDArray[np.bool_] = np.logical_or.reduce(violated, axis=1)
     if not rejected.any():
         return leaves
-    row_of_key = representative
-    row_of_key[asked] = np.arange(len(asked), dtype=np.int32)
-    row = row_of_key[key]
     dead = rejected[row]
     dead_rows = row[dead]
     place = violated.argmax(axis=1)[dead_rows]
@@ -90,3 +87,29 @@ def apply(leaves: Leaves, check: Check) -> Leaves:
         upper=np.broadcast_to(findings.upper, shape)[dead_rows, place],
     )
     return leaves.keep(~dead, leaves.frame, leaves.code, leaves.level, (*leaves.pruned, pruned))
+
+
+def choices(leaves: Leaves, check: Check) -> tuple[Indices, Indices]:
+    """Find the distinct choices of a check's own branches among nodes (N,), of which there is one at least.
+
+    Returns
+    -------
+    nodes : int array (R,)
+        A node of each choice, frame by frame.
+    row : int array (N,)
+        Which choice each node has.
+    """
+    support = leaves.support(check.points)
+    choice = select(leaves.level, support)[leaves.code]
+    first = leaves.frame[0]
+    key = (leaves.frame - first).astype(np.int64) << len(support) | choice
+    width = int(leaves.frame[-1] - first + 1) << len(support)
+    if width > SPARSE * len(key):
+        _, found, inverse = np.unique(key, return_index=True, return_inverse=True)
+        return found.astype(np.int32), inverse.reshape(-1).astype(np.int32)
+    table: Indices = np.full(width, -1, dtype=np.int32)
+    table[key] = np.arange(len(key), dtype=np.int32)
+    asked = np.flatnonzero(table >= 0)
+    nodes = table[asked]  # a copy
+    table[asked] = np.arange(len(asked), dtype=np.int32)
+    return nodes, table[key]

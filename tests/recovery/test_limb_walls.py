@@ -38,15 +38,15 @@ def scene() -> SyntheticScene:
 
 def walls_of(name: str) -> LimbWalls:
     ranges = load_ranges(name)
-    walls = LimbWalls.of(figure(), ranges, joint_range(figure(), ranges, tolerance=1.0), 1.0)
+    walls = LimbWalls.of(figure(), joint_range(figure(), ranges, tolerance=1.0), 1.0)
     assert walls is not None
     return walls
 
 
 def test_boxes_of_the_figures_own_angles_need_none() -> None:
     ranges = load_ranges("urdf")
-    assert LimbWalls.of(figure(), ranges, joint_range(figure(), ranges), 1.0) is None
-    assert LimbWalls.of(figure(), load_ranges("table1"), [], 1.0) is None
+    assert LimbWalls.of(figure(), joint_range(figure(), ranges), 1.0) is None
+    assert LimbWalls.of(figure(), [], 1.0) is None
 
 
 @pytest.mark.parametrize("name", RANGES)

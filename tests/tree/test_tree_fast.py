@@ -5,7 +5,7 @@ Where Numba is not installed the same loops run as Python does, over fewer views
 
 import importlib.util
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any, Literal
 
@@ -17,13 +17,13 @@ from posekit.body import load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.compiled import compiling as compiled
 from posekit.compiled import tree_kernels as kernels
+from posekit.refinement import under_noise
 from posekit.settings import RigidTolerance
-from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree, Leaves, fast, whole
-from posekit.tree.blocks import Block
+from posekit.skeleton import DOFS, JOINT, JOINTS, PARENTS, POINTS, TREE_SEGMENTS, segment_name
+from posekit.tree import Check, Findings, InterpretationTree, Leaves, Place, fast, stretches
+from posekit.tree.blocks import FrameBlock
 from posekit.tree.candidates import Candidates, lift_all, rays_of
-from posekit.tree.layout import places_of, programme_of
-from posekit.tree.steps import grow_steps
+from posekit.tree.layout import programme_of
 from posekit.validators import load_ranges, make_checks
 from posekit.validators.collision import PairCollision
 
@@ -317,7 +317,7 @@ def test_blocks_and_threads_change_nothing(
     points = at_a_pole(frames if NUMBA else min(frames, 6))
     suite = checks()
     whole = both(suite, points[:, 0], seen(points), points[:, N:])[0]
-    for name in ("LEAST", "MOST", "BLOCK"):
+    for name in ("MIN_FRAMES", "MAX_FRAMES", "PLAIN_FRAMES"):
         monkeypatch.setattr(fast, name, size)
     compiled.use_threads(threads)
     try:
@@ -339,31 +339,32 @@ def test_frames_are_shared_out_evenly() -> None:
         assert (blocks[0][0], blocks[-1][1]) == (0, frames)
         sizes = {b - a for a, b in blocks[:-1]}
         assert len(sizes) <= 1
-        assert max(b - a for a, b in blocks) <= fast.MOST
-        if frames > threads * fast.LEAST:
+        assert max(b - a for a, b in blocks) <= fast.MAX_FRAMES
+        if frames > threads * fast.MIN_FRAMES:
             assert len(blocks) >= threads
 
 
-def test_only_frames_of_which_a_rule_is_unsure_are_grown_step_by_step(
+def test_only_frames_of_which_a_rule_is_unsure_are_grown_by_numpy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     points = at_a_pole(20 if NUMBA else 6)
-    stepped: list[int] = []
+    left: list[int] = []
+    grow_plainly = fast._grown_plainly
 
-    def spy(*args: Any) -> Block:
-        stepped.extend(args[-1].tolist())
-        return grow_steps(*args)
+    def spy(*args: Any) -> FrameBlock:
+        left.extend(args[-1].tolist())
+        return grow_plainly(*args)
 
-    monkeypatch.setattr(fast, "grow_steps", spy)
+    monkeypatch.setattr(fast, "_grown_plainly", spy)
     plain, quick = both(checks(), points[:, 0], seen(points), points[:, N:])
     assert_same(plain, quick)
-    assert stepped == list(range(0, len(points), 5))
+    assert left == list(range(0, len(points), 5))
 
 
 def test_rows_that_are_too_few_are_made_more(monkeypatch: pytest.MonkeyPatch) -> None:
     points = postures(26, 40 if NUMBA else 3, beyond=0.0)
-    for name in ("NODES", "LEAVES", "LOSSES", "QUESTIONS"):
-        monkeypatch.setattr(whole, name, 1)
+    for name in ("NODE_ROWS", "LEAF_ROWS", "LOSS_ROWS", "QUESTION_ROWS"):
+        monkeypatch.setattr(stretches, name, 1)
     compiled.use_threads(1)
     try:
         assert_same(*both(checks(0.05, 3.0), points[:, 0], seen(points), points[:, N:], tolerance=0.05))
@@ -374,24 +375,95 @@ def test_rows_that_are_too_few_are_made_more(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize("ranges", ["urdf", "anatomical"])
 def test_ordinary_trees_are_grown_whole(monkeypatch: pytest.MonkeyPatch, ranges: str) -> None:
     points = postures(30, 20 if NUMBA else 3, beyond=0.0)
-    monkeypatch.setattr(fast, "grow_steps", None)
+    monkeypatch.setattr(fast, "_grown_plainly", None)
+    monkeypatch.setattr(stretches, "_first_violated", None)
     image = hide_some(seen(points), 31)
     suite = checks(0.05, 3.0, ranges)
     with compiled.path("fast"):
         assert len(TREE.grow(CAMERA, points[:, 0], image, suite, given=points[:, N:], tolerance=0.02).code)
 
 
-def test_checks_that_a_loop_does_not_know_are_asked_step_by_step() -> None:
-    suite: list[Any] = list(checks())
-    nothing: list[list[Any]] = [[] for _ in range(N - 1)]
-    places = [places_of(check.points, PARENTS, tuple(range(N + 1)), N + 1) for check in suite]
-    assert programme_of([*nothing, suite], [*nothing, places]) is not None
-    assert programme_of([*nothing, []], [*nothing, []]) is None
-    ruleless = SimpleNamespace(points=suite[0].points)
-    stranger = SimpleNamespace(points=suite[0].points, rule=replace(suite[0].rule, kernels=kernels))
-    for other in (ruleless, stranger):
-        layout: list[list[Any]] = [*nothing, [*suite, other]]
-        assert programme_of(layout, [*nothing, [*places, places[0]]]) is None
+@dataclass(frozen=True, kw_only=True)
+class Apart(Check):
+    """A check without a compiled form: some joints are no nearer to each other than this."""
+
+    points: tuple[int, ...]
+    least: float
+    name: str = "apart"
+    unit: str = "m"
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        return tuple(Place(name=POINTS[point]) for point in self.points[1:])
+
+    def judge(self, points: np.ndarray) -> Findings:
+        value = np.linalg.norm(points[:, 1:] - points[:, :1], axis=-1)
+        return Findings(value=value, lower=np.array([self.least]), upper=np.array([np.inf]))
+
+
+def apart(*names: str, least: float) -> Apart:
+    return Apart(points=tuple(JOINT[name] for name in names), least=least)
+
+
+UNCOMPILED = {
+    "of torso and hips": [apart("right_hip", "left_shoulder", "right_shoulder", least=0.5)],
+    "of the first joint": [Apart(points=(JOINT["right_shoulder"], N), least=0.25)],
+    "of the limbs": [
+        apart("right_elbow", "pelvis", least=0.3),
+        apart("left_wrist", "neck", least=0.35),
+        apart("right_knee", "left_knee", least=0.2),
+    ],
+    "two at a level": [apart("left_elbow", "pelvis", least=0.3), apart("left_elbow", "neck", least=0.3)],
+    "of the whole body": [apart("right_wrist", "left_wrist", "right_ankle", "left_ankle", least=0.4)],
+    "of a given point": [Apart(points=(JOINT["right_wrist"], N), least=0.3)],
+}
+
+
+@pytest.mark.parametrize("place", ["first", "last"])
+@pytest.mark.parametrize("kind", UNCOMPILED)
+def test_a_check_without_a_compiled_form_is_asked_where_the_loop_stops_for_it(
+    monkeypatch: pytest.MonkeyPatch, kind: str, place: str
+) -> None:
+    points = np.concatenate([at_a_pole(VIEWS // 4 + 1), postures(40, VIEWS // 4, beyond=0.1)])
+    more = [replace(check, name=f"apart_{k}") for k, check in enumerate(UNCOMPILED[kind])]
+    suite = [*more, *checks()] if place == "first" else [*checks(), *more]
+    asked: list[int] = []
+    plainly = fast._grown_plainly
+
+    def spy(*args: Any) -> FrameBlock:
+        asked.append(len(args[-1]))
+        return plainly(*args)
+
+    monkeypatch.setattr(fast, "_grown_plainly", spy)
+    plain, quick = both(suite, points[:, 0], hide_some(seen(points), 41), points[:, N:])
+    assert_same(plain, quick)
+    assert {check.name for check in more} & {group.check for group in plain.pruned}
+    assert sum(asked) < len(points)
+
+
+def test_checks_without_a_compiled_form_alone_grow_the_same_trees() -> None:
+    points = postures(42, VIEWS // 4 + 1)
+    assert_same(*both(list(UNCOMPILED["of the limbs"]), points[:, 0], seen(points), None))
+
+
+def test_noise_allowed_for_in_each_angle_grows_the_same_trees() -> None:
+    points = postures(43, VIEWS // 4 + 1, beyond=0.1)
+    suite = under_noise(checks(0.05, 1.0), 0.004)
+    assert_same(*both(suite, points[:, 0], seen(points, noise=2.0), points[:, N:], tolerance=0.03))
+
+
+def test_a_check_that_reads_more_points_than_the_loop_has_room_for_is_asked_in_between() -> None:
+    rule = checks()[0].rule
+    assert rule is not None
+    first = tuple(range(N + 1))
+    suite = checks()
+    programme = programme_of([*([] for _ in range(N - 1)), suite], PARENTS, first, N + 1)
+    assert [stretch.check for stretch in programme.stretches] == [None]
+    assert len(programme.checks) == len(suite)
+    wide: Any = SimpleNamespace(points=tuple(range(17)), rule=rule)
+    programme = programme_of([*([] for _ in range(N - 1)), [wide, *suite]], PARENTS, first, N + 1)
+    assert [stretch.check for stretch in programme.stretches] == [wide, None]
+    assert programme.checks[:, 6].tolist() == list(range(1, len(suite) + 1))
 
 
 @pytest.mark.parametrize("own", [False, True], ids=["one length", "a length a frame"])

@@ -9,6 +9,7 @@ import pytest
 from posekit.body import load_figure
 from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.skeleton import DOFS, JOINT, SIDES
+from posekit.tree import screened
 from posekit.validators import Ranges, joint_range, load_ranges
 from posekit.validators.anatomical import Anatomy, Coupling
 from posekit.validators.anatomical_checks import AnatomicalLimb
@@ -78,7 +79,7 @@ def compare(check: AnatomicalLimb, points: np.ndarray) -> tuple[np.ndarray, np.n
     """Return what the screen says of postures, and what the judge; where the screen is sure they are the same."""
     own = np.ascontiguousarray(points[:, check.points])
     with np.errstate(invalid="ignore"):
-        places, presumed = check.screen(own)
+        places, presumed = screened(check.rule, own)
         violated = check.judge(own).violated
     first = np.where(violated.any(axis=1), violated.argmax(axis=1), PASSED)
     assert presumed is None
@@ -171,4 +172,4 @@ def test_what_cannot_be_judged_passes_or_is_left_to_the_judge() -> None:
             if k < len(check.points) - 1 or len(check.limb) == 2:
                 assert places[0] == PASSED
             assert (places[1:3] == UNSURE).all()
-        assert check.screen(np.empty((0, len(check.points), 3)))[0].shape == (0,)
+        assert screened(check.rule, np.empty((0, len(check.points), 3)))[0].shape == (0,)

@@ -69,12 +69,12 @@ class FigureConfigurations:
             tolerance=self.angle_tolerance if limits else None,
         )
         named = quick.renamed(self._under_its_names)
-        of_points = [check for check in self.suite if check.name == "walking" or self._projects(check)]
+        of_points = [check for check in self.suite if not check.of_configuration]
         if not of_points:
             return checked, named
         found = {one.check: one for one in judge(of_points, self.figure.forward_kinematics(checked))}
         found |= {one.check: one for one in named}
-        order = [name.replace("-", "_") for name in self.checks]
+        order = dict.fromkeys(check.name for check in self.suite)
         return checked, [found[name] for name in order if name in found]
 
     @cached_property
@@ -96,9 +96,6 @@ class FigureConfigurations:
     def collision(self) -> SelfCollision:
         """What judges collisions."""
         return SelfCollision(subject=self.subject, contact_margin=self.contact_margin)
-
-    def _projects(self, check: Check) -> bool:
-        return check.name == "joint_range" and self._of_postures
 
     @property
     def _of_postures(self) -> bool:

@@ -21,8 +21,9 @@ from posekit.errors import InputError
 from posekit.geometry import Array, rotate_back
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, JOINTS
-from posekit.tree import Check, Findings
-from posekit.validators import PHYSICAL, Ranges, make_checks
+from posekit.tree import Check, Findings, Place, Scope
+from posekit.validators import PHYSICAL, AnyCheck, CheckOptions, Ranges, make_checks
+from posekit.validators.options import LEVEL_CAMERA_UP
 
 MIDDLES = ("mid_shoulders", "mid_hips")
 SHOULDERS = ("right_shoulder", "left_shoulder")
@@ -109,7 +110,7 @@ class Completion:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Completed:
+class Completed(Check):
     """A check of posekit's joints, asked about Taylor's human: the joints that it lacks are completed first.
 
     Parameters
@@ -132,9 +133,14 @@ class Completed:
         return self.check.name
 
     @property
-    def where(self) -> tuple[str, ...]:
+    def places(self) -> tuple[Place, ...]:
         """The places it judges."""
-        return self.check.where
+        return self.check.places
+
+    @property
+    def rigid(self) -> bool:
+        """Whether it judges rigid parts."""
+        return self.check.rigid
 
     @property
     def unit(self) -> str:
@@ -148,7 +154,7 @@ class Completed:
 
 def joint_checks(
     figure: Figure,
-    names: Iterable[str] = PHYSICAL,
+    names: Iterable[AnyCheck] = PHYSICAL,
     *,
     ranges: Ranges,
     tolerance: Tolerance = MEASURED_TOLERANCE,
@@ -163,8 +169,8 @@ def joint_checks(
     Parameters
     ----------
     figure : Figure
-    names : iterable of str
-        Some of ``rigid-parts``, ``joint-range``, ``collision``.
+    names : iterable of str, Check or CheckSettings
+        Some of ``rigid-parts``, ``joint-range``, ``collision``, and others that do not judge motion.
     ranges : Ranges
     tolerance : Tolerance
         Its `rigid` and `angle` count.
@@ -176,28 +182,28 @@ def joint_checks(
     InputError
         Where a check is unknown, or is the walking model, which reads motion from a calibrated camera.
     """
-    names = tuple(names)
-    if "walking" in names:
-        raise InputError(
-            f"--checks: walking needs a head and a calibrated camera; expected some of {', '.join(PHYSICAL)}"
-        )
-    checks = make_checks(
-        figure,
-        names,
+    options = CheckOptions(
         ranges=ranges,
         rigid_tolerance=tolerance.rigid,
         rigid_mode="distances",
         limbs=True,
         angle_tolerance=tolerance.angle,
         contact_margin=contact_margin,
+        up=LEVEL_CAMERA_UP,
     )
+    checks = make_checks(figure, names, options)
+    motion = next((check.name for check in checks if check.scope is Scope.MOTION), "")
+    if motion:
+        raise InputError(
+            f"--checks: {motion} needs a head and a calibrated camera; expected some of {', '.join(PHYSICAL)}"
+        )
     return [check for check in checks if max(check.points) < len(JOINTS) and not _is_limb(check)]
 
 
 def taylor_checks(
     figure: Figure,
     points: Sequence[str],
-    names: Iterable[str] = PHYSICAL,
+    names: Iterable[AnyCheck] = PHYSICAL,
     *,
     ranges: Ranges,
     tolerance: Tolerance = MEASURED_TOLERANCE,
@@ -225,4 +231,4 @@ _TRUNK = tuple(
 
 def _is_limb(check: Check) -> bool:
     """Tell whether a check of rigid parts judges a limb's own segment."""
-    return check.name == "rigid_parts" and not set(check.points) <= set(_TRUNK)
+    return check.rigid and not set(check.points) <= set(_TRUNK)
