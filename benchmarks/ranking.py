@@ -27,6 +27,7 @@ from posekit.formats.own import OpenCVModel
 from posekit.ranking import (
     Prior,
     Ranking,
+    RankingEvidence,
     Up,
     deviation_of_tolerance,
     fit_weights,
@@ -55,14 +56,16 @@ class How:
     def rank(self, clip: Clip, prior: Prior) -> Ranking:
         up = {"known": Up(direction=clip.up), "level": Up.level(), "none": None}[self.up]
         ranking = rank(
-            clip.joints,
-            clip.lengths,
-            frame=clip.frame,
-            length_residual=clip.length_residual,
-            chi2=clip.chi2,
-            deviation=clip.deviation,
-            up=up,
-            depth=clip.depth,
+            RankingEvidence.of(
+                clip.joints,
+                clip.lengths,
+                frame=clip.frame,
+                length_residual=clip.length_residual,
+                chi2=clip.chi2,
+                deviation=clip.deviation,
+                up=up,
+                depth=clip.depth,
+            ),
             extra={"plausibility": clip.plausibility} if self.extra else None,
             prior=prior,
         )
@@ -323,11 +326,13 @@ def trial(folder: Path) -> None:
                     first = int(rank_by_fit(frame.joints, frame.length_residual, recovery.figure.lengths)[0])
                 else:
                     ranking = rank(
-                        frame.joints,
-                        recovery.figure.lengths,
-                        length_residual=frame.length_residual,
-                        deviation=deviation_of_tolerance(tolerance),
-                        up=up or None,  # type: ignore[arg-type]
+                        RankingEvidence.of(
+                            frame.joints,
+                            recovery.figure.lengths,
+                            length_residual=frame.length_residual,
+                            deviation=deviation_of_tolerance(tolerance),
+                            up=up or None,  # type: ignore[arg-type]
+                        )
                     )
                     first = int(ranking.order[0])
                 found[name].append(tuple(error[first]))

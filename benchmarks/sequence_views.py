@@ -12,7 +12,7 @@ from posekit.body import Figure
 from posekit.errors import PosekitError
 from posekit.following import SurvivorFrame
 from posekit.formats.own import OpenCVModel, View
-from posekit.ranking import Prior, Up, fit_prior, load_prior, rank
+from posekit.ranking import Prior, RankingEvidence, Up, fit_prior, load_prior, rank
 from posekit.recovery import recover
 from posekit.refinement import (
     ObservedFrames,
@@ -24,7 +24,7 @@ from posekit.refinement import (
     under_noise,
 )
 from posekit.skeleton import JOINTS, PARENTS, SEGMENT_NAMES, SEGMENTS
-from posekit.synthesis import Capture, SyntheticScene, Walker, mocap_scene
+from posekit.synthesis import CameraPlacements, Capture, SyntheticScene, Walker, mocap_scene
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
@@ -62,8 +62,7 @@ def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> Syn
         walker.figure,
         sphere.camera,
         points,
-        np.broadcast_to(R, (frames, 3, 3)),
-        np.broadcast_to(position, (frames, 3)),
+        CameraPlacements(np.broadcast_to(R, (frames, 3, 3)), np.broadcast_to(position, (frames, 3))),
         time=at,
         size=sphere.size,
         labels=("synthetic walking",) * frames,
@@ -148,12 +147,14 @@ def exact(scene: SyntheticScene, *, rooted: bool = True) -> Recovered:
 
     def evidence(prior: Prior) -> np.ndarray:
         return rank(
-            joints,
-            scene.figure.lengths,
-            frame=index,
-            length_residual=np.concatenate([frame.length_residual for frame in found]),
-            deviation=0.001 if rooted else 0.012,
-            up=Up.level(),
+            RankingEvidence.of(
+                joints,
+                scene.figure.lengths,
+                frame=index,
+                length_residual=np.concatenate([frame.length_residual for frame in found]),
+                deviation=0.001 if rooted else 0.012,
+                up=Up.level(),
+            ),
             prior=prior,
         ).probability
 
@@ -214,7 +215,9 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     spread = kept.deviation
 
     def evidence(prior: Prior) -> np.ndarray:
-        return rank(kept.joints, frame=kept.frame, chi2=kept.chi2, up=Up.level(), prior=prior).probability
+        return rank(
+            RankingEvidence.of(kept.joints, frame=kept.frame, chi2=kept.chi2, up=Up.level()), prior=prior
+        ).probability
 
     frames = [
         SurvivorFrame(time=float(at), joints=kept.joints[kept.frame == k], deviation=spread[kept.frame == k])

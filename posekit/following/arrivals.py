@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.compiled.compiling import is_fast
 from posekit.following import fast, plain
 from posekit.following.beam import Beam
-from posekit.following.channels import Channels
+from posekit.following.channels import NextSurvivors
 from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
-from posekit.geometry import Array
 
 PAIRS_PER_TREE_GROWN: Final = 2500
 """Pairs of an end and a survivor that take as long, without compiled loops, as growing a frame's tree does."""
@@ -22,10 +20,7 @@ PAIRS_PER_TREE_GROWN: Final = 2500
 
 def arrivals(
     states: States,
-    channels: Channels,
-    time: float,
-    own: Array,
-    new: NDArray[np.bool_],
+    to: NextSurvivors,
     *,
     model: MotionModel,
     beam: Beam,
@@ -37,25 +32,21 @@ def arrivals(
     Parameters
     ----------
     states : States
-    channels : Channels
-        N survivors.
-    time : float
-        Seconds.
-    own : array (N,)
-        What each costs itself; finite.
-    new : bool array (N,)
-        Those that make a path fresh.
+        The ends of the paths so far.
+    to : NextSurvivors
+        The survivors of the frame.
     model : MotionModel
+        What steps and turns cost.
     beam : Beam
-        What of it is kept.
+        What of the arrivals is kept.
     """
-    floors = Floors.of(states, channels, time, own, model)
-    least = 0 if floors.moving else len(own)
-    find = fast.find if is_fast(len(states) * len(own) // PAIRS_PER_TREE_GROWN) else plain.find
+    floors = Floors.of(states, to, model)
+    # As long as no end has a velocity, all survivors are followed: the first steps say too little to choose.
+    least = 0 if floors.moving else len(to)
+    find = fast.find if is_fast(len(states) * len(to) // PAIRS_PER_TREE_GROWN) else plain.find
     width = max(beam.width, least)
-    found = find(states, channels, time, own, new, floors, model=model, beam=beam, width=width)
-    came, went, cost, dropped = found
+    came, went, cost, dropped = find(states, to, floors, model=model, beam=beam, width=width)
     order = np.lexsort((went, came))
     came, went, cost = came[order], went[order], cost[order]
-    kept, lost = beam.keep(cost, states.fresh[came] | new[went], least=least)
+    kept, lost = beam.keep(cost, states.fresh[came] | to.fresh[went], least=least)
     return Arrivals(came[kept], went[kept], cost[kept], min(dropped, lost))

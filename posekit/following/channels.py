@@ -29,6 +29,7 @@ class Channels:
     variance : array (27, N)
         In each coordinate: square metres, then square radians.
     known : bool array (27, N)
+        Whether the posture has the joint, or both ends of the segment.
     """
 
     value: Array
@@ -47,6 +48,32 @@ class Channels:
             variance=self.variance.take(rows, axis=1),
             known=self.known.take(rows, axis=1),
         )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NextSurvivors:
+    """The N survivors of a frame that paths may go on to.
+
+    Parameters
+    ----------
+    channels : Channels
+        Where their joints are and where their segments point.
+    time : float
+        When, seconds.
+    cost : array (N,)
+        What each costs itself; finite.
+    fresh : bool array (N,)
+        Those that no better path uses: a path through one of them is a fresh one.
+    """
+
+    channels: Channels
+    time: float
+    cost: Array
+    fresh: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return len(self.cost)
 
 
 def directions(joints: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from posekit.compiled import path_kernels as kernels
 from posekit.compiled.compiling import compiled
 from posekit.following.beam import Beam
-from posekit.following.channels import Channels
+from posekit.following.channels import NextSurvivors
 from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
@@ -28,10 +28,7 @@ CHANNEL_RANKS: Final = np.argsort(CHANNEL_ORDER)
 
 def find(
     states: States,
-    channels: Channels,
-    time: float,
-    own: Array,
-    new: NDArray[np.bool_],
+    to: NextSurvivors,
     floors: Floors,
     *,
     model: MotionModel,
@@ -40,12 +37,13 @@ def find(
 ) -> Arrivals:
     """Find the cheapest way from each last survivor to each new one; see `posekit.following.plain.find`."""
     loops: Any = compiled(kernels)
+    channels = to.channels
     order = np.lexsort((states.cost + floors.turns, states.group))
     group = states.group[order]
     first = np.flatnonzero(np.diff(group, prepend=group[0] - 1))
     floor = np.minimum.reduceat(floors.ends[order], first)
     ahead = np.argsort(floors.to, kind="stable")
-    since = time - states.time
+    since = to.time - states.time
     since = np.where(np.isfinite(since), since, np.inf)
     give = [model.spread * np.sqrt(each.variance) for each in (states, channels)]
     ends = _laid(
@@ -80,10 +78,10 @@ def find(
         ends,
         heading,
         survivors,
-        own[ahead],
+        to.cost[ahead],
         floors.to[ahead],
         floors.to_turns[ahead],
-        new[ahead],
+        to.fresh[ahead],
         CHANNEL_RANKS[joints],
         _narrowness(model.usual),
         _narrowness(model.at_rest),

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.following.channels import N_JOINTS, Channels
+from posekit.following.channels import N_JOINTS, NextSurvivors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import Heading, States
 from posekit.geometry import Array
@@ -32,6 +32,7 @@ class Arrivals(NamedTuple):
     went : int array (A,)
         The new survivor.
     cost : array (A,)
+        Of the path with that survivor.
     dropped : float
         No more than the cheapest of those that were left out; infinite if none were.
     """
@@ -73,12 +74,13 @@ class Floors:
     to_turns: Array
 
     @staticmethod
-    def of(states: States, channels: Channels, time: float, own: Array, model: MotionModel) -> Floors:
-        """Compute the floors of going from the ends of paths to survivors that cost `own` (N,) themselves."""
+    def of(states: States, survivors: NextSurvivors, model: MotionModel) -> Floors:
+        """Compute the floors of going from the ends of paths to the survivors of a frame."""
+        channels, time = survivors.channels, survivors.time
         moving = bool(np.isfinite(states.interval).any())
         heading = states.heading(time)
-        ends, to = np.zeros(len(states)), np.zeros(len(own))
-        turns, to_turns = np.zeros(len(states)), np.zeros(len(own))
+        ends, to = np.zeros(len(states)), np.zeros(len(survivors))
+        turns, to_turns = np.zeros(len(states)), np.zeros(len(survivors))
         if channels.variance.any() or states.variance.any():
             since = time - states.time
             known = np.asarray(np.isfinite(since))
@@ -100,7 +102,7 @@ class Floors:
             ends=states.cost + ends + turns,
             turns=turns,
             heading=heading,
-            to=own + to + to_turns,
+            to=survivors.cost + to + to_turns,
             to_turns=to_turns,
         )
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.compiled.path_kernels import TIGHT
 from posekit.following.beam import Beam
-from posekit.following.channels import N_CHANNELS, Channels
+from posekit.following.channels import N_CHANNELS, NextSurvivors
 from posekit.following.floors import Arrivals, Floors
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
@@ -25,10 +25,7 @@ N_PROBED_ENDS: Final = 8
 
 def find(
     states: States,
-    channels: Channels,
-    time: float,
-    own: Array,
-    new: NDArray[np.bool_],
+    to: NextSurvivors,
     floors: Floors,
     *,
     model: MotionModel,
@@ -37,14 +34,28 @@ def find(
 ) -> Arrivals:
     """Find the cheapest way from each last survivor to each new one.
 
-    Parameters are those of `posekit.following.arrivals.arrivals`; of paths of either kind, fresh or not, at least the
-    `width` cheapest are among those found, if they are within the beam's slack.
+    Of paths of either kind, fresh or not, at least the `width` cheapest are among those found, if they are within the
+    beam's slack.
+
+    Parameters
+    ----------
+    states : States
+        The ends of the paths so far.
+    to : NextSurvivors
+        The survivors of the frame.
+    floors : Floors
+        What each way costs at least.
+    model : MotionModel
+        What steps and turns cost.
+    beam : Beam
+        Its slack is how much dearer than the cheapest a way may be.
+    width : int
+        How many ways of each kind are found at least.
     """
-    target = Target.of(channels, time)
-    search = _ArrivalSearch(target, own, new, floors, model, beam, width)
+    search = _ArrivalSearch(to, floors, model, beam, width)
     groups = _groups(states, floors)
     sizes = np.cumsum([0, *(len(group) for group in groups)])
-    for start, end in _blocks(sizes, max(1, MAX_BLOCK_NUMBERS // (N_CHANNELS * len(own)))):
+    for start, end in _blocks(sizes, max(1, MAX_BLOCK_NUMBERS // (N_CHANNELS * len(to)))):
         rows = np.concatenate(groups[start:end])
         begins = sizes[start:end] - sizes[start]
         search.add(states.take(rows), rows, begins)
@@ -56,15 +67,14 @@ class _ArrivalSearch:
 
     def __init__(
         self,
-        target: Target,
-        own: Array,
-        new: NDArray[np.bool_],
+        to: NextSurvivors,
         floors: Floors,
         model: MotionModel,
         beam: Beam,
         width: int,
     ) -> None:
-        self.target, self.own, self.new, self.floors = target, own, new, floors
+        self.target, self.own, self.new = Target.of(to.channels, to.time), to.cost, to.fresh
+        self.floors = floors
         self.model, self.slack, self.width = model, beam.slack, width
         self.most = np.full(2, np.inf)
         self.dropped = np.inf

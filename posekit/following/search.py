@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.following.arrivals import arrivals
 from posekit.following.beam import Beam
-from posekit.following.channels import N_JOINTS, Channels, channels_of
+from posekit.following.channels import N_JOINTS, Channels, NextSurvivors, channels_of
 from posekit.following.frame import SurvivorFrame
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
@@ -78,9 +78,8 @@ def advance(
     if len(usable) < len(frame):
         channels = channels.take(usable)
     new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
-    came, went, cost, left_out = arrivals(
-        states, channels, frame.time, own[usable], new, model=model, beam=beam
-    )
+    to = NextSurvivors(channels=channels, time=frame.time, cost=own[usable], fresh=new)
+    came, went, cost, left_out = arrivals(states, to, model=model, beam=beam)
     # Once a path has a velocity, the beam is no wider than it is said to be.
     seen = np.isfinite(states.time[:N_JOINTS]).any(axis=1) & channels.known[:N_JOINTS].any(axis=1)
     still = not (np.isfinite(states.interval).any() or (len(came) and seen.any()))

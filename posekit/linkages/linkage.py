@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypedDict, Unpack
 
 import numpy as np
 
@@ -21,12 +22,22 @@ class Midpoint:
     Parameters
     ----------
     name : str
+        Its own, as an image or a constraint names it.
     ends : tuple of int
         The segment's two ends, as indices into the linkage's points.
     """
 
     name: str
     ends: tuple[int, int]
+
+
+class AboutLinkage(TypedDict, total=False):
+    """What is said of a linkage as a whole; `Linkage` describes each."""
+
+    unit: float | None
+    height: float | None
+    urdf: str | None
+    source: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,6 +49,7 @@ class Linkage:
     Parameters
     ----------
     name : str
+        What messages and files call the object.
     points : tuple of str (P,)
         Names of the points that an image shows.
     segments : tuple of (int, int) (S,)
@@ -146,25 +158,28 @@ class Linkage:
         coplanar: Iterable[Sequence[str]] = (),
         perpendicular: Iterable[tuple[str, str]] = (),
         collinear: Iterable[Sequence[str]] = (),
-        unit: float | None = None,
-        height: float | None = None,
-        urdf: str | None = None,
-        source: str = "",
+        **about: Unpack[AboutLinkage],
     ) -> Linkage:
         """Make a linkage from names.
 
         Parameters
         ----------
+        name : str
+            What messages call it.
         segments : mapping
             Segment, as ``"a-b"`` or ``("a", "b")``, to its length.
         points : sequence of str, optional
             Their order; by default as the segments, given as pairs, name them.
         midpoints : mapping, optional
             Name of a midpoint to the ends of its segment.
-        coplanar, collinear : iterables of sequences of node names
-        perpendicular : iterable of pairs of segment names
-        name, unit, height, urdf, source
-            As `Linkage` has them.
+        coplanar : iterable of sequences of str
+            Groups of four or more nodes that lie in one plane, by name.
+        perpendicular : iterable of (str, str)
+            Pairs of segments at a right angle, by name.
+        collinear : iterable of sequences of str
+            Triples of nodes on one line, by name.
+        **about
+            Unit, height, URDF and source, as `Linkage` has them.
 
         Raises
         ------
@@ -206,10 +221,7 @@ class Linkage:
                 for a, b in perpendicular
             ),
             collinear=tuple(_triple(where, group, nodes) for group in collinear),
-            unit=unit,
-            height=height,
-            urdf=urdf,
-            source=source,
+            **about,
         )
 
 

@@ -79,12 +79,12 @@ def search(
 
     Examples
     --------
-    >>> from posekit.linkages import Linkage
+    >>> from posekit.linkages import Linkage, LinkageFamily
     >>> kite = Linkage.from_names(
     ...     name="kite", segments={("a", "b"): 3.0, ("b", "c"): 3.0, ("c", "d"): 5.0, ("d", "a"): 5.0}
     ... )
     >>> image = np.array([[0.0, 0.0], [120.0, 180.0], [330.0, 90.0], [200.0, -240.0]])
-    >>> found = search(Family(linkage=kite, image=image), {"closure": 1.0})
+    >>> found = search(LinkageFamily(linkage=kite, image=image), {"closure": 1.0})
     >>> found.n_flips
     8
     """

@@ -1,13 +1,14 @@
 """Which survivor, and how sure: a probability for each, from the image, a prior on postures, gravity and the ground.
 
-`rank` orders the survivors of many frames at once; `load_prior` reads the table that it uses, `fit_prior` and
-`fit_weights` make one.
+`rank` orders the survivors of many frames at once by their `RankingEvidence`; `load_prior` reads the table that it
+uses, `fit_prior` and `fit_weights` make one.
 """
 
 from posekit.ranking.centre_of_mass import centre_of_mass as centre_of_mass
 from posekit.ranking.depth import Depth as Depth
 from posekit.ranking.deviation import deviation_of_noise as deviation_of_noise
 from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
+from posekit.ranking.evidence import RankingEvidence as RankingEvidence
 from posekit.ranking.fitting import fit_prior as fit_prior
 from posekit.ranking.prior import TERM_NAMES as TERM_NAMES
 from posekit.ranking.prior import Prior as Prior
@@ -17,4 +18,4 @@ from posekit.ranking.rank import Term as Term
 from posekit.ranking.rank import rank as rank
 from posekit.ranking.ranking import Ranking as Ranking
 from posekit.ranking.upright import Up as Up
-from posekit.ranking.weighing import fit_weights as fit_weights
+from posekit.ranking.weights import fit_weights as fit_weights

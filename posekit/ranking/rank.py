@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Final, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.depth import Depth
-from posekit.ranking.given import RankingEvidence, numbers
-from posekit.ranking.judging import judge
+from posekit.ranking.evidence import RankingEvidence, numbers
+from posekit.ranking.log_terms import log_terms
 from posekit.ranking.prior import TERM_NAMES, Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.ranking import Ranking, softmax
-from posekit.ranking.upright import Up
 from posekit.safe_io import nearest
-
-DEFAULT_DEVIATION_METRES: Final = 0.012
-"""Metres by which survivors are off, where nobody says: 2 px at 4 m, or a torso that gives."""
 
 
 class Term(Protocol):
@@ -32,15 +27,8 @@ class Term(Protocol):
 
 
 def rank(
-    joints: ArrayLike,
-    lengths: Mapping[str, float] | None = None,
+    evidence: RankingEvidence,
     *,
-    frame: ArrayLike | None = None,
-    length_residual: ArrayLike | None = None,
-    chi2: ArrayLike | None = None,
-    deviation: ArrayLike = DEFAULT_DEVIATION_METRES,
-    up: Up | None = None,
-    depth: Depth | None = None,
     extra: Mapping[str, ArrayLike | Term] | None = None,
     without: Iterable[str] = (),
     prior: Prior | None = None,
@@ -58,22 +46,8 @@ def rank(
 
     Parameters
     ----------
-    joints : array (N, 14, 3)
-        Survivors, camera frame, metres; NaN where a joint is not known.
-    lengths : mapping, optional
-        The person's, by segment name, metres. Without them and `chi2` the image says nothing.
-    frame : int array (N,), optional
-        The frame of each survivor, from 0, in any order; without it all are of one frame.
-    length_residual : array (N,), optional
-        How much too short each survivor's worst segment was for its image, metres.
-    chi2 : array (N,), optional
-        Of a refinement: then the image's term is minus its half. NaN counts as the largest of its frame.
-    deviation : float or array (F,)
-        How far off survivors' joints are, metres (`deviation_of_noise`, `deviation_of_tolerance`): the deviation of
-        distances inside torso and hips, and what blurs the prior on postures.
-    up : Up, optional
-        Which way is up in the camera's frame. Without it gravity, balance and contact say nothing.
-    depth : Depth, optional
+    evidence : RankingEvidence
+        The survivors of any number of frames, and what is known of them: see `RankingEvidence.of`.
     extra : mapping, optional
         Terms from outside: a name to log-densities (N,), or to a function of the joints that returns them. Unknown ones
         (NaN) count as their frame's mean.
@@ -89,37 +63,39 @@ def rank(
     Raises
     ------
     InputError
-        Where a shape is wrong, a joint is infinite, or a name is unknown.
+        Where a term has a wrong shape or is infinite, or a name is unknown.
 
     Examples
     --------
     >>> import posekit
-    >>> from posekit.ranking import Up, rank
+    >>> from posekit.ranking import RankingEvidence, Up, rank
     >>> recovery = posekit.recover(posekit.builtin_view("seq1"))
     >>> frame = recovery.frames[0]
-    >>> ranking = rank(frame.joints, recovery.figure.lengths, length_residual=frame.length_residual, up=Up.level())
+    >>> evidence = RankingEvidence.of(
+    ...     frame.joints, recovery.figure.lengths, length_residual=frame.length_residual, up=Up.level()
+    ... )
+    >>> ranking = rank(evidence)
     >>> round(float(ranking.probability.sum()), 9), len(ranking.order) == len(frame)
     (1.0, True)
     """
-    given = RankingEvidence.checked(joints, lengths, frame, length_residual, chi2, deviation, up, depth)
     added = dict(extra or {})
     left_out = _left_out(without, added)
     prior = prior or load_prior()
-    terms = judge(given, [name for name in TERM_NAMES if name not in left_out], prior)
-    refined = given.chi2 is not None
+    terms = log_terms(evidence, [name for name in TERM_NAMES if name not in left_out], prior)
+    refined = evidence.chi2 is not None
     if refined and "image" in terms:
-        terms["image"] = _least_where_unknown(terms["image"], given.frame)
+        terms["image"] = _least_where_unknown(terms["image"], evidence.frame)
     for name in terms:
         terms[name] *= prior.weights["chi2" if refined and name == "image" else name]
     for name, term in added.items():
         if name not in left_out:
-            terms[name] = _added(name, term, given)
-    score = np.sum(list(terms.values()), axis=0) if terms else np.zeros(len(given.joints))
+            terms[name] = _added(name, term, evidence)
+    score = np.sum(list(terms.values()), axis=0) if terms else np.zeros(len(evidence.joints))
     return Ranking(
-        probability=softmax(score, given.frame),
-        frame=given.frame,
+        probability=softmax(score, evidence.frame),
+        frame=evidence.frame,
         terms=terms,
-        up="" if up is None else up.says,
+        up="" if evidence.up is None else evidence.up.says,
     )
 
 
@@ -134,15 +110,15 @@ def _left_out(without: Iterable[str], added: Mapping[str, object]) -> set[str]:
     return names
 
 
-def _added(name: str, term: ArrayLike | Term, given: RankingEvidence) -> Array:
+def _added(name: str, term: ArrayLike | Term, evidence: RankingEvidence) -> Array:
     """Return a term from outside, with its frame's mean where it is not known; 0 where none of its frame is."""
-    values = numbers(name, term(given.joints) if callable(term) else term, (len(given.joints),))
+    values = numbers(name, term(evidence.joints) if callable(term) else term, (len(evidence.joints),))
     if (values == np.inf).any():
         raise InputError(f"{name}: an infinite log-density; expected numbers, minus infinity or NaN")
     known = np.isfinite(values)
-    count = np.bincount(given.frame[known], minlength=len(given.deviation))
-    total = np.bincount(given.frame[known], weights=values[known], minlength=len(given.deviation))
-    return np.where(np.isnan(values), (total / np.maximum(count, 1))[given.frame], values)
+    count = np.bincount(evidence.frame[known], minlength=len(evidence.deviation))
+    total = np.bincount(evidence.frame[known], weights=values[known], minlength=len(evidence.deviation))
+    return np.where(np.isnan(values), (total / np.maximum(count, 1))[evidence.frame], values)
 
 
 def _least_where_unknown(values: Array, frame: NDArray[np.intp]) -> Array:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.formats.own import Result
 from posekit.geometry import Array
-from posekit.ranking import Ranking, Up, deviation_of_tolerance, rank
+from posekit.ranking import Ranking, RankingEvidence, Up, deviation_of_tolerance, rank
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
 
 
@@ -80,13 +80,15 @@ def _rank(
     deviation: Array,
 ) -> Ranking:
     return rank(
-        joints,
-        lengths,
-        frame=frame,
-        length_residual=length_residual,
-        chi2=chi2,
-        deviation=deviation,
-        up=Up.level(),
+        RankingEvidence.of(
+            joints,
+            lengths,
+            frame=frame,
+            length_residual=length_residual,
+            chi2=chi2,
+            deviation=deviation,
+            up=Up.level(),
+        )
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -39,41 +41,53 @@ def fit_limbs(
     and the next step does not promise to halve it. Only those that are `used` (4, M) are looked at.
     """
     n = chains.start.shape[2]
-    damping = np.full((4, n), INITIAL_DAMPING)
-    watch = np.zeros((4, 4, n), dtype=np.int8)
+    search = _LimbSearch(
+        problem=problem,
+        chains=chains,
+        chi2=chi2,
+        used=used,
+        damping=np.full((4, n), INITIAL_DAMPING),
+        watch=np.zeros((4, 4, n), dtype=np.int8),
+        precision=precision,
+        hopeless=hopeless,
+    )
     rows = np.flatnonzero((used & (chi2 > precision)).any(axis=0))
     for _ in range(steps):
         left: list[NDArray[np.intp]] = []
         for at in range(0, len(rows), BLOCK_POSTURES):
             part = rows[at : at + BLOCK_POSTURES]
-            going = _advance(problem, chains, chi2, used, damping, watch, part, precision, hopeless)
-            left.append(part[going])
+            left.append(part[_advance(search, part)])
         rows = np.concatenate(left) if left else rows[:0]
         if not rows.size:
             break
 
 
-def _advance(
-    problem: RefinementProblem,
-    chains: Chains,
-    chi2: Array,
-    used: NDArray[np.bool_],
-    damping: Array,
-    watch: NDArray[np.int8],
-    rows: NDArray[np.intp],
-    precision: float,
-    hopeless: float,
-) -> NDArray[np.bool_]:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _LimbSearch:
+    """The limbs (4, M) of a search, and how far it has come: arrays are changed in place."""
+
+    problem: RefinementProblem
+    chains: Chains
+    chi2: Array
+    used: NDArray[np.bool_]
+    damping: Array
+    watch: NDArray[np.int8]
+    precision: float
+    hopeless: float
+
+
+def _advance(search: _LimbSearch, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Take a step with the limbs of some columns, in place; return which columns have limbs that are not done."""
-    problem = problem.take(rows)
+    chains, chi2, used, damping, watch = search.chains, search.chi2, search.used, search.damping, search.watch
+    problem = search.problem.take(rows)
     now, watched, value, damped = chains.take(rows), watch[..., rows], chi2[:, rows], damping[:, rows]
     terms = limb_terms(problem, now, watched if watched.any() else None)
     block = eliminate(terms.matrix, terms.coupling[:, :0], terms.gradient, damped, DIAGONAL_FLOOR)
     step = -backward(block.factor, block.right[:, -1].copy())
     gain = (block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0) - terms.slack
     watching = (watched != 0).any(axis=0)
-    done = (damped > MAX_DAMPING) | ((gain <= precision) & ((damped <= LIGHT_DAMPING) | watching))
-    done |= (value > hopeless) & (gain < 0.5 * value) & ~watching
+    done = (damped > MAX_DAMPING) | ((gain <= search.precision) & ((damped <= LIGHT_DAMPING) | watching))
+    done |= (value > search.hopeless) & (gain < 0.5 * value) & ~watching
     done |= ~used[:, rows]
     if done.all():
         return np.zeros(len(rows), dtype=np.bool_)

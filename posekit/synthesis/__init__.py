@@ -3,6 +3,7 @@
 Each is a `SyntheticScene`: a figure, a camera, every point in the camera's frame and where it is seen.
 """
 
+from posekit.synthesis.camera_sphere import CameraPlacements as CameraPlacements
 from posekit.synthesis.camera_sphere import CameraSphere as CameraSphere
 from posekit.synthesis.capture import Capture as Capture
 from posekit.synthesis.capture_file import read_capture as read_capture

@@ -11,7 +11,7 @@ from posekit.body import Figure, load_figure
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
-from posekit.synthesis.camera_sphere import CameraSphere
+from posekit.synthesis.camera_sphere import CameraPlacements, CameraSphere
 from posekit.synthesis.capture import Capture
 from posekit.synthesis.observe import observe
 from posekit.synthesis.scene import SyntheticScene
@@ -97,8 +97,10 @@ def mocap_scene(
         (figure or load_figure()).scaled(clip_lengths(points)),
         sphere.camera,
         points,
-        np.broadcast_to(R, (len(rows), 3, 3)),
-        np.broadcast_to(centre, (len(rows), 3)),
+        CameraPlacements(
+            R_cam_world=np.broadcast_to(R, (len(rows), 3, 3)),
+            position=np.broadcast_to(centre, (len(rows), 3)),
+        ),
         time=(capture.order[rows] - capture.order[rows[0]]) / capture.fps[index],
         size=sphere.size,
         labels=(capture.actions[index],) * len(rows),
@@ -150,14 +152,13 @@ def mocap_scenes(
             continue
         rows = _spread(capture, index, frames, share, None)
         points = capture.points[rows]
-        placement = sphere.place(points, capture.up, rng)
+        placements = sphere.place(points, capture.up, rng)
         scenes.append(
             observe(
                 figure.scaled(clip_lengths(capture.points[frames])),
                 sphere.camera,
                 points,
-                placement.R_cam_world,
-                placement.position,
+                placements,
                 time=capture.order[rows] / capture.fps[index],
                 size=sphere.size,
                 labels=(capture.actions[index],) * share,

@@ -9,6 +9,7 @@ from posekit.body.frames import torso_frame
 from posekit.cameras import PinholeCamera
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.skeleton import JOINTS, TORSO
+from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import to_camera
 
@@ -17,12 +18,10 @@ def observe(
     figure: Figure,
     camera: PinholeCamera,
     points: Array,
-    R_cam_world: Array,
-    position: Array,
+    placements: CameraPlacements,
     *,
     q: Array | None = None,
     time: Array | None = None,
-    lee_chen_f: float | None = None,
     size: tuple[int, int] | None = None,
     labels: tuple[str, ...] = (),
 ) -> SyntheticScene:
@@ -30,18 +29,28 @@ def observe(
 
     Parameters
     ----------
+    figure : Figure
+        The person that is seen.
+    camera : PinholeCamera
+        One for all frames.
     points : array (F, 19, 3)
         World frame, metres; NaN where absent.
-    R_cam_world : array (F, 3, 3)
-    position : array (F, 3)
-        Optical centres, world frame, metres.
+    placements : CameraPlacements
+        Where each frame's camera stands (F).
     q : array (F, nq), optional
         Configurations in the world frame: only the torso's pose changes with the frame.
+    time : array (F,), optional
+        Seconds; without it frames are counted from 0.
+    size : (int, int), optional
+        Width and height of the picture, pixels.
+    labels : tuple of str, optional
+        A word on each frame, such as the action of a clip.
 
     Returns
     -------
     SyntheticScene
     """
+    R_cam_world, position = placements
     points_cam = to_camera(points, R_cam_world, position)
     if q is None:
         q_cam = np.full((len(points), figure.model.nq), np.nan)
@@ -57,7 +66,6 @@ def observe(
         q=q_cam,
         R_cam_world=R_cam_world,
         t_cam_world=-np.einsum("fij,fj->fi", R_cam_world, position),
-        lee_chen_f=lee_chen_f,
         size=size,
         labels=labels,
     )

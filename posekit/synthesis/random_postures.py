@@ -89,7 +89,5 @@ def random_views(
     sphere = sphere or CameraSphere()
     q = random_postures(figure, n, rng)
     points = figure.forward_kinematics(q)
-    placement = sphere.place(points, UP_TORSO, rng)
-    return observe(
-        figure, sphere.camera, points, placement.R_cam_world, placement.position, q=q, size=sphere.size
-    )
+    placements = sphere.place(points, UP_TORSO, rng)
+    return observe(figure, sphere.camera, points, placements, q=q, size=sphere.size)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.cameras import lee_chen
 from posekit.errors import InputError
+from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.observe import observe
 from posekit.synthesis.scene import SyntheticScene
 from posekit.synthesis.viewpoints import look_at
@@ -94,16 +96,13 @@ def walker_scene(
     q = walker.configurations(walker.phase(time, phase0))
     if not carried:
         q[:, :3] += walker.travel(time, phase0)
-    return observe(
-        walker.figure,
-        pinhole,
-        walker.figure.forward_kinematics(q),
-        np.broadcast_to(R, (frames, 3, 3)),
-        np.broadcast_to(position - f * R[2], (frames, 3)),
-        q=q,
-        time=time,
-        lee_chen_f=f,
+    # The paper's camera is at the middle of the image plane, one focal length in front of the optical centre.
+    placements = CameraPlacements(
+        R_cam_world=np.broadcast_to(R, (frames, 3, 3)),
+        position=np.broadcast_to(position - f * R[2], (frames, 3)),
     )
+    points = walker.figure.forward_kinematics(q)
+    return replace(observe(walker.figure, pinhole, points, placements, q=q, time=time), lee_chen_f=f)
 
 
 def seq1(*, velocity: float = SEQ_VELOCITY, phase0: float = SEQ1_PHASE0) -> SyntheticScene:

@@ -23,7 +23,7 @@ from posekit.following.smoothing import rts
 from posekit.formats.own import OpenCVModel, View
 from posekit.recovery import recover
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
-from posekit.synthesis import Walker, walker_scene
+from posekit.synthesis import CameraPlacements, Walker, walker_scene
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
@@ -333,7 +333,11 @@ def recovered(yaw, scale=1.0, frames=30):
     position = middle + 4 * np.array([math.cos(math.radians(yaw)), 0.05, math.sin(math.radians(yaw))])
     R = np.broadcast_to(look_at(position, middle, np.array([0.0, 1.0, 0.0])), (frames, 3, 3))
     scene = observe(
-        walker.figure, sphere.camera, points, R, np.broadcast_to(position, (frames, 3)), time=time
+        walker.figure,
+        sphere.camera,
+        points,
+        CameraPlacements(R, np.broadcast_to(position, (frames, 3))),
+        time=time,
     )
     view = View(
         camera=OpenCVModel(K=scene.camera.K),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from posekit.compiled.compiling import path as loops
 from posekit.errors import InputError
 from posekit.following import Beam, MotionModel, SurvivorFrame, best_paths, bridge
-from posekit.following.channels import N_JOINTS, N_SEGMENTS, channels_of
+from posekit.following.channels import N_JOINTS, N_SEGMENTS, NextSurvivors, channels_of
 from posekit.following.floors import Floors
 from posekit.following.search import advance
 from posekit.following.states import States
@@ -490,7 +490,13 @@ def test_nothing_costs_less_than_its_floor(seed, noise, even):
         states, _ = advance(states, frame, model, ALL)
     states = states.take(np.flatnonzero(np.isfinite(states.interval).all(axis=0)))
     channels = channels_of(frames[2].joints, frames[2].deviation)
-    floors = Floors.of(states, channels, frames[2].time, frames[2].cost, model)
+    survivors = NextSurvivors(
+        channels=channels,
+        time=frames[2].time,
+        cost=frames[2].cost,
+        fresh=np.zeros(len(frames[2]), dtype=np.bool_),
+    )
+    floors = Floors.of(states, survivors, model)
     target = Target.of(channels, frames[2].time)
     turns = turn_costs(states, target, model)
     least = floors.turns[:, None] + floors.to_turns

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.geometry import Array
-from posekit.ranking import TERM_NAMES, Depth, Ranking, Up, load_prior, rank
+from posekit.ranking import TERM_NAMES, Depth, Ranking, RankingEvidence, Up, load_prior, rank
 from posekit.ranking.prior import WEIGHT_NAMES
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
@@ -41,12 +41,10 @@ def ups(seed: int = 4) -> Array:
 
 
 def ranked(joints: Array, frame: NDArray[np.intp], residual: Array, **given: object) -> Ranking:
-    options = {
-        "prior": PRIOR,
-        "up": Up(direction=ups()),
-        "deviation": np.linspace(0.006, 0.05, FRAMES),
-    } | given
-    return rank(joints, LENGTHS, frame=frame, length_residual=residual, **options)  # type: ignore[arg-type]
+    options = {"up": Up(direction=ups()), "deviation": np.linspace(0.006, 0.05, FRAMES)} | given
+    others = {name: options.pop(name) for name in ("prior", "extra", "without") if name in options}
+    evidence = RankingEvidence.of(joints, LENGTHS, frame=frame, length_residual=residual, **options)  # type: ignore[arg-type]
+    return rank(evidence, **({"prior": PRIOR} | others))  # type: ignore[arg-type]
 
 
 def test_probabilities_of_a_frame_sum_to_one() -> None:
@@ -82,11 +80,13 @@ def test_frames_are_ranked_by_themselves() -> None:
     for k in (0, FRAMES - 1):
         mine = frame == k
         alone = rank(
-            joints[mine],
-            LENGTHS,
-            length_residual=residual[mine],
-            up=Up(direction=ups()[k]),
-            deviation=np.linspace(0.006, 0.05, FRAMES)[k],
+            RankingEvidence.of(
+                joints[mine],
+                LENGTHS,
+                length_residual=residual[mine],
+                up=Up(direction=ups()[k]),
+                deviation=np.linspace(0.006, 0.05, FRAMES)[k],
+            ),
             prior=PRIOR,
         )
         np.testing.assert_allclose(alone.probability, together.probability[mine], rtol=1e-9)
@@ -152,7 +152,7 @@ def test_without_up_the_posture_is_judged_as_with_it() -> None:
 
 def test_without_anything_to_go_by_all_are_equal() -> None:
     joints, frame, _ = survivors()
-    ranking = rank(joints, frame=frame, without=TERM_NAMES)
+    ranking = rank(RankingEvidence.of(joints, frame=frame), without=TERM_NAMES)
     np.testing.assert_allclose(ranking.probability, 1.0 / np.bincount(frame)[frame], rtol=1e-12)
     assert not ranking.terms
 
@@ -186,11 +186,13 @@ def test_what_does_not_hang_on_an_unknown_joint_is_not_changed_by_it() -> None:
 def test_nothing_known_at_all_is_equal() -> None:
     joints = np.full((5, 14, 3), np.nan)
     ranking = rank(
-        joints,
-        LENGTHS,
-        length_residual=np.full(5, np.nan),
-        up=Up.level(),
-        depth=Depth(estimate=np.array([np.nan]), deviation=np.array([np.nan])),
+        RankingEvidence.of(
+            joints,
+            LENGTHS,
+            length_residual=np.full(5, np.nan),
+            up=Up.level(),
+            depth=Depth(estimate=np.array([np.nan]), deviation=np.array([np.nan])),
+        )
     )
     np.testing.assert_allclose(ranking.probability, 0.2, rtol=1e-12)
     assert all((values == 0).all() for values in ranking.terms.values())
@@ -221,7 +223,9 @@ def test_order_is_by_frame_and_probability() -> None:
 
 
 def test_no_survivors_at_all() -> None:
-    ranking = rank(np.empty((0, 14, 3)), LENGTHS, frame=np.empty(0, dtype=int), up=Up.level())
+    ranking = rank(
+        RankingEvidence.of(np.empty((0, 14, 3)), LENGTHS, frame=np.empty(0, dtype=int), up=Up.level())
+    )
     assert len(ranking) == 0
     assert len(ranking.probability) == 0
     assert ranking.first(2).tolist() == [-1, -1]
@@ -229,7 +233,9 @@ def test_no_survivors_at_all() -> None:
 
 def test_one_survivor_is_certain() -> None:
     joints, _, residual = survivors(1)
-    assert rank(joints, LENGTHS, length_residual=residual, up=Up.level()).probability.tolist() == [1.0]
+    assert rank(
+        RankingEvidence.of(joints, LENGTHS, length_residual=residual, up=Up.level())
+    ).probability.tolist() == [1.0]
 
 
 def test_results_are_read_only() -> None:

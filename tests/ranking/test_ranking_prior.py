@@ -16,6 +16,7 @@ from posekit.ranking import (
     TERM_NAMES,
     Prior,
     Ranking,
+    RankingEvidence,
     Up,
     fit_prior,
     fit_weights,
@@ -117,8 +118,8 @@ def test_its_own_postures_are_above_strangers() -> None:
     q[:, FIGURE.angle_index] *= 0.1
     calm = FIGURE.forward_kinematics(q)[:, :14]
     prior = fit_prior(calm[:200], UP)
-    inside = rank(calm[200:], prior=prior).terms["posture"]
-    outside = rank(near, prior=prior).terms["posture"]
+    inside = rank(RankingEvidence.of(calm[200:]), prior=prior).terms["posture"]
+    outside = rank(RankingEvidence.of(near), prior=prior).terms["posture"]
     assert np.median(inside) > np.quantile(outside, 0.99)
 
 
@@ -139,7 +140,9 @@ def test_a_prior_is_written_and_read_again(tmp_path: Path) -> None:
     assert again.weights == prior.weights
     assert again.balance.usual == pytest.approx(prior.balance.usual, rel=1e-3)
     joints = postures(100, 5)
-    here, there = (rank(joints, up=Up(direction=UP), prior=one).terms for one in (prior, again))
+    here, there = (
+        rank(RankingEvidence.of(joints, up=Up(direction=UP)), prior=one).terms for one in (prior, again)
+    )
     for name, values in here.items():
         np.testing.assert_allclose(there[name], values, rtol=0, atol=0.05)
     assert list(prior_lines(again)) == list(prior_lines(load_prior(path)))
@@ -164,10 +167,10 @@ def test_a_prior_need_not_have_all_directions(tmp_path: Path) -> None:
     prior = load_prior(path)
     joints = postures(3)
     joints[1] = joints[1] * [-1, 1, -1]  # upside down
-    ranking = rank(joints, up=Up(direction=UP), prior=prior)
+    ranking = rank(RankingEvidence.of(joints, up=Up(direction=UP)), prior=prior)
     assert (ranking.terms["posture"] == 0).all()
     assert np.ptp(ranking.terms["gravity"]) > 0
-    assert (rank(joints, prior=prior).terms["posture"] == 0).all()
+    assert (rank(RankingEvidence.of(joints), prior=prior).terms["posture"] == 0).all()
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking import (
     Depth,
+    RankingEvidence,
     Up,
     centre_of_mass,
     deviation_of_noise,
@@ -168,7 +169,7 @@ def test_between_the_feet_is_over_the_support() -> None:
 def test_gravity_prefers_who_stands_upright() -> None:
     turn = np.diag([1.0, -1.0, -1.0])
     both = np.stack([STANDING, STANDING @ turn.T])
-    ranking = rank(both, LENGTHS, up=Up(direction=UP))
+    ranking = rank(RankingEvidence.of(both, LENGTHS, up=Up(direction=UP)))
     assert ranking.terms["gravity"][0] > ranking.terms["gravity"][1] + 1
     assert ranking.terms["posture"][0] == pytest.approx(ranking.terms["posture"][1])
     assert ranking.probability[0] > 0.9
@@ -178,7 +179,11 @@ def test_a_less_certain_up_says_less() -> None:
     turn = np.diag([1.0, -1.0, -1.0])
     both = np.stack([STANDING, STANDING @ turn.T])
     gaps = [
-        float(np.ptp(rank(both, LENGTHS, up=Up(direction=UP, deviation=angle)).terms["gravity"]))
+        float(
+            np.ptp(
+                rank(RankingEvidence.of(both, LENGTHS, up=Up(direction=UP, deviation=angle))).terms["gravity"]
+            )
+        )
         for angle in (0.0, 20.0, 60.0)
     ]
     assert gaps[0] > gaps[1] > gaps[2] > 0
@@ -190,14 +195,16 @@ def test_the_prior_prefers_a_standing_person_to_broken_ones() -> None:
     for joint, wrong in (("right_ankle", 0.35), ("left_ankle", 0.35), ("right_wrist", -0.25)):
         backward[JOINT[joint], 0] += wrong
         backward[JOINT[joint], 2] += 0.2
-    ranking = rank(np.stack([STANDING, backward]), LENGTHS, without=["image"])
+    ranking = rank(RankingEvidence.of(np.stack([STANDING, backward]), LENGTHS), without=["image"])
     assert ranking.probability[0] > 0.8
 
 
 def test_the_posture_counts_less_the_farther_survivors_are_off() -> None:
     joints = random_joints(2)
     prior = load_prior()
-    exact, rough = (rank(joints, deviation=value).terms["posture"] for value in (0.0, 0.04))
+    exact, rough = (
+        rank(RankingEvidence.of(joints, deviation=value)).terms["posture"] for value in (0.0, 0.04)
+    )
     np.testing.assert_allclose(rough, exact / (1 + 0.04 / prior.temperature), rtol=1e-12)
 
 
@@ -205,11 +212,16 @@ def test_the_image_prefers_who_has_the_persons_lengths() -> None:
     stretched = STANDING.copy()
     stretched[JOINT["right_shoulder"], 1] -= 0.03
     both = np.stack([STANDING, stretched])
-    ranking = rank(both, LENGTHS, length_residual=np.zeros(2), without=["posture"])
+    ranking = rank(RankingEvidence.of(both, LENGTHS, length_residual=np.zeros(2)), without=["posture"])
     assert ranking.probability[0] > ranking.probability[1]
-    less = rank(both, LENGTHS, length_residual=np.zeros(2), deviation=0.1, without=["posture"])
+    less = rank(
+        RankingEvidence.of(both, LENGTHS, length_residual=np.zeros(2), deviation=0.1), without=["posture"]
+    )
     assert less.probability[0] < ranking.probability[0]
-    short = rank(np.stack([STANDING, STANDING]), LENGTHS, length_residual=[0.0, 0.02], without=["posture"])
+    short = rank(
+        RankingEvidence.of(np.stack([STANDING, STANDING]), LENGTHS, length_residual=[0.0, 0.02]),
+        without=["posture"],
+    )
     assert short.probability[0] > 0.6
 
 
@@ -217,7 +229,7 @@ def test_the_image_is_a_t_distribution_of_each_misfit() -> None:
     joints = random_joints(6) + np.random.default_rng(3).normal(scale=0.02, size=(6, 14, 3))
     residual = np.linspace(0, 0.05, 6)
     deviation = 0.02
-    ranking = rank(joints, LENGTHS, length_residual=residual, deviation=deviation)
+    ranking = rank(RankingEvidence.of(joints, LENGTHS, length_residual=residual, deviation=deviation))
     pairs = [
         ("right_shoulder", "left_shoulder"),
         ("right_shoulder", "pelvis"),
@@ -236,7 +248,8 @@ def test_the_image_is_a_t_distribution_of_each_misfit() -> None:
 def test_a_torso_is_no_more_rigid_than_torsos_are() -> None:
     joints = random_joints(3)
     one, other = (
-        rank(joints, LENGTHS, deviation=value).terms["image"] for value in (0.0, MIN_DEVIATION_METRES)
+        rank(RankingEvidence.of(joints, LENGTHS, deviation=value)).terms["image"]
+        for value in (0.0, MIN_DEVIATION_METRES)
     )
     np.testing.assert_allclose(one, other, rtol=0, atol=0)
 
@@ -244,28 +257,29 @@ def test_a_torso_is_no_more_rigid_than_torsos_are() -> None:
 def test_chi2_is_the_images_term_where_there_is_one() -> None:
     joints = random_joints(4)
     chi2 = np.array([1.0, 5.0, np.nan, np.inf])
-    ranking = rank(joints, LENGTHS, chi2=chi2, without=["posture"])
+    ranking = rank(RankingEvidence.of(joints, LENGTHS, chi2=chi2), without=["posture"])
     weight = load_prior().weights["chi2"]
     assert ranking.terms["image"][:2].tolist() == pytest.approx([-0.5 * weight, -2.5 * weight])
     assert ranking.terms["image"][2] == -np.inf  # as bad as the worst of its frame
     assert ranking.probability[2:].tolist() == [0, 0]
-    finite = rank(joints[:3], chi2=chi2[:3], without=["posture"])
+    finite = rank(RankingEvidence.of(joints[:3], chi2=chi2[:3]), without=["posture"])
     assert finite.terms["image"][2] == finite.terms["image"][1]
-    nothing = rank(joints[:2], chi2=np.full(2, np.nan), without=["posture"])
+    nothing = rank(RankingEvidence.of(joints[:2], chi2=np.full(2, np.nan)), without=["posture"])
     assert nothing.probability.tolist() == [0.5, 0.5]
-    hopeless = rank(joints[:2], chi2=np.full(2, np.inf), without=["posture"])
+    hopeless = rank(RankingEvidence.of(joints[:2], chi2=np.full(2, np.inf)), without=["posture"])
     assert hopeless.probability.tolist() == [0.5, 0.5]
 
 
 def test_depth_prefers_what_is_where_it_was_told_to_be() -> None:
     joints = STANDING + np.array([[[0.0, 0.0, z]] for z in (3.0, 3.2, 4.0)])
     depth = Depth(estimate=np.array([3.2]), deviation=np.array([0.1]))
-    ranking = rank(joints, depth=depth, without=["posture"])
+    ranking = rank(RankingEvidence.of(joints, depth=depth), without=["posture"])
     neck = joints[:, 0, 2]
     law = stats.t(df=4.0, loc=3.2, scale=0.1)
     wanted = law.logpdf(neck) + stats.t(df=4.0, scale=0.1).entropy()
     np.testing.assert_allclose(ranking.terms["depth"], load_prior().weights["depth"] * wanted, rtol=1e-9)
-    unknown = rank(joints, depth=Depth(estimate=[np.nan], deviation=[np.nan]), without=["posture"])  # type: ignore[arg-type]
+    unheard = Depth(estimate=np.array([np.nan]), deviation=np.array([np.nan]))
+    unknown = rank(RankingEvidence.of(joints, depth=unheard), without=["posture"])
     assert (unknown.terms["depth"] == 0).all()
 
 
@@ -273,14 +287,15 @@ def test_terms_from_outside() -> None:
     joints = random_joints(4)
     frame = np.array([0, 0, 1, 1])
     ranking = rank(
-        joints,
-        frame=frame,
+        RankingEvidence.of(joints, frame=frame),
         without=["posture"],
         extra={"mine": [0.0, np.log(3.0), np.nan, -2.0], "theirs": lambda postures: np.zeros(len(postures))},
     )
     assert ranking.probability.tolist() == pytest.approx([0.25, 0.75, 0.5, 0.5])
     assert set(ranking.terms) == {"mine", "theirs"}
-    less = rank(joints, frame=frame, without=["posture", "mine"], extra={"mine": np.zeros(4)})
+    less = rank(
+        RankingEvidence.of(joints, frame=frame), without=["posture", "mine"], extra={"mine": np.zeros(4)}
+    )
     assert not less.terms
 
 
@@ -288,7 +303,9 @@ def test_contact_prefers_feet_on_one_level() -> None:
     raised = STANDING.copy()
     raised[JOINT["left_ankle"], 2] += 0.2
     prior = replace(load_prior(), weights=dict.fromkeys(WEIGHT_NAMES, 2.0))
-    terms = rank(np.stack([STANDING, raised]), up=Up(direction=UP), prior=prior).terms["contact"]
+    terms = rank(RankingEvidence.of(np.stack([STANDING, raised]), up=Up(direction=UP)), prior=prior).terms[
+        "contact"
+    ]
     assert terms[0] == pytest.approx(2 * prior.contact.usual)
     assert terms[0] - terms[1] == pytest.approx(2 * np.log1p((0.2 / prior.contact.scale) ** 2))
 
@@ -357,8 +374,9 @@ def test_no_depth_is_refused(estimate: object, deviation: object) -> None:
 )
 def test_what_cannot_be_is_refused(given: dict[str, object], says: str) -> None:
     options: dict[str, object] = {"joints": np.zeros((2, 14, 3))} | given
+    others = {name: options.pop(name) for name in ("extra", "without", "prior") if name in options}
     with pytest.raises(InputError, match=says) as caught:
-        rank(**options)  # type: ignore[arg-type]
+        rank(RankingEvidence.of(**options), **others)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
 
 

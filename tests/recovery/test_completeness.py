@@ -18,7 +18,7 @@ from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
 from posekit.settings import EXACT_TOLERANCE
 from posekit.skeleton import DOFS, HEAD, PARENTS, SEGMENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import CameraSphere, SyntheticScene, random_postures, random_views
+from posekit.synthesis import CameraPlacements, CameraSphere, SyntheticScene, random_postures, random_views
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.tree import enumerate_leaves
@@ -256,7 +256,9 @@ def test_limits_met_exactly_and_straight_limbs_are_no_exception() -> None:
     direction = direction / np.linalg.norm(direction, axis=1, keepdims=True)
     target = points[np.arange(len(q)), rng.integers(0, 14, len(q))]
     position = target + 4.0 * direction
-    scene = observe(FIGURE, CameraSphere().camera, points, look_at(position, target, UP), position, q=q)
+    scene = observe(
+        FIGURE, CameraSphere().camera, points, CameraPlacements(look_at(position, target, UP), position), q=q
+    )
     chunk = recovered(scene)
     apart, exact = distance_to_truth(chunk), chunk.exact
     assert (apart < FOUND).all()
@@ -277,7 +279,7 @@ def square_on(off: float, count: int = 200) -> Chunk:
     side /= np.linalg.norm(side, axis=1, keepdims=True)
     position = end + 4.0 * (side * np.cos(off / length) + axis * np.sin(off / length))
     R = look_at(position, end, np.array([0.1, 0.2, 1.0]))
-    return recovered(observe(FIGURE, CameraSphere().camera, points, R, position))
+    return recovered(observe(FIGURE, CameraSphere().camera, points, CameraPlacements(R, position)))
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-9, 1e-6, 1e-5])

@@ -23,6 +23,7 @@ from posekit.synthesis import (
     random_views,
     walker_scene,
 )
+from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.views.builtin import builtin_view, view_of
@@ -147,7 +148,12 @@ def distorted_scene(count: int = 10) -> SyntheticScene:
         K=np.array([[900.0, 0.5, 640.0], [0, 910.0, 360.0], [0, 0, 1]]),
         distortion=np.array([-0.3, 0.1, 1e-3, -2e-3, 0.0]),
     )
-    return observe(FIGURE, camera, points, look_at(position, middle, np.array([0.0, 0.0, 1.0])), position)
+    return observe(
+        FIGURE,
+        camera,
+        points,
+        CameraPlacements(look_at(position, middle, np.array([0.0, 0.0, 1.0])), position),
+    )
 
 
 def test_a_distorted_opencv_view_is_recovered(truth_at) -> None:

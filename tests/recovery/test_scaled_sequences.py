@@ -13,7 +13,7 @@ from posekit.following import Paths, ScaleChoice
 from posekit.formats.own import OpenCVModel, View
 from posekit.recovery.scaled_sequences import SURE, follow_scaled
 from posekit.settings import EXACT_TOLERANCE
-from posekit.synthesis import Walker
+from posekit.synthesis import CameraPlacements, Walker
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
@@ -31,7 +31,13 @@ def view():
     middle = points.reshape(-1, 3).mean(axis=0)
     position = middle + np.array([2.0, 0.2, -3.5])
     R = np.broadcast_to(look_at(position, middle, np.array([0.0, 1.0, 0.0])), (4, 3, 3))
-    scene = observe(walker.figure, sphere.camera, points, R, np.broadcast_to(position, (4, 3)), time=time)
+    scene = observe(
+        walker.figure,
+        sphere.camera,
+        points,
+        CameraPlacements(R, np.broadcast_to(position, (4, 3))),
+        time=time,
+    )
     seen = scene.with_noise(1.0, np.random.default_rng(0))
     return View(
         camera=OpenCVModel(K=scene.camera.K),

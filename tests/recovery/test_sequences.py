@@ -14,7 +14,7 @@ from posekit.recovery.recovery import Recovery
 from posekit.recovery.sequences import follow, follow_frames, survivor_frames
 from posekit.settings.scale import parse_scale
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
-from posekit.synthesis import Walker, walker_scene
+from posekit.synthesis import CameraPlacements, Walker, walker_scene
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
@@ -34,7 +34,13 @@ def view():
     middle = points.reshape(-1, 3).mean(axis=0)
     position = middle + np.array([2.0, 0.2, -3.5])
     R = np.broadcast_to(look_at(position, middle, np.array([0.0, 1.0, 0.0])), (12, 3, 3))
-    scene = observe(walker.figure, sphere.camera, points, R, np.broadcast_to(position, (12, 3)), time=time)
+    scene = observe(
+        walker.figure,
+        sphere.camera,
+        points,
+        CameraPlacements(R, np.broadcast_to(position, (12, 3))),
+        time=time,
+    )
     return View(
         camera=OpenCVModel(K=scene.camera.K),
         time=time,

@@ -14,7 +14,7 @@ from posekit.errors import ViewerError
 from posekit.formats.own import Postures, Result, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.branch import lift_branch, one_a_reason, rejected_of
 from posekit.viewer.scene.compose import Style, compose, row_count
 from posekit.viewer.scene.culprit import culprit
@@ -86,10 +86,11 @@ def test_pinocchios_capsules_lie_where_the_posture_has_them(subject: DrawnSubjec
     assert shown.q is not None
     world = upright_world(subject.points())
     scene = Scene()
-    add_posture(scene, "by-q", shown.points[3], figure=subject.figure, world=world, q=shown.q[3])
+    posture = DrawnPosture(points=shown.points[3], q=shown.q[3])
+    add_posture(scene, "by-q", posture, figure=subject.figure, world=world)
     bent = shown.points[3].copy()
     bent[JOINT["left_ankle"]] += 1e-3  # no q gives this back: the capsules are laid along the segments
-    add_posture(scene, "laid", bent, figure=subject.figure, world=world)
+    add_posture(scene, "laid", DrawnPosture(points=bent), figure=subject.figure, world=world)
     for capsule in subject.figure.capsules:
         ends = [
             capsule_ends(scene, f"/meshcat/{name}/bodies/{capsule.link}", capsule.half_length)
@@ -127,13 +128,14 @@ def test_unknown_joints_are_left_out(subject: DrawnSubject) -> None:
     points = subject.frames[0].points[0].copy()
     points[JOINT["right_wrist"]] = np.nan
     scene = Scene()
-    add_posture(scene, "a", points, figure=subject.figure, world=upright_world(points))
+    add_posture(scene, "a", DrawnPosture(points=points), figure=subject.figure, world=upright_world(points))
     assert "/meshcat/a/joints/right_elbow" in scene.nodes
     assert "/meshcat/a/joints/right_wrist" not in scene.nodes
     assert "/meshcat/a/bodies/right_forearm" not in scene.nodes
     assert "/meshcat/a/bodies/right_upper_arm" in scene.nodes
     with pytest.raises(ViewerError, match="no joint of the posture is known"):
-        add_posture(scene, "b", np.full((14, 3), np.nan), figure=subject.figure, world=upright_world(points))
+        unknown = DrawnPosture(points=np.full((14, 3), np.nan))
+        add_posture(scene, "b", unknown, figure=subject.figure, world=upright_world(points))
     with pytest.raises(ViewerError, match="all are NaN"):
         upright_world(np.full((14, 3), np.nan))
 

@@ -18,7 +18,7 @@ from posekit.skeleton import JOINTS
 from posekit.viewer.browser.browser import Browser
 from posekit.viewer.browser.find import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_drawn
-from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.compose import Style, compose
 from posekit.viewer.scene.eye import Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.framing import fitted_eye, view_eye
@@ -37,7 +37,9 @@ def scene_of_joints(subject: DrawnSubject, world: World, points: Array) -> Scene
     """Draw joints alone, each in a colour of its own that no light changes."""
     scene = Scene()
     look = Look(bodies=False, bones=False)
-    add_posture(scene, "body", points[:14], figure=subject.figure, world=world, look=look)
+    add_posture(
+        scene, "body", DrawnPosture(points=points[:14]), figure=subject.figure, world=world, look=look
+    )
     add_stage(scene, world.place(points[:14]), ground=False)
     for k, name in enumerate(JOINTS):
         node = scene.nodes[f"/meshcat/body/joints/{name}"]

@@ -1,5 +1,6 @@
 """What is drawn and from where: bodies, cameras, the stage, and the eye that looks."""
 
+from posekit.viewer.scene.body import DrawnPosture as DrawnPosture
 from posekit.viewer.scene.body import Look as Look
 from posekit.viewer.scene.body import add_posture as add_posture
 from posekit.viewer.scene.compose import Style as Style

@@ -16,6 +16,7 @@ from posekit.formats.own import Inferred
 from posekit.geometry import Array, cross
 from posekit.skeleton import HEAD, JOINTS, POINTS, TREE_SEGMENTS
 from posekit.viewer.scene.colours import ALARM_RGB, POINT_SIDES, SIDE_RGB, Rgb, number, side
+from posekit.viewer.scene.culprit import Culprit
 from posekit.viewer.scene.region import add_region
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.shapes import add_ball, add_tubes, glow, matte, smooth
@@ -68,19 +69,39 @@ class Look:
 TRANSLUCENT_LOOK = Look()
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnPosture:
+    """One posture that is to be drawn.
+
+    Parameters
+    ----------
+    points : array (14, 3) or (19, 3)
+        Joints, and the head's points where they are known; OpenCV camera frame, metres; NaN where unknown.
+    q : array (nq,), optional
+        The posture's configuration in the camera's frame; it is calculated where it is not given.
+    culprit : Culprit
+        What to point at: drawn in the alarm's colour, the joints with a halo, the rest of the body faded.
+    inferred : mapping of str to Inferred
+        The joints that were not seen, and where they can be.
+    shift : array (3,), optional
+        Moves the body in the world, metres.
+    """
+
+    points: Array
+    q: Array | None = None
+    culprit: Culprit = field(default_factory=Culprit)
+    inferred: Mapping[str, Inferred] = field(default_factory=dict)
+    shift: Array | None = None
+
+
 def add_posture(
     scene: Scene,
     name: str,
-    points: Array,
+    posture: DrawnPosture,
     *,
     figure: Figure,
     world: World,
-    q: Array | None = None,
     look: Look = TRANSLUCENT_LOOK,
-    links: tuple[str, ...] = (),
-    joints: tuple[str, ...] = (),
-    inferred: Mapping[str, Inferred] | None = None,
-    shift: Array | None = None,
 ) -> None:
     """Draw one posture below ``/meshcat/NAME``: ``bodies/LINK``, ``joints/JOINT``, ``head/POINT``, ``bones``.
 
@@ -93,37 +114,30 @@ def add_posture(
     Parameters
     ----------
     scene : Scene
+        What the posture is added to.
     name : str
         A path may have several parts: ``frame-0/survivor-3``.
-    points : array (14, 3) or (19, 3)
-        Joints, and the head's points where they are known; OpenCV camera frame, metres; NaN where unknown.
+    posture : DrawnPosture
+        The posture, and what is to be shown of it.
     figure : Figure
         Whose capsules.
     world : World
         Where the posture stands.
-    q : array (nq,), optional
-        The posture's configuration in the camera's frame; it is calculated where it is not given.
     look : Look
-    links, joints : sequence of str
-        What to point at (see `posekit.viewer.scene.culprit`): drawn in the alarm's colour, the joints with a halo,
-        the rest of the body faded.
-    inferred : mapping of str to Inferred, optional
-        The joints that were not seen, and where they can be.
-    shift : array (3,), optional
-        Moves the body in the world, metres.
+        What is drawn, and in which colours.
 
     Raises
     ------
     ViewerError
         Where no joint is known.
     """
-    points = with_head(np.asarray(points, dtype=np.float64)[None])[0]
+    points = with_head(np.asarray(posture.points, dtype=np.float64)[None])[0]
     if not np.isfinite(points[: len(JOINTS)]).all(axis=1).any():
         raise ViewerError(f"{name}: no joint of the posture is known (all are NaN); expected at least one")
-    shift = np.zeros(3) if shift is None else shift
+    shift = np.zeros(3) if posture.shift is None else posture.shift
+    links, joints, inferred = posture.culprit.links, posture.culprit.joints, posture.inferred
     placed = world.place(points) + shift
     scene.transform(f"/meshcat/{name}", np.eye(4))
-    inferred = inferred or {}
     guessed = {index for index, point in enumerate(POINTS) if point in inferred}
     pointed = bool(links or joints)
     opacity = min(look.opacity, FADED_OPACITY) if pointed else look.opacity
@@ -140,7 +154,9 @@ def add_posture(
         }
         T_world_cam = world.T_world_cam
         T_world_cam[:3, 3] += shift
-        _add_capsules(scene, name, points, figure=figure, colours=colours, q=q, T_world_cam=T_world_cam)
+        _add_capsules(
+            scene, name, points, figure=figure, colours=colours, q=posture.q, T_world_cam=T_world_cam
+        )
     if look.joints:
         for index, point in enumerate(POINTS):
             if point in look.without:

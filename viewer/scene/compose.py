@@ -12,7 +12,7 @@ from posekit.body import Figure
 from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, PARENTS, POINTS
-from posekit.viewer.scene.body import Look, add_posture
+from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.colours import GROUP_RGB
 from posekit.viewer.scene.culprit import Culprit, culprit
 from posekit.viewer.scene.framing import sight_axes
@@ -124,15 +124,16 @@ def compose(
         add_posture(
             scene,
             f"posture-{k}",
-            points,
+            DrawnPosture(
+                points=points,
+                q=None if shown.q is None else shown.q[k],
+                culprit=found,
+                inferred=shown.inferred[k] if shown.inferred else {},
+                shift=shift,
+            ),
             figure=figure,
             world=world,
-            q=None if shown.q is None else shown.q[k],
             look=look,
-            links=found.links,
-            joints=found.joints,
-            inferred=shown.inferred[k] if shown.inferred else None,
-            shift=shift,
         )
         body = world.place(points) + shift
         regions = shown.inferred[k].values() if shown.inferred else ()

@@ -1,4 +1,4 @@
-"""What `rank` is given, checked once."""
+"""The survivors that `rank` compares and the evidence on them, checked once."""
 
 from __future__ import annotations
 
@@ -18,24 +18,35 @@ from posekit.ranking.upright import Up
 from posekit.skeleton import JOINTS
 
 MAX_COORDINATE_METRES: Final = 1e6
-"""Metres."""
+"""Coordinates beyond this are taken for a mistake: no body is seen from there, and squares stay finite."""
+
+
+DEFAULT_DEVIATION_METRES: Final = 0.012
+"""Metres by which survivors are off, where nobody says: 2 px at 4 m, or a torso that gives."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RankingEvidence:
-    """Survivors and the evidence on them.
+    """Survivors of F frames and the evidence on them; made by `RankingEvidence.of`.
 
     Parameters
     ----------
     joints : array (N, 14, 3)
+        Survivors, camera frame, metres; NaN where a joint is not known.
     frame : int array (N,)
+        The frame of each survivor, from 0.
     deviation : array (F,)
-        F is one more than the highest frame.
+        How far off the joints of each frame's survivors are, metres; F is one more than the highest frame.
     lengths : array (4,), optional
-        The person's distances inside torso and hips.
-    length_residual, chi2 : array (N,), optional
+        The person's distances inside torso and hips, metres, in the order of `posekit.skeleton.RIGID_SEGMENTS`.
+    length_residual : array (N,), optional
+        How much too short each survivor's worst segment was for its image, metres.
+    chi2 : array (N,), optional
+        The chi-square of each refined survivor; NaN where it has none.
     up : Up, optional
+        Which way is up in the camera's frame.
     depth : Depth, optional
+        Estimates of the neck's depth.
     """
 
     joints: Array
@@ -48,22 +59,43 @@ class RankingEvidence:
     depth: Depth | None
 
     @staticmethod
-    def checked(
+    def of(
         joints: ArrayLike,
-        lengths: Mapping[str, float] | None,
-        frame: ArrayLike | None,
-        length_residual: ArrayLike | None,
-        chi2: ArrayLike | None,
-        deviation: ArrayLike,
-        up: Up | None,
-        depth: Depth | None,
+        lengths: Mapping[str, float] | None = None,
+        *,
+        frame: ArrayLike | None = None,
+        length_residual: ArrayLike | None = None,
+        chi2: ArrayLike | None = None,
+        deviation: ArrayLike = DEFAULT_DEVIATION_METRES,
+        up: Up | None = None,
+        depth: Depth | None = None,
     ) -> RankingEvidence:
-        """Check everything against everything else.
+        """Gather the evidence, and check each part of it against the others.
+
+        Parameters
+        ----------
+        joints : array (N, 14, 3)
+            Survivors, camera frame, metres; NaN where a joint is not known.
+        lengths : mapping, optional
+            The person's, by segment name, metres. Without them and `chi2` the image says nothing.
+        frame : int array (N,), optional
+            The frame of each survivor, from 0, in any order; without it all are of one frame.
+        length_residual : array (N,), optional
+            How much too short each survivor's worst segment was for its image, metres.
+        chi2 : array (N,), optional
+            Of a refinement: then the image's term is minus its half. NaN counts as the largest of its frame.
+        deviation : float or array (F,)
+            How far off survivors' joints are, metres (`deviation_of_noise`, `deviation_of_tolerance`): the deviation of
+            distances inside torso and hips, and what blurs the prior on postures.
+        up : Up, optional
+            Which way is up in the camera's frame. Without it gravity, balance and contact say nothing.
+        depth : Depth, optional
+            Estimates of the neck's depth, frame by frame. Without them depth says nothing.
 
         Raises
         ------
         InputError
-            Where a shape is wrong, a joint is out of the world or something is given for too few frames.
+            Where a shape is wrong, a joint is beyond `MAX_COORDINATE_METRES` or evidence is given for too few frames.
         """
         positions = numbers("joints", joints, (None, len(JOINTS), 3))
         if (np.abs(positions) > MAX_COORDINATE_METRES).any():
@@ -102,7 +134,7 @@ class RankingEvidence:
 
     @property
     def possible(self) -> list[str]:
-        """The terms for which there is something to go by."""
+        """The names of the terms for which there is evidence."""
         upright = self.up is not None
         there = {
             "image": self.lengths is not None or self.chi2 is not None,

@@ -9,45 +9,45 @@ import numpy as np
 
 from posekit.geometry import Array
 from posekit.ranking.directions import directions
-from posekit.ranking.given import RankingEvidence
+from posekit.ranking.evidence import RankingEvidence
 from posekit.ranking.ground import standing
 from posekit.ranking.image import misfit
 from posekit.ranking.prior import Prior
 from posekit.skeleton import JOINT
 
-AT_ONCE: Final = 4096
+BLOCK_SURVIVORS: Final = 4096
 """Survivors whose terms are computed together: few enough to stay in the cache."""
 
 CENTRE_OF_MASS_HEIGHT_METRES, STANCE_WIDTH_METRES = 0.9, 0.4
 """Metres from ankles to centre of mass, and between ankles: how far a wrong `up` moves one beside the other."""
 
 
-def judge(given: RankingEvidence, wanted: Collection[str], prior: Prior) -> dict[str, Array]:
+def log_terms(evidence: RankingEvidence, wanted: Collection[str], prior: Prior) -> dict[str, Array]:
     """Return the log terms of all survivors (N,), by name: of those wanted for which there is something to go by."""
-    count = len(given.joints)
-    terms = {name: np.empty(count) for name in given.possible if name in wanted}
-    for start in range(0, count, AT_ONCE):
-        part = slice(start, min(start + AT_ONCE, count))
-        for name, values in _judge(given, part, terms, prior):
+    count = len(evidence.joints)
+    terms = {name: np.empty(count) for name in evidence.possible if name in wanted}
+    for start in range(0, count, BLOCK_SURVIVORS):
+        part = slice(start, min(start + BLOCK_SURVIVORS, count))
+        for name, values in _log_terms_of(evidence, part, terms, prior):
             terms[name][part] = values
     return terms
 
 
-def _judge(
-    given: RankingEvidence, part: slice, wanted: Collection[str], prior: Prior
+def _log_terms_of(
+    evidence: RankingEvidence, part: slice, wanted: Collection[str], prior: Prior
 ) -> Iterator[tuple[str, Array]]:
-    joints = np.ascontiguousarray(given.joints[part].transpose(1, 2, 0))
-    frame = given.frame[part]
-    deviation = given.deviation[frame]
+    joints = np.ascontiguousarray(evidence.joints[part].transpose(1, 2, 0))
+    frame = evidence.frame[part]
+    deviation = evidence.deviation[frame]
     upward, sine = None, 0.0
-    if given.up is not None:
-        direction, sine = given.up.direction, given.up.sine
+    if evidence.up is not None:
+        direction, sine = evidence.up.direction, evidence.up.sine
         upward = direction[frame].T if direction.ndim == 2 else direction[:, None]
-    if "image" in wanted and given.chi2 is not None:
-        yield "image", -0.5 * given.chi2[part]
-    elif "image" in wanted and given.lengths is not None:
-        residual = None if given.length_residual is None else given.length_residual[part]
-        yield "image", misfit(joints, given.lengths, residual, deviation)
+    if "image" in wanted and evidence.chi2 is not None:
+        yield "image", -0.5 * evidence.chi2[part]
+    elif "image" in wanted and evidence.lengths is not None:
+        residual = None if evidence.length_residual is None else evidence.length_residual[part]
+        yield "image", misfit(joints, evidence.lengths, residual, deviation)
     if "posture" in wanted or "gravity" in wanted:
         posture, gravity = prior.judge(directions(joints, upward if "gravity" in wanted else None), sine)
         coolness = 1.0 / (1.0 + deviation / prior.temperature)
@@ -60,5 +60,5 @@ def _judge(
             yield "balance", prior.balance.judge(beside, CENTRE_OF_MASS_HEIGHT_METRES * sine)
         if "contact" in wanted:
             yield "contact", prior.contact.judge(apart, STANCE_WIDTH_METRES * sine)
-    if "depth" in wanted and given.depth is not None:
-        yield "depth", given.depth.judge(joints[JOINT["neck"], 2], frame)
+    if "depth" in wanted and evidence.depth is not None:
+        yield "depth", evidence.depth.judge(joints[JOINT["neck"], 2], frame)
