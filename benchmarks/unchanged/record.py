@@ -61,6 +61,9 @@ def record(
         "posekit": [str(posekit.absolute())],
         "python": [str(python.absolute()), "-P", str(CALLS_SCRIPT)],
     }
+    where = [*programs["python"][:2], "-c", "import posekit; print(posekit.__file__)"]
+    code, said = _outcome(where, folder, environment)
+    print(f"records {said['stdout'].strip()}" if code == 0 else said["stderr"], flush=True)
     corpus = cases(data=data is not None, only=only)
     seconds: dict[str, float] = {}
     exits: dict[str, list[int]] = {}
