@@ -223,7 +223,7 @@ def by_refiner(scene: SyntheticScene, image: np.ndarray, pixels: float, lengths:
     lifted = refiner.lift(np.arange(len(view)))
     frame, postures, truth = lifted.frame[lifted.hypothesis], lifted.postures(), scene.joints_cam
     refined = refine(lifted.seen.sight, postures, frame=lifted.hypothesis, hopeless=HOPELESS)
-    sifted = refiner.sift(lifted)
+    sifted = refiner.refine(lifted)
     kept = frame[sifted.kept], sifted.survivors.joints
     n, near = len(view), best(*kept, truth)
     return Outcome(

@@ -31,8 +31,8 @@ from torso_views import (  # type: ignore[import-not-found]  # the script beside
 from posekit.body import load_figure
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
-from posekit.recovery.body import FigureBody, Judges
-from posekit.settings import MEASURED_TOLERANCE, Tolerance
+from posekit.recovery.body import FigureBody
+from posekit.settings import MEASURED_TOLERANCE, RecoverSettings, Tolerance
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
 from posekit.synthesis import Capture, SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.validators import load_ranges
@@ -273,8 +273,8 @@ def speed(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> str:
         grown = []
         for scene in scenes:
             body = FigureBody(figure=scene.figure, stature=1.7)
-            judges = Judges(checks=CHECKS, ranges=load_ranges(ranges), rules=(), contact_margin=0.0)
-            grown.append((scene, body.tree, {one: body.checks(judges, one) for one in seconds}))
+            asked = RecoverSettings(checks=CHECKS, ranges=ranges, rules=())
+            grown.append((scene, body.tree, {one: body.checks(asked, one) for one in seconds}))
         for tolerance in [*seconds] * 9:
             start = time.process_time()
             for scene, tree, checks in grown:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -14,24 +14,19 @@ from posekit.body import Figure, with_head
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
-from posekit.robots.joint_map import JointMap
 from posekit.robots.scaling import segment_lengths
-from posekit.settings.check import check_settings
+from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
-from posekit.validators.joint_range import TOLERANCE
 from posekit.validators.ranges import load_ranges
-from posekit.validators.registry import PHYSICAL, AnyCheck, chosen_checks, make_checks
+from posekit.validators.registry import PHYSICAL, chosen_checks, make_checks
 from posekit.validators.robot.figure import FigureConfigurations
 from posekit.validators.robot.load import STICK_FIGURE, load_subject
 from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
-from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, Bodies, Lengths, RobotSettings
+from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, RobotSettings
 from posekit.validators.suite import judge
-from posekit.validators.walking import DEFAULT_RULES, thresholds_of
-
-RIGID_TOLERANCE = 0.03
-"""Metres: measured torsos give by some centimetres (docs, "Tolerances")."""
+from posekit.validators.walking import thresholds_of
 
 FARTHEST = 1e9
 """Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
@@ -46,34 +41,11 @@ class Validator:
         ``"stick_figure"`` (the default), the built-in figure; the path of a figure's URDF; or a figure: these are
         judged in closed form. Or the name of a robot of example-robot-data (``"human"``, ``"g1"``, …), the path of its
         URDF, or a `posekit.robots.Robot`: these are judged by inverse kinematics (docs, "Validate").
-    checks : sequence of str, Check or CheckSettings, optional
-        Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
-        otherwise, and your own (docs, "Write your own check"); of a robot some of ``reach``, ``rigid-parts``,
-        ``joint-range``, ``collision``, ``balance``, the first four.
-    ranges : str
-        ``urdf``, ``table1`` (figures alone) or the path of a TOML table.
-    rules : sequence of int
-        Rules of walking.
-    walkers : {"paper", "people"}
-        Whose thresholds those have: by the paper's word, or as real walkers keep them.
-    rigid_tolerance : float
-        Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off.
-    angle_tolerance : float
-        Degrees by which the direction of a segment may be off, or a robot's joint outside its limits.
-    contact_margin : float
-        Metres that bodies must keep from each other; negative allows penetration.
-    lengths : {"model", "median", "each"}, optional
-        Whose segment lengths the model has: its own (figures unless told otherwise), the medians of the postures
-        (robots unless told otherwise), or each posture's own (robots alone, slow).
-    joint_map : str or JointMap, optional
-        Which frames of a robot stand for the joints; found by their names where not given.
-    bodies : {"auto", "urdf", "visual", "capsules"}
-        What collides, of a robot: its collision bodies, its visual bodies, or capsules that are made up; ``auto``
-        makes them up where no two collision bodies can touch.
-    srdf, package_dirs, untrusted
-        See `posekit.robots.load_robot`.
-    up : array (3,)
-        Against gravity, in the frame of the postures: for ``balance``.
+    settings : ValidateSettings, optional
+        What postures are judged by, and with which tolerances; the usual if not given.
+    **changes
+        Single settings that are other than those, by the names of the fields of `posekit.ValidateSettings`, as
+        ``contact_margin=0.01``.
 
     Examples
     --------
@@ -88,72 +60,58 @@ class Validator:
     def __init__(
         self,
         urdf: str | Path | Figure | Robot | None = None,
-        *,
-        checks: Sequence[AnyCheck] | None = None,
-        ranges: str = "urdf",
-        rules: Sequence[int] = DEFAULT_RULES,
-        walkers: str = "paper",
-        rigid_tolerance: float = RIGID_TOLERANCE,
-        angle_tolerance: float = TOLERANCE,
-        contact_margin: float = 0.0,
-        lengths: Lengths | None = None,
-        joint_map: str | JointMap | None = None,
-        bodies: Bodies = "auto",
-        srdf: str | Path | None = None,
-        package_dirs: Sequence[str | Path] = (),
-        untrusted: bool | None = None,
-        up: ArrayLike = (0.0, 0.0, 1.0),
+        settings: ValidateSettings | None = None,
+        **changes: Any,
     ) -> None:
-        thresholds = thresholds_of(walkers)
+        asked = (settings or ValidateSettings()).changed(**changes)
         subject = load_subject(
             STICK_FIGURE if urdf is None else urdf,
-            srdf=srdf,
-            package_dirs=package_dirs,
-            untrusted=untrusted,
-            visuals=bodies == "visual",
+            srdf=asked.srdf,
+            package_dirs=asked.package_dirs,
+            untrusted=asked.untrusted,
+            visuals=asked.bodies == "visual",
         )
+        self.settings = asked
         self.robot = subject if isinstance(subject, Robot) else None
         self._figure = subject if isinstance(subject, Figure) else None
         if isinstance(subject, Robot):
-            settings = RobotSettings(
-                checks=tuple(
-                    ROBOT_DEFAULT if checks is None else (check_settings(one).name for one in checks)
-                ),
-                ranges=ranges,
-                joint_map=joint_map,
-                lengths=lengths or "median",
-                bodies=bodies,
-                rigid_tolerance=rigid_tolerance,
-                angle_tolerance=angle_tolerance,
-                contact_margin=contact_margin,
-                up=up,
+            own = RobotSettings(
+                checks=ROBOT_DEFAULT if asked.check_names is None else asked.check_names,
+                ranges=asked.ranges if isinstance(asked.ranges, str) else asked.ranges.name,
+                joint_map=asked.joint_map,
+                lengths=asked.lengths or "median",
+                bodies=asked.bodies,
+                rigid_tolerance=asked.rigid_tolerance,
+                angle_tolerance=asked.angle_tolerance,
+                contact_margin=asked.contact_margin,
+                up=asked.up,
             )
-            self.checks, self.lengths = settings.checks, settings.lengths
-            self._robot = RobotValidator(robot=subject, settings=settings)
+            self.checks, self.lengths = own.checks, own.lengths
+            self._robot = RobotValidator(robot=subject, settings=own)
             _ = self._robot.models.limits
             return
-        self.lengths = lengths or "model"
+        self.lengths = asked.lengths or "model"
         for option, given, known in (
             ("--lengths", self.lengths, LENGTHS[:2]),
-            ("--bodies", bodies, ("auto", "urdf")),
-            ("--joint-map", joint_map, (None,)),
+            ("--bodies", asked.bodies, ("auto", "urdf")),
+            ("--joint-map", asked.joint_map, (None,)),
         ):
             if given not in known:
                 raise InputError(
                     f"{option} {given}: the stick figure has its own; expected a robot, as --urdf human"
                 )
-        self._chosen = chosen_checks(PHYSICAL if checks is None else checks)
+        self._chosen = chosen_checks(PHYSICAL if asked.checks is None else asked.checks)
         self.checks = tuple(one.name for one in self._chosen)
         if not self.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
         self._options: dict[str, Any] = {
-            "ranges": load_ranges(ranges),
-            "rigid_tolerance": rigid_tolerance,
-            "angle_tolerance": angle_tolerance,
-            "rules": rules,
-            "thresholds": thresholds,
-            "contact_margin": contact_margin,
-            "up": tuple(np.asarray(up, dtype=np.float64).tolist()),
+            "ranges": load_ranges(asked.ranges) if isinstance(asked.ranges, str) else asked.ranges,
+            "rigid_tolerance": asked.rigid_tolerance,
+            "angle_tolerance": asked.angle_tolerance,
+            "rules": asked.rules,
+            "thresholds": thresholds_of(asked.walkers),
+            "contact_margin": asked.contact_margin,
+            "up": tuple(np.asarray(asked.up, dtype=np.float64).tolist()),
         }
         self._suite = self._make_suite(subject)
 

@@ -138,7 +138,7 @@ def frames_of(rows: ImageRows, recovery: Recovery, recipe: Recipe) -> Frames:
     unseen = np.isnan(rows.points[:, :IMAGE, 0])
     inferred = [
         ",".join(name for name, lacks in zip(JOINTS, row, strict=True) if lacks)
-        if recipe.infer and any(row)
+        if recipe.settings.infer and any(row)
         else ""
         for row in unseen.tolist()
     ]
@@ -164,7 +164,7 @@ def _asked(column: Column, recipe: Recipe) -> bool:
 def value_columns(recipe: Recipe) -> tuple[str, ...]:
     """List the numbers of a survivor that a recipe asks for."""
     parts = {
-        "margins": [check.replace("-", "_") for check in recipe.checks],
+        "margins": [check.replace("-", "_") for check in recipe.settings.check_names],
         "q": load_figure().configuration_names,
     }
     return tuple(

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.own import ScaledOrthographicModel, View, read_view, write_view
 from posekit.geometry import Array
-from posekit.recovery.seen import NECK_LOST, NO_NECK, ROOT_LOST
+from posekit.recovery.observed import NECK_LOST, NO_NECK, ROOT_LOST
 from posekit.skeleton import HEAD, JOINTS, POINTS
 
 IMAGE: Final = len(JOINTS)

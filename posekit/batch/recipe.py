@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -12,14 +10,11 @@ from typing import Any, Final
 from posekit.batch import digests
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.own import PER_METRE, ScaledOrthographicModel, View
-from posekit.recovery.conductor import recover
+from posekit.formats.own import View
+from posekit.recovery.body import loaded, ranges_of
 from posekit.recovery.noise import refuse_deviation
-from posekit.recovery.recovery import Recovery
-from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Rooting, Tolerance
-from posekit.settings.scale import parse_scale
-from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges
-from posekit.validators.walking import DEFAULT_RULES, thresholds_of
+from posekit.recovery.person import refuse_settings
+from posekit.settings import PartialTolerance, RecoverSettings, Scale, Tolerance
 from posekit.views.camera import split_camera
 from posekit.views.source import Source
 
@@ -42,29 +37,10 @@ class Recipe:
     Parameters
     ----------
     source : Source
-        How key points are to be read: who, with which camera, with which lengths.
-    checks : sequence of str
-        As `posekit.recover` takes them.
-    ranges : str
-        ``urdf``, ``table1``, … or a TOML table.
-    rules : sequence of int
-    walkers : {"paper", "people"}
-    rigid, tangent, angle : float, optional
-        Tolerances: metres, metres, degrees. Those that are not given are as `posekit recover` has them.
-    contact_margin : float
-        Metres.
-    scale : str
-        How the scale of uncalibrated views is found, as `posekit.settings.scale.parse_scale` reads it; empty for the
-        default.
-    proportions : {"figure", "taylor"}
-    infer : bool
-        Whether joints that were not seen are completed.
-    root : str
-        How the neck of calibrated views is placed.
-    refine : bool, optional
-        Whether survivors become the likeliest postures near them; by default where the noise is known.
-    length_deviation : float, optional
-        Relative standard deviation of lengths, for that.
+        How key points are to be read: who, with which camera, with which lengths. Its deviation is that of the image
+        points of all views.
+    settings : RecoverSettings
+        What is asked of every recovery.
     rank : bool
         Whether the table has each survivor's probability among those of its frame.
     q, margins : bool
@@ -72,6 +48,8 @@ class Recipe:
         recovery itself.
     shard_frames : int
         Frames of one output file, at most.
+    made_with : mapping of str to str
+        Versions of the packages that decide results, or the bytes that they are written in.
 
     Raises
     ------
@@ -80,20 +58,7 @@ class Recipe:
     """
 
     source: Source = field(default_factory=Source)
-    checks: Sequence[str] = PHYSICAL
-    ranges: str = "urdf"
-    rules: Sequence[int] = DEFAULT_RULES
-    walkers: str = "paper"
-    rigid: float | None = None
-    tangent: float | None = None
-    angle: float | None = None
-    contact_margin: float = 0.0
-    scale: str = ""
-    proportions: str = "figure"
-    infer: bool = True
-    root: str = "auto"
-    refine: bool | None = None
-    length_deviation: float | None = None
+    settings: RecoverSettings = field(default_factory=RecoverSettings)
     rank: bool = True
     q: bool = False
     margins: bool = False
@@ -103,34 +68,19 @@ class Recipe:
     def __post_init__(self) -> None:
         if not 1 <= self.shard_frames <= 1_000_000:
             raise InputError(f"--shard-frames: {self.shard_frames}; expected 1 to 1,000,000")
-        object.__setattr__(self, "checks", check_names(self.checks))
-        if self.scale:
-            parse_scale(self.scale)
-        thresholds_of(self.walkers)
-        _ = self.table, self.rooting, self.tolerance(uncalibrated=False)
-
-    @cached_property
-    def table(self) -> Ranges:
-        """The joint ranges."""
-        return load_ranges(self.ranges)
-
-    @cached_property
-    def rooting(self) -> Rooting:
-        """How a neck is placed."""
-        return Rooting(method=self.root, deviation=self.source.deviation)  # type: ignore[arg-type]
-
-    def tolerance(self, *, uncalibrated: bool) -> Tolerance | None:
-        """Return the tolerances that are given, the rest as usual; None where none is."""
-        if self.rigid is None and self.tangent is None and self.angle is None:
-            return None
-        usual = PHOTOGRAPH_TOLERANCE if uncalibrated else MEASURED_TOLERANCE
-        rigid = usual.rigid if self.rigid is None else self.rigid
-        return Tolerance(
-            rigid=rigid,
-            tangent=usual.tangent if self.tangent is None else self.tangent,
-            placement=rigid <= EXACT_TOLERANCE.rigid,
-            angle=usual.angle if self.angle is None else self.angle,
-        )
+        said = [one for one in (self.source.deviation, self.settings.rooting.deviation) if one is not None]
+        deviation = said[0] if said else None
+        asked = loaded(self.settings)
+        asked = asked.changed(rooting=replace(asked.rooting, deviation=deviation))
+        if (asked.group, asked.nearer, asked.rooting.trust_head) != (None, None, True) or any(
+            isinstance(one, Tolerance | Scale) for one in (asked.tolerance, asked.scale)
+        ):
+            raise InputError(
+                "a batch groups nothing and takes no flips by hand, tolerances one by one (`PartialTolerance`) and a "
+                "scale as text; expected settings of that kind"
+            )
+        object.__setattr__(self, "settings", asked)
+        object.__setattr__(self, "source", replace(self.source, deviation=deviation))
 
     def document(self) -> dict[str, Any]:
         """Return all of it as plain values, with the content of the files that are named.
@@ -140,14 +90,28 @@ class Recipe:
         InputError
             Where one of those cannot be read.
         """
-        own = asdict(replace(self, source=Source()))
-        del own["source"]
-        table = Path(self.ranges)
+        asked = self.settings
+        ranges = ranges_of(asked).name
+        table = Path(ranges)
+        taylor = asked.proportions == "taylor"
         return {
-            **own,
-            "checks": list(self.checks),
-            "rules": list(self.rules),
-            "ranges": [self.ranges, digests.of_file(table)] if table.is_file() else [self.ranges],
+            **vars(asked.tolerance or PartialTolerance()),
+            "checks": list(map(str, asked.checks)),
+            "ranges": [ranges, digests.of_file(table)] if table.is_file() else [ranges],
+            "rules": list(asked.rules),
+            "walkers": asked.walkers,
+            "contact_margin": asked.contact_margin,
+            "scale": asked.scale or "",
+            "proportions": asked.proportions if taylor else self.source.proportions,
+            "infer": asked.infer,
+            "root": asked.rooting.method,
+            "refine": asked.refine,
+            "length_deviation": asked.length_deviation,
+            "rank": self.rank,
+            "q": self.q,
+            "margins": self.margins,
+            "shard_frames": self.shard_frames,
+            "made_with": dict(self.made_with),
             "source": self.reading(),
             "figure": load_figure().hash,
         }
@@ -191,33 +155,4 @@ class Recipe:
             camera is not an `opencv` one a deviation.
         """
         refuse_deviation(view, self.source.deviation)
-        if isinstance(view.camera, ScaledOrthographicModel):
-            if self.root != "auto":
-                raise InputError(
-                    "--root: the view's camera is not known, and so no depth is; leave the option out"
-                )
-        elif self.scale:
-            raise InputError("--scale: the view's camera is calibrated; leave the option out")
-        elif self.proportions == "taylor":
-            raise InputError(
-                "--proportions: taylor is for uncalibrated views (scaled-orthographic); leave the option out"
-            )
-
-    def recover(self, view: View) -> Recovery:
-        """Recover some frames: `posekit.recover` with what is asked."""
-        uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-        return recover(
-            view,
-            checks=self.checks,
-            ranges=self.table,
-            rules=self.rules,
-            walkers=self.walkers,
-            tolerance=self.tolerance(uncalibrated=uncalibrated),
-            contact_margin=self.contact_margin,
-            scale=parse_scale(self.scale, per_unit=PER_METRE[view.unit]) if self.scale else None,
-            proportions=self.proportions if self.proportions == "taylor" else "figure",
-            infer=self.infer,
-            rooting=Rooting(method=self.rooting.method) if uncalibrated else self.rooting,
-            refine=self.refine,
-            length_deviation=self.length_deviation,
-        )
+        refuse_settings(view, self.settings)

@@ -22,6 +22,7 @@ from posekit.batch.staging import Staged, StagedTable, stem_of
 from posekit.batch.view_table import read_rows
 from posekit.errors import PosekitError
 from posekit.formats.own import View
+from posekit.recovery.conductor import recover
 from posekit.safe_io import extra
 from posekit.skeleton import JOINTS
 
@@ -222,7 +223,7 @@ def _recovered(rows: ImageRows, head: View, shard: Shard) -> Frames:
     """Recover frames; where none of several can be, each by itself, so that each has its own reason."""
     try:
         with _numbered(rows):
-            return frames_of(rows, shard.recipe.recover(rows.view(head)), shard.recipe)
+            return frames_of(rows, recover(rows.view(head), shard.recipe.settings), shard.recipe)
     except PosekitError as error:
         if len(rows) == 1:
             return unrecovered(rows, re.sub(r"^frames\[0\]: ", "", str(error)))

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from posekit.cli.asked import settings_of
 from posekit.cli.detector_options import Proportions, Reading, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
@@ -108,20 +109,14 @@ def batch(
 
     recipe = Recipe(
         source=source_of(reading, who, proportions=proportions, deviation=uncertain.deviation),
-        checks=judging.names,
-        ranges=judging.ranges,
-        rules=judging.numbers,
-        walkers=judging.walkers,
-        rigid=tolerances.rigid,
-        tangent=tolerances.tangent,
-        angle=tolerances.angle_tolerance,
-        contact_margin=signed_length(contact_margin, "--contact-margin"),
-        scale=scale,
-        proportions=proportions,
-        infer=uncertain.infer,
-        root=uncertain.root,
-        refine=uncertain.refine,
-        length_deviation=uncertain.length_deviation,
+        settings=settings_of(
+            judging,
+            tolerances,
+            uncertain,
+            contact_margin=signed_length(contact_margin, "--contact-margin"),
+            scale=scale,
+            proportions="taylor" if proportions == "taylor" else "figure",
+        ),
         rank=rank,
         q=q,
         margins=margins,

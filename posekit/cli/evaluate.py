@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from posekit.cli.asked import settings_of
 from posekit.cli.detector_options import Format, Skeleton, Unit
 from posekit.cli.detector_source import pixels
 from posekit.cli.groups import with_groups
@@ -133,7 +134,6 @@ def evaluate(
     from posekit.evaluate.draw import plot_paths, write_plots
     from posekit.evaluate.report import check_evaluation_path, summary
     from posekit.formats.own import View
-    from posekit.settings import MEASURED_TOLERANCE
     from posekit.viewer.plots.figure import drawing
 
     charts = plot_paths(output[0]) if plots else {}
@@ -158,11 +158,7 @@ def evaluate(
     )
     options: dict[str, Any] = {
         "root": root or None,
-        "checks": judging.names,
-        "ranges": judging.ranges,
-        "rules": judging.numbers,
-        "walkers": judging.walkers,
-        "tolerance": tolerances.filled(MEASURED_TOLERANCE),
+        "settings": settings_of(judging, tolerances),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,
     }

@@ -10,7 +10,7 @@ import typer
 from posekit.cli.options import PHYSICAL, AngleTolerance, Rules, as_recover, rule_numbers, split
 
 if TYPE_CHECKING:
-    from posekit.settings import Tolerance
+    from posekit.settings import PartialTolerance
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,21 +85,12 @@ class Tolerances:
         """Metres, where it is given."""
         return _length(self.tangent_tolerance, "--tangent-tolerance")
 
-    def filled(self, otherwise: Tolerance) -> Tolerance | None:
-        """Make the tolerance of what is given, the rest as it is `otherwise`; None where nothing is given."""
-        from posekit.settings import EXACT_TOLERANCE
-        from posekit.settings import Tolerance as Made
+    @property
+    def given(self) -> PartialTolerance | None:
+        """The tolerances that are given; None where none is."""
+        from posekit.settings import PartialTolerance as Made
 
-        rigid, tangent, angle = self.rigid, self.tangent, self.angle_tolerance
-        if rigid is None and tangent is None and angle is None:
-            return None
-        metres = otherwise.rigid if rigid is None else rigid
-        return Made(
-            rigid=metres,
-            tangent=otherwise.tangent if tangent is None else tangent,
-            placement=metres <= EXACT_TOLERANCE.rigid,
-            angle=otherwise.angle if angle is None else angle,
-        )
+        return Made.of(rigid=self.rigid, tangent=self.tangent, angle=self.angle_tolerance)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from posekit.cli.asked import Asked
+from posekit.cli.asked import check_noise, follow_scaled, leaving_out, refuse_unrecovered, settings_of
 from posekit.cli.detector_options import Proportions, Reading, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
@@ -19,6 +19,7 @@ from posekit.cli.options import (
     distinct,
     examples,
     options_given,
+    progress,
     progress_so_far,
     signed_length,
 )
@@ -27,8 +28,10 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.following.following import Following
+    from posekit.formats.own import View
     from posekit.recovery.recovery import Recovery
     from posekit.recovery.scaled_sequences import ScaledFollowing
+    from posekit.views.opening import Opened
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
@@ -135,12 +138,10 @@ def recover(
     ] = False,
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
-    from posekit import validators
     from posekit.conversion.conversion import of_person
-    from posekit.evaluate.comparison import compare
     from posekit.formats import own as files
-    from posekit.recovery import following_line, result_of
-    from posekit.settings import Rooting
+    from posekit.recovery.conductor import recover as recover_view
+    from posekit.recovery.result import result_of
     from posekit.views.given_views import given_views
 
     for read in (view, nearer, truth, who.calibrate, who.lengths):
@@ -154,31 +155,33 @@ def recover(
         recover_object(view, output, linkage, scale, nearer, tolerances)
         return
     files.check_result_path(output)
-    if write_urdf is not None and write_urdf.suffix.lower() != ".urdf":
-        raise InputError(
-            f"--write-urdf {write_urdf}: expected a name that ends in .urdf; its .srdf is put beside it"
-        )
+    _check_urdf_path(write_urdf)
     source = source_of(reading, who, proportions=proportions, deviation=uncertain.deviation)
-    asked = Asked(
-        checks=judging.names,
-        ranges=validators.load_ranges(judging.ranges),
-        rules=judging.numbers,
-        walkers=judging.walkers,
-        tolerances=tolerances,
+    settings = settings_of(
+        judging,
+        tolerances,
+        uncertain,
         contact_margin=signed_length(contact_margin, "--contact-margin"),
         group=files.parse_length(group, name="--group") if group else None,
         scale=scale,
-        proportions=proportions if proportions in ("figure", "taylor") else "figure",
+        proportions="taylor" if proportions == "taylor" else "figure",
         nearer=None if nearer is None else files.read_nearer(nearer),
-        infer=uncertain.infer,
-        rooting=Rooting(method=uncertain.root, deviation=uncertain.deviation),  # type: ignore[arg-type]
-        refine=uncertain.refine,
-        length_deviation=uncertain.length_deviation,
-        paths=paths,
-        scale_deviation=follow_scale,
     )
     people = given_views(view, source, truth)
-    for one, recovery, scaled in asked.recover_all(people, view):
+    check_noise(people[0].view, uncertain.deviation)  # one camera sees them all
+    recovered: list[tuple[Opened, Recovery, ScaledFollowing | None]] = []
+    for one in people:  # everybody, before anything is written
+        with leaving_out(one, people, recovered):
+            if follow_scale is not None:
+                scaled = follow_scaled(one.view, view, settings, paths=paths, deviation=follow_scale)
+                recovery = scaled.recovery
+            else:
+                scaled = None
+                with progress("recovering", len(one.view)) as done, about(view):
+                    recovery = recover_view(one.view, settings, progress=done)
+            refuse_unrecovered(recovery, view)
+            recovered.append((one, recovery, scaled))
+    for one, recovery, scaled in recovered:
         for line in one.says:
             typer.echo(line)
         alone = len(people) == 1
@@ -189,22 +192,41 @@ def recover(
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         files.write_result(path, result)
         summarize(recovery)
-        if scaled is not None:
-            typer.echo(_scale_line(scaled))
-        if following is not None:
-            typer.echo(following_line(following))
-        if truth is not None:
-            for line in compare(recovery, one.view.truth).lines:
-                typer.echo(line)
+        _tell(recovery, scaled, following, None if truth is None else one.view)
         typer.echo(f"written: {path}")
+
+
+def _check_urdf_path(path: Path | None) -> None:
+    """Refuse a name that is no URDF's."""
+    if path is not None and path.suffix.lower() != ".urdf":
+        raise InputError(
+            f"--write-urdf {path}: expected a name that ends in .urdf; its .srdf is put beside it"
+        )
+
+
+def _tell(
+    recovery: Recovery, scaled: ScaledFollowing | None, following: Following | None, truth: View | None
+) -> None:
+    """Print the scale that was found, the paths, and how far the survivors are from the truth of a view."""
+    if scaled is not None:
+        typer.echo(_scale_line(scaled))
+    if following is not None:
+        from posekit.recovery.summary import following_line
+
+        typer.echo(following_line(following))
+    if truth is not None:
+        from posekit.evaluate.comparison import compare
+
+        for line in compare(recovery, truth.truth).lines:
+            typer.echo(line)
 
 
 def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, paths: int) -> Following | None:
     """Follow the person through the frames, where that is asked for and not done by now."""
-    from posekit.recovery import follow
-
     if scaled is not None or not paths:
         return None if scaled is None else scaled.following
+    from posekit.recovery.sequences import follow
+
     with progress_so_far("following") as done, about(view):
         return follow(recovery, k=paths, progress=done)
 

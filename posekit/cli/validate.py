@@ -200,7 +200,7 @@ def validate(
     from posekit.formats import own as files
     from posekit.formats.own.report import columns_of
     from posekit.formats.own.report_table import summary_table
-    from posekit.validators.validator import RIGID_TOLERANCE
+    from posekit.settings import RIGID_TOLERANCE
 
     if output is not None:
         distinct(postures, output)
@@ -231,9 +231,9 @@ def validate(
         rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
         angle_tolerance=angle_tolerance,
         contact_margin=margin,
-        lengths=lengths or None,  # type: ignore[arg-type]
+        lengths=lengths or None,
         joint_map=joint_map or None,
-        bodies=bodies,  # type: ignore[arg-type]
+        bodies=bodies,
         srdf=srdf or None,
         package_dirs=package_dir or (),
         untrusted=None if trusted is None else not trusted,

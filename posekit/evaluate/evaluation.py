@@ -84,14 +84,14 @@ def evaluate(
     sampling, sweep, method = sampling or FrameSampling(), sweep or Sweep(), method or Method()
     if isinstance(given, View):
         material = of_view(given, method, source or "view")
-        settings = {"source": source or "view", **method.settings()}
+        settings = {"source": source or "view", **method.document()}
     else:
         material = of_capture(given, sampling, sweep, method)
         settings = {
             "source": given.source,
             **asdict(sampling),
             **asdict(sweep),
-            **method.settings(),
+            **method.document(),
             "root": method.root or "given",
             "lengths": "each clip's medians",
             "shank_px": round(material.shank, 3),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any, Final, Literal, get_args
@@ -17,11 +17,11 @@ from posekit.errors import InputError, PosekitError
 from posekit.evaluate.ranking import Ranker, by_probability
 from posekit.evaluate.sequences import Chooser
 from posekit.formats.own import View
-from posekit.recovery.conductor import person_of, recover
+from posekit.recovery.body import loaded, ranges_of
+from posekit.recovery.conductor import recover
+from posekit.recovery.person import person_of
 from posekit.recovery.recovery import FrameRecovery
-from posekit.settings import Rooting, Tolerance
-from posekit.validators import PHYSICAL, Ranges, check_names, load_ranges, walking
-from posekit.validators.walking import DEFAULT_RULES, thresholds_of
+from posekit.settings import MEASURED_TOLERANCE, RecoverSettings
 
 RootFrom = Literal["given", "auto"]
 
@@ -39,15 +39,10 @@ class Method:
     noise : tuple of float
         Levels: standard deviation of each coordinate of the image points, pixels.
     root : {"given", "auto"}, optional
-        Whether the neck is the true one, or placed from the image (`posekit.recovery.rooting.Rooting`). By default it
-        is given for virtual cameras, and views stay as they are.
-    checks : tuple of str
-    ranges : Ranges or str
-    rules : tuple of int
-    walkers : {"paper", "people"}
-        As `posekit.recover` takes them.
-    tolerance : Tolerance, optional
-        Likewise.
+        Whether the neck is the true one, or placed from the image (`posekit.settings.Rooting`). By default it is given
+        for virtual cameras, and views stay as they are.
+    settings : RecoverSettings
+        What is asked of every recovery.
     seed : int
         Of the noise and of the random survivors.
     rank : Ranker
@@ -63,20 +58,13 @@ class Method:
 
     noise: tuple[float, ...] = NOISE
     root: RootFrom | None = None
-    checks: Sequence[str] = PHYSICAL
-    ranges: Ranges | str = "urdf"
-    rules: Sequence[int] = DEFAULT_RULES
-    walkers: str = "paper"
-    tolerance: Tolerance | None = None
+    settings: RecoverSettings = field(default_factory=RecoverSettings)
     seed: int = 0
     rank: Ranker = by_probability
     choose: Chooser | None = field(default=None)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "checks", check_names(self.checks))
-        walking(load_figure(), self.rules, thresholds_of(self.walkers))  # refuses rules that there are not
-        if isinstance(self.ranges, str):
-            object.__setattr__(self, "ranges", load_ranges(self.ranges))
+        object.__setattr__(self, "settings", loaded(self.settings))
         if self.root is not None and self.root not in get_args(RootFrom):
             raise InputError(f"--root: {self.root!r}; expected {' or '.join(get_args(RootFrom))}")
         if not self.noise or not all(0 <= level < math.inf for level in self.noise):
@@ -89,11 +77,6 @@ class Method:
             )
         if self.seed < 0:
             raise InputError(f"--seed: {self.seed}; expected zero or more")
-
-    @property
-    def table(self) -> Ranges:
-        """The ranges, loaded."""
-        return self.ranges if isinstance(self.ranges, Ranges) else load_ranges(self.ranges)
 
     def recover(self, view: View) -> list[FrameRecovery]:
         """Recover all frames of a view; what `posekit.recover` refuses as impossible is a frame without survivors.
@@ -109,16 +92,18 @@ class Method:
                 frames += part
         return frames
 
-    def settings(self) -> dict[str, Any]:
+    def document(self) -> dict[str, Any]:
         """List what decides the results, as plain values."""
+        asked = self.settings
+        tolerance = asked.tolerance_for(MEASURED_TOLERANCE)
         return {
             "noise_px": list(self.noise),
             "root": self.root,
-            "checks": list(self.checks),
-            "ranges": self.table.name,
-            "rules": list(self.rules) if "walking" in self.checks else [],
-            "walkers": self.walkers,
-            "tolerance": "exact, else measured" if self.tolerance is None else vars(self.tolerance),
+            "checks": list(asked.check_names),
+            "ranges": ranges_of(asked).name,
+            "rules": list(asked.rules) if "walking" in asked.check_names else [],
+            "walkers": asked.walkers,
+            "tolerance": "exact, else measured" if tolerance is None else vars(tolerance),
             "seed": self.seed,
             "ranking": _name(self.rank),
             "sequences": None if self.choose is None else _name(self.choose),
@@ -126,16 +111,8 @@ class Method:
 
     def _parts(self, view: View, figure: Figure, rows: NDArray[np.intp]) -> Iterator[list[FrameRecovery]]:
         try:
-            yield recover(
-                view if len(rows) == len(view) else of_frames(view, rows),
-                figure=figure,
-                checks=self.checks,
-                ranges=self.table,
-                rules=self.rules,
-                walkers=self.walkers,
-                tolerance=self.tolerance,
-                rooting=Rooting() if self.root == "auto" else None,
-            ).frames
+            part = view if len(rows) == len(view) else of_frames(view, rows)
+            yield recover(part, self.settings, figure=figure).frames
         except PosekitError as error:
             if len(rows) == 1:
                 yield [FrameRecovery(time=float(view.time[rows[0]]), batch=None, index=0, reason=str(error))]

@@ -18,7 +18,7 @@ from posekit.evaluate.sequences import chosen_by
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.formats.own import ScaledOrthographicModel, View
 from posekit.geometry import Array
-from posekit.recovery.body import FigureBody
+from posekit.recovery.body import FigureBody, ranges_of
 from posekit.recovery.recovery import FrameRecovery
 from posekit.recovery.trees import Batch
 from posekit.settings import Tolerance
@@ -246,7 +246,8 @@ def _certified(
     frames: Sequence[FrameRecovery], figure: Figure, method: Method
 ) -> tuple[dict[str, NDArray[np.intp]], dict[str, Array]]:
     """Certify some survivors of every frame."""
-    ranges = method.table if "joint-range" in method.checks else None
+    asked = method.settings
+    ranges = ranges_of(asked) if "joint-range" in asked.check_names else None
     count = {name: np.zeros(len(frames), dtype=np.intp) for name in ("all", "lengths", "ranges")}
     worst = {name: np.full(len(frames), np.nan) for name in SurvivorCertificate._fields}
     by_tolerance: dict[Tolerance, list[int]] = {}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from posekit.recovery.admitting import least_violation
-from posekit.recovery.doubts import doubt_lines
+from posekit.recovery.least_violation import least_violation
+from posekit.recovery.length_diagnosis import doubt_lines
 from posekit.recovery.recovery import Recovery
 from posekit.settings import MEASURED_TOLERANCE
 
@@ -16,8 +16,8 @@ NAMED: Final = 3
 def advice_lines(recovery: Recovery) -> list[str]:
     """Say of frames without a posture what would admit one, and which lengths the picture does not bear out.
 
-    Of the first few frames the least violation (`posekit.recovery.admitting`); where most of the frames have none, the
-    lengths that would have to be others (`posekit.refinement.diagnose`).
+    Of the first few frames the least violation (`posekit.recovery.least_violation`); where most of them have none,
+    the lengths that would have to be others (`posekit.refinement.diagnose`).
     """
     grower = recovery.grower
     if grower is None:

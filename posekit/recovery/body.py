@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
@@ -12,50 +12,47 @@ import numpy as np
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.linkages import Linkage
-from posekit.settings import Tolerance
+from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
-from posekit.validators import AnyCheck, CheckOptions, Ranges, make_checks
+from posekit.validators import CheckOptions, Ranges, chosen_checks, load_ranges, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
-from posekit.validators.walking import WalkingThresholds
+from posekit.validators.walking import thresholds_of
 
 
-@dataclass(frozen=True, kw_only=True)
-class Judges:
-    """Which checks are asked, and with what.
+def ranges_of(settings: RecoverSettings) -> Ranges:
+    """Return the joint ranges that are asked for, loaded where only their name is given."""
+    given = settings.ranges
+    return given if isinstance(given, Ranges) else load_ranges(str(given))
 
-    Parameters
-    ----------
-    checks : sequence of CheckSettings
-    ranges : Ranges
-    rules : tuple of int
-        Rules of walking.
-    contact_margin : float
-        Metres that bodies must keep from each other.
-    thresholds : WalkingThresholds
-        Of the rules of walking.
+
+def loaded(settings: RecoverSettings) -> RecoverSettings:
+    """Return settings with their ranges loaded and their checks in the order in which they are applied.
+
+    Raises
+    ------
+    InputError
+        Where a check is unknown, or the ranges cannot be loaded.
     """
+    return settings.changed(checks=chosen_checks(settings.checks), ranges=ranges_of(settings))
 
-    checks: Sequence[AnyCheck]
-    ranges: Ranges
-    rules: tuple[int, ...]
-    contact_margin: float
-    thresholds: WalkingThresholds = field(default_factory=WalkingThresholds)
 
-    def suite(self, figure: Figure, tolerance: Tolerance, *, exact: bool = False) -> list[Check]:
-        """Make the checks of a figure, with every distance measured where `exact`."""
-        options = CheckOptions(
-            ranges=self.ranges,
-            rigid_tolerance=tolerance.distances,
-            rigid_mode="placement" if tolerance.placement else "distances",
-            angle_tolerance=tolerance.angle,
-            rules=self.rules,
-            thresholds=self.thresholds,
-            contact_margin=self.contact_margin,
-            exact=exact,
-            up=LEVEL_CAMERA_UP,
-        )
-        return make_checks(figure, self.checks, options)
+def suite_of(
+    settings: RecoverSettings, figure: Figure, tolerance: Tolerance, *, exact: bool = False
+) -> list[Check]:
+    """Make the checks of a figure that settings ask for, with every distance measured where `exact`."""
+    options = CheckOptions(
+        ranges=ranges_of(settings),
+        rigid_tolerance=tolerance.distances,
+        rigid_mode="placement" if tolerance.placement else "distances",
+        angle_tolerance=tolerance.angle,
+        rules=tuple(settings.rules),
+        thresholds=thresholds_of(settings.walkers),
+        contact_margin=settings.contact_margin,
+        exact=exact,
+        up=LEVEL_CAMERA_UP,
+    )
+    return make_checks(figure, settings.checks, options)
 
 
 class Body(Protocol):
@@ -99,7 +96,7 @@ class Body(Protocol):
         """Place the figure's joints and head (N, 19, 3) in leaves, metres."""
         ...
 
-    def checks(self, judges: Judges, tolerance: Tolerance) -> Sequence[Check]:
+    def checks(self, settings: RecoverSettings, tolerance: Tolerance) -> Sequence[Check]:
         """Make the checks that prune the tree."""
         ...
 
@@ -148,6 +145,6 @@ class FigureBody:
         """Put the head beside the joints."""
         return np.concatenate([leaves.postures(), leaves.given[leaves.frame]], axis=1)
 
-    def checks(self, judges: Judges, tolerance: Tolerance) -> Sequence[Check]:
+    def checks(self, settings: RecoverSettings, tolerance: Tolerance) -> Sequence[Check]:
         """Make the figure's own checks."""
-        return judges.suite(self.figure, tolerance)
+        return suite_of(settings, self.figure, tolerance)

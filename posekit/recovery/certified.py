@@ -12,17 +12,16 @@ from posekit.body import Figure
 from posekit.compiled.compiling import is_fast
 from posekit.compiled.verdicts import PASSED
 from posekit.geometry import Array
-from posekit.recovery.body import Judges
+from posekit.recovery.body import ranges_of
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.sight import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
-from posekit.settings import Tolerance
+from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
 from posekit.tree import Check, Scope, screened
 from posekit.validators import CheckOptions, Judgement, judge, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
-from posekit.validators.validator import RIGID_TOLERANCE
 
 
 def certified_within(noise: Noise) -> Tolerance:
@@ -37,19 +36,19 @@ def certified_within(noise: Noise) -> Tolerance:
     return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=DEVIATIONS * LIMIT_DEVIATION)
 
 
-def certifying_checks(figure: Figure, judges: Judges, tolerance: Tolerance) -> list[Check]:
+def certifying_checks(figure: Figure, settings: RecoverSettings, tolerance: Tolerance) -> list[Check]:
     """Make those of the checks that judge a posture by itself, as `posekit.Validator` makes them."""
     options = CheckOptions(
-        ranges=judges.ranges,
+        ranges=ranges_of(settings),
         rigid_tolerance=tolerance.distances,
         rigid_mode="distances",
         limbs=True,
         angle_tolerance=tolerance.angle,
         directions=True,
-        contact_margin=contact_under_noise(judges.contact_margin),
+        contact_margin=contact_under_noise(settings.contact_margin),
         up=LEVEL_CAMERA_UP,
     )
-    made = make_checks(figure, judges.checks, options)
+    made = make_checks(figure, settings.checks, options)
     return [check for check in made if check.scope is not Scope.MOTION]
 
 

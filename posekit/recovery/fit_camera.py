@@ -16,8 +16,8 @@ from posekit.compiled.compiling import n_threads
 from posekit.errors import HeadError, InputError
 from posekit.formats.own import Family, LeeChenModel, OpenCVModel, View
 from posekit.geometry import Array
+from posekit.recovery.observed import NO_NECK, neckless
 from posekit.recovery.rooting import place_roots
-from posekit.recovery.seen import NO_NECK, neckless
 from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, HEAD_POINTS
 

@@ -15,10 +15,10 @@ from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.hidden import CompletedSurvivors, complete, reject
 from posekit.objects.nearer import NearerEnds
-from posekit.recovery.body import Body, FigureBody, Judges
+from posekit.recovery.body import Body, FigureBody, suite_of
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
-from posekit.settings import EXACT_TOLERANCE, Tolerance
+from posekit.settings import EXACT_TOLERANCE, Judged, RecoverSettings, Tolerance
 from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
@@ -40,21 +40,19 @@ class Grower:
     view : View
     fit : CameraFit
     body : Body
-    judges : Judges
+    settings : RecoverSettings
+        What is asked
     nearer : NearerEnds, optional
         Flips given by hand.
-    infer : bool
-        Whether joints that were not seen are completed.
     """
 
     view: View
     fit: CameraFit
     body: Body
-    judges: Judges
+    settings: RecoverSettings
     nearer: NearerEnds | None = None
-    infer: bool = True
 
-    def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance) -> Batch:
+    def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance, judged: Judged = "given") -> Batch:
         """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
         suite, measured = self.suites_of(tolerance)
         image = self.body.image(self.view.image[self.fit.frame[chosen]])
@@ -71,7 +69,7 @@ class Grower:
                 tolerance=tolerance.tangent,
             )
         exact = np.zeros(leaves.n_frames, dtype=np.bool_)
-        if tolerance == EXACT_TOLERANCE:
+        if judged == "exact":
             exact = is_exact(
                 leaves,
                 self.body,
@@ -89,6 +87,7 @@ class Grower:
             checks=measured,
             body=self.body,
             tolerance=tolerance,
+            judged=judged,
             exact=exact,
             completion=completion,
         )
@@ -146,7 +145,7 @@ class Grower:
         too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
         self._warn_of(frame[too_many & placed])
         worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
-        if not (self.infer and isinstance(self.body, FigureBody) and worth.any()):
+        if not (self.settings.infer and isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
         part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
         done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
@@ -154,7 +153,7 @@ class Grower:
 
     def _warn_of(self, frames: NDArray[np.intp]) -> None:
         """Say of which frames nothing is inferred."""
-        if self.infer and isinstance(self.body, FigureBody) and len(frames):
+        if self.settings.infer and isinstance(self.body, FigureBody) and len(frames):
             named = ", ".join(f"frames[{k}]" for k in np.unique(frames)[:3].tolist())
             warnings.warn(
                 f"{named}: too many survivors and hidden joints to infer ({MOST_HIDDEN} in a frame at most): "
@@ -166,8 +165,8 @@ class Grower:
     def suites_of(self, tolerance: Tolerance) -> tuple[Sequence[Check], Sequence[Check]]:
         """Return the checks that prune, and those that tell every margin: made once for each tolerance."""
         if tolerance not in self._suites:
-            exact = self.judges.suite(self.body.figure, tolerance, exact=True)
-            self._suites[tolerance] = (self.body.checks(self.judges, tolerance), exact)
+            exact = suite_of(self.settings, self.body.figure, tolerance, exact=True)
+            self._suites[tolerance] = (self.body.checks(self.settings, tolerance), exact)
         return self._suites[tolerance]
 
     @cached_property

@@ -119,7 +119,7 @@ class Noise:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Seen:
+class ObservedHypotheses:
     """What H hypotheses of a view saw, and how well.
 
     Parameters
@@ -156,7 +156,7 @@ class Seen:
         noise: Noise,
         limits: Limits | None = None,
         walls: Walls | None = None,
-    ) -> Seen:
+    ) -> ObservedHypotheses:
         """Gather what some hypotheses saw with their `camera`; `limits` are the figure's if not given.
 
         Those of limbs may be `walls` instead.
@@ -175,7 +175,7 @@ class Seen:
             limits=limits,
             walls=walls,
         )
-        return Seen(sight=sight, deviation=deviation, focal=focal, step=step)
+        return ObservedHypotheses(sight=sight, deviation=deviation, focal=focal, step=step)
 
 
 def neck_priors(

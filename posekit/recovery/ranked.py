@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.ranking import Ranking, RankingEvidence, Up, deviation_of_tolerance, rank
-from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
+from posekit.recovery.judged import rigid_of
 
 
 class Survivors(Protocol):
@@ -90,22 +90,6 @@ def _rank(
             up=Up.level(),
         )
     )
-
-
-def rigid_of(settings: Mapping[str, Any], count: int) -> Array:
-    """Return the tolerance of rigid distances that a result's frames were judged with (F,), metres."""
-    judged = settings.get("judged")
-    kinds = judged if isinstance(judged, list) and len(judged) == count else [None] * count
-    known: dict[str | None, float] = {
-        "exact": EXACT_TOLERANCE.rigid,
-        "measured": MEASURED_TOLERANCE.rigid,
-        "photograph": PHOTOGRAPH_TOLERANCE.rigid,
-    }
-    for kind, field in (("noisy", "noisy"), ("refined", "refined"), ("given", "tolerance")):
-        said = settings.get(field)
-        if isinstance(said, Mapping) and isinstance(said.get("rigid"), int | float):
-            known[kind] = float(said["rigid"])
-    return np.array([known.get(str(kind), EXACT_TOLERANCE.rigid) for kind in kinds])
 
 
 def probabilities(result: Result, lengths: Mapping[str, float]) -> list[Array]:

@@ -24,9 +24,9 @@ from posekit.recovery.grouping import group_postures
 from posekit.recovery.grower import Grower
 from posekit.recovery.ranked import ranked
 from posekit.recovery.refined import RefinedSurvivors
-from posekit.recovery.rooting import root_of, tolerance_of
+from posekit.recovery.rooting import root_of
 from posekit.recovery.trees import Batch
-from posekit.settings import Tolerance
+from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 
 
@@ -252,17 +252,9 @@ class FrameRecovery:
         return self.batch.tolerance if self.batch else None
 
     @property
-    def judged(self) -> str | None:
-        """How the frame was judged; None where nothing was grown.
-
-        As ``exact``, ``measured``, a ``photograph``, ``noisy`` (what the deviation of its image points leads to),
-        ``refined`` (the same, and to the likeliest postures), or with tolerances that were ``given``.
-        """
-        if self.batch is None:
-            return None
-        placement = self.placement
-        noisy = placement is not None and len(placement.necks) and self.tolerance == tolerance_of(placement)
-        return "noisy" if noisy and self.batch.refined is None else self.batch.judged
+    def judged(self) -> Judged | None:
+        """How the frame was judged (`posekit.settings.Judged`); None where nothing was grown."""
+        return None if self.batch is None else self.batch.judged
 
     @property
     def camera(self) -> dict[str, Any]:
@@ -321,7 +313,7 @@ class Recovery:
     settings : mapping
         Everything that decided the result.
     grower : Grower, optional
-        What grew the trees: it can tell what would have admitted a posture (`posekit.recovery.admitting`).
+        What grew the trees: it can tell what would have admitted a posture (`posekit.recovery.least_violation`).
     """
 
     figure: Figure

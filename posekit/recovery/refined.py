@@ -10,12 +10,61 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.recovery.uncertainty import Covariances
-from posekit.refinement import Merged
+from posekit.refinement import Merged, Refined
 
-ALL = slice(None)
+ALL_ROWS = slice(None)
 
-ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged")
+SURVIVOR_ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged")
+
+
+class Covariances:
+    """Covariances of N survivors, all found at the first reading: small arrays of each frame would take longer.
+
+    Parameters
+    ----------
+    refined : Refined
+        The survivors.
+    unknown : bool array (N, 14)
+        Joints whose covariances are NaN.
+    """
+
+    def __init__(self, refined: Refined, unknown: NDArray[np.bool_]) -> None:
+        self._asked: tuple[Refined, NDArray[np.bool_]] | Sequence[Covariances] = (refined, unknown)
+        self._count = len(refined)
+        self._found: Array | None = None
+
+    @staticmethod
+    def joined(parts: Sequence[Covariances]) -> Covariances:
+        """Put those of one part behind those of the last."""
+        out = object.__new__(Covariances)
+        out._asked = list(parts)
+        out._count = sum(map(len, parts))
+        out._found = None
+        return out
+
+    def __len__(self) -> int:
+        """Count the survivors."""
+        return self._count
+
+    def read(self) -> Array:
+        """Return the covariances (N, 14, 3, 3), square metres."""
+        if self._found is None:
+            self._found = self._find()
+            self._found.flags.writeable = False
+            self._asked = []
+        return self._found
+
+    def _find(self) -> Array:
+        if isinstance(self._asked, tuple):
+            refined, unknown = self._asked
+            covariance = refined.covariance.copy()
+            covariance[unknown] = np.nan
+            return np.asarray(covariance)
+        return np.concatenate([part.read() for part in self._asked])
+
+    def __getstate__(self) -> dict[str, object]:
+        """Give away what was found: what it is found from is larger."""
+        return {"_asked": [], "_count": self._count, "_found": self.read()}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,7 +101,7 @@ class RefinedSurvivors:
     rows: slice
 
     def __post_init__(self) -> None:
-        for name in ARRAYS:
+        for name in SURVIVOR_ARRAYS:
             getattr(self, name).flags.writeable = False
 
     @property
@@ -81,22 +130,22 @@ class RefinedSurvivors:
             p=chosen.p.copy(),
             merged=size - 1,
             covariances=Covariances(chosen, unknown),
-            rows=ALL,
+            rows=ALL_ROWS,
         )
 
     @staticmethod
     def joined(parts: Sequence[RefinedSurvivors]) -> RefinedSurvivors:
         """Put those of one part behind those of the last, each of them whole."""
         arrays: dict[str, Any] = {
-            name: np.concatenate([getattr(part, name) for part in parts]) for name in ARRAYS
+            name: np.concatenate([getattr(part, name) for part in parts]) for name in SURVIVOR_ARRAYS
         }
         covariances = Covariances.joined([part.covariances for part in parts])
-        return RefinedSurvivors(**arrays, covariances=covariances, rows=ALL)
+        return RefinedSurvivors(**arrays, covariances=covariances, rows=ALL_ROWS)
 
     def part(self, rows: slice) -> RefinedSurvivors:
         """Return some of them, one after the other."""
         own = range(*self.rows.indices(len(self.covariances)))[rows]
-        arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in ARRAYS}
+        arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in SURVIVOR_ARRAYS}
         return RefinedSurvivors(
             **arrays,
             covariances=self.covariances,

@@ -20,24 +20,23 @@ from posekit.cameras import Camera, PinholeCamera
 from posekit.geometry import Array
 from posekit.hidden import CompletedSurvivors
 from posekit.ranking import deviation_of_noise
-from posekit.recovery.body import Judges
+from posekit.recovery.body import ranges_of, suite_of
 from posekit.recovery.certified import Contradiction, certified_within, certifying_checks
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
-from posekit.recovery.grown import Grown
 from posekit.recovery.limb_walls import LimbWalls
-from posekit.recovery.noise import Noise, Seen
-from posekit.recovery.sifting import Sifted, blocks, drop, sift
-from posekit.recovery.trees import Batch
+from posekit.recovery.noise import Noise, ObservedHypotheses
+from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
+from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.refinement.trunk import N_TRUNK_JOINTS
-from posekit.settings import Rooting, Tolerance
+from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
-ANGLE: Final = 1.0
+NOISE_UNIT_DEGREES: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
 
 HYPOTHESES_AT_ONCE: Final = 250
@@ -56,7 +55,7 @@ class Lifted:
         Whose frame each is, counted from 0.
     frames : int array (F,)
         The view's frames.
-    seen : Seen
+    seen : ObservedHypotheses
     trunks : Trunks
         Of those hypotheses.
     leaves : Leaves
@@ -70,7 +69,7 @@ class Lifted:
     chosen: NDArray[np.intp]
     frame: NDArray[np.intp]
     frames: NDArray[np.intp]
-    seen: Seen
+    seen: ObservedHypotheses
     trunks: Trunks
     leaves: Leaves
     physical: NDArray[np.int64]
@@ -102,26 +101,24 @@ class Refiner:
     ----------
     grower : Grower
     noise : Noise
-    rooting : Rooting, optional
-        How necks are placed.
     """
 
     grower: Grower
     noise: Noise
-    rooting: Rooting | None = None
 
-    def grow(self, frames: NDArray[np.intp]) -> dict[int, Grown]:
+    def grow(self, frames: NDArray[np.intp]) -> dict[int, FrameTrees]:
         """Grow the trees of some frames of the view, and refine their leaves: hypotheses are trunks, maybe none."""
         fit = self.fit
         chosen = np.flatnonzero(np.isin(fit.frame, frames) & np.isfinite(fit.root).all(axis=1))
-        grown = {
-            int(k): Grown(batch=None, index=0, hypotheses=1, fit=fit)
+        trees = {
+            int(k): FrameTrees(batch=None, index=0, hypotheses=1, fit=fit)
             for k in np.setdiff1d(frames, fit.frame[chosen])
         }
         for rows in blocks(fit.frame[chosen], HYPOTHESES_AT_ONCE):
             if rows.stop > rows.start:
-                grown |= self._refine(self.lift(chosen[rows]))
-        return grown
+                lifted = self.lift(chosen[rows])
+                trees |= self._trees(lifted, self.refine(lifted))
+        return trees
 
     @cached_property
     def fit(self) -> CameraFit:
@@ -129,14 +126,14 @@ class Refiner:
         given, view = self.grower.fit, self.grower.view
         if given.pose is None or not np.isnan(view.root).any():
             return given
-        rooting = replace(self.rooting or Rooting(), trust_head=False)
+        rooting = replace(self.grower.settings.rooting, trust_head=False)
         return fit_camera(view, self.grower.body.figure, rooting)
 
     @cached_property
-    def judges(self) -> Judges:
+    def settings(self) -> RecoverSettings:
         """What the checks are asked with: bodies may overlap by as much as depths are off."""
-        asked = self.grower.judges
-        return replace(asked, contact_margin=contact_under_noise(asked.contact_margin))
+        asked = self.grower.settings
+        return asked.changed(contact_margin=contact_under_noise(asked.contact_margin))
 
     @cached_property
     def tolerance(self) -> Tolerance:
@@ -146,19 +143,19 @@ class Refiner:
     @cached_property
     def certifying(self) -> Sequence[Check]:
         """The checks that every survivor passes."""
-        made = certifying_checks(self.grower.body.figure, self.grower.judges, self.tolerance)
+        made = certifying_checks(self.grower.body.figure, self.grower.settings, self.tolerance)
         return [check for check in made if self._can_be_told(check)]
 
     @cached_property
     def _measuring(self) -> Sequence[Check]:
         """The checks that tell every margin."""
-        suite = self.judges.suite(self.grower.body.figure, self.tolerance, exact=True)
+        suite = suite_of(self.settings, self.grower.body.figure, self.tolerance, exact=True)
         return [check for check in suite if self._can_be_told(check)]
 
     @cached_property
     def _limits(self) -> Limits:
         """The limits that refinement keeps to: those of the ranges where they are of the figure's own angles."""
-        ranges, figure = self.grower.judges.ranges, self.grower.body.figure
+        ranges, figure = ranges_of(self.grower.settings), self.grower.body.figure
         if ranges.kind != "configuration" or not ranges.limits:
             return figure.limits
         radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}
@@ -167,9 +164,9 @@ class Refiner:
     @cached_property
     def _walls(self) -> LimbWalls | None:
         """The limits of limbs that no box of angles can say."""
-        figure, judges = self.grower.body.figure, self.grower.judges
-        suite = judges.suite(figure, replace(self.tolerance, angle=ANGLE))
-        return LimbWalls.of(figure, suite, ANGLE)
+        figure, settings = self.grower.body.figure, self.grower.settings
+        suite = suite_of(settings, figure, replace(self.tolerance, angle=NOISE_UNIT_DEGREES))
+        return LimbWalls.of(figure, suite, NOISE_UNIT_DEGREES)
 
     def _can_be_told(self, check: Check) -> bool:
         """Whether the noise says enough of its points: not of a detector's head, which no arm can be said to touch."""
@@ -180,7 +177,7 @@ class Refiner:
         fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
         frames, frame = np.unique(fit.frame[chosen], return_inverse=True)
         camera = _pinhole(fit.cameras(chosen))
-        seen = Seen.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
+        seen = ObservedHypotheses.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
         trunks = find_trunks(seen.sight)
         leaves, tolerance = self._leaves(trunks, chosen, camera, seen)
         own = chosen[trunks.frame]
@@ -205,10 +202,10 @@ class Refiner:
             completion=completion,
         )
 
-    def sift(self, lifted: Lifted) -> Sifted:
+    def refine(self, lifted: Lifted) -> LeafOutcomes:
         """Refine leaves, reject and merge."""
         heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
-        return sift(
+        return refine_leaves(
             self._with_heads(lifted),
             lifted.postures(),
             heads[lifted.leaves.frame],
@@ -229,10 +226,9 @@ class Refiner:
             return seen.sight
         return replace(seen.sight, head_image=head, head_deviation=seen.deviation[:, len(JOINTS) :])
 
-    def _refine(self, lifted: Lifted) -> dict[int, Grown]:
-        """Refine leaves, and gather what is left of each frame."""
-        sifted = self.sift(lifted)
-        leaves, fit = sifted.prune(lifted.leaves), self.fit
+    def _trees(self, lifted: Lifted, outcomes: LeafOutcomes) -> dict[int, FrameTrees]:
+        """Gather what is left of each frame."""
+        leaves, fit = outcomes.prune(lifted.leaves), self.fit
         depth = np.median(fit.root[lifted.chosen, 2] / lifted.seen.focal)
         batch = Batch(
             leaves=leaves,
@@ -240,19 +236,20 @@ class Refiner:
             checks=self._measuring,
             body=self.grower.body,
             tolerance=self.tolerance,
+            judged="refined",
             exact=np.zeros(leaves.n_frames, dtype=np.bool_),
-            completion=None if lifted.completion is None else lifted.completion.take(sifted.kept),
-            refined=sifted.survivors,
+            completion=None if lifted.completion is None else lifted.completion.take(outcomes.kept),
+            refined=outcomes.survivors,
             spread=float(deviation_of_noise(self.noise.deviation, depth)),
         )
         bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
         return {
-            frame: Grown(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
+            frame: FrameTrees(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
             for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
         }
 
     def _leaves(
-        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: Seen
+        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: ObservedHypotheses
     ) -> tuple[Leaves, Tolerance]:
         """Grow limbs on trunks, with every angle's own allowance."""
         fit, body = self.fit, self.grower.body
@@ -269,8 +266,8 @@ class Refiner:
         # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
         rigid = max(DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
-        tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=ANGLE)
-        suite = under_noise(self.judges.suite(body.figure, tolerance), allowed.bound)
+        tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
+        suite = under_noise(suite_of(self.settings, body.figure, tolerance), allowed.bound)
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )

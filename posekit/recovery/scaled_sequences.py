@@ -22,7 +22,8 @@ from posekit.following import (
     best_paths,
 )
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
-from posekit.recovery.conductor import person_of, recover
+from posekit.recovery.conductor import recover
+from posekit.recovery.person import person_of
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.sequences import follow, survivor_frames
 

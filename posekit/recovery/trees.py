@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,22 +15,15 @@ from posekit.geometry import Array
 from posekit.hidden import CompletedSurvivors
 from posekit.objects.mirror import mirrored
 from posekit.recovery.body import Body
+from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.refined import RefinedSurvivors
-from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
+from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
 from posekit.validators import worst_margins
 
-LEVEL = 5e-10
+LEVEL_METRES = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""
-
-JUDGED: Final = {
-    EXACT_TOLERANCE: "exact",
-    MEASURED_TOLERANCE: "measured",
-    replace(MEASURED_TOLERANCE, hips=1.0): "measured",  # where nothing is left with less for the hips
-    PHOTOGRAPH_TOLERANCE: "photograph",
-}
-"""What frames are said to be judged as, by their tolerance."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,6 +41,9 @@ class Batch:
     body : Body
         What the trees are of.
     tolerance : Tolerance
+        What may be off.
+    judged : str
+        How its frames were judged: `posekit.settings.Judged`.
     exact : bool array (F,)
         Where there is evidence that the image points are exact, of frames that were judged so.
     completion : CompletedSurvivors, optional
@@ -64,15 +59,11 @@ class Batch:
     checks: Sequence[Check]
     body: Body
     tolerance: Tolerance
+    judged: Judged
     exact: NDArray[np.bool_]
     completion: CompletedSurvivors | None = None
     refined: RefinedSurvivors | None = None
     spread: float = 0.0
-
-    @cached_property
-    def judged(self) -> str:
-        """How its frames were judged: see `FrameRecovery.judged`."""
-        return "refined" if self.refined is not None else JUDGED.get(self.tolerance, "given")
 
     @cached_property
     def points(self) -> Array:
@@ -121,7 +112,7 @@ class Batch:
     def mirrored(self) -> NDArray[np.bool_]:
         """Survivors (N,) whose mirror image survives too: the same picture with near and far exchanged throughout."""
         leaves = self.leaves
-        return mirrored(leaves.postures()[..., 2], leaves.parents, leaves.frame, level=LEVEL)
+        return mirrored(leaves.postures()[..., 2], leaves.parents, leaves.frame, level=LEVEL_METRES)
 
     @cached_property
     def motion(self) -> NDArray[np.int64]:
@@ -150,3 +141,32 @@ class Batch:
             for a, b in SEGMENTS
         ]
         return np.asarray(np.fmax.reduce([np.zeros(len(self.refined)), *longer]))
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrameTrees:
+    """Where the trees of one frame are.
+
+    Parameters
+    ----------
+    batch : Batch or None
+        What they were grown in; None where nothing was grown.
+    index, hypotheses : int
+        The place in the batch of the frame's first hypothesis, and how many there are.
+    fit : CameraFit
+        Where the necks came from.
+    """
+
+    batch: Batch | None
+    index: int
+    hypotheses: int
+    fit: CameraFit
+
+
+def trees_of(batch: Batch, fit: CameraFit, rows: NDArray[np.intp]) -> dict[int, FrameTrees]:
+    """Say for each frame of a batch, which was grown of some hypotheses, where its own trees are."""
+    frames, first, count = np.unique(fit.frame[rows], return_index=True, return_counts=True)
+    return {
+        frame: FrameTrees(batch=batch, index=index, hypotheses=hypotheses, fit=fit)
+        for frame, index, hypotheses in zip(frames.tolist(), first.tolist(), count.tolist(), strict=True)
+    }

@@ -44,6 +44,10 @@ class CheckSettings:
     def __hash__(self) -> int:
         return hash((self.name, json.dumps(self.parameters, sort_keys=True)))
 
+    def __str__(self) -> str:
+        """Name the check, with its parameters where it has some: ``collision {"contact_margin": -0.02}``."""
+        return f"{self.name} {json.dumps(self.parameters, sort_keys=True)}" if self.parameters else self.name
+
     def to_json(self) -> dict[str, Any]:
         """Return the check as a JSON object with ``name`` and ``parameters``."""
         return {"name": self.name, "parameters": dict(self.parameters)}

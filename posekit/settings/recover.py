@@ -96,7 +96,7 @@ class RecoverSettings:
     'table1'
     """
 
-    checks: Sequence[CheckSettings] = DEFAULT_CHECKS
+    checks: Sequence[Any] = DEFAULT_CHECKS  # a tuple of CheckSettings, once they are made
     ranges: str | RangeTable = "urdf"
     rules: Sequence[int] = DEFAULT_RULES
     walkers: str = "paper"

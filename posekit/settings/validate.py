@@ -11,7 +11,7 @@ from typing import Any, Final, Literal
 from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
-from posekit.settings.check import CheckSettings, check_settings
+from posekit.settings.check import check_settings
 from posekit.settings.recover import DEFAULT_RULES, RangeTable, check_walkers, checked_rules
 from posekit.settings.tolerance import EXACT_TOLERANCE, MEASURED_TOLERANCE
 
@@ -65,7 +65,7 @@ class ValidateSettings:
         Where one of them is impossible, whatever is judged.
     """
 
-    checks: Sequence[CheckSettings] | None = None
+    checks: Sequence[Any] | None = None  # a tuple of CheckSettings, once they are made
     ranges: str | RangeTable = "urdf"
     rules: Sequence[int] = DEFAULT_RULES
     walkers: str = "paper"

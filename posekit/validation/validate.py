@@ -15,17 +15,16 @@ from posekit.formats.own import Postures, Report, Result
 from posekit.formats.own.postures_q import Configurations
 from posekit.formats.own.report import PostureReport
 from posekit.formats.own.report_columns import Columns, Place, joined
-from posekit.recovery.trees import JUDGED
+from posekit.recovery.judged import tolerances_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
-from posekit.settings import EXACT_TOLERANCE
+from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
 from posekit.validators import Validator
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
-from posekit.validators.validator import RIGID_TOLERANCE
 from posekit.validators.walking import WALKERS
 
 BATCH: Final = 4096
@@ -170,15 +169,13 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
     judged = settings.get("judged")
     kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
     asked = _number(settings, "contact_margin", 0.0)
-    usual = [one for one, kind in JUDGED.items() if kind in kinds]
-    rigid = [RIGID_TOLERANCE, *(one.rigid for one in usual)]
-    angles, margins = [EXACT_TOLERANCE.angle, *(one.angle for one in usual)], [asked]
-    for kind, field in (("given", "tolerance"), ("noisy", "noisy"), ("refined", "refined")):
-        said = settings.get(field)
-        if kind in kinds and isinstance(said, dict):
-            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=f"{field}."))
-            angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=f"{field}."))
-            margins.append(_number(said, "contact", asked, within=f"{field}."))
+    rigid, angles, margins = [RIGID_TOLERANCE], [EXACT_TOLERANCE.angle], [asked]
+    for kind, said in tolerances_of(settings).items():
+        if kind in kinds:
+            within = "tolerance." if kind == "given" else f"{kind}."
+            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
+            angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
+            margins.append(_number(said, "contact", asked, within=within))
     walkers = settings.get("walkers", "paper")
     if not (isinstance(walkers, str) and walkers in WALKERS):
         raise refusal(

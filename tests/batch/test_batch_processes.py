@@ -17,10 +17,11 @@ from posekit.batch.durable import PARTS
 from posekit.batch.shard import shards_of
 from posekit.batch.staging import Staging, stage
 from posekit.body import load_figure
+from posekit.settings import RecoverSettings
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
-RECIPE = Recipe(checks=("rigid-parts",), shard_frames=2, rank=False)
+RECIPE = Recipe(settings=RecoverSettings(checks=("rigid-parts",)), shard_frames=2, rank=False)
 OPTIONS = ("--checks", "rigid-parts", "--shard-frames", "2", "--no-rank")
 FRAMES = 160
 POISON, KILLED = 4, 8

@@ -8,6 +8,7 @@ import threading
 import warnings
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -34,11 +35,13 @@ from posekit.batch.staging import STAGED
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats.own import View, write_view
+from posekit.settings import MEASURED_TOLERANCE, RecoverSettings, Rooting
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
+from posekit.views.source import Source
 from tests.detector_files import view_keypoints, write_keypoints
 
-RECIPE = Recipe(checks=("rigid-parts",), shard_frames=4, rank=False)
+RECIPE = Recipe(settings=RecoverSettings(checks=("rigid-parts",)), shard_frames=4, rank=False)
 
 
 class HerePool:
@@ -174,7 +177,7 @@ def test_a_shard_that_fails_is_named_with_its_frames(archive: Path, tmp_path: Pa
 def test_other_settings_are_refused_unless_asked(archive: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     run_batch([archive], out, RECIPE)
-    other = Recipe(checks=("rigid-parts",), shard_frames=5, rank=False)
+    other = Recipe(settings=RecoverSettings(checks=("rigid-parts",)), shard_frames=5, rank=False)
     before = contents(out)
     with pytest.raises(InputError, match=r"other settings \(shard_frames: 4 there, 5 now\).*--overwrite"):
         run_batch([archive], out, other)
@@ -205,7 +208,7 @@ def test_formats_are_not_mixed_by_mistake(archive: Path, tmp_path: Path) -> None
     place.mkdir()
     (place / "a.parquet").write_bytes((archive / "a.parquet").read_bytes())
     write_keypoints(place / "k", view_keypoints(seen(2), "openpose"), "openpose")
-    recipe = Recipe(checks=("rigid-parts",), shard_frames=4, rank=False)
+    recipe = Recipe(settings=RecoverSettings(checks=("rigid-parts",)), shard_frames=4, rank=False)
     with pytest.raises(
         InputError, match=r"k: got key points: openpose, body_25, and a\.parquet is views; .*--mixed"
     ):
@@ -285,7 +288,7 @@ def test_a_full_disk_is_an_error_and_nothing_half_written_counts(archive: Path, 
     """The system itself refuses to let a file grow, as a full disk does."""
     out = tmp_path / "out"
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    large = Recipe(checks=("rigid-parts",), shard_frames=9, rank=False)
+    large = Recipe(settings=RecoverSettings(checks=("rigid-parts",)), shard_frames=9, rank=False)
     run_batch([archive / "a.parquet"], tmp_path / "enough", large)
     (written,) = shard_paths(tmp_path / "enough")
     resource.setrlimit(resource.RLIMIT_FSIZE, (written.stat().st_size - 1, hard))
@@ -339,16 +342,33 @@ def test_impossible_numbers_are_refused(options: dict, says: str, archive: Path,
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"shard_frames": 0}, "--shard-frames: 0"),
         ({"scale": "big"}, "--scale"),
-        ({"root": "feet"}, "--root: 'feet'"),
+        ({"rooting": {"method": "feet"}}, "--root: 'feet'"),
         ({"ranges": "none.toml"}, "none.toml"),
-        ({"rigid": -1.0}, "--rigid-tolerance"),
+        ({"tolerance": {"rigid": -1.0}}, "--rigid-tolerance"),
+        ({"checks": ["gravity"]}, "--checks: 'gravity'"),
+        ({"group": 0.05}, "a batch groups nothing"),
+        ({"nearer": []}, "a batch groups nothing"),
+        ({"scale": {"how": "min"}}, "a batch groups nothing"),
+        ({"tolerance": asdict(MEASURED_TOLERANCE)}, "a batch groups nothing"),
     ],
 )
 def test_impossible_recipes_are_refused(options: dict, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        Recipe(**options)
+        Recipe(settings=RecoverSettings.from_json(options))
+
+
+def test_a_shard_has_frames() -> None:
+    with pytest.raises(InputError, match="--shard-frames: 0"):
+        Recipe(shard_frames=0)
+
+
+@pytest.mark.parametrize("deviation", [None, 3.0])
+def test_a_deviation_of_source_or_root_is_both(deviation: float | None) -> None:
+    by_root = Recipe(
+        settings=RecoverSettings(rooting=Rooting(deviation=2.0)), source=Source(deviation=deviation)
+    )
+    assert by_root.source.deviation == by_root.settings.rooting.deviation == (deviation or 2.0)
 
 
 def test_the_command_line(archive: Path, tmp_path: Path, command: Callable[..., Any]) -> None:

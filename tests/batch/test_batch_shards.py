@@ -19,14 +19,13 @@ from posekit.batch.shard import SHARDS, finished, portions, shards_of
 from posekit.batch.staging import STAGED, Staged, Staging, stage
 from posekit.batch.view_table import open_view_table, read_rows, write_rows
 from posekit.body import load_figure
-from posekit.cli.judging_options import Tolerances
 from posekit.errors import InputError
 from posekit.formats.motion.survivors import COORDINATES
 from posekit.formats.motion.survivors_files import read_survivors
-from posekit.formats.own import View, parse_length, read_view, write_view
+from posekit.formats.own import View, read_view, write_view
 from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
-from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
+from posekit.settings import MEASURED_TOLERANCE, PartialTolerance, RecoverSettings
 from posekit.settings.scale import parse_scale
 from posekit.skeleton import JOINTS
 from posekit.synthesis import random_views
@@ -97,15 +96,22 @@ def test_every_kind_of_view(how: str, tmp_path: Path, folder: Path) -> None:
     view, recipe = seen(4, 1), Recipe()
     options: dict[str, Any] = {}
     if how == "uncalibrated":
-        view, recipe = forget_camera(view), Recipe(scale="closure")
+        view, recipe = forget_camera(view), Recipe(settings=RecoverSettings(scale="closure"))
         options = {"scale": parse_scale("closure")}
     elif how == "placed":
         view = replace(view, root=np.empty(0), head_image=np.empty(0), deviation=2.0)
     elif how == "lee-chen":
         view = builtin_view("seq1")
     else:
-        recipe = Recipe(rigid=0.02, checks=("rigid-parts", "joint-range"))
-        options = {"checks": recipe.checks, "tolerance": recipe.tolerance(uncalibrated=False)}
+        recipe = Recipe(
+            settings=RecoverSettings(
+                tolerance=PartialTolerance(rigid=0.02), checks=("rigid-parts", "joint-range")
+            )
+        )
+        options = {
+            "checks": ("rigid-parts", "joint-range"),
+            "tolerance": replace(MEASURED_TOLERANCE, rigid=0.02, hips=1.0),
+        }
     write_view(tmp_path / "view.json", view)
     rows = table(tmp_path / "view.json", folder, recipe)
     recovery = recover(read_view(tmp_path / "view.json"), **options)
@@ -116,20 +122,6 @@ def test_every_kind_of_view(how: str, tmp_path: Path, folder: Path) -> None:
         np.testing.assert_array_equal(rows[rows.survivor >= 0].scale, scales)
     else:
         assert rows.scale.isna().all()
-
-
-@pytest.mark.parametrize("given", [("", "", None), ("2cm", "", None), ("", "3mm", 4.0), ("1e-8m", "", None)])
-@pytest.mark.parametrize("uncalibrated", [False, True])
-def test_tolerances_mean_what_they_mean_to_recover(given: tuple, uncalibrated: bool) -> None:
-    rigid, tangent, angle = given
-    recipe = Recipe(
-        rigid=parse_length(rigid, name="r") if rigid else None,
-        tangent=parse_length(tangent, name="t") if tangent else None,
-        angle=angle,
-    )
-    usual = PHOTOGRAPH_TOLERANCE if uncalibrated else MEASURED_TOLERANCE
-    options = Tolerances(rigid_tolerance=rigid, tangent_tolerance=tangent, angle_tolerance=angle)
-    assert recipe.tolerance(uncalibrated=uncalibrated) == options.filled(usual)
 
 
 @pytest.mark.parametrize(
@@ -348,8 +340,8 @@ def test_bad_tables_are_refused_in_a_line(columns: dict, says: str, tmp_path: Pa
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        ({"scale": "closure"}, "--scale: the view's camera is calibrated"),
-        ({"proportions": "taylor"}, "--proportions: taylor is for uncalibrated"),
+        ({"settings": RecoverSettings(scale="closure")}, "--scale: the view's camera is calibrated"),
+        ({"settings": RecoverSettings(proportions="taylor")}, "--proportions: taylor is for uncalibrated"),
         ({"source": Source(fov=60.0)}, "--fov: .* is a view"),
         ({"source": Source(proportions="winter")}, "--proportions: 'winter'"),
     ],

@@ -19,6 +19,7 @@ from posekit.formats.own import write_view
 from posekit.inspection.telling import counts_line, settings_line
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
+from posekit.settings import RecoverSettings
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
@@ -54,7 +55,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (archive / "b.json").write_text('{"schema": "posekit.view/1"}', encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_module, "LocalPool", HerePool)
-        run_batch([archive], folder / "run", Recipe(checks=("rigid-parts", "joint-range"), shard_frames=2))
+        settings = RecoverSettings(checks=("rigid-parts", "joint-range"))
+        run_batch([archive], folder / "run", Recipe(settings=settings, shard_frames=2))
     return folder / "run"
 
 

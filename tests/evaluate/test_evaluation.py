@@ -29,7 +29,7 @@ from posekit.evaluate.report import csv_lines, document, summary
 from posekit.formats.own import OpenCVModel, View
 from posekit.measures import mpjpe
 from posekit.recovery.recovery import FrameRecovery
-from posekit.settings import MEASURED_TOLERANCE, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, RecoverSettings, Tolerance
 from posekit.skeleton import JOINTS
 from posekit.synthesis import Capture, Walker, random_views, read_capture, seq1
 from posekit.views.builtin import forget_camera, view_of
@@ -406,9 +406,9 @@ def test_a_person_outside_the_picture_is_left_out_and_counted(capture: Capture) 
         (lambda: Method(noise=(np.inf,)), "--noise"),
         (lambda: Method(noise=(1.0, 1.0)), "each level once"),
         (lambda: Method(root="head"), "--root"),  # type: ignore[arg-type]
-        (lambda: Method(checks=("gravity",)), "not a check"),
-        (lambda: Method(ranges="nowhere"), "--ranges"),
-        (lambda: Method(rules=(9,)), "--rules"),
+        (lambda: Method(settings=RecoverSettings(checks=("gravity",))), "not a check"),
+        (lambda: Method(settings=RecoverSettings(ranges="nowhere")), "--ranges"),
+        (lambda: Method(settings=RecoverSettings(rules=(9,))), "--rules"),
         (lambda: Method(seed=-1), "--seed"),
     ],
 )
@@ -465,17 +465,39 @@ def test_reports_hold_the_same_numbers(exact: Any, tmp_path: Path) -> None:
 
 
 def test_tolerances_and_ranges_are_used(capture: Capture) -> None:
+    def asked(noise: float, **changes: Any) -> Any:
+        method = Method(noise=(noise,), settings=RecoverSettings(**changes))
+        return evaluate(capture, sampling=FEW, sweep=SWEEP, method=method)
+
     wide = Tolerance(rigid=0.1, tangent=0.05, placement=False, angle=10.0)
-    loose = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=wide))
+    loose = evaluate(
+        capture,
+        sampling=FEW,
+        sweep=SWEEP,
+        method=Method(noise=(2.0,), settings=RecoverSettings(tolerance=wide)),
+    )
     strict = evaluate(
-        capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(2.0,), tolerance=MEASURED_TOLERANCE)
+        capture,
+        sampling=FEW,
+        sweep=SWEEP,
+        method=Method(noise=(2.0,), settings=RecoverSettings(tolerance=MEASURED_TOLERANCE)),
     )
     assert (loose.frames.measured.survivors >= strict.frames.measured.survivors).all()
     assert of(loose)["violations"]["ranges"] == 0
-    table = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,), ranges="table1"))
+    table = evaluate(
+        capture,
+        sampling=FEW,
+        sweep=SWEEP,
+        method=Method(noise=(0.0,), settings=RecoverSettings(ranges="table1")),
+    )
     assert of(table)["violations"]["ranges"] == 0
     assert of(table)["violations"]["witness_turned_deg"] is None
-    free = evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,), checks=("rigid-parts",)))
+    free = evaluate(
+        capture,
+        sampling=FEW,
+        sweep=SWEEP,
+        method=Method(noise=(0.0,), settings=RecoverSettings(checks=("rigid-parts",))),
+    )
     assert of(free)["violations"]["range_excess_deg"] is None
     assert of(free)["survivors"]["mean"] > of(table)["survivors"]["mean"]
 

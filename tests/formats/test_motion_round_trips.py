@@ -21,7 +21,8 @@ from posekit.formats import own as files
 from posekit.formats.motion.urdf_folder import LINK_OF
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
-from posekit.recovery.ranked import ranked, rigid_of
+from posekit.recovery.judged import rigid_of
+from posekit.recovery.ranked import ranked
 from posekit.recovery.result import result_of
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS
 from posekit.synthesis import Walker, walker_scene

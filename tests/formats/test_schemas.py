@@ -37,7 +37,7 @@ from posekit.formats.own import (
     write_view,
 )
 from posekit.formats.own.batch_schema import ManifestFile, SettingsFields, SourceFields
-from posekit.settings import MEASURED_TOLERANCE
+from posekit.settings import MEASURED_TOLERANCE, PartialTolerance, RecoverSettings
 from posekit.skeleton import JOINTS, SEGMENT_NAMES
 from posekit.synthesis import Capture
 from posekit.views.source import Source
@@ -94,10 +94,12 @@ def write_batch(folder: Path) -> None:
                 source=Source(
                     skeleton=str(layout), camera=str(camera), size=(640, 480), rate=25.0, lengths=table
                 ),
-                ranges=str(table),
-                rigid=0.01,
-                refine=True,
-                length_deviation=0.03,
+                settings=RecoverSettings(
+                    ranges=str(table),
+                    tolerance=PartialTolerance(rigid=0.01),
+                    refine=True,
+                    length_deviation=0.03,
+                ),
             ),
         ),
         ("named", Recipe(source=Source(camera="nowhere.toml:left", calibrate=table))),

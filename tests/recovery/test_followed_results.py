@@ -18,8 +18,8 @@ from posekit.formats.motion import read_motion
 from posekit.formats.own import View
 from posekit.formats.own.paths import FollowedPaths
 from posekit.recovery import recover
-from posekit.recovery.admitting import least_violation
 from posekit.recovery.advice import advice_lines
+from posekit.recovery.least_violation import least_violation
 from posekit.recovery.result import result_of
 from posekit.recovery.sequences import follow
 from posekit.recovery.summary import following_line

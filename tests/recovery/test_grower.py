@@ -14,8 +14,8 @@ from posekit.cameras import PinholeCamera
 from posekit.cameras.head import TABLE_A2, blocks, head_points_cam, solve_pose
 from posekit.formats.own import View
 from posekit.recovery import grower
-from posekit.recovery.conductor import person_of
 from posekit.recovery.grower import Grower
+from posekit.recovery.person import person_of
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
@@ -66,9 +66,9 @@ def test_frames_whose_torso_does_not_close_are_grown_once(monkeypatch: pytest.Mo
     grown: list[int] = []
     grow = Grower.grow
 
-    def counted(self: Grower, chosen: Any, tolerance: Any) -> Any:
+    def counted(self: Grower, chosen: Any, *how: Any) -> Any:
         grown.append(len(chosen))
-        return grow(self, chosen, tolerance)
+        return grow(self, chosen, *how)
 
     monkeypatch.setattr(Grower, "grow", counted)
     recover(mixed(slice(0, None, 3)), checks=("rigid-parts",))

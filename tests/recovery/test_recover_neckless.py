@@ -21,6 +21,7 @@ from posekit.recovery import recover
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.recovery.sequences import follow
+from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
 from posekit.views.builtin import builtin_view, view_of
@@ -128,7 +129,8 @@ def test_an_evaluation_goes_on_where_a_whole_part_lacks_it() -> None:
     image = scene.image.copy()
     image[256:, 0] = np.nan
     view = replace(view_of(scene), image=image, root=scene.joints_cam[:, 0])
-    found = evaluate(view, method=Method(noise=(0.0,), checks=("rigid-parts",))).frames.measured
+    method = Method(noise=(0.0,), settings=RecoverSettings(checks=("rigid-parts",)))
+    found = evaluate(view, method=method).frames.measured
     assert (found.survivors[:256] > 0).all() and (found.survivors[256:] == 0).all()
 
 

@@ -16,7 +16,7 @@ from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.own import View
-from posekit.recovery import recover, sifting
+from posekit.recovery import recover, survival
 from posekit.recovery.certified import certified_within
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
@@ -140,7 +140,7 @@ def test_bodies_overlap_no_farther_than_is_allowed() -> None:
         return deepest.check(joints).verdicts.count("invalid")
 
     recovery = recover(view)
-    with mock.patch.object(sifting, "contradictions", lambda *_: []):
+    with mock.patch.object(survival, "contradictions", lambda *_: []):
         unchecked = recover(view)
     assert recovery.settings["refined"]["contact"] == -0.03
     assert overlapping(unchecked) > 0

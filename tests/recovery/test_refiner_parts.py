@@ -15,8 +15,8 @@ from posekit.compiled.compiling import path
 from posekit.formats.own import View
 from posekit.recovery import recover, refiner
 from posekit.recovery.recovery import Recovery
+from posekit.recovery.refined import Covariances
 from posekit.recovery.result import result_of
-from posekit.recovery.uncertainty import Covariances
 from posekit.refinement import covariance, refined
 from posekit.synthesis import random_views
 from posekit.tree import Leaves

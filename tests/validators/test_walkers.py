@@ -19,6 +19,7 @@ from posekit.formats import own as files
 from posekit.formats.own import View
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
+from posekit.settings import RecoverSettings, ValidateSettings
 from posekit.skeleton import DOFS
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
@@ -78,12 +79,13 @@ def test_people_are_recovered_where_the_papers_rules_kill_them(view: View) -> No
 
 def test_every_way_to_ask_means_the_same(view: View) -> None:
     expected = recover(view, checks=ALL, rules=(1,), walkers="people").frames[0].joints
-    recipe = Recipe(checks=ALL, rules=(1,), walkers="people")
-    np.testing.assert_array_equal(recipe.recover(view).frames[0].joints, expected)
+    settings = RecoverSettings(checks=ALL, rules=(1,), walkers="people")
+    recipe = Recipe(settings=settings)
+    np.testing.assert_array_equal(recover(view, recipe.settings).frames[0].joints, expected)
     assert recipe.document()["walkers"] == "people"  # a batch of other thresholds is another batch
-    method = Method(checks=ALL, rules=(1,), walkers="people")
+    method = Method(settings=settings)
     np.testing.assert_array_equal(method.recover(view)[0].joints, expected)
-    assert method.settings()["walkers"] == "people"
+    assert method.document()["walkers"] == "people"
     verdicts = {name: Validator(checks=ALL, rules=(1,), walkers=name) for name in WALKERS}
     assert verdicts["people"].check(view.truth).verdicts == ["undecided"]  # no swing is large enough to say
     assert verdicts["paper"].check(view.truth).verdicts == ["invalid"]
@@ -98,7 +100,12 @@ def test_every_way_to_ask_means_the_same(view: View) -> None:
 
 
 @pytest.mark.parametrize(
-    "made", [lambda: Recipe(walkers="x"), lambda: Method(walkers="x"), lambda: Validator(walkers="x")]
+    "made",
+    [
+        lambda: RecoverSettings(walkers="x"),
+        lambda: ValidateSettings(walkers="x"),
+        lambda: Validator(walkers="x"),
+    ],
 )
 def test_other_names_are_refused_at_once(made: Callable[[], object]) -> None:
     with pytest.raises(InputError, match="--walkers: 'x'; expected paper or people"):

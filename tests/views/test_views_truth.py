@@ -12,7 +12,8 @@ from posekit.errors import InputError
 from posekit.evaluate.comparison import compare
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
-from posekit.recovery.ranked import ranked, rigid_of
+from posekit.recovery.judged import rigid_of
+from posekit.recovery.ranked import ranked
 from posekit.recovery.result import result_of
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of

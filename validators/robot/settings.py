@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,14 +13,13 @@ from numpy.typing import ArrayLike
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.joint_map import JointMap
+from posekit.settings.validate import Bodies, Lengths
 
 ROBOT_CHECKS: Final = ("reach", "rigid-parts", "joint-range", "collision", "balance")
 ROBOT_DEFAULT: Final = ROBOT_CHECKS[:4]
 OF_POSITIONS: Final = ("reach", "rigid-parts")
 """Checks of what was seen: a configuration has nothing to compare."""
 
-Bodies = Literal["auto", "urdf", "visual", "capsules"]
-Lengths = Literal["model", "median", "each"]
 LENGTHS: Final[tuple[Lengths, ...]] = ("model", "median", "each")
 BODIES_FROM: Final[Mapping[str, str]] = {
     "urdf": "the URDF's collision bodies",

@@ -11,11 +11,11 @@ import numpy as np
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.linkages import Linkage
-from posekit.recovery.body import Judges
+from posekit.recovery.body import ranges_of
 from posekit.recovery.taylor_figure.completion import NEEDS, Completion, taylor_checks
 from posekit.recovery.taylor_figure.human import Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
-from posekit.settings import Tolerance
+from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import collision, judge
@@ -68,15 +68,15 @@ class TaylorBody:
         joints = self._completion.complete(leaves.postures())
         return np.concatenate([joints, np.full((len(joints), len(HEAD), 3), np.nan)], axis=1)
 
-    def checks(self, judges: Judges, tolerance: Tolerance) -> Sequence[Check]:
+    def checks(self, settings: RecoverSettings, tolerance: Tolerance) -> Sequence[Check]:
         """Make the checks that hold the middles, and the figure's on the completed joints."""
         judging = taylor_checks(
             self.figure,
             self.tree.joints,
-            judges.checks,
-            ranges=judges.ranges,
+            settings.checks,
+            ranges=ranges_of(settings),
             tolerance=tolerance,
-            contact_margin=judges.contact_margin + self.overlap,
+            contact_margin=settings.contact_margin + self.overlap,
         )
         return [*self._human.closing, *judging]
 

@@ -15,7 +15,7 @@ from posekit.formats.own import OpenCVModel
 from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.grower import Grower
-from posekit.recovery.noise import TRUNK, Noise, Seen
+from posekit.recovery.noise import TRUNK, Noise, ObservedHypotheses
 from posekit.recovery.recovery import Recovery
 from posekit.refinement import LengthDoubt, diagnose
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS, segment_name
@@ -131,7 +131,7 @@ def _doubts(
     camera = fit.cameras(rows)
     if not len(rows) or not isinstance(camera, PinholeCamera):
         return []
-    return diagnose(Seen.of(grower.view, fit, rows, camera, recovery.figure, noise).sight)
+    return diagnose(ObservedHypotheses.of(grower.view, fit, rows, camera, recovery.figure, noise).sight)
 
 
 def _placed_by_trunk(recovery: Recovery, grower: Grower, frames: NDArray[np.intp], noise: Noise) -> CameraFit:

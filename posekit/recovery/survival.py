@@ -17,10 +17,10 @@ from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check, Leaves
 from posekit.tree.leaves import Pruned
 
-HOPELESS: Final = 60.0
+HOPELESS_CHI2: Final = 60.0
 """A chi2 beyond which a leaf is given up unless the next step promises to halve it."""
 
-WALLED: Final = 250.0
+HOPELESS_CHI2_AT_WALLS: Final = 250.0
 """The same where limits couple angles: they bend, and a single step promises less."""
 
 LEAVES_AT_ONCE: Final = 60_000
@@ -28,7 +28,7 @@ LEAVES_AT_ONCE: Final = 60_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sifted:
+class LeafOutcomes:
     """What became of N leaves.
 
     Parameters
@@ -50,7 +50,7 @@ class Sifted:
     survivors: RefinedSurvivors
 
     @staticmethod
-    def of(refined: Refined, known: NDArray[np.bool_], checks: Sequence[Check]) -> Sifted:
+    def of(refined: Refined, known: NDArray[np.bool_], checks: Sequence[Check]) -> LeafOutcomes:
         """Reject what noise cannot explain, then what checks contradict, and merge what became one.
 
         Joints that are not `known` become NaN.
@@ -66,7 +66,7 @@ class Sifted:
         merged = merge(refined, keep=legal)
         kept = np.zeros(len(refined), dtype=np.bool_)
         kept[merged.rows] = True
-        return Sifted(
+        return LeafOutcomes(
             p=refined.p,
             contradicted=tuple(contradicted),
             explained=explained,
@@ -75,7 +75,7 @@ class Sifted:
         )
 
     @staticmethod
-    def joined(parts: list[Sifted]) -> Sifted:
+    def joined(parts: list[LeafOutcomes]) -> LeafOutcomes:
         """Put the leaves of one part behind those of the last."""
         p, explained, kept = (
             np.concatenate([getattr(part, name) for part in parts]) for name in ("p", "explained", "kept")
@@ -87,7 +87,9 @@ class Sifted:
             for one in part.contradicted
         )
         survivors = RefinedSurvivors.joined([part.survivors for part in parts])
-        return Sifted(p=p, contradicted=contradicted, explained=explained, kept=kept, survivors=survivors)
+        return LeafOutcomes(
+            p=p, contradicted=contradicted, explained=explained, kept=kept, survivors=survivors
+        )
 
     def prune(self, leaves: Leaves) -> Leaves:
         """Drop the leaves that checks contradict, those that noise cannot explain, and those that became another."""
@@ -113,23 +115,23 @@ class Sifted:
         return drop(leaves, gone, why)
 
 
-def sift(
+def refine_leaves(
     sight: ObservedFrames,
     postures: Array,
     head: Array,
     hypothesis: NDArray[np.intp],
     frame: NDArray[np.intp],
     checks: Sequence[Check],
-) -> Sifted:
+) -> LeafOutcomes:
     """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject and merge frame by frame (N,)."""
     parts = []
-    hopeless = HOPELESS if sight.walls is None else WALLED
+    hopeless = HOPELESS_CHI2 if sight.walls is None else HOPELESS_CHI2_AT_WALLS
     for rows in blocks(frame, LEAVES_AT_ONCE):
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=hopeless)
         refined = replace(refined, frame=frame[rows])
-        parts.append(Sifted.of(refined, np.asarray(np.isfinite(start).all(axis=2)), checks))
-    return Sifted.joined(parts)
+        parts.append(LeafOutcomes.of(refined, np.asarray(np.isfinite(start).all(axis=2)), checks))
+    return LeafOutcomes.joined(parts)
 
 
 def blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:

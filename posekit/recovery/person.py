@@ -1,0 +1,72 @@
+"""Whose body a view shows: the figure with the view's own lengths, or another with its proportions."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from posekit.body import Figure, stature_from_lengths
+from posekit.errors import InputError
+from posekit.formats.own import ScaledOrthographicModel, View
+from posekit.recovery.body import Body, FigureBody
+from posekit.settings import RecoverSettings, Rooting
+
+CACHED_PERSONS = 32
+"""Figures of persons that are kept: clips and shards of the same person follow each other."""
+
+
+def person_of(view: View, figure: Figure) -> Figure:
+    """Apply a view's own stature, lengths and head points to a figure."""
+    head = {
+        name: tuple(np.asarray(at, dtype=np.float64).tolist())
+        for name, at in (view.head_points or {}).items()
+    }
+    return _person(figure, view.stature, tuple(view.lengths.items()), tuple(head.items()))
+
+
+@lru_cache(maxsize=CACHED_PERSONS)
+def _person(
+    figure: Figure,
+    stature: float | None,
+    lengths: tuple[tuple[str, float], ...],
+    head_points: tuple[tuple[str, tuple[float, ...]], ...],
+) -> Figure:
+    """Make the figure of a person: building one takes as long as recovering some hundred frames."""
+    if stature is not None:
+        figure = figure.from_stature(stature)
+    if lengths or head_points:
+        figure = figure.scaled(dict(lengths), dict(head_points))
+    return figure
+
+
+def body_of(view: View, figure: Figure, proportions: str) -> Body:
+    """Choose what the view's points are lifted into."""
+    person = person_of(view, figure)
+    stature = view.stature or stature_from_lengths(person.lengths)
+    if proportions == "taylor":
+        from posekit.recovery.taylor_figure.body import TaylorBody
+
+        return TaylorBody.of(stature, figure)
+    return FigureBody(figure=person, stature=stature, derived=view.derived)
+
+
+def refuse_settings(view: View, settings: RecoverSettings) -> None:
+    """Refuse settings that say nothing of such a view.
+
+    Raises
+    ------
+    InputError
+        Where a calibrated view is given a scale or Taylor's proportions, or an uncalibrated one a root.
+    """
+    if isinstance(view.camera, ScaledOrthographicModel):
+        if settings.rooting != Rooting():
+            raise InputError(
+                "--root: the view's camera is not known, and so no depth is; leave the option out"
+            )
+    elif settings.proportions == "taylor":
+        raise InputError(
+            "--proportions: taylor is for uncalibrated views (scaled-orthographic); leave the option out"
+        )
+    elif settings.scale is not None:
+        raise InputError("--scale: the view's camera is calibrated; leave the option out")
