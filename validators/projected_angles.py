@@ -8,18 +8,25 @@ holds is said at the angle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
 
 import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
+from posekit.compiled import check_kernels as kernels
 from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
-from posekit.tree import Check, Findings, Loosening, Place
+from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.ranges import Ranges
 
 ROUNDING = 1e-3
 """Degrees within which -180 is taken for 180."""
+
+HIP_SIGNS: Final = (1.0, -1.0, 1.0)
+HEAD_SIGNS: Final = (-1.0, 1.0, -1.0)
+"""What flexion, rotation and bending of a plane are times, to be the part's own."""
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
 
@@ -37,6 +44,20 @@ def projected_angles(figure: Figure, ranges: Ranges, *, tolerance: float) -> lis
                 ProjectedHinge(ranges=ranges, tolerance=tolerance, side=side, limb=limb),
             ]
     return checks
+
+
+def _rule(kind: int, ranges: Ranges, tolerance: float, *more: object, wrap: float | None = None) -> Rule:
+    """Write a screen as numbers: tolerance, shortest projection, where a turn is added, and what else there is."""
+    turn = max(tolerance if wrap is None else wrap, ROUNDING) - 180
+    return Rule(
+        kind=kind,
+        numbers=np.concatenate(
+            [
+                [tolerance, ranges.shortest_projection, turn],
+                *(np.ravel(np.asarray(one, dtype=np.float64)) for one in more),
+            ]
+        ),
+    )
 
 
 def paper_axes(points: Array) -> Array:
@@ -94,8 +115,18 @@ class ProjectedBall(Check):
             [angle_in_plane(across, u[:, 1], shortest, self.tolerance) for across in (u[:, 0], outward)],
             axis=-1,
         )
-        bounds = np.array([self.ranges.limits[f"{self.limb[0]}.{a}"] for a in ("flexion", "abduction")])
+        bounds = self._bounds
         return Findings(value=value, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=self.tolerance)
+
+    @property
+    def _bounds(self) -> Array:
+        return np.array([self.ranges.limits[f"{self.limb[0]}.{a}"] for a in ("flexion", "abduction")])
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: which way is outward, and the bounds."""
+        outward = 1.0 if self.side == "left" else -1.0
+        return _rule(kernels.PROJECTED_BALL, self.ranges, self.tolerance, outward, self._bounds)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,6 +191,16 @@ class ProjectedHinge(Check):
             tolerance=self.tolerance,
         )
 
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: which way it bends and the bounds; at the knee what the hip's depend on, and these."""
+        limits = self.ranges.limits
+        own = limits[f"{self.limb[1]}.flexion"]
+        if self.limb[1] == "elbow":
+            return _rule(kernels.PROJECTED_HINGE, self.ranges, self.tolerance, 1.0, own)
+        hip = (self.ranges.knee_flexed, *limits["hip.flexion"], *limits["hip.flexion_with_straight_knee"])
+        return _rule(kernels.PROJECTED_HINGE, self.ranges, self.tolerance, -1.0, own, hip)
+
 
 def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
     """Return flexion, rotation and bending (N, 3), deg, of a plane against the torso's (§3.2.A iii).
@@ -201,8 +242,14 @@ class HipPlane(Check):
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
         middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
         normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
-        angles = plane_angles(normal, middle, self.ranges) * [1.0, -1.0, 1.0]
+        angles = plane_angles(normal, middle, self.ranges) * HIP_SIGNS
         return _plane_findings("pelvis", angles, self.ranges, self.tolerance)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: signs and bounds."""
+        bounds = _plane_bounds("pelvis", self.ranges)
+        return _rule(kernels.HIP_PLANE, self.ranges, self.tolerance, HIP_SIGNS, bounds, wrap=ROUNDING)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -227,10 +274,20 @@ class HeadPlane(Check):
         axes = paper_axes(points[:, :4])
         R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:])
         normal, crown = (np.einsum("nij,nj->ni", axes, R_head[:, :, k]) for k in (0, 2))
-        angles = plane_angles(normal, -crown, self.ranges) * [-1.0, 1.0, -1.0]
+        angles = plane_angles(normal, -crown, self.ranges) * HEAD_SIGNS
         return _plane_findings("neck", angles, self.ranges, self.tolerance)
+
+    @cached_property
+    def rule(self) -> Rule:
+        """The screen as numbers: signs and bounds, and where the head's points are."""
+        more = HEAD_SIGNS, _plane_bounds("neck", self.ranges), self.figure.ik.head_offsets
+        return _rule(kernels.HEAD_PLANE, self.ranges, self.tolerance, *more, wrap=ROUNDING)
 
 
 def _plane_findings(joint: str, angles: Array, ranges: Ranges, tolerance: float) -> Findings:
-    bounds = np.array([ranges.limits[f"{joint}.{angle}"] for angle in ("flexion", "rotation", "bending")])
+    bounds = _plane_bounds(joint, ranges)
     return Findings(value=angles, lower=bounds[:, 0], upper=bounds[:, 1], tolerance=tolerance)
+
+
+def _plane_bounds(joint: str, ranges: Ranges) -> Array:
+    return np.array([ranges.limits[f"{joint}.{angle}"] for angle in ("flexion", "rotation", "bending")])

@@ -170,16 +170,24 @@ def polar(w: Array) -> Any:
     return False
 
 
-def neck(w: Array, at: int) -> Any:
-    """Screen the neck: the torso's four points, then the head's five, whose offsets follow the tolerance."""
-    if unknown(w, 0, 9):
-        return PASSED
+def laid_head(w: Array, at: int) -> Any:
+    """Lay the head onto the five points after the torso's four, and say whether that is clear: its frame is at `TURN`.
+
+    From some place on are the offsets of its points from the neck.
+    """
     for i in range(3):
         for j in range(3):
             w[TURN + 3 * i + j] = 0.0
             for k in range(5):
-                w[TURN + 3 * i + j] += (w[3 * (4 + k) + i] - w[i]) * w[at + 10 + 3 * k + j]
-    if not polar(w):
+                w[TURN + 3 * i + j] += (w[3 * (4 + k) + i] - w[i]) * w[at + 3 * k + j]
+    return polar(w)
+
+
+def neck(w: Array, at: int) -> Any:
+    """Screen the neck: the torso's four points, then the head's five, whose offsets follow the tolerance."""
+    if unknown(w, 0, 9):
+        return PASSED
+    if not laid_head(w, at + 10):
         return UNSURE
     head = (
         w[TURN],
@@ -284,6 +292,7 @@ COMPILED = {
     "transposed": "",
     "pelvis": "(f8[::1], i8)",
     "polar": "(f8[::1],)",
+    "laid_head": "(f8[::1], i8)",
     "neck": "(f8[::1], i8)",
     "direction": "",
     "limb": "",

@@ -13,10 +13,11 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from posekit.compiled import anatomical_kernels, angle_kernels, rigid_kernels
+from posekit.compiled import anatomical_kernels, angle_kernels, projected_kernels, rigid_kernels
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
 from posekit.compiled.frame_kernels import PRESUMED
+from posekit.compiled.projected_kernels import head_plane, hip_plane, projected_ball, projected_hinge
 from posekit.compiled.rigid_kernels import (
     distance,
     hips,  # noqa: F401 - to be compiled
@@ -35,6 +36,10 @@ NECK: Final = 3
 LIMB: Final = 4
 CAPSULES: Final = 5
 ANATOMICAL: Final = 6
+PROJECTED_BALL: Final = 7
+PROJECTED_HINGE: Final = 8
+HIP_PLANE: Final = 9
+HEAD_PLANE: Final = 10
 """Kinds of screens."""
 
 CLEAR_GAP = 1e-6
@@ -140,6 +145,14 @@ def screen(kind: int, w: Array, at: int) -> Any:
         return anatomical(w, at)
     if kind == PLACEMENT:
         return placement(w, at)
+    if kind == PROJECTED_BALL:
+        return projected_ball(w, at)
+    if kind == PROJECTED_HINGE:
+        return projected_hinge(w, at)
+    if kind == HIP_PLANE:
+        return hip_plane(w, at)
+    if kind == HEAD_PLANE:
+        return head_plane(w, at)
     if kind == PELVIS:
         return pelvis(w, at)
     if kind == NECK:
@@ -147,7 +160,7 @@ def screen(kind: int, w: Array, at: int) -> Any:
     return UNSURE
 
 
-PARTS = (rigid_kernels, angle_kernels, anatomical_kernels)
+PARTS = (rigid_kernels, angle_kernels, anatomical_kernels, projected_kernels)
 """Other modules whose kernels are compiled with these."""
 
 COMPILED = {

@@ -36,7 +36,7 @@ MIN_FRAMES, MAX_FRAMES = 50, 2000
 """Frames a block: with fewer, calls cost more than what they do; of more the losses fill the memory twice."""
 
 PLAIN_FRAMES = 500
-"""Frames a block that is grown by NumPy: their candidates are a megabyte."""
+"""Frames a block that NumPy has a part in: their candidates are a megabyte."""
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -62,7 +62,8 @@ def grow(lifting: Lifting, checks: Sequence[Sequence[Check]]) -> Leaves | None:
     programme = programme_of(checks, lifting.parents, candidates.first, candidates.table.shape[1])
     lift = (lifts, *lifting.arrays(candidates))
     flat = [check for at in checks for check in at]
-    grown = _spread(growing(programme, flat, roots, lift), _blocks(roots.n_frames))
+    least = MIN_FRAMES if len(programme.stretches) == 1 else PLAIN_FRAMES
+    grown = _spread(growing(programme, flat, roots, lift), _blocks(roots.n_frames, least))
     left = np.concatenate([np.empty(0, dtype=np.int64), *(block.unsure for block in grown)])
     parts = [left[k : k + PLAIN_FRAMES] for k in range(0, len(left), PLAIN_FRAMES)]
     again = _spread(lambda frames: _grown_plainly(roots, checks, frames), parts)
@@ -70,10 +71,10 @@ def grow(lifting: Lifting, checks: Sequence[Sequence[Check]]) -> Leaves | None:
     return merged(roots, checks, grown, ordered=not again) if _confirmed(grown) else None
 
 
-def _blocks(n: int) -> list[tuple[int, int]]:
-    """Part frames into blocks of about the same size: several for each of several threads."""
+def _blocks(n: int, least: int) -> list[tuple[int, int]]:
+    """Part frames into blocks of about the same size, at least so large: several for each of several threads."""
     threads = n_threads()
-    size = min(max(-(-n // (threads * SHARES)), MIN_FRAMES), MAX_FRAMES) if threads > 1 else MAX_FRAMES
+    size = min(max(-(-n // (threads * SHARES)), least), MAX_FRAMES) if threads > 1 else MAX_FRAMES
     return [(k, min(k + size, n)) for k in range(0, n, size)]
 
 

@@ -332,7 +332,7 @@ def test_frames_are_shared_out_evenly() -> None:
     for threads, frames in ((1, 1000), (2, 1015), (3, 100), (2, 9), (2, 30_001)):
         compiled.use_threads(threads)
         try:
-            blocks = fast._blocks(frames)
+            blocks = fast._blocks(frames, fast.MIN_FRAMES)
         finally:
             compiled.use_threads(None)
         assert [b for _, b in blocks[:-1]] == [a for a, _ in blocks[1:]]
@@ -372,7 +372,7 @@ def test_rows_that_are_too_few_are_made_more(monkeypatch: pytest.MonkeyPatch) ->
         compiled.use_threads(None)
 
 
-@pytest.mark.parametrize("ranges", ["urdf", "anatomical"])
+@pytest.mark.parametrize("ranges", ["urdf", "anatomical", "table1"])
 def test_ordinary_trees_are_grown_whole(monkeypatch: pytest.MonkeyPatch, ranges: str) -> None:
     points = postures(30, 20 if NUMBA else 3, beyond=0.0)
     monkeypatch.setattr(fast, "_grown_plainly", None)

@@ -13,7 +13,7 @@ from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.geometry import fit_rotation
 from posekit.skeleton import DOFS
 from posekit.tree import Check
-from posekit.validators import collision, joint_range, rigid_parts
+from posekit.validators import collision, joint_range, load_ranges, rigid_parts
 
 FIGURE = load_figure()
 N = 150
@@ -21,11 +21,12 @@ N = 150
 
 def suite(tolerance: float) -> list[Check]:
     rigid = rigid_parts(FIGURE, tolerance=tolerance / 100)
-    return [*rigid, *joint_range(FIGURE, tolerance=tolerance), *collision(FIGURE)]
+    projected = joint_range(FIGURE, load_ranges("table1"), tolerance=tolerance)
+    return [*rigid, *joint_range(FIGURE, tolerance=tolerance), *projected, *collision(FIGURE)]
 
 
 SUITES = {tolerance: suite(tolerance) for tolerance in (0.0, 1e-3, 3.0)}
-NAMES = [f"{check.name} {check.where[0]} {len(check.where)}" for check in SUITES[0.0]]
+NAMES = [f"{type(check).__name__} {check.where[0]} {len(check.where)}" for check in SUITES[0.0]]
 
 
 def postures(seed: int, n: int = N) -> np.ndarray:
@@ -79,7 +80,8 @@ def test_a_screen_never_contradicts_the_judge(tolerance: float, index: int) -> N
 
 @pytest.mark.parametrize("index", range(len(NAMES)), ids=NAMES)
 def test_a_screen_is_hardly_ever_unsure_of_ordinary_postures(index: int) -> None:
-    screened, judged = places(SUITES[1e-3][index], postures(100 + index))
+    points = np.concatenate([postures(100 + index), FIGURE.neutral_points[None]])
+    screened, judged = places(SUITES[1e-3][index], points)
     assert (screened == UNSURE).mean() < 0.03
     if SUITES[1e-3][index].name == "joint_range":
         assert (judged >= 0).any() and (judged == PASSED).any()
