@@ -22,7 +22,7 @@ CLEAR_ANGLE = 1e-8
 """Degrees, over the part of a segment that is seen in a plane, within which its angle there is not clear."""
 
 CLEAR_PART = 1e-10
-"""Part of a length within which it is not clear: where shoulders are near the spine, the torso's frame is a little off."""
+"""Part of a length within which it is not clear: a torso whose shoulders are near its spine has no clear frame."""
 
 SHORTEST_PART = 1e-5
 """Part of a segment below which its projection tells no angle, whatever the table of ranges says."""
