@@ -11,13 +11,13 @@ from posekit.body import Figure
 from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.hidden.asking import Index
 from posekit.hidden.completion import CompletedSurvivors
-from posekit.hidden.describing import write
-from posekit.hidden.party import Party
-from posekit.hidden.plan import JointState, OcclusionPattern
+from posekit.hidden.occlusion_pattern import JointState, OcclusionPattern
+from posekit.hidden.pattern_batch import PatternBatch
+from posekit.hidden.posture_rows import Index
 from posekit.hidden.rays import find_rays
-from posekit.hidden.settings import OcclusionSampling
+from posekit.hidden.sampling import OcclusionSampling
+from posekit.hidden.set_descriptions import describe_sets
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree import Check, Leaves
 
@@ -89,20 +89,30 @@ def complete(
     rays = find_rays(camera, root, image, reach=sum(figure.lengths.values()))
     seen = np.asarray(np.isfinite(image).all(axis=-1))[leaves.frame]
     states = np.where(unknown, np.where(seen, JointState.SEEN, JointState.HIDDEN), JointState.EXACT)
+    # Which checks can be asked when depends on the pattern of seen and hidden joints alone: survivors that share one
+    # are completed together.
     patterns, which = np.unique(states[open_], axis=0, return_inverse=True)
-    for k, pattern in enumerate(patterns):
-        plan = OcclusionPattern(states=tuple(JointState(int(state)) for state in pattern), checks=checks)
-        party = partial(Party.of, plan=plan, figure=figure, rays=rays, tolerance=tolerance, sampling=sampling)
+    for k, joint_states in enumerate(patterns):
+        pattern = OcclusionPattern(
+            states=tuple(JointState(int(state)) for state in joint_states), checks=checks
+        )
+        batch_of = partial(
+            PatternBatch.of, pattern=pattern, figure=figure, rays=rays, tolerance=tolerance, sampling=sampling
+        )
         rows = open_[which.reshape(-1) == k]
-        for part in _parts(rows, plan, sampling):
+        for part in _parts(rows, pattern, sampling):
             frame = np.asarray(leaves.frame[part], dtype=np.intp)
-            write(party(points=points[part], frame=frame), done, part)
+            describe_sets(batch_of(points=points[part], frame=frame), done, part)
     return done.frozen()
 
 
-def _parts(rows: Index, plan: OcclusionPattern, sampling: OcclusionSampling) -> list[Index]:
+def _parts(rows: Index, pattern: OcclusionPattern, sampling: OcclusionSampling) -> list[Index]:
     """Split survivors, in order, so that what is judged together fits into the memory."""
-    both = any(all(plan.states[joint] == JointState.HIDDEN for joint in limb.free) for limb in plan.limbs)
-    each = sampling.sphere * (sampling.ends // 2 if both else 2) * (4 if plan.trunk else 1)
+    # Placements of one limb of one survivor: middles times ends where both are hidden, else near and far of each
+    # middle; about four times as many where the trunk has several placements that share them out.
+    both = any(
+        all(pattern.states[joint] == JointState.HIDDEN for joint in limb.free) for limb in pattern.limbs
+    )
+    each = sampling.sphere * (sampling.ends // 2 if both else 2) * (4 if pattern.trunk_joints else 1)
     size = max(ROWS_AT_ONCE // each, 8)
     return [rows[first : first + size] for first in range(0, len(rows), size)]

@@ -1,4 +1,4 @@
-"""What is said of joints that were not seen."""
+"""The completions of survivors: the sets of positions of the joints that were not seen, and one of each."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask
+from posekit.hidden.posture_rows import Index, Mask
 from posekit.skeleton import JOINTS
 
 
@@ -32,10 +32,10 @@ class PositionKind(IntEnum):
 class CompletionOutcome(IntEnum):
     """What became of a survivor."""
 
-    EXACT = 0
-    COMPLETED = 1
-    UNDECIDED = 2
-    IMPOSSIBLE = 3
+    EXACT = 0  # no joint was unknown
+    COMPLETED = 1  # a completion was found that passes all checks
+    UNDECIDED = 2  # no sample passed: that proves nothing
+    IMPOSSIBLE = 3  # proven to have no completion
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +45,7 @@ class Region:
     Parameters
     ----------
     joint : str
+        The joint's name, as in `posekit.skeleton.JOINTS`.
     kind : PositionKind
         ``POINT``: one position. ``CIRCLE``: part of a circle about two known points. ``SPHERE_REGION``: part of
         the sphere about its parent. ``DEPTH_INTERVAL``: the joint is seen, its depth is not known.
@@ -97,7 +98,9 @@ class CompletedSurvivors:
     kind : int array (N, 14)
         `PositionKind`, as the pattern of seen and hidden joints gives it.
     lower, upper : array (N, 14, 3)
+        Bounding box of each joint's positions: see `Region`; the position itself for exact joints.
     radius, fraction, spacing, accuracy : array (N, 14)
+        See `Region`; NaN where nothing was found.
     samples : int array (N, 14)
         See `Region`; NaN (or 0) where nothing was found, and for exact joints but for the box.
     """

@@ -24,6 +24,7 @@ def zone(n: int, lower: Array, upper: Array, turn: Array | float = 0.0) -> Array
     Parameters
     ----------
     n : int
+        How many directions each zone gets.
     lower, upper : array (Z,)
         Heights a and b of each zone along its axis, between -1 and 1.
     turn : array (Z,) or float

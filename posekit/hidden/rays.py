@@ -17,7 +17,7 @@ RAY_START_BEHIND_METRES = 1e7
 """Metres behind the body at which a ray is looked for that has no start: a parallel camera's."""
 
 N_RAY_BISECTIONS = 70
-"""Of `RAY_START_BEHIND_METRES`: to 1e-14 m."""
+"""Bisections of `RAY_START_BEHIND_METRES`: 1e7 m / 2^70 is 1e-14 m."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,6 +62,7 @@ def find_rays(camera: Camera, root: Array, image: Array, reach: float) -> Rays:
     Parameters
     ----------
     camera : Camera
+        The calibrated camera, whose first axis counts frames.
     root : array (F, 3)
         The neck, camera frame, metres.
     image : array (F, J, 2)

@@ -20,8 +20,8 @@ from posekit.hidden import (
     PositionKind,
     Region,
     complete,
+    limb_combinations,
     reject,
-    together,
 )
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import random_views
@@ -405,7 +405,7 @@ def test_two_hidden_knees_are_chosen_so_that_the_legs_do_not_collide(monkeypatch
     check_completions(case)
     assert (case.done.outcome == CompletionOutcome.COMPLETED).all()
     # The middles alone would not do.
-    monkeypatch.setattr(together, "N_WAYS_TRIED", {2: (1,)})
+    monkeypatch.setattr(limb_combinations, "N_WAYS_TRIED", {2: (1,)})
     alone = hide(knees, seed=2, checks=wide).done.outcome
     assert (alone == CompletionOutcome.UNDECIDED).any()
     assert (alone == CompletionOutcome.COMPLETED).any()
@@ -519,7 +519,7 @@ def test_an_image_of_another_shape_is_refused() -> None:
         complete(case.leaves, case.camera, case.image[:, :13], FIGURE, CHECKS)
 
 
-@pytest.mark.parametrize("name", ["sphere", "ends", "circle", "rotations", "hosts", "rounds"])
+@pytest.mark.parametrize("name", ["sphere", "ends", "circle", "rotations", "trunks", "rounds"])
 def test_too_few_samples_are_refused(name: str) -> None:
     with pytest.raises(InputError, match=name):
         replace(OcclusionSampling(), **{name: -1})

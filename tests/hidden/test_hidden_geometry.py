@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from posekit.body import load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import frame_along, rotation_about, rotation_between, unit
-from posekit.hidden.closure import closing_angles
-from posekit.hidden.groups import box, distinct, largest, mean, pairs
+from posekit.hidden.grouped_rows import box, distinct, largest, mean, pairs
+from posekit.hidden.hip_closure import closing_angles
 from posekit.hidden.lattices import rotation_spacing, rotations, sphere_spacing, zone
 from posekit.hidden.rays import find_rays
 from posekit.skeleton import JOINT, JOINTS

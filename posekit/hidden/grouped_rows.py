@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index
+from posekit.hidden.posture_rows import Index
 
 
 def offsets(group: Index, n: int) -> Index:

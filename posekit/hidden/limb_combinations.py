@@ -7,17 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask, PostureRows, ask
-from posekit.hidden.groups import offsets
-from posekit.hidden.placed import LimbPlacements
-from posekit.hidden.plan import OcclusionPattern
+from posekit.hidden.grouped_rows import offsets
+from posekit.hidden.limb_placements import LimbPlacements
+from posekit.hidden.occlusion_pattern import OcclusionPattern
+from posekit.hidden.posture_rows import Index, Mask, PostureRows, judge_rows
 
 N_WAYS_TRIED: dict[int, tuple[int, ...]] = {1: (1, 48), 2: (1, 6, 48), 3: (1, 5, 16), 4: (1, 4, 9)}
 """Ways tried of each limb, by how many limbs there are: the middle one first, more where it fails."""
 
 
-def choose(
-    plan: OcclusionPattern,
+def choose_combination(
+    pattern: OcclusionPattern,
     base: Array,
     limbs: Sequence[tuple[Index, LimbPlacements, Array]],
 ) -> tuple[list[Index], Mask]:
@@ -30,7 +30,7 @@ def choose(
     base : array (n, P, 3)
         Their points, known ones and those of the chosen trunk.
     limbs : sequence of (survivor (S,), LimbPlacements of S rows, cost (S,))
-        By limb of the plan: each row's survivor, in order, and how far it is from the middle of its set.
+        By limb of the pattern: each row's survivor, in order, and how far it is from the middle of its set.
 
     Returns
     -------
@@ -59,18 +59,18 @@ def choose(
             place = np.arange(tried)[None, :] * count[:, None] // tried
             candidates.append(order[start[open_][:, None] + place])
         allowed = np.ones((len(open_), *(tried,) * m), dtype=bool)
-        for check in plan.several:
-            which = plan.limbs_of(check)
+        for check in pattern.several:
+            which = pattern.limbs_of(check)
             shape = (len(open_), *(tried,) * len(which))
             grid = np.indices(shape).reshape(len(shape), -1)
             columns: dict[int, tuple[Array, Index | None]] = {}
             for k, limb in enumerate(which):
                 row = candidates[limb][grid[0], grid[1 + k]]
                 placed = limbs[limb][1]
-                for joint, table in zip(plan.limbs[limb].free, (placed.middle, placed.end), strict=True):
-                    if joint in plan.free(plan.limbs[limb]):
+                for joint, table in zip(pattern.limbs[limb].free, (placed.middle, placed.end), strict=True):
+                    if joint in pattern.free(pattern.limbs[limb]):
                         columns[joint] = (table, row)
-            passed, _ = ask([check], PostureRows.of(base, open_[grid[0]]).with_(columns))
+            passed, _ = judge_rows([check], PostureRows.of(base, open_[grid[0]]).with_(columns))
             spread = [len(open_), *(tried if limb in which else 1 for limb in range(m))]
             allowed &= passed.reshape(spread)
         rank = np.indices((tried,) * m)

@@ -21,7 +21,7 @@ class OcclusionSampling:
         Turns of a rigid part about two known points: 120 are 3 degrees apart.
     rotations : int
         Turns of a rigid part about one known point: 6000 are 14 degrees apart.
-    hosts : int
+    trunks : int
         Of those, how many limbs are placed on, at most.
     rounds : int
         Steps in which the ends of the boxes are sought between the samples.
@@ -36,7 +36,7 @@ class OcclusionSampling:
     ends: int = 24
     circle: int = 120
     rotations: int = 6000
-    hosts: int = 120
+    trunks: int = 120
     rounds: int = 16
 
     def __post_init__(self) -> None:
@@ -45,7 +45,7 @@ class OcclusionSampling:
             ("ends", 8),
             ("circle", 24),
             ("rotations", 256),
-            ("hosts", 8),
+            ("trunks", 8),
             ("rounds", 0),
         ):
             value = getattr(self, name)

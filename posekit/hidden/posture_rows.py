@@ -1,4 +1,4 @@
-"""Asking checks about rows whose points come from different tables."""
+"""Judging postures by checks without writing the postures out: their points come from different tables."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ class PostureRows:
     Parameters
     ----------
     count : int
+        How many postures there are: N.
     columns : mapping of int to (array (k, 3), int array (N,) or None)
         By point: its table, and the row of it that each posture has; None where they are the same.
     """
@@ -51,7 +52,7 @@ class PostureRows:
         return placed
 
 
-def ask(checks: Sequence[Check], rows: PostureRows) -> tuple[Mask, Array]:
+def judge_rows(checks: Sequence[Check], rows: PostureRows) -> tuple[Mask, Array]:
     """Ask checks one after the other, each about the rows that passed so far.
 
     Returns

@@ -3,40 +3,40 @@
 from __future__ import annotations
 
 from posekit.hidden.completion import PositionKind
-from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
+from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
 
 
-def kinds(plan: OcclusionPattern, *, spins: bool = False) -> dict[int, PositionKind]:
+def position_kinds(pattern: OcclusionPattern, *, spins: bool = False) -> dict[int, PositionKind]:
     """Name the kind of each unknown joint's set; `spins` where a measured torso turns about its shoulders' line.
 
     A position that is one of finitely many does not widen what hangs on it: an elbow on either of two shoulders
     is in a part of a sphere.
     """
     found: dict[int, PositionKind] = {}
-    known = [joint for joint in TORSO_JOINTS[1:] if plan.states[joint] == JointState.EXACT]
+    known = [joint for joint in TORSO_JOINTS[1:] if pattern.states[joint] == JointState.EXACT]
     few = 1 if spins else len(known)
     torso = {0: PositionKind.SPHERE_REGION, 1: PositionKind.CIRCLE}.get(few, PositionKind.POINT)
-    found |= {joint: torso for joint in TORSO_JOINTS if plan.states[joint] == JointState.HIDDEN}
+    found |= {joint: torso for joint in TORSO_JOINTS if pattern.states[joint] == JointState.HIDDEN}
     pelvis, *hips = HIP_JOINTS
-    hidden = [joint for joint in hips if plan.states[joint] == JointState.HIDDEN]
+    hidden = [joint for joint in hips if pattern.states[joint] == JointState.HIDDEN]
     loose = _loose(found.get(pelvis, PositionKind.EXACT))
     for joint in hips:
-        if plan.states[joint] == JointState.SEEN:
+        if pattern.states[joint] == JointState.SEEN:
             found[joint] = PositionKind.DEPTH_INTERVAL
-        elif plan.states[joint] == JointState.HIDDEN:
+        elif pattern.states[joint] == JointState.HIDDEN:
             free = PositionKind.CIRCLE if len(hidden) == 1 else PositionKind.SPHERE_REGION
             found[joint] = PositionKind.REGION if loose else free
-    for limb in plan.limbs:
+    for limb in pattern.limbs:
         base = found.get(limb.base, PositionKind.EXACT)
         loose = _loose(base) or (
             base == PositionKind.DEPTH_INTERVAL and _loose(found.get(pelvis, PositionKind.EXACT))
         )
-        for joint in plan.free(limb):
+        for joint in pattern.free(limb):
             hidden_kind = PositionKind.REGION if loose else PositionKind.SPHERE_REGION
             found[joint] = (
-                hidden_kind if plan.states[joint] == JointState.HIDDEN else PositionKind.DEPTH_INTERVAL
+                hidden_kind if pattern.states[joint] == JointState.HIDDEN else PositionKind.DEPTH_INTERVAL
             )
-            loose = loose or plan.states[joint] == JointState.HIDDEN
+            loose = loose or pattern.states[joint] == JointState.HIDDEN
     return found
 
 

@@ -1,4 +1,8 @@
-"""Seeking the ends of a set between its samples."""
+"""Seeking how far a set of positions reaches, between and beyond its samples.
+
+A box around samples alone is too small by up to their spacing. From the outermost samples random steps go further out,
+each of which must pass all checks; steps grow after a success and shrink where none of those tried did.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +12,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask
-from posekit.hidden.groups import largest
+from posekit.hidden.grouped_rows import largest
 from posekit.hidden.lattices import GOLDEN_ANGLE
-from posekit.hidden.limb import LimbPlacer
-from posekit.hidden.placed import LimbPlacements
+from posekit.hidden.limb_placements import LimbPlacements
+from posekit.hidden.limb_placer import LimbPlacer
+from posekit.hidden.posture_rows import Index, Mask
 
 N_STEP_PROPOSALS = 6
 """Steps tried at once from each place, evenly around; and one more the way the last one went."""
 
-N_WALK_STARTS, STARTS_IN_FOUR = 4, 8
+N_WALK_STARTS, N_WALK_STARTS_FOUR_ANGLES = 4, 8
 """Places from which each end is sought, each far from those before it; with four free angles."""
 
-START_SPACINGS, APART_IN_FOUR = 1.6, 0.8
+START_SPACINGS, START_SPACINGS_FOUR_ANGLES = 1.6, 0.8
 """Spacings between them."""
 
 STEP_GROWTH, STEP_SHRINKAGE = 1.3, 0.55
@@ -37,7 +41,7 @@ N_WALK_GOALS = len(BOX_DIRECTIONS) + 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ends:
+class SetExtremes:
     """How far n sets reach, and the placements that do.
 
     Parameters
@@ -48,6 +52,7 @@ class Ends:
     group : int array (K,)
         The set of each placement.
     rows : LimbPlacements
+        Those placements (K), the outermost that were found.
     """
 
     reach: Array
@@ -64,14 +69,14 @@ def reaches(placer: LimbPlacer, rows: LimbPlacements, group: Index, representati
     return table
 
 
-def seek_ends(
+def seek_extremes(
     placer: LimbPlacer,
     group: Index,
     rows: LimbPlacements,
     representatives: Array,
     passes: Callable[[Index, LimbPlacements], Mask],
     wanted: Mask,
-) -> Ends:
+) -> SetExtremes:
     """Walk from the outermost samples of each set further out while all checks pass.
 
     Parameters
@@ -79,6 +84,7 @@ def seek_ends(
     group : int array (S,)
         Which of n sets each feasible row belongs to, in order.
     rows : LimbPlacements
+        The feasible samples (S) of the limb, from which the walks start.
     representatives : array (2, n, 3)
         Of the limb's middle and end: from which radii are measured; NaN where there is none.
     passes : callable
@@ -89,11 +95,13 @@ def seek_ends(
     n = wanted.shape[1]
     reach = np.full((2, n, N_WALK_GOALS), -np.inf)
     if not (len(group) and wanted.any()):
-        return Ends(reach=reach, group=group[:0], rows=rows.take(group[:0]))
-    spacing = placer.spacing()[rows.host]
+        return SetExtremes(reach=reach, group=group[:0], rows=rows.take(group[:0]))
+    spacing = placer.spacing()[rows.trunk]
     levers = np.cumsum(placer.lengths)
     table = reaches(placer, rows, group, representatives)
-    many, apart = (STARTS_IN_FOUR, APART_IN_FOUR) if placer.both_hidden else (N_WALK_STARTS, START_SPACINGS)
+    many, apart = N_WALK_STARTS, START_SPACINGS
+    if placer.both_hidden:  # four angles are free: a set has more corners, and its samples are farther apart
+        many, apart = N_WALK_STARTS_FOUR_ANGLES, START_SPACINGS_FOUR_ANGLES
     columns: list[tuple[Index, Index, Index]] = []
     mode = rows.branch @ np.array([2, 1])  # near and far are sets of their own
     for joint, goal in zip(*np.nonzero(wanted.any(axis=1)), strict=True):
@@ -137,7 +145,7 @@ def seek_ends(
         step[moved] *= STEP_GROWTH / STEP_SHRINKAGE
     np.maximum.at(reach, (goal // N_WALK_GOALS, who, goal % N_WALK_GOALS), best)
     order = np.argsort(who, kind="stable")
-    return Ends(reach=reach, group=who[order], rows=here.take(order).with_seed(np.full(len(who), -1)))
+    return SetExtremes(reach=reach, group=who[order], rows=here.take(order).with_seed(np.full(len(who), -1)))
 
 
 def _around(n: int, round_: int, *, both: bool) -> Array:

@@ -8,13 +8,13 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.geometry import Array, fit_rotation, rotation_about, rotation_between, unit
-from posekit.hidden.asking import Index, PostureRows, ask
-from posekit.hidden.closure import closing_angles
-from posekit.hidden.hosts import EXACT_WITHIN, Hosts, Turn
+from posekit.hidden.hip_closure import closing_angles
 from posekit.hidden.lattices import circle, rotation_spacing, rotations
-from posekit.hidden.plan import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
+from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
+from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
 from posekit.hidden.rays import Rays
-from posekit.hidden.settings import OcclusionSampling
+from posekit.hidden.sampling import OcclusionSampling
+from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, TrunkPlacements, Turn
 from posekit.skeleton import JOINT
 
 N_PELVIS_RINGS = 24
@@ -30,46 +30,50 @@ class TrunkPlacer:
 
     Parameters
     ----------
-    plan : OcclusionPattern
+    pattern : OcclusionPattern
+        Which joints are seen and hidden, and the checks that read them.
     figure : Figure
+        The person, whose rigid torso and hips are laid onto known points.
     rays : Rays
+        The rays of the joints that are seen.
     frame : int array (C,)
         The frame of each core: which row of the rays.
     tolerance : float
         Metres by which a segment may be too short for its image.
     sampling : OcclusionSampling
+        How finely the turns of a rigid part are sampled.
     """
 
-    plan: OcclusionPattern
+    pattern: OcclusionPattern
     figure: Figure
     rays: Rays
     frame: Index
     tolerance: float
     sampling: OcclusionSampling
 
-    def place(self, points: Array) -> Hosts:
+    def place(self, points: Array) -> TrunkPlacements:
         """Place them in every way that the rigid parts allow, on cores (C, P, 3); evenly where they turn."""
-        hosts = Hosts.of(points)
+        trunks = TrunkPlacements.of(points)
         pelvis, *hips = HIP_JOINTS
-        if any(self.plan.states[joint] for joint in TORSO_JOINTS):
-            hosts = self._turned(hosts, TORSO_JOINTS)
-            alive, _ = ask(self.plan.torso_own, PostureRows.of(hosts.points))
+        if any(self.pattern.states[joint] for joint in TORSO_JOINTS):
+            trunks = self._turned(trunks, TORSO_JOINTS)
+            alive, _ = judge_rows(self.pattern.torso_own, PostureRows.of(trunks.points))
             # Where only the torso turns, a near miss may be looked at more closely; otherwise it is gone.
-            hosts = hosts if self._torso_alone() else hosts.take(alive)
+            trunks = trunks if self._torso_alone() else trunks.take(alive)
         for joint in hips:
-            if self.plan.states[joint] == JointState.SEEN:
-                hosts = self._lifted(hosts, pelvis, joint)
-        if any(self.plan.states[joint] == JointState.HIDDEN for joint in hips):
-            hosts = self._turned(hosts, HIP_JOINTS)
-        return hosts
+            if self.pattern.states[joint] == JointState.SEEN:
+                trunks = self._lifted(trunks, pelvis, joint)
+        if any(self.pattern.states[joint] == JointState.HIDDEN for joint in hips):
+            trunks = self._turned(trunks, HIP_JOINTS)
+        return trunks
 
     def _torso_alone(self) -> bool:
-        return all(self.plan.states[joint] == JointState.EXACT for joint in HIP_JOINTS)
+        return all(self.pattern.states[joint] == JointState.EXACT for joint in HIP_JOINTS)
 
-    def _turned(self, hosts: Hosts, joints: tuple[int, ...]) -> Hosts:
+    def _turned(self, trunks: TrunkPlacements, joints: tuple[int, ...]) -> TrunkPlacements:
         """Lay a rigid part on: nothing is free with two points beside the pivot, an angle with one, else all."""
         pivot = joints[0]
-        states = self.plan.states
+        states = self.pattern.states
         known = [k for k, joint in enumerate(joints) if k and states[joint] != JointState.HIDDEN]
         free = [k for k, joint in enumerate(joints) if k and states[joint] == JointState.HIDDEN]
         body = self.figure.neutral_points[list(joints)] - self.figure.neutral_points[pivot]
@@ -79,45 +83,45 @@ class TrunkPlacer:
             free=tuple(joints[k] for k in free),
             body=body[free],
         )
-        seen = hosts.points[:, [joints[k] for k in known]] - hosts.points[:, pivot, None]
+        seen = trunks.points[:, [joints[k] for k in known]] - trunks.points[:, pivot, None]
         if len(known) >= 2:
             R = fit_rotation(body[known], seen)
             misfit = np.linalg.norm(np.einsum("nij,pj->npi", R, body[known]) - seen, axis=-1).max(axis=1)
             # By chance some of what was measured fits: that the rest does too is not said.
-            fits = np.asarray((misfit <= EXACT_WITHIN) & (self.tolerance <= EXACT_WITHIN))
-            placed = replace(hosts.filled(R, turn), sure=hosts.sure & fits)
+            fits = np.asarray((misfit <= EXACT_WITHIN_METRES) & (self.tolerance <= EXACT_WITHIN_METRES))
+            placed = replace(trunks.filled(R, turn), sure=trunks.sure & fits)
             spun = np.flatnonzero(~fits) if HIP_JOINTS[0] in turn.free else np.zeros(0, dtype=np.intp)
             return self._spun(placed, spun, body[joints.index(HIP_JOINTS[0])]) if len(spun) else placed
-        loose = bool((hosts.spacing > 0.0).any())
+        loose = bool((trunks.spacing > 0.0).any())
         if known:
             n = self.sampling.circle // HIP_COARSENING if loose else self.sampling.circle
             axis = unit(seen[:, 0])
             first = rotation_between(np.broadcast_to(unit(body[known[0]]), axis.shape), axis)
-            row = np.repeat(np.arange(len(hosts)), n)
-            R = rotation_about(axis[row], np.tile(circle(n), len(hosts))) @ first[row]
+            row = np.repeat(np.arange(len(trunks)), n)
+            R = rotation_about(axis[row], np.tile(circle(n), len(trunks))) @ first[row]
             spacing = 2.0 * np.pi / n
         else:
             every = rotations(self.sampling.rotations // HIP_COARSENING if loose else self.sampling.rotations)
-            row = np.repeat(np.arange(len(hosts)), len(every))
-            R = np.tile(every, (len(hosts), 1, 1))
+            row = np.repeat(np.arange(len(trunks)), len(every))
+            R = np.tile(every, (len(trunks), 1, 1))
             spacing = float(rotation_spacing(len(every)))
-        placed = hosts.take(row).filled(R, turn)
+        placed = trunks.take(row).filled(R, turn)
         offset = body[joints.index(HIP_JOINTS[0])]
         if HIP_JOINTS[0] in turn.free and self._hips_seen():
             if known:
-                row, R = self._closing(hosts, pivot, offset, np.arange(len(hosts)), axis, first)
+                row, R = self._closing(trunks, pivot, offset, np.arange(len(trunks)), axis, first)
             else:
-                row, R = self._closing_rings(hosts, pivot, offset)
-            placed = placed.and_(hosts.take(row).uneven().filled(R, turn))
+                row, R = self._closing_rings(trunks, pivot, offset)
+            placed = placed.and_(trunks.take(row).uneven().filled(R, turn))
         return replace(
             placed,
-            tried=np.bincount(placed.core[placed.even], minlength=len(hosts.tried)).astype(np.float64),
-            spacing=np.maximum(hosts.spacing, spacing),
-            sure=np.zeros(len(hosts.sure), dtype=bool),
+            tried=np.bincount(placed.core[placed.even], minlength=len(trunks.tried)).astype(np.float64),
+            spacing=np.maximum(trunks.spacing, spacing),
+            sure=np.zeros(len(trunks.sure), dtype=bool),
             turn=turn if not loose and self._last(joints) else None,
         )
 
-    def _spun(self, hosts: Hosts, rows: Index, offset: Array) -> Hosts:
+    def _spun(self, trunks: TrunkPlacements, rows: Index, offset: Array) -> TrunkPlacements:
         """Spin measured torsos without a pelvis about the line of their shoulders.
 
         Neck and shoulders are almost in line, and spines bend: where points are off by a centimetre, the pelvis that
@@ -125,24 +129,24 @@ class TrunkPlacer:
         """
         n, right, left = self.sampling.circle, JOINT["right_shoulder"], JOINT["left_shoulder"]
         turn = Turn(pivot=TORSO_JOINTS[0], about=None, free=(HIP_JOINTS[0],), body=offset[None])
-        axis, first = unit(hosts.points[:, left] - hosts.points[:, right]), hosts.R
+        axis, first = unit(trunks.points[:, left] - trunks.points[:, right]), trunks.R
         row = np.repeat(rows, n)
         R = rotation_about(axis[row], np.tile(circle(n), len(rows))) @ first[row]
-        spun = hosts.take(row).filled(R, turn)
+        spun = trunks.take(row).filled(R, turn)
         if self._hips_seen():
-            row, R = self._closing(hosts, turn.pivot, offset, rows, axis[rows], first[rows])
-            spun = spun.and_(hosts.take(row).uneven().filled(R, turn))
-        both = hosts.and_(spun)
-        spacing, spins = hosts.spacing.copy(), np.zeros(len(hosts.tried), dtype=bool)
-        spacing[hosts.core[rows]], spins[hosts.core[rows]] = 2.0 * np.pi / n, True
-        tried = np.bincount(both.core[both.even], minlength=len(hosts.tried)).astype(np.float64)
+            row, R = self._closing(trunks, turn.pivot, offset, rows, axis[rows], first[rows])
+            spun = spun.and_(trunks.take(row).uneven().filled(R, turn))
+        both = trunks.and_(spun)
+        spacing, spins = trunks.spacing.copy(), np.zeros(len(trunks.tried), dtype=bool)
+        spacing[trunks.core[rows]], spins[trunks.core[rows]] = 2.0 * np.pi / n, True
+        tried = np.bincount(both.core[both.even], minlength=len(trunks.tried)).astype(np.float64)
         return replace(both, tried=tried, spacing=spacing, spins=spins)
 
     def _hips_seen(self) -> bool:
-        return all(self.plan.states[joint] == JointState.SEEN for joint in HIP_JOINTS[1:])
+        return all(self.pattern.states[joint] == JointState.SEEN for joint in HIP_JOINTS[1:])
 
     def _closing(
-        self, hosts: Hosts, pivot: int, offset: Array, row: Index, axis: Array, first: Array
+        self, trunks: TrunkPlacements, pivot: int, offset: Array, row: Index, axis: Array, first: Array
     ) -> tuple[Index, Array]:
         """Find the turns of a torso at which both hips, lifted from its pelvis, are as far apart as they must be.
 
@@ -153,39 +157,39 @@ class TrunkPlacer:
         offset : array (3,)
             From the pivot to the pelvis in the torso's frame.
         row : int array (K,)
-            The host of each circle.
+            The trunk of each circle.
         axis, first : array (K, 3), (K, 3, 3)
             The circles, and the torso's rotation at angle zero of each.
 
         Returns
         -------
         row, R
-            Hosts, and rotations.
+            Trunks, and rotations.
         """
         which, angle = closing_angles(
             self.figure,
             self.rays,
-            self.frame[hosts.core[row]],
-            hosts.points[row, pivot],
+            self.frame[trunks.core[row]],
+            trunks.points[row, pivot],
             axis,
             np.einsum("nij,j->ni", first, offset),
             self.sampling.circle,
         )
         return row[which], rotation_about(axis[which], angle) @ first[which]
 
-    def _closing_rings(self, hosts: Hosts, pivot: int, offset: Array) -> tuple[Index, Array]:
+    def _closing_rings(self, trunks: TrunkPlacements, pivot: int, offset: Array) -> tuple[Index, Array]:
         """Do the same where only the neck is known: on rings of pelvis positions, spun about each root."""
         z = np.array([0.0, 0.0, 1.0])
         tilt = np.pi * (np.arange(N_PELVIS_RINGS) + 0.5) / N_PELVIS_RINGS
         towards = np.stack([np.sin(tilt), np.zeros(N_PELVIS_RINGS), np.cos(tilt)], axis=1)
         ring = rotation_between(np.broadcast_to(unit(offset), towards.shape), towards)
         row, R = self._closing(
-            hosts,
+            trunks,
             pivot,
             offset,
-            np.repeat(np.arange(len(hosts)), N_PELVIS_RINGS),
-            np.broadcast_to(z, (len(hosts) * N_PELVIS_RINGS, 3)),
-            np.tile(ring, (len(hosts), 1, 1)),
+            np.repeat(np.arange(len(trunks)), N_PELVIS_RINGS),
+            np.broadcast_to(z, (len(trunks) * N_PELVIS_RINGS, 3)),
+            np.tile(ring, (len(trunks), 1, 1)),
         )
         spin = np.tile(circle(N_PELVIS_RINGS), len(row))
         row, R = np.repeat(row, N_PELVIS_RINGS), np.repeat(R, N_PELVIS_RINGS, axis=0)
@@ -195,17 +199,17 @@ class TrunkPlacer:
         """Whether nothing of the trunk hangs on the part that is turned."""
         return joints == HIP_JOINTS or self._torso_alone()
 
-    def _lifted(self, hosts: Hosts, pelvis: int, joint: int) -> Hosts:
+    def _lifted(self, trunks: TrunkPlacements, pelvis: int, joint: int) -> TrunkPlacements:
         """Lift a hip that is seen from the pelvis."""
         offset = self.figure.neutral_points[joint] - self.figure.neutral_points[pelvis]
         lift = self.rays.lift(
             joint,
-            self.frame[hosts.core],
-            hosts.points[:, pelvis],
+            self.frame[trunks.core],
+            trunks.points[:, pelvis],
             float(np.linalg.norm(offset)),
             self.tolerance,
         )
         row, branch = np.nonzero(lift.valid)
-        placed = hosts.take(row)
+        placed = trunks.take(row)
         placed.points[:, joint] = lift.points[row, branch]
-        return replace(placed, tried=np.bincount(placed.core, minlength=len(hosts.tried)).astype(np.float64))
+        return replace(placed, tried=np.bincount(placed.core, minlength=len(trunks.tried)).astype(np.float64))

@@ -1,4 +1,4 @@
-"""Places that the trunk can have, and the turn that is free in them."""
+"""Placements of the trunk (torso and hips), and the turn that is free in them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from posekit.geometry import Array, rotation_about, unit
-from posekit.hidden.asking import Index, Mask
+from posekit.hidden.posture_rows import Index, Mask
 
 N_SUBSAMPLES = 8
 """Parts into which the neighbourhood of a sample is split: eight arcs, or a cube's eight corners."""
 
-EXACT_WITHIN = 1e-6
+EXACT_WITHIN_METRES = 1e-6
 """Metres of tolerance, and of misfit, up to which points are exact: what a rigid part then forbids is proven."""
 
 CUBE_CORNERS = np.stack(np.meshgrid(*[[-0.25, 0.25]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -46,8 +46,8 @@ class Turn:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Hosts:
-    """H places of the trunk, for C cores: sets of known joints.
+class TrunkPlacements:
+    """H placements of the trunk, for C cores: sets of known joints.
 
     Parameters
     ----------
@@ -85,10 +85,10 @@ class Hosts:
     turn: Turn | None = None
 
     @staticmethod
-    def of(points: Array) -> Hosts:
+    def of(points: Array) -> TrunkPlacements:
         """Take the cores (C, P, 3) as they are."""
         n = len(points)
-        return Hosts(
+        return TrunkPlacements(
             core=np.arange(n),
             points=points,
             R=np.full((n, 3, 3), np.nan),
@@ -104,13 +104,13 @@ class Hosts:
         """Count the places."""
         return len(self.core)
 
-    def take(self, rows: Index | Mask) -> Hosts:
+    def take(self, rows: Index | Mask) -> TrunkPlacements:
         """Take some places."""
         return replace(
             self, core=self.core[rows], points=self.points[rows], R=self.R[rows], even=self.even[rows]
         )
 
-    def and_(self, other: Hosts) -> Hosts:
+    def and_(self, other: TrunkPlacements) -> TrunkPlacements:
         """Add places of the same cores."""
         both = replace(
             self,
@@ -121,23 +121,23 @@ class Hosts:
         )
         return both.take(np.argsort(both.core, kind="stable"))
 
-    def uneven(self) -> Hosts:
+    def uneven(self) -> TrunkPlacements:
         """Say of all places that they were found by a closer look."""
         return replace(self, even=np.zeros(len(self), dtype=bool))
 
-    def filled(self, R: Array, turn: Turn) -> Hosts:
+    def filled(self, R: Array, turn: Turn) -> TrunkPlacements:
         """Lay a rigid part onto all places by rotations (H, 3, 3)."""
         points = self.points.copy()
         for joint, offset in zip(turn.free, turn.body, strict=True):
             points[:, joint] = points[:, turn.pivot] + np.einsum("nij,j->ni", R, offset)
         return replace(self, points=points, R=R)
 
-    def children(self, rows: Index, width: Array) -> tuple[Hosts, Index]:
+    def split(self, rows: Index, width: Array) -> tuple[TrunkPlacements, Index]:
         """Split the neighbourhoods of some places into eight, `width` (len(rows),) radians across.
 
         Returns
         -------
-        Hosts, parent
+        TrunkPlacements, parent
             The children, and which of `rows` each is from.
         """
         if self.turn is None:

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.hidden.asking import Index, Mask
+from posekit.hidden.posture_rows import Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LimbPlacements:
-    """S ways to place a limb's free joints on hosts.
+    """S ways to place a limb's free joints on trunks.
 
     Parameters
     ----------
-    host : int array (S,)
+    trunk : int array (S,)
         On which place of the trunk.
     middle, end : array (S, 3)
         Positions, camera frame, metres; `middle` also where it was known.
@@ -25,10 +25,10 @@ class LimbPlacements:
     excess : array (S,)
         Metres by which the worst lifted segment is too short for its image; 0 where none is.
     seed : int array (S,)
-        Which sample of its host's even lattice it belongs to; -1 where it was found by a closer look.
+        Which sample of its trunk's even lattice it belongs to; -1 where it was found by a closer look.
     """
 
-    host: Index
+    trunk: Index
     middle: Array
     end: Array
     branch: Index
@@ -40,11 +40,11 @@ class LimbPlacements:
         return LimbPlacements(**{name: getattr(self, name)[rows] for name in PLACEMENT_FIELDS})
 
     def and_(self, other: LimbPlacements) -> LimbPlacements:
-        """Put two tables together, by host."""
+        """Put two tables together, by trunk."""
         both = LimbPlacements(
             **{name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in PLACEMENT_FIELDS}
         )
-        return both.take(np.argsort(both.host, kind="stable"))
+        return both.take(np.argsort(both.trunk, kind="stable"))
 
     def replaced(self, rows: Index, by: LimbPlacements) -> LimbPlacements:
         """Put others in the place of some."""
@@ -60,4 +60,4 @@ class LimbPlacements:
         )
 
 
-PLACEMENT_FIELDS = ("host", "middle", "end", "branch", "excess", "seed")
+PLACEMENT_FIELDS = ("trunk", "middle", "end", "branch", "excess", "seed")

@@ -12,7 +12,7 @@ from posekit.tree import Check
 
 
 class JointState(IntEnum):
-    """What is known of a joint in a survivor."""
+    """What is known of a joint in a survivor: its position, only its ray, or nothing."""
 
     EXACT = 0
     SEEN = 1
@@ -53,12 +53,13 @@ class OcclusionPattern:
     """One pattern of seen and hidden joints.
 
     Checks fall into classes by the unknown joints that they read: those of the trunk (torso and hips), or of one
-    limb as well, or of several. What reads only the trunk and limbs with unknown joints is asked once for all
-    survivors that share those (`*_own`); what reads a limb that is known is asked for each survivor (`*_cross`).
+    limb as well, or of several. What reads only the trunk and limbs with unknown joints is judged once for all
+    survivors that share those (`*_own`); what reads a limb that is known is judged for each survivor (`*_cross`).
 
     Parameters
     ----------
     states : tuple of JointState (14,)
+        What is known of each joint, in tree order.
     checks : sequence of Check
         All that the survivors passed so far as they were decided.
     """
@@ -72,7 +73,7 @@ class OcclusionPattern:
         return tuple(joint for joint, state in enumerate(self.states) if state != JointState.EXACT)
 
     @cached_property
-    def trunk(self) -> tuple[int, ...]:
+    def trunk_joints(self) -> tuple[int, ...]:
         """Unknown joints of torso and hips."""
         return tuple(joint for joint in self.unknown if joint in TRUNK_JOINTS)
 
@@ -96,7 +97,7 @@ class OcclusionPattern:
         return tuple(joint for joint in wanted if self.states[joint] == JointState.EXACT)
 
     @cached_property
-    def asked(self) -> tuple[Check, ...]:
+    def relevant_checks(self) -> tuple[Check, ...]:
         """The checks that read an unknown joint."""
         return tuple(check for check in self.checks if self._reads(check))
 
@@ -139,7 +140,7 @@ class OcclusionPattern:
     @cached_property
     def several(self) -> list[Check]:
         """Checks that read unknown joints of more than one limb."""
-        return [check for check in self.asked if len(self._limbs_read(check)) > 1]
+        return [check for check in self.relevant_checks if len(self._limbs_read(check)) > 1]
 
     def limbs_of(self, check: Check) -> tuple[int, ...]:
         """Return the open limbs, as indices into `limbs`, whose unknown joints a check reads."""
@@ -160,6 +161,6 @@ class OcclusionPattern:
         known = {joint for limb in LIMB_CHAINS if limb not in self.limbs for joint in limb.free}
         return [
             check
-            for check in self.asked
+            for check in self.relevant_checks
             if self._limbs_read(check) == limbs and bool(known & set(check.points)) == cross
         ]

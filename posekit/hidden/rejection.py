@@ -18,6 +18,7 @@ def reject(leaves: Leaves, completion: CompletedSurvivors) -> tuple[Leaves, Comp
     Parameters
     ----------
     leaves : Leaves
+        The survivors of the tree.
     completion : CompletedSurvivors
         Of all their survivors.
 

@@ -8,14 +8,14 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.geometry import Array, cross
-from posekit.hidden.asking import Index, Mask
 from posekit.hidden.lattices import circle
+from posekit.hidden.posture_rows import Index, Mask
 from posekit.hidden.rays import Rays
 from posekit.skeleton import HIPS, JOINT, segment_name
 
 PELVIS_JOINT, RIGHT_HIP, LEFT_HIP = (JOINT[name] for name in HIPS)
 N_BISECTIONS = 50
-"""Of the angle between two samples: to rounding."""
+"""Bisections of the angle between two samples: 2^-50 of it is rounding."""
 
 
 def closing_angles(
@@ -31,6 +31,7 @@ def closing_angles(
     Parameters
     ----------
     frame : int array (C,)
+        The frame of each circle: which row of the rays.
     center, axis, offset : array (C, 3)
         Of each circle: the neck, the unit axis, and from the neck to the pelvis at angle zero; metres.
     n : int
