@@ -1,6 +1,6 @@
 """Draw docs/pictures/layers.svg: the rooms of posekit, as the layers in pyproject.toml have them.
 
-    python docs/make_layers.py
+python docs/make_layers.py
 """
 
 from __future__ import annotations

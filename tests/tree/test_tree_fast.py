@@ -590,20 +590,21 @@ def test_without_a_folder_for_the_cache_it_is_compiled_for_this_process(
 
 
 @pytest.mark.parametrize(
-    "error", [ModuleNotFoundError("numba"), ImportError("Numba needs NumPy 2.5 or less")]
+    ("error", "says"),
+    [
+        (ModuleNotFoundError("numba"), r"not installed, .* install it: pip install 'posekit\[fast\]'"),
+        (
+            ImportError("Numba needs NumPy 2.5 or less"),
+            "Numba cannot be used, the slower path is taken: Numba needs",
+        ),
+    ],
 )
-def test_numba_that_cannot_be_used_is_done_without(
-    monkeypatch: pytest.MonkeyPatch, error: ImportError
+def test_numba_that_cannot_be_used_is_done_without_and_said(
+    monkeypatch: pytest.MonkeyPatch, error: ImportError, says: str
 ) -> None:
     def fail(name: str) -> None:
         raise error
 
     monkeypatch.setattr(compiled, "import_module", fail)
-    load = compiled._numba.__wrapped__
-    if isinstance(error, ModuleNotFoundError):
-        assert load() is None
-    else:
-        with pytest.warns(
-            RuntimeWarning, match="numba cannot be used, the slower path is taken: Numba needs"
-        ):
-            assert load() is None
+    with pytest.warns(RuntimeWarning, match=says):
+        assert compiled._numba.__wrapped__() is None
