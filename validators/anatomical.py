@@ -18,12 +18,6 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.skeleton import DOFS
 
-ANGLES = tuple(dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS))
-"""The 12 angles that differ by more than their side: ``"hip.flexion"``."""
-
-DERIVED = ("shoulder.elevation", "shoulder.plane", "shoulder.turn")
-"""What `posekit.validators.anatomical_shoulder` makes of the shoulder's three angles."""
-
 Side = Literal["lower", "upper"]
 
 OUTWARD: Mapping[str, int] = {"lower": -1, "upper": 1}
@@ -67,7 +61,7 @@ class Coupling:
     Parameters
     ----------
     angle : str
-        The angle that is bounded: one of `ANGLES`, or ``shoulder.elevation`` or ``shoulder.turn``.
+        The angle that is bounded: one of `posekit.tables.angles.ANGLES`, ``shoulder.elevation``, ``shoulder.turn``.
     side : {"lower", "upper"}
     of : str
         The angle on which the end depends.
@@ -113,7 +107,7 @@ class Anatomy:
     Parameters
     ----------
     motions : mapping
-        Each of `ANGLES`.
+        Each of `posekit.tables.angles.ANGLES`.
     couplings : tuple of Coupling
     sinuses : tuple of Sinus
         At most one of a joint.

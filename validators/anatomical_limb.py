@@ -13,14 +13,15 @@ from functools import reduce
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.validators.anatomical import DERIVED, OUTWARD, Anatomy, Side
+from posekit.tables.angles import DERIVED_ANGLES
+from posekit.validators.anatomical import OUTWARD, Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
 
 BALL = ("flexion", "abduction", "rotation")
 HINGES: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
 ROTATION = BALL.index("rotation")
 ENDS: tuple[Side, Side] = ("lower", "upper")
-ELEVATION, PLANE, TURN = DERIVED
+ELEVATION, PLANE, TURN = DERIVED_ANGLES
 
 LEAST_LEFT = 0.1
 """The fraction of a range that a sinus leaves at the very end of another angle: below it spreads lose their meaning."""

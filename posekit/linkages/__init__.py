@@ -7,8 +7,8 @@ from posekit.linkages.linkage import Linkage as Linkage
 from posekit.linkages.linkage import Midpoint as Midpoint
 from posekit.linkages.minima import Minima as Minima
 from posekit.linkages.reading import linkage_names as linkage_names
+from posekit.linkages.reading import linkage_of as linkage_of
 from posekit.linkages.reading import load_linkage as load_linkage
-from posekit.linkages.reading import parse_linkage as parse_linkage
 from posekit.linkages.search import search as search
 from posekit.linkages.spanning import SpanningTree as SpanningTree
 from posekit.linkages.spanning import span as span

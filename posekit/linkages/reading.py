@@ -4,30 +4,14 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING
 
 from posekit.errors import InputError
 from posekit.linkages.linkage import Linkage
-from posekit.safe_io.refusal import nearest, refusal, shown
-from posekit.safe_io.text_file import read_text
-from posekit.safe_io.toml_file import parse_toml
+from posekit.safe_io.refusal import refusal, shown
 
-LINKAGES_SCHEMA = "posekit.linkage/1"
-MAX_BYTES = 1_000_000
-
-LINKAGE_FIELDS = (
-    "schema",
-    "name",
-    "source",
-    "unit",
-    "height",
-    "urdf",
-    "points",
-    "midpoints",
-    "segments",
-    "constraints",
-)
-WRITTEN_CONSTRAINTS = ("coplanar", "perpendicular", "collinear")
+if TYPE_CHECKING:
+    from posekit.tables.linkage import LinkageTable
 
 
 def linkage_names() -> tuple[str, ...]:
@@ -61,10 +45,12 @@ def load_linkage(name: str | Path) -> Linkage:
     >>> len(human.points), len(human.segments)
     (12, 11)
     """
+    from posekit.tables.linkage import LinkageTable
+    from posekit.tables.reading import read_built_in, read_table
+
     built_in = linkage_names()
     if str(name) in built_in:
-        text = (resources.files("posekit.urdf") / "linkages" / f"{name}.toml").read_text(encoding="utf-8")
-        return parse_linkage(text, str(name))
+        return linkage_of(read_built_in("linkages", str(name), LinkageTable), str(name))
     path = Path(name)
     try:
         there = bool(str(name)) and path.exists()
@@ -74,104 +60,37 @@ def load_linkage(name: str | Path) -> Linkage:
         raise refusal(
             "", "linkage", shown(str(name)), f"{', '.join(built_in)} or a TOML file", "correct the name"
         )
-    return parse_linkage(read_text(path, limit=MAX_BYTES), path)
+    return linkage_of(read_table(path, LinkageTable), path)
 
 
-def parse_linkage(text: str, source: str | Path) -> Linkage:
-    """Parse the TOML of a linkage that came from `source`; its name is the file's, where it gives none."""
-    table = parse_toml(text, source)
-    schema = table.get("schema")
-    if schema != LINKAGES_SCHEMA:
-        raise refusal(
-            source,
-            "schema",
-            shown(schema),
-            f'"{LINKAGES_SCHEMA}"',
-            f'write schema = "{LINKAGES_SCHEMA}" in the first line',
-        )
-    for field in table:
-        if field not in LINKAGE_FIELDS:
-            raise refusal(
-                source, field, "a field that is not known", "one that is", nearest(field, LINKAGE_FIELDS)
-            )
-    constraints = _table(source, "constraints", table.get("constraints", {}))
-    for field in constraints:
-        if field not in WRITTEN_CONSTRAINTS:
-            raise refusal(
-                source,
-                f"constraints.{field}",
-                "a kind that is not known",
-                ", ".join(WRITTEN_CONSTRAINTS),
-                nearest(field, WRITTEN_CONSTRAINTS),
-            )
+def linkage_of(table: LinkageTable, source: str | Path) -> Linkage:
+    """Make a linkage of its table; its name is the file's, where the table gives none.
+
+    Parameters
+    ----------
+    table : LinkageTable
+        What a file says.
+    source : str or path
+        The file, for errors.
+
+    Raises
+    ------
+    InputError
+        Where what it says describes no object.
+    """
     try:
         return Linkage.from_names(
-            name=_text(source, "name", table.get("name", Path(source).stem)),
-            points=_names(source, "points", table.get("points")),
-            segments={
-                segment: _number(source, f"segments.{segment}", length)
-                for segment, length in _table(source, "segments", table.get("segments")).items()
-            },
-            midpoints={
-                middle: _pair(source, f"midpoints.{middle}", ends)
-                for middle, ends in _table(source, "midpoints", table.get("midpoints", {})).items()
-            },
-            coplanar=_groups(source, "constraints.coplanar", constraints.get("coplanar", [])),
-            perpendicular=[
-                _pair(source, f"constraints.perpendicular[{number}]", pair)
-                for number, pair in enumerate(
-                    _groups(source, "constraints.perpendicular", constraints.get("perpendicular", []))
-                )
-            ],
-            collinear=_groups(source, "constraints.collinear", constraints.get("collinear", [])),
-            unit=None if "unit" not in table else _number(source, "unit", table["unit"]),
-            height=None if "height" not in table else _number(source, "height", table["height"]),
-            urdf=None if "urdf" not in table else _text(source, "urdf", table["urdf"]),
-            source=_text(source, "source", table.get("source", "")),
+            name=table.name or Path(source).stem,
+            points=table.points,
+            segments=table.segments,
+            midpoints={middle: (a, b) for middle, (a, b) in table.midpoints.items()},
+            coplanar=table.constraints.coplanar,
+            perpendicular=[(a, b) for a, b in table.constraints.perpendicular],
+            collinear=table.constraints.collinear,
+            unit=table.unit,
+            height=table.height,
+            urdf=table.urdf,
+            source=table.source,
         )
     except InputError as error:
-        # What the object itself is refused for does not know the file it came from.
-        if str(error).startswith("linkage "):
-            raise InputError(f"{source}: {error}") from None
-        raise
-
-
-def _refuse(source: str | Path, field: str, value: object, expected: str) -> NoReturn:
-    raise refusal(source, field, "nothing" if value is None else shown(value), expected, "correct it")
-
-
-def _text(source: str | Path, field: str, value: object) -> str:
-    if not isinstance(value, str) or not value.isprintable():
-        _refuse(source, field, value, "a text on one line")
-    return value
-
-
-def _number(source: str | Path, field: str, value: object) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        _refuse(source, field, value, "a number")
-    return float(value)
-
-
-def _table(source: str | Path, field: str, value: object) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        _refuse(source, field, value, f"a table, [{field}]")
-    return value
-
-
-def _names(source: str | Path, field: str, value: object) -> list[str]:
-    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
-        _refuse(source, field, value, "a list of names")
-    return value
-
-
-def _pair(source: str | Path, field: str, value: object) -> tuple[str, str]:
-    names = _names(source, field, value)
-    if len(names) != 2:
-        _refuse(source, field, value, "a list of two names")
-    return names[0], names[1]
-
-
-def _groups(source: str | Path, field: str, value: object) -> list[list[str]]:
-    if not isinstance(value, list):
-        _refuse(source, field, value, "a list of lists of names")
-    return [_names(source, f"{field}[{number}]", group) for number, group in enumerate(value)]
+        raise InputError(f"{source}: {error}") from None  # the object does not know the file it came from

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 import pinocchio as pin
@@ -16,19 +14,17 @@ import pinocchio as pin
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.kinematics import BodyPoint, Kinematics, Site, find_frame, frame_index
-from posekit.safe_io import nearest, one_line, parse_toml, read_toml, refusal, shown
-from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS
+from posekit.safe_io import nearest, one_line, refusal, shown
+from posekit.skeleton import JOINTS, POINT, POINTS
+
+if TYPE_CHECKING:
+    from posekit.tables.joint_map import JointMapTable, MeanTable, SiteTable
 
 SCHEMA: Final = "posekit.joint_map/1"
 MAX_BYTES: Final = 100_000
-MAX_SITES: Final = 16
-"""Frames in one mean."""
 
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
 """The maps that come with the package, in the order in which they are tried."""
-
-FEWEST: Final = 3
-"""Points that a map must have: fewer do not tell how a body is turned."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,15 +120,17 @@ def load_joint_map(name: str | Path) -> JointMap:
     InputError
         Where there is no such map, or it is not what `posekit.joint_map/1` says.
     """
+    from posekit.tables.joint_map import JointMapTable
+    from posekit.tables.reading import read_built_in, read_table
+
     if str(name) in BUILT_IN:
-        text = resources.files("posekit.urdf").joinpath("joint_maps", f"{name}.toml").read_text("utf-8")
-        return parse_joint_map(parse_toml(text, str(name)), str(name))
+        return joint_map_of(read_built_in("joint_maps", str(name), JointMapTable), str(name))
     path = Path(name)
     if not path.suffix and not path.exists():
         raise refusal(
             "", "joint map", shown(str(name)), f"{', '.join(BUILT_IN)} or a TOML file", "choose one of them"
         )
-    return parse_joint_map(read_toml(path, limit=MAX_BYTES), str(path))
+    return joint_map_of(read_table(path, JointMapTable, limit=MAX_BYTES), str(path))
 
 
 def find_joint_map(model: pin.Model) -> JointMap:
@@ -161,82 +159,29 @@ def find_joint_map(model: pin.Model) -> JointMap:
     )
 
 
-def parse_joint_map(table: Mapping[str, Any], source: str) -> JointMap:
-    """Make a joint map of a parsed TOML table.
+def joint_map_of(table: JointMapTable, name: str) -> JointMap:
+    """Make a joint map of its table.
 
-    Raises
-    ------
-    InputError
-        Where it is not what `posekit.joint_map/1` says.
+    Parameters
+    ----------
+    table : JointMapTable
+        What a file says.
+    name : str
+        What reports and errors call the map.
     """
-    if table.get("schema") != SCHEMA:
-        raise refusal(
-            source, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line"
-        )
-    unknown = sorted(set(table) - {"schema", "points", "optional"})
-    if unknown:
-        raise refusal(source, unknown[0], "an unknown entry", "schema, [points], [optional]", "remove it")
-    both: list[Mapping[str, BodyPoint]] = []
-    for part in ("points", "optional"):
-        entries = table.get(part, {})
-        if not isinstance(entries, dict):
-            raise refusal(source, part, shown(entries), "a table", f"write [{part}] above the points")
-        both.append(
-            MappingProxyType({name: _point(name, entry, source, part) for name, entry in entries.items()})
-        )
-    points, optional = both
-    twice = sorted(set(points) & set(optional))
-    if twice:
-        raise refusal(
-            source, f"optional.{twice[0]}", "a point that is in [points] too", "one of them", "drop one"
-        )
-    if len(points) < FEWEST:
-        raise refusal(source, "points", f"{len(points)} points", f"at least {FEWEST}", "name more joints")
-    return JointMap(name=source, points=points, optional=optional)
+    points, optional = (
+        MappingProxyType({point: _point(point, place) for point, place in places.items()})
+        for places in (table.points, table.optional)
+    )
+    return JointMap(name=name, points=points, optional=optional)
 
 
-def _point(name: str, entry: object, source: str, part: str) -> BodyPoint:
-    field = f"{part}.{name}"
-    if name not in POINT:
-        kind = f"a joint or one of {', '.join(HEAD_POINTS)}"
-        raise refusal(source, field, "an unknown point", kind, nearest(name, POINTS))
-    if isinstance(entry, dict) and "mean" in entry:
-        means = entry["mean"]
-        if set(entry) != {"mean"} or not isinstance(means, list) or not 1 <= len(means) <= MAX_SITES:
-            raise refusal(
-                source,
-                field,
-                shown(entry),
-                f"mean = [1 to {MAX_SITES} frames] and nothing else",
-                "correct it",
-            )
-        return BodyPoint(
-            name=name, sites=tuple(_site(site, source, f"{field}.mean[{k}]") for k, site in enumerate(means))
-        )
-    return BodyPoint(name=name, sites=(_site(entry, source, field),))
-
-
-def _site(entry: object, source: str, field: str) -> Site:
-    if isinstance(entry, str):
-        entry = {"frame": entry}
-    expected = "a frame's name, or { frame = …, offset = [x, y, z], weight = … }"
-    if not isinstance(entry, dict) or set(entry) - {"frame", "offset", "weight"}:
-        raise refusal(source, field, shown(entry), expected, "correct it")
-    frame = entry.get("frame")
-    if not isinstance(frame, str) or not frame:
-        raise refusal(source, f"{field}.frame", shown(frame), "a frame's name", "name a link or a joint")
-    offset = entry.get("offset", [0.0, 0.0, 0.0])
-    if not isinstance(offset, list) or len(offset) != 3 or not all(map(_is_number, offset)):
-        raise refusal(source, f"{field}.offset", shown(offset), "[x, y, z], metres", "give three numbers")
-    weight = entry.get("weight", 1.0)
-    if not _is_number(weight) or not weight > 0:
-        raise refusal(source, f"{field}.weight", shown(weight), "a positive number", "correct it")
-    x, y, z = map(float, offset)
-    return Site(frame=frame, offset=(x, y, z), weight=float(weight))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+def _point(name: str, place: SiteTable | MeanTable) -> BodyPoint:
+    sites = (
+        Site(frame=site.frame, offset=(site.offset[0], site.offset[1], site.offset[2]), weight=site.weight)
+        for site in getattr(place, "mean", [place])
+    )
+    return BodyPoint(name=name, sites=tuple(sites))
 
 
 def _point_index(name: str) -> int:

@@ -19,11 +19,11 @@ from posekit.body.anthropometry import (
     write_lengths,
 )
 from posekit.body.anthropometry.body import DIMENSIONS, TRUNK, dimensions_of, lengths_of
-from posekit.body.anthropometry.lengths_file import BOTH_SIDES
 from posekit.body.lengths import hips_points, torso_points
 from posekit.body.stature import lengths_from_stature
 from posekit.errors import FigureError, InputError
 from posekit.skeleton import SEGMENT_NAMES
+from posekit.tables.lengths import BOTH_SIDES
 
 FACTORS = st.lists(st.floats(0.7, 1.3), min_size=len(DIMENSIONS), max_size=len(DIMENSIONS))
 
@@ -197,7 +197,7 @@ def test_json_and_views(tmp_path: Path) -> None:
         (HEAD.replace("cm", "inch") + '[lengths]\n"neck-pelvis" = 20', "unit"),
         (HEAD, "no length"),
         (HEAD + "[lengths]\n", "no length"),
-        (HEAD + "lengths = 3", "a table"),
+        (HEAD + "lengths = 3", "lengths: got 3; expected an object"),
         (HEAD + '[lengths]\n"neck-pelvi" = 50', "neck-pelvis"),
         (HEAD + '[lengths]\n"neck-pelvis" = 0', "positive"),
         (HEAD + '[lengths]\n"neck-pelvis" = -3', "positive"),
@@ -208,7 +208,10 @@ def test_json_and_views(tmp_path: Path) -> None:
         (HEAD + '[lengths]\nelbow-wrist = 25\n"left_elbow-left_wrist" = 25', "twice"),
         (HEAD + '[lengths]\n"neck-pelvis" = 50\n[deviation]\n"elbow-wrist" = 1', "without its length"),
         (HEAD + 'stature = "tall"\n[lengths]\n"neck-pelvis" = 50', "stature"),
-        (HEAD + 'colour = "red"\n[lengths]\n"neck-pelvis" = 50', "unknown entry"),
+        (
+            HEAD + 'colour = "red"\n[lengths]\n"neck-pelvis" = 50',
+            "colour: got .* expected no field of this name",
+        ),
         ("[[", "TOML"),
     ],
 )

@@ -14,7 +14,9 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.reading import read_keypoints, suiting
-from posekit.formats.skeleton_maps import load_skeleton_map, parse_skeleton_map
+from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_of
+from posekit.tables.file_model import validated
+from posekit.tables.skeleton_map import SkeletonMapTable
 from tests.detector_files import write_keypoints
 
 COCO = load_skeleton_map("coco_17")
@@ -120,7 +122,9 @@ def test_names_of_ones_own_need_a_map(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="any built-in skeleton map; write a skeleton map"):
         read_keypoints(tmp_path / "v.csv")
     own = {"nose": "snout", "left_ear": "ear", "left_wrist": "paw", "pelvis": "tail"}
-    layout = parse_skeleton_map({"schema": "posekit.skeleton_map/1", "landmarks": own}, "own")
+    layout = skeleton_map_of(
+        validated(SkeletonMapTable, {"schema": "posekit.skeleton_map/1", "landmarks": own}, "own"), "own"
+    )
     assert np.isfinite(read_keypoints(tmp_path / "v.csv", layout=layout).landmarks[0, :, 0]).sum() == 4
 
 

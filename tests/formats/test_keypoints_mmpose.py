@@ -15,7 +15,9 @@ from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
 from posekit.formats.keypoints.reading import read_keypoints, suiting
-from posekit.formats.skeleton_maps import load_skeleton_map, parse_skeleton_map
+from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_of
+from posekit.tables.file_model import validated
+from posekit.tables.skeleton_map import SkeletonMapTable
 from tests.detector_files import write_keypoints
 
 COCO, H36M, HALPE = map(load_skeleton_map, ("coco_17", "h36m_17", "halpe_26"))
@@ -159,7 +161,9 @@ def test_names_of_ones_own_need_a_map(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r'got names as "a", "b", "c", "d"; expected .* --skeleton'):
         read_keypoints(path)
     own = {"left_hip": "A", "right_hip": "b", "left_knee": "c", "right_knee": "d"}
-    layout = parse_skeleton_map({"schema": "posekit.skeleton_map/1", "landmarks": own}, "own")
+    layout = skeleton_map_of(
+        validated(SkeletonMapTable, {"schema": "posekit.skeleton_map/1", "landmarks": own}, "own"), "own"
+    )
     assert np.isfinite(read_keypoints(path, layout=layout).landmarks[0]).all(axis=-1).sum() == 4
 
 

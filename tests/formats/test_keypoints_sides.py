@@ -16,8 +16,10 @@ from posekit.formats.keypoints.persons import select
 from posekit.formats.keypoints.side_flips import GROUPS, flips
 from posekit.formats.keypoints.side_gait import gait_evidence
 from posekit.formats.keypoints.sides import SURE
-from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, parse_skeleton_map
+from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, skeleton_map_of
 from posekit.synthesis import SyntheticScene, Walker, random_views, walker_scene
+from posekit.tables.file_model import validated
+from posekit.tables.skeleton_map import SkeletonMapTable
 from tests.detector_files import scatter
 
 COCO = load_skeleton_map("coco_17")
@@ -120,15 +122,14 @@ def test_sides_of_several_points_are_exchanged_too() -> None:
         "points": ["a1", "a2", "b1", "b2", "c"],
         "landmarks": {"left_wrist": ["a1", "a2"], "right_wrist": ["b1", "b2"], "nose": "c"},
     }
-    layout = parse_skeleton_map(table, "markers")
+    layout = skeleton_map_of(validated(SkeletonMapTable, table, "markers"), "markers")
     points = np.arange(10.0).reshape(1, 5, 2)
     there = KeyPoints(
         format="t", source="t", layout=layout, pictures=("a",), frame=np.zeros(1, int), points=points
     )
     np.testing.assert_array_equal(swap(there).points[0], points[0, [2, 3, 0, 1, 4]])
-    uneven = parse_skeleton_map(
-        {**table, "landmarks": {"left_wrist": "a1", "right_wrist": ["b1", "b2"]}}, "markers"
-    )
+    other = {**table, "landmarks": {"left_wrist": "a1", "right_wrist": ["b1", "b2"]}}
+    uneven = skeleton_map_of(validated(SkeletonMapTable, other, "markers"), "markers")
     there = replace(there, layout=uneven)
     np.testing.assert_array_equal(swap(there).landmarks, uneven.swapped().gather(points))
 

@@ -17,9 +17,11 @@ from posekit.formats.skeleton_maps import (
     find_by_names,
     find_by_order,
     load_skeleton_map,
-    parse_skeleton_map,
     skeleton_map_names,
+    skeleton_map_of,
 )
+from posekit.tables.file_model import validated
+from posekit.tables.skeleton_map import SkeletonMapTable
 from tests.detector_files import scatter
 
 NAMES = skeleton_map_names()
@@ -227,7 +229,7 @@ GOOD = {
 
 
 def test_a_good_table_is_a_map() -> None:
-    layout = parse_skeleton_map(GOOD, "mine.toml")
+    layout = skeleton_map_of(validated(SkeletonMapTable, GOOD, "mine.toml"), "mine.toml")
     assert layout.needed == ("a", "b", "c")
     assert layout.landmarks["mid_hips"] == ("b", "c")
 
@@ -256,7 +258,7 @@ def test_a_good_table_is_a_map() -> None:
 )
 def test_a_bad_table_is_refused_in_one_line(change: dict, said: str) -> None:
     with pytest.raises(InputError) as caught:
-        parse_skeleton_map(GOOD | change, "mine.toml")
+        skeleton_map_of(validated(SkeletonMapTable, GOOD | change, "mine.toml"), "mine.toml")
     assert said in str(caught.value) and "\n" not in str(caught.value)
     assert str(caught.value).startswith("mine.toml")
 

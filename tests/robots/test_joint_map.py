@@ -15,13 +15,15 @@ from posekit.robots import load_robot
 from posekit.robots.joint_map import (
     BUILT_IN,
     find_joint_map,
+    joint_map_of,
     load_joint_map,
-    parse_joint_map,
     postures_of,
     targets_of,
 )
 from posekit.robots.scaling import model_lengths
 from posekit.skeleton import JOINTS, POINTS, SIDES
+from posekit.tables.file_model import validated
+from posekit.tables.joint_map import JointMapTable
 
 SUBJECT: dict[
     str, tuple[str, str, tuple[float, float, float], str]
@@ -169,29 +171,38 @@ GOOD = {"schema": "posekit.joint_map/1", "points": {"neck": "a", "pelvis": "b", 
     [
         ({"schema": "posekit.view/1"}, "schema: got"),
         ({"schema": None}, "schema: got null"),
-        ({"extra": 1}, "extra: got an unknown entry"),
+        ({"extra": 1}, "extra: got 1; expected no field of this name"),
         ({"points": []}, "points: got"),
         ({"points": {"neck": "a"}}, "points: got 1 points; expected at least 3"),
         ({"points": {"neck": "a", "pelvis": "b", "rigth_hip": "c"}}, "did you mean right_hip"),
         ({"optional": {"neck": "a"}}, "optional.neck: got a point that is in \\[points\\] too"),
         ({"optional": {"nose": 3}}, "optional.nose: got 3"),
         ({"optional": {"nose": ""}}, "optional.nose.frame: got"),
-        ({"optional": {"nose": {"frame": "a", "ofset": [0, 0, 0]}}}, "optional.nose: got"),
+        (
+            {"optional": {"nose": {"frame": "a", "ofset": [0, 0, 0]}}},
+            "optional.nose.ofset: got .* did you mean offset",
+        ),
         ({"optional": {"nose": {"frame": "a", "offset": [0, 0]}}}, "optional.nose.offset: got"),
-        ({"optional": {"nose": {"frame": "a", "offset": [0, 0, "1"]}}}, "optional.nose.offset: got"),
-        ({"optional": {"nose": {"frame": "a", "offset": [0, 0, float("nan")]}}}, "optional.nose.offset: got"),
+        ({"optional": {"nose": {"frame": "a", "offset": [0, 0, "1"]}}}, "optional.nose.offset\\[2\\]: got"),
+        (
+            {"optional": {"nose": {"frame": "a", "offset": [0, 0, float("nan")]}}},
+            "optional.nose.offset\\[2\\]: got",
+        ),
         ({"optional": {"nose": {"frame": "a", "weight": 0}}}, "optional.nose.weight: got 0"),
         ({"optional": {"nose": {"frame": "a", "weight": True}}}, "optional.nose.weight: got true"),
-        ({"optional": {"nose": {"mean": []}}}, "optional.nose: got"),
+        ({"optional": {"nose": {"mean": []}}}, "optional.nose.mean: got"),
         ({"optional": {"nose": {"mean": ["a", 1]}}}, "optional.nose.mean\\[1\\]: got 1"),
-        ({"optional": {"nose": {"mean": ["a"], "frame": "b"}}}, "optional.nose: got"),
-        ({"optional": {"nose": {"mean": ["a"] * 17}}}, "optional.nose: got"),
+        ({"optional": {"nose": {"mean": ["a"], "frame": "b"}}}, "optional.nose.frame: got"),
+        (
+            {"optional": {"nose": {"mean": ["a"] * 17}}},
+            "optional.nose.mean: got a list of 17 entries; expected at most 16",
+        ),
     ],
 )
 def test_a_wrong_map_is_refused(change: dict[str, object], message: str) -> None:
-    parse_joint_map(GOOD, "good")
+    joint_map_of(validated(JointMapTable, GOOD, "good"), "good")
     with pytest.raises(InputError, match=message) as refused:
-        parse_joint_map({**GOOD, **change}, "bad.toml")
+        joint_map_of(validated(JointMapTable, {**GOOD, **change}, "bad.toml"), "bad.toml")
     assert str(refused.value).startswith("bad.toml: ") and "\n" not in str(refused.value)
 
 

@@ -10,9 +10,10 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.skeleton import DOFS
+from posekit.tables.anatomy import MAX_COUPLINGS
+from posekit.tables.angles import ANGLES
 from posekit.validators import Ranges, load_ranges
-from posekit.validators.anatomical import ANGLES, Anatomy
-from posekit.validators.anatomical_table import MAX_COUPLINGS
+from posekit.validators.anatomical import Anatomy
 
 TEXT = (resources.files("posekit.urdf") / "ranges" / "anatomical.toml").read_text(encoding="utf-8")
 TABLE = load_ranges("anatomical")
@@ -87,76 +88,136 @@ def changed(old: str, new: str) -> str:
 NECK = "[neck.flexion]\nlower = { mean = -75.5, spread = 8.5,"
 COUPLING = 'angle = "hip.flexion"'
 WRONG = {
-    "no spreads": (changed("spreads = ", "# spreads = "), "spreads: None; expected a finite number"),
-    "negative spreads": (changed("spreads = 1.0", "spreads = -1.0"), "spreads is -1; expected 0 to 10"),
-    "endless spreads": (changed("spreads = 1.0", "spreads = inf"), "spreads: inf; expected a finite"),
-    "a missing angle": (changed("[neck.flexion]", "[neck.extra]"), "'neck.extra' is not an angle"),
+    "no spreads": (changed("spreads = ", "# spreads = "), "spreads: got nothing; expected this field"),
+    "negative spreads": (
+        changed("spreads = 1.0", "spreads = -1.0"),
+        "spreads: got -1.0; expected a number of at least 0",
+    ),
+    "endless spreads": (changed("spreads = 1.0", "spreads = inf"), "spreads: got inf; expected a finite"),
+    "a missing angle": (
+        changed("[neck.flexion]", "[neck.extra]"),
+        "neck.extra: got a name that is not an angle",
+    ),
     "a missing joint": (
         TEXT.replace("[neck.rotation]", "[neck.bending2]").split("[neck.bending2]")[0]
         + TEXT[TEXT.index("[pelvis.flexion]") :],
-        "missing neck.rotation",
+        "got no neck.rotation",
     ),
     "a number for an angle": (
         changed("[neck.flexion]\nlower", "[neck]\nflexion = 3\nlower"),
-        "neck.flexion: 3",
+        "neck.lower: got a name that is not an angle",
     ),
     "a joint that is no table": (
         changed("spreads = 1.0", "spreads = 1.0\nneck2 = 3"),
-        "'neck2': expected a table",
+        "neck2: got 3; expected a table",
     ),
-    "no upper": (changed("upper = { mean = 60.0", "uper = { mean = 60.0"), "neck.flexion: missing upper"),
-    "a further key": (changed(NECK, NECK.replace("mean", "men = 1, mean")), "unknown 'men'"),
+    "no upper": (
+        changed("upper = { mean = 60.0", "uper = { mean = 60.0"),
+        "neck.flexion.upper: got nothing; expected this field",
+    ),
+    "a further key": (
+        changed(NECK, NECK.replace("mean", "men = 1, mean")),
+        "neck.flexion.lower.men: got 1; expected no field of this name; did you mean mean",
+    ),
     "a spread of zero": (changed("spread = 8.5", "spread = 0.0"), "expected a positive standard deviation"),
     "a negative spread": (changed("spread = 8.5", "spread = -1"), "expected a positive standard deviation"),
-    "NaN": (changed("mean = -75.5", "mean = nan"), "neck.flexion.lower.mean: nan; expected a finite number"),
-    "a truth value": (changed("mean = -75.5", "mean = true"), "neck.flexion.lower.mean: True"),
-    "a huge number": (changed("mean = -75.5", "mean = 1" + "0" * 400), "neck.flexion.lower.mean: inf"),
-    "radians squared": (changed("mean = -75.5", "mean = -7550"), "expected degrees from -360 to 360"),
-    "swapped ends": (changed("mean = -75.5", "mean = 75.5"), "lower mean 75.5 is not below upper mean 60"),
+    "NaN": (
+        changed("mean = -75.5", "mean = nan"),
+        "neck.flexion.lower.mean: got nan; expected a finite number",
+    ),
+    "a truth value": (
+        changed("mean = -75.5", "mean = true"),
+        "neck.flexion.lower.mean: got true; expected a number",
+    ),
+    "a huge number": (
+        changed("mean = -75.5", "mean = 1" + "0" * 400),
+        "neck.flexion.lower.mean: got an integer that no float64 holds",
+    ),
+    "radians squared": (
+        changed("mean = -75.5", "mean = -7550"),
+        "neck.flexion.lower.mean: got -7550; expected a number of at least -360",
+    ),
+    "swapped ends": (
+        changed("mean = -75.5", "mean = 75.5"),
+        "neck.flexion: got means 75.5 and 60; expected the lower mean below the upper one",
+    ),
     "more than a turn": (changed("mean = -75.5", "mean = -359"), "expected at most a full turn"),
     "a source that is none": (
         changed('source = "aaos"', 'source = "hearsay"'),
-        "'hearsay' is not in [sources]",
+        'neck.flexion.lower.source: got "hearsay"; expected a key of [sources]',
     ),
-    "a source that is a number": (changed('source = "aaos"', "source = 3"), "expected one or more keys"),
-    "sources that are numbers": (changed("[sources]", "[sources]\nx = 1"), "sources: expected a table"),
+    "a source that is a number": (
+        changed('source = "aaos"', "source = 3"),
+        "neck.flexion.lower.source: got 3; expected a list; name one or more keys",
+    ),
+    "sources that are numbers": (
+        changed("[sources]", "[sources]\nx = 1"),
+        "sources.x: got 1; expected a text",
+    ),
     "a coupling of an unknown angle": (
         changed(COUPLING, 'angle = "ankle.flexion"'),
-        "angle is 'ankle.flexion'",
+        'coupling[0].angle: got "ankle.flexion"',
     ),
-    "a coupling across limbs": (changed('of = "knee.flexion"', 'of = "elbow.flexion"'), "of 'elbow.flexion'"),
-    "a coupling to itself": (changed('of = "knee.flexion"', 'of = "hip.flexion"'), "of 'hip.flexion'"),
+    "a coupling across limbs": (
+        changed('of = "knee.flexion"', 'of = "elbow.flexion"'),
+        'coupling[0].of: got "elbow.flexion"; expected one that hip.flexion may depend on',
+    ),
+    "a coupling to itself": (
+        changed('of = "knee.flexion"', 'of = "hip.flexion"'),
+        'coupling[0].of: got "hip.flexion"',
+    ),
     "a coupling without end": (
         changed('end = "upper"\nof = "knee', 'end = "left"\nof = "knee'),
-        "end is 'left'",
+        'coupling[0].end: got "left"',
     ),
     "a coupling of one point": (
         changed("[[0.0, 61.0], [24.0, 90.0], [60.0, 122.6]]", "[[0.0, 61.0]]"),
-        "expected two or more",
+        "coupling[0].points: got a list of 1 entries; expected at least 2 entries",
     ),
-    "a point of three numbers": (changed("[0.0, 61.0]", "[0.0, 61.0, 1.0]"), "points: [0.0, 61.0, 1.0]"),
-    "points out of order": (changed("[24.0, 90.0]", "[0.0, 90.0]"), "knee.flexion does not ascend"),
-    "a point that is text": (changed("[24.0, 90.0]", '[24.0, "x"]'), "points: x; expected a finite number"),
+    "a point of three numbers": (
+        changed("[0.0, 61.0]", "[0.0, 61.0, 1.0]"),
+        "coupling[0].points[0]: got [0.0, 61.0, 1.0]; expected at most 2 entries",
+    ),
+    "points out of order": (
+        changed("[24.0, 90.0]", "[0.0, 90.0]"),
+        "coupling[0].points: got points out of order; expected knee.flexion to ascend",
+    ),
+    "a point that is text": (
+        changed("[24.0, 90.0]", '[24.0, "x"]'),
+        'coupling[0].points[1][1]: got "x"; expected a number',
+    ),
     "a coupling that is no table": (
         changed("spreads = 1.0", "spreads = 1.0\ncoupling = 3").split("[[coupling]]")[0],
-        "coupling: expected [[coupling]] tables",
+        "coupling: got 3; expected a list; write [[coupling]] tables",
     ),
     "too many couplings": (
         TEXT + TEXT[TEXT.index("[[coupling]]") :] * MAX_COUPLINGS,
-        f"at most {MAX_COUPLINGS}",
+        f"entries; expected at most {MAX_COUPLINGS} entries",
     ),
-    "a sinus of a joint without one": (changed('joint = "hip"', 'joint = "shoulder"'), "joint is 'shoulder'"),
-    "a sinus sharper than a diamond": (changed("power = 4.0", "power = 0.5"), "power is 0.5; expected 1 to"),
+    "a sinus of a joint without one": (
+        changed('joint = "hip"', 'joint = "shoulder"'),
+        'sinus[0].joint: got "shoulder"; expected',
+    ),
+    "a sinus sharper than a diamond": (
+        changed("power = 4.0", "power = 0.5"),
+        "sinus[0].power: got 0.5; expected a number of at least 1",
+    ),
     "a sinus without source": (
         changed('power = 4.0\nsource = ["van_arkel", "han"]', "power = 4.0"),
-        "sinus 1: missing source",
+        "sinus[0].source: got nothing; expected this field",
     ),
-    "a power that is none": (changed("power = 4.0", 'power = "x"'), "power: x; expected a finite number"),
+    "a power that is none": (
+        changed("power = 4.0", 'power = "x"'),
+        'sinus[0].power: got "x"; expected a number',
+    ),
     "two sinuses of one joint": (
         TEXT + TEXT[TEXT.index("[[sinus]]") :],
-        "sinus: expected [[sinus]] tables, at most one",
+        "sinus: got a list of 2 entries; expected at most 1 entries; write [[sinus]] tables",
     ),
-    "a line break in a name": (changed("[neck.flexion]", '[neck."a\\nb"]'), "is not an angle"),
+    "a line break in a name": (
+        changed("[neck.flexion]", '[neck."a\\nb"]'),
+        "got a name that is not an angle",
+    ),
 }
 
 

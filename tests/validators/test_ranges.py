@@ -7,8 +7,9 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.skeleton import DOFS
+from posekit.tables.angles import PROJECTED_ANGLES
 from posekit.validators import Ranges, load_ranges
-from posekit.validators.ranges import PROJECTED_ANGLES, SCHEMA, URDF_RANGES
+from posekit.validators.ranges import SCHEMA, URDF_RANGES
 
 HEAD = f'schema = "{SCHEMA}"\nkind = "configuration"\n'
 PROJECTED = f'schema = "{SCHEMA}"\nkind = "projected"\n'
@@ -83,13 +84,16 @@ def test_equal_bounds_are_a_range(tmp_path: Path) -> None:
 
 WRONG = {
     "nothing": ("", "an empty file; expected a file with content"),
-    "no schema": ("# nothing", "schema is None; expected 'posekit.ranges/1'"),
+    "no schema": ("# nothing", 'schema: got nothing; expected "posekit.ranges/1"'),
     "another schema": (
         'schema = "posekit.ranges/9"',
-        "schema is 'posekit.ranges/9'; expected 'posekit.ranges/1'",
+        'schema: got "posekit.ranges/9"; expected "posekit.ranges/1"',
     ),
-    "no kind": (f'schema = "{SCHEMA}"', "kind is None; expected 'configuration' or 'projected'"),
-    "another kind": (f'schema = "{SCHEMA}"\nkind = "euler"', "kind is 'euler'"),
+    "no kind": (f'schema = "{SCHEMA}"', "kind: got nothing; expected this field"),
+    "another kind": (
+        f'schema = "{SCHEMA}"\nkind = "euler"',
+        "kind: got \"euler\"; expected 'configuration' or 'projected'",
+    ),
     "no TOML": (HEAD + "[neck\n", "not TOML"),
     "a key twice": (HEAD + "[neck]\nflexion = [0, 1]\nflexion = [0, 1]\n", "not TOML"),
     "a control character": (HEAD + "a = \x01", "not TOML"),
@@ -99,34 +103,61 @@ WRONG = {
     "a number of 5000 digits": (HEAD + f"[neck]\nflexion = [0, 1{'0' * 5000}]\n", "not TOML"),
     "a number of 400 digits": (
         HEAD + f"[neck]\nflexion = [0, 1{'0' * 400}]\n",
-        "neck.flexion: inf; expected a finite",
+        "neck.flexion[1]: got an integer that no float64 holds; expected a finite number",
     ),
-    "NaN": (HEAD + "[neck]\nflexion = [nan, 1]\n", "neck.flexion: nan; expected a finite number"),
-    "infinity": (HEAD + "[neck]\nflexion = [0, inf]\n", "neck.flexion: inf; expected a finite number"),
-    "a string": (HEAD + '[neck]\nflexion = ["0", 1]\n', "neck.flexion: '0'; expected a finite number"),
-    "a truth value": (HEAD + "[neck]\nflexion = [true, 1]\n", "neck.flexion: True; expected a finite number"),
-    "one number": (HEAD + "[neck]\nflexion = 3\n", "neck.flexion: 3; expected [lower, upper] in degrees"),
-    "three numbers": (HEAD + "[neck]\nflexion = [1, 2, 3]\n", "expected [lower, upper] in degrees"),
+    "NaN": (HEAD + "[neck]\nflexion = [nan, 1]\n", "neck.flexion[0]: got nan; expected a finite number"),
+    "infinity": (HEAD + "[neck]\nflexion = [0, inf]\n", "neck.flexion[1]: got inf; expected a finite number"),
+    "a string": (
+        HEAD + '[neck]\nflexion = ["0", 1]\n',
+        'neck.flexion: got ["0", 1]; expected [lower, upper], two numbers',
+    ),
+    "a truth value": (
+        HEAD + "[neck]\nflexion = [true, 1]\n",
+        "neck.flexion: got [true, 1]; expected [lower, upper], two numbers",
+    ),
+    "one number": (
+        HEAD + "[neck]\nflexion = 3\n",
+        "neck.flexion: got 3; expected [lower, upper], two numbers",
+    ),
+    "three numbers": (
+        HEAD + "[neck]\nflexion = [1, 2, 3]\n",
+        "neck.flexion: got [1, 2, 3]; expected [lower, upper], two numbers",
+    ),
     "swapped bounds": (
         HEAD + "[neck]\nflexion = [10, -10]\n",
-        "neck.flexion: lower 10 is above upper -10; swap them",
+        "neck.flexion: got [10, -10]; expected the lower one first; swap them",
     ),
-    "an unknown joint": (HEAD + "[tail]\nflexion = [0, 1]\n", "'tail.flexion' is not an angle of kind"),
-    "an unknown angle": (HEAD + "[neck]\nabduction = [0, 1]\n", "'neck.abduction' is not an angle of kind"),
+    "an unknown joint": (
+        HEAD + "[tail]\nflexion = [0, 1]\n",
+        "tail.flexion: got a name that is not an angle; expected one of neck.flexion",
+    ),
+    "an unknown angle": (
+        HEAD + "[neck]\nabduction = [0, 1]\n",
+        "neck.abduction: got a name that is not an angle",
+    ),
     "a joint of the other kind": (
         HEAD + "[shoulder]\nflexion = [0, 1]\n",
-        "'shoulder.flexion' is not an angle",
+        "shoulder.flexion: got a name that is not an angle",
     ),
-    "no table": (HEAD + "neck = 3\n", "'neck': expected a table"),
-    "a line break in a name": (HEAD + '["a\\nb"]\nflexion = [0, 1]\n', "is not an angle of kind"),
+    "no table": (HEAD + "neck = 3\n", "neck: got 3; expected a table such as [neck]"),
+    "a line break in a name": (HEAD + '["a\\nb"]\nflexion = [0, 1]\n', "a name that is not an angle"),
     "a line break in a key": (HEAD + '"a\\nb" = 3\n', "expected a table"),
-    "missing angles": (PROJECTED + "[neck]\nflexion = [0, 1]\n", "missing elbow.flexion, hip.abduction"),
+    "missing angles": (
+        PROJECTED + "[neck]\nflexion = [0, 1]\n",
+        "got no shoulder.flexion, shoulder.abduction, elbow.flexion",
+    ),
     "a threshold that is none": (
         HEAD + 'knee_flexed = "bent"\n',
-        "knee_flexed: 'bent'; expected a finite number",
+        'knee_flexed: got "bent"; expected a number',
     ),
-    "a negative threshold": (HEAD + "shortest_projection = -0.1\n", "expected a fraction from 0 to below 1"),
-    "a threshold of one": (HEAD + "shortest_projection = 1\n", "expected a fraction from 0 to below 1"),
+    "a negative threshold": (
+        HEAD + "shortest_projection = -0.1\n",
+        "shortest_projection: got -0.1; expected a number of at least 0",
+    ),
+    "a threshold of one": (
+        HEAD + "shortest_projection = 1\n",
+        "shortest_projection: got 1; expected less than 1",
+    ),
 }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,8 @@ import pinocchio as pin
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.safe_io import cut, nearest, one_line, read_toml, refusal, shown
-from posekit.validators.ranges import MAX_BYTES, SCHEMA
+from posekit.safe_io import cut, nearest, one_line, refusal
 
-KIND = "joints"
 UNLIMITED = 1e100
 """Radians or metres from which on a limit of the model is none."""
 
@@ -44,6 +41,9 @@ def load_joint_limits(name: str, model: pin.Model) -> tuple[Array, Array]:
 
 
 def _read(name: str, model: pin.Model) -> dict[str, tuple[float, float]]:
+    from posekit.tables.ranges import JointLimitsTable
+    from posekit.tables.reading import read_table
+
     try:
         exists = Path(name).exists()
     except (OSError, ValueError):
@@ -55,36 +55,11 @@ def _read(name: str, model: pin.Model) -> dict[str, tuple[float, float]]:
                 f"--ranges {cut(name)}: no such table or file{extra}; expected urdf or the path of a TOML file"
             )
         )
-    table = read_toml(name, limit=MAX_BYTES)
-    if table.get("schema") != SCHEMA:
-        raise refusal(name, "schema", shown(table.get("schema")), f'"{SCHEMA}"', "name it in the first line")
-    if table.get("kind") != KIND:
-        remedy = f'write kind = "{KIND}" and a table [limits] of the robot\'s own joints'
-        raise refusal(name, "kind", shown(table.get("kind")), f'"{KIND}"', remedy)
-    unknown = sorted(set(table) - {"schema", "kind", "limits"})
-    if unknown:
-        raise refusal(name, unknown[0], "an unknown entry", "schema, kind, [limits]", "remove it")
-    limits = table.get("limits", {})
-    if not isinstance(limits, dict) or not limits:
-        raise refusal(name, "limits", shown(limits), "a table of joints", "write [limits] above them")
+    table = read_table(name, JointLimitsTable)
     known = [str(model.names[k]) for k in range(1, model.njoints) if model.nqs[k] == 1]
-    return {joint: _range(name, joint, bounds, known) for joint, bounds in limits.items()}
-
-
-def _range(source: str, joint: str, bounds: object, known: Sequence[str]) -> tuple[float, float]:
-    field = f"limits.{joint}"
-    if joint not in known:
-        raise refusal(
-            source, field, "a joint that the robot has not", "one with limits", nearest(joint, known)[:200]
-        )
-    numbers = [
-        float(bound)
-        for bound in (bounds if isinstance(bounds, list) else [])
-        if isinstance(bound, int | float) and not isinstance(bound, bool)
-    ]
-    if not isinstance(bounds, list) or len(bounds) != 2 or len(numbers) != 2:
-        raise refusal(source, field, shown(bounds), "[lower, upper], degrees or metres", "give two numbers")
-    lower, upper = numbers
-    if lower > upper:
-        raise refusal(source, field, f"[{lower:g}, {upper:g}]", "the lower one first", "swap them")
-    return lower, upper
+    for joint in table.limits:
+        if joint not in known:
+            got = "a joint that the robot has not"
+            remedy = nearest(joint, known)[:200]
+            raise refusal(name, f"limits.{cut(joint)}", got, "one with limits", remedy)
+    return {joint: (lower, upper) for joint, (lower, upper) in table.limits.items()}

@@ -3,38 +3,20 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Final
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
 
 from posekit.body.anthropometry.body import SegmentLengths
 from posekit.errors import FigureError, InputError
-from posekit.safe_io import cut, nearest, one_line, read_json, read_toml, refusal, shown, write_text
-from posekit.skeleton import SEGMENT_NAMES
+from posekit.safe_io import one_line, read_json, read_toml, refusal, shown, write_text
 
-SCHEMA: Final = "posekit.lengths/1"
-VIEW: Final = "posekit.view/"
-FIELDS: Final = ("schema", "unit", "source", "stature", "lengths", "deviation")
+if TYPE_CHECKING:
+    from posekit.tables.lengths import FigureTable
+
+LENGTHS_SCHEMA: Final = "posekit.lengths/1"
 PER_METRE: Final = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
-LONGEST: Final = 3.0
-"""Metres that a segment may have; longer is another unit."""
-
-
-def _both_sides() -> dict[str, tuple[str, ...]]:
-    """Name what stands for both sides: ``elbow-wrist``, ``neck-shoulder``, ``shoulder-pelvis``."""
-    names: dict[str, tuple[str, ...]] = {}
-    for name in SEGMENT_NAMES:
-        if not all(end.startswith("left_") for end in name.split("-")):  # one side names the pair
-            plain = name.replace("right_", "").replace("left_", "")
-            pair = tuple(dict.fromkeys((name, name.replace("right_", "left_"))))
-            if plain != name and len(pair) == 2 and all(one in SEGMENT_NAMES for one in pair):
-                names[plain] = pair
-    return names
-
-
-BOTH_SIDES: Final = _both_sides()
-"""Names without a side, and the two segments that they stand for."""
 
 
 def read_lengths(path: str | Path) -> SegmentLengths:
@@ -57,30 +39,21 @@ def read_lengths(path: str | Path) -> SegmentLengths:
     InputError
         Where the file cannot be read, or is not what its schema says.
     """
+    from posekit.tables.file_model import validated
+    from posekit.tables.lengths import LengthsTable, ViewTable
+
     path = Path(path)
     suffix = path.suffix.lower()
     if suffix not in (".toml", ".json"):
         raise refusal(path, "", f"the ending {shown(suffix)}", ".toml or .json", "name a file of lengths")
-    table = read_toml(path) if suffix == ".toml" else read_json(path)
-    if not isinstance(table, dict):
-        raise refusal(path, "", shown(table), f'an object with schema "{SCHEMA}"', "name a file of lengths")
-    schema = table.get("schema")
-    if isinstance(schema, str) and schema.startswith(VIEW):
-        figure = table.get("figure")
-        if not isinstance(figure, dict) or not (figure.get("lengths") or figure.get("stature")):
-            raise refusal(
-                path, "figure.lengths", shown(figure), "lengths or a stature", "name a view that has them"
-            )
-        table = {"unit": table.get("unit"), "source": f"the figure of {path.name}"} | {
-            name: figure[name] for name in ("lengths", "stature") if figure.get(name) is not None
-        }
-        return _parsed(table, path, "figure.")
-    if schema != SCHEMA:
-        raise refusal(path, "schema", shown(schema), f'"{SCHEMA}"', "name it in the first line")
-    for field in table:
-        if field not in FIELDS:
-            raise refusal(path, cut(one_line(field)), "an unknown entry", ", ".join(FIELDS), "remove it")
-    return _parsed(table, path, "")
+    document = read_toml(path) if suffix == ".toml" else read_json(path)
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if isinstance(schema, str) and schema.startswith("posekit.view/"):
+        view = validated(ViewTable, document, path)
+        return _lengths(view.figure, view.unit, f"the figure of {path.name}", path)
+    table = validated(LengthsTable, document, path)
+    source = str(path) if table.source is None else table.source
+    return _lengths(table, table.unit, source, path, table.deviation)
 
 
 def write_lengths(path: str | Path, lengths: SegmentLengths, *, unit: str = "m") -> None:
@@ -98,7 +71,7 @@ def write_lengths(path: str | Path, lengths: SegmentLengths, *, unit: str = "m")
         raise refusal(path, "", f"the ending {shown(path.suffix)}", ".toml", "name it so")
     scale = PER_METRE[unit]
     lines = [
-        f'schema = "{SCHEMA}"',
+        f'schema = "{LENGTHS_SCHEMA}"',
         f'unit = "{unit}"',
         f"source = {json.dumps(one_line(lengths.source), ensure_ascii=False)}",
     ]
@@ -111,60 +84,20 @@ def write_lengths(path: str | Path, lengths: SegmentLengths, *, unit: str = "m")
     write_text(path, (f"{line}\n" for line in lines))
 
 
-def _parsed(table: Mapping[str, Any], path: Path, place: str) -> SegmentLengths:
-    unit = table.get("unit")
-    if not isinstance(unit, str) or unit not in PER_METRE:
-        got = "nothing" if unit is None else shown(unit)
-        raise refusal(path, "unit", got, ", ".join(PER_METRE), "say what the lengths are in")
-    source = table.get("source", str(path))
-    if not isinstance(source, str):
-        raise refusal(path, "source", shown(source), "a text", "say where the lengths come from")
-    stature = table.get("stature")
-    if stature is not None:
-        stature = _number(stature, path, f"{place}stature") / PER_METRE[unit]
-    lengths = _named(table.get("lengths", {}), path, f"{place}lengths", unit)
-    deviation = _named(table.get("deviation", {}), path, f"{place}deviation", unit)
-    if not lengths and stature is None:
-        raise refusal(path, f"{place}lengths", "no length", "one or more, or a stature", "add them")
-    extra = sorted(set(deviation) - set(lengths))
-    if extra:
-        raise refusal(
-            path, f"deviation.{extra[0]}", "a deviation without its length", "both", "add the length"
-        )
+def _lengths(
+    table: FigureTable,
+    unit: str,
+    source: str,
+    path: Path,
+    deviation: Mapping[str, float] = MappingProxyType({}),
+) -> SegmentLengths:
+    lengths, off = (
+        {name: value / PER_METRE[unit] for name, value in each.items()} for each in (table.lengths, deviation)
+    )
+    stature = None if table.stature is None else table.stature / PER_METRE[unit]
     try:
         return SegmentLengths(
-            lengths=lengths, deviation=deviation, source=source, measured=tuple(lengths), stature=stature
+            lengths=lengths, deviation=off, source=source, measured=tuple(lengths), stature=stature
         )
     except FigureError as error:
         raise InputError(f"{path}: {error}; correct the file") from None
-
-
-def _named(table: object, path: Path, field: str, unit: str) -> dict[str, float]:
-    if not isinstance(table, dict):
-        raise refusal(path, field, shown(table), "a table of segments", f"write [{field}] above them")
-    values: dict[str, float] = {}
-    for key, entry in table.items():
-        names = BOTH_SIDES.get(key, (key,))
-        place = f"{field}.{cut(one_line(str(key)))}"
-        if names[0] not in SEGMENT_NAMES:
-            raise refusal(path, place, "an unknown segment", "a known one", nearest(key, SEGMENT_NAMES))
-        number = _number(entry, path, place)
-        if number / PER_METRE[unit] > LONGEST:
-            raise refusal(
-                path, place, f"{number:g} {unit}", f"at most {LONGEST:g} m", "correct it, or the unit"
-            )
-        for name in names:
-            if name in values:
-                raise refusal(path, place, f"{name} twice", "once", "drop the name without a side")
-            values[name] = number / PER_METRE[unit]
-    return values
-
-
-def _number(value: object, path: Path, field: str) -> float:
-    if (
-        isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not (math.isfinite(value) and value > 0)
-    ):
-        raise refusal(path, field, shown(value), "a positive number", "correct it")
-    return float(value)

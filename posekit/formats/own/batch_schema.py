@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from posekit.formats.own.validation import FileModel
+from posekit.tables.file_model import FileModel
 
 SCHEMA = "posekit.batch/1"
 MANIFEST_SCHEMA = "posekit.batch_manifest/1"

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import FailFast, Field
 
 from posekit.formats.own.reading import read_json
-from posekit.formats.own.validation import FEW, FileModel, validated
+from posekit.tables.file_model import FEW, FileModel, validated
 
 SCHEMA = "posekit.nearer/1"
 

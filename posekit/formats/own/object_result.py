@@ -15,9 +15,9 @@ from posekit.formats.own.npz import suffix
 from posekit.formats.own.object_result_schema import SCHEMA, ObjectFile, ObjectFrameRecord
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
-from posekit.formats.own.validation import validated
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import check_target, json_pieces, write_text
+from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 

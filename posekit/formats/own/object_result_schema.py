@@ -10,7 +10,7 @@ from pydantic import FailFast, Field
 from posekit.formats.own.result_schema import Maybe, MaybePoint, Names, ResultFamily
 from posekit.formats.own.survivor_models import Count
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FEW, FileModel
+from posekit.tables.file_model import FEW, FileModel
 
 SCHEMA = "posekit.object/1"
 

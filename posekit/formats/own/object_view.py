@@ -14,10 +14,10 @@ from posekit.formats.own.camera_model import ScaledOrthographicModel
 from posekit.formats.own.object_view_schema import SCHEMA, ObjectViewFile
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
-from posekit.formats.own.validation import validated
 from posekit.linkages import Linkage
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, write_text
+from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import FailFast, Field
 
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FEW, FileModel
 from posekit.formats.own.view_schema import Point2, Point3, ScaledOrthographicCamera
+from posekit.tables.file_model import FEW, FileModel
 
 SCHEMA = "posekit.view/1"
 

@@ -18,10 +18,10 @@ from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
 from posekit.formats.own.result_schema import SCHEMA as RESULT_SCHEMA
 from posekit.formats.own.units import Unit, from_metres, to_metres
-from posekit.formats.own.validation import validated
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS
+from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
 from posekit.formats.own.postures_q_schema import SCHEMA, ConfigurationsFile
 from posekit.formats.own.reading import read_json
-from posekit.formats.own.validation import validated
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
+from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 

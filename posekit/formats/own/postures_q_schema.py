@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import FailFast, Field
 
-from posekit.formats.own.validation import FileModel
+from posekit.tables.file_model import FileModel
 
 SCHEMA = "posekit.configurations/1"
 MOST_VARIABLES = 1000

@@ -8,9 +8,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import AfterValidator, FailFast, Field
 
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FileModel, refuse
 from posekit.safe_io.refusal import nearest, shown
 from posekit.skeleton import POINTS
+from posekit.tables.file_model import FileModel, refuse
 
 SCHEMA = "posekit.postures/1"
 

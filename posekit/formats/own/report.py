@@ -25,9 +25,9 @@ from posekit.formats.own.report_schema import (
     Verdict,
 )
 from posekit.formats.own.report_table import markdown_lines
-from posekit.formats.own.validation import validated
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
+from posekit.tables.file_model import validated
 from posekit.tree.check import Findings
 
 NUMBERS = ("value", "lower", "upper", "margin")

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import FailFast, Field
 
-from posekit.formats.own.validation import FEW, FileModel
+from posekit.tables.file_model import FEW, FileModel
 
 SCHEMA = "posekit.report/1"
 

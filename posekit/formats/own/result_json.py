@@ -23,9 +23,9 @@ from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
 from posekit.formats.own.units import Unit, from_metres, to_metres
-from posekit.formats.own.validation import validated
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
+from posekit.tables.file_model import validated
 
 _KINDS: Final = {"survivor": int, "interpolated": bool}
 

@@ -11,9 +11,9 @@ from posekit.formats.own.inferred import Inferred
 from posekit.formats.own.survivor_columns import SurvivorColumns
 from posekit.formats.own.survivor_models import Count, model_of
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FEW, FileModel, refuse
 from posekit.safe_io.refusal import shown
 from posekit.skeleton import JOINTS
+from posekit.tables.file_model import FEW, FileModel, refuse
 
 SCHEMA = "posekit.result/1"
 

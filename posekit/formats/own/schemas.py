@@ -16,8 +16,8 @@ from posekit.formats.own import (
     view_schema,
 )
 from posekit.formats.own import nearer as nearer_schema
-from posekit.formats.own.validation import FileModel
 from posekit.safe_io.refusal import nearest, refusal, shown
+from posekit.tables.file_model import FileModel
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
     view_schema.SCHEMA: view_schema.ViewFile,

@@ -8,8 +8,8 @@ from typing import Annotated, Any, Final
 from pydantic import FailFast, Field, create_model
 
 from posekit.formats.own.column import Column, columns_in
-from posekit.formats.own.validation import FEW, FileModel, named
 from posekit.skeleton import JOINTS
+from posekit.tables.file_model import FEW, FileModel, named
 
 Count = Annotated[int, Field(ge=0, le=2**53)]
 MAX_EXTENT: Final = 1000

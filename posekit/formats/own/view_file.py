@@ -14,7 +14,6 @@ from posekit.errors import CameraError
 from posekit.formats.own.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
-from posekit.formats.own.validation import validated
 from posekit.formats.own.view import View
 from posekit.formats.own.view_schema import (
     SCHEMA,
@@ -26,6 +25,7 @@ from posekit.formats.own.view_schema import (
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
+from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from pydantic import ConfigDict, FailFast, Field, model_validator
 
 from posekit.formats.own.camera_model import check_intrinsics, check_rotation
 from posekit.formats.own.units import Unit
-from posekit.formats.own.validation import FileModel, checked, named, refuse
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
+from posekit.tables.file_model import FileModel, checked, named, refuse
 
 SCHEMA = "posekit.view/1"
 HEAD_NAMES = ("neck", *HEAD_POINTS)

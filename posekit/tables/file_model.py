@@ -33,13 +33,16 @@ class FileModel(BaseModel):
     Attributes
     ----------
     hints : mapping of str to str
-        What to do about a wrong value, by the name of the field that it is in.
+        What to do about a wrong value, by the name of the field that it is in, however deep.
+    hints_at : mapping of str to str
+        The same, by the name of the field that is wrong itself.
     tags : frozenset of str
         Names of variants, which pydantic puts into an error's location though the file does not nest there.
     """
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
     hints: ClassVar[Mapping[str, str]] = {}
+    hints_at: ClassVar[Mapping[str, str]] = {}
     tags: ClassVar[frozenset[str]] = frozenset()
 
     @model_validator(mode="before")
@@ -131,7 +134,11 @@ def _check_schema(document: object, expected: str, path: str | Path) -> None:
     elif isinstance(schema, str) and schema.startswith("posekit."):
         remedy = f"give a file of schema {expected} instead"
     else:
-        remedy = f'add "schema": "{expected}" if it is such a file'
+        remedy = (
+            f'write schema = "{expected}" in the first line'
+            if Path(path).suffix.lower() != ".json"
+            else f'add "schema": "{expected}" if it is such a file'
+        )
     raise refusal(path, "schema", got, f'"{expected}"', remedy)
 
 
@@ -148,7 +155,9 @@ def _wording(model: type[FileModel], error: ErrorDetails) -> tuple[str, str, str
     kind, context = error["type"], error.get("ctx", {})
     field = _field(error["loc"], model.tags)
     got = "nothing" if kind == "missing" else shown(error["input"])
-    hints = [model.hints[str(name)] for name in reversed(error["loc"]) if name in model.hints]
+    names = [str(name) for name in reversed(error["loc"])]
+    hints = [model.hints_at[name] for name in names[:1] if name in model.hints_at]
+    hints += [model.hints[name] for name in names if name in model.hints]
     remedy = (hints or [_REMEDIES.get(kind, "correct it")])[0]
     expected = _plain(error)
     if kind == _OWN:
@@ -156,7 +165,8 @@ def _wording(model: type[FileModel], error: ErrorDetails) -> tuple[str, str, str
         field += inside if inside.startswith("[") or not field or not inside else f".{inside}"
         return field, context["got"] or got, context["expected"], context["remedy"]
     if kind == "extra_forbidden":
-        suggestion = nearest(str(error["loc"][-1]), sorted(set(_fields(model.model_json_schema()))))
+        known = set(_fields(model.model_json_schema())) - {names[0]}
+        suggestion = nearest(names[0], sorted(known))
         expected = "no field of this name"
         remedy = f"{suggestion} Otherwise remove it" if suggestion.startswith("did") else "remove it"
     elif kind in ("missing", "union_tag_not_found"):
