@@ -160,5 +160,5 @@ def _numba() -> ModuleType | None:
             if isinstance(error, ModuleNotFoundError)
             else f"Numba cannot be used, the slower path is taken: {error}"
         )
-        warnings.warn(reason, RuntimeWarning, stacklevel=4)
+        warnings.warn(reason, UserWarning, stacklevel=4)
         return None

@@ -606,5 +606,5 @@ def test_numba_that_cannot_be_used_is_done_without_and_said(
         raise error
 
     monkeypatch.setattr(compiled, "import_module", fail)
-    with pytest.warns(RuntimeWarning, match=says):
+    with pytest.warns(UserWarning, match=says):
         assert compiled._numba.__wrapped__() is None
