@@ -18,6 +18,7 @@ SECTIONS: Final = (
     ("Vectors and rotations", "posekit.geometry"),
     ("Settings", "posekit.settings"),
     ("Reading and writing files safely", "posekit.safe_io"),
+    ("Tables", "posekit.tables"),
     ("Measures", "posekit.measures"),
     ("Linkages", "posekit.linkages"),
     ("Robots", "posekit.robots"),
