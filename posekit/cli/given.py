@@ -1,4 +1,4 @@
-"""What a file says it is: a result, postures or a view."""
+"""What `posekit render` and `posekit view` draw: a result, postures, or whatever else has postures in it."""
 
 from __future__ import annotations
 
@@ -8,32 +8,39 @@ from typing import TYPE_CHECKING
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
+    from posekit.formats.held_postures import HeldPostures
     from posekit.formats.own import Postures, Result, View
-
-
-def schema_of(path: Path) -> str:
-    """Return the name of a file's schema, or an empty text: what is none is left to the readers' own errors."""
-    from posekit.formats import own as files
-    from posekit.formats.own.npz import open_npz
-    from posekit.formats.own.result_npz import MAX_PADDED
-
-    if path.suffix.lower() == ".npz":
-        with open_npz(path, limit=MAX_PADDED) as archive:
-            return str(archive.array("schema", "U", ())) if "schema" in archive.names else ""
-    document = files.read_json(path)
-    return str(document.get("schema", "")) if isinstance(document, dict) else ""
 
 
 def read_given(
     path: Path, seen: Path | None, *, explain: bool = False
-) -> tuple[Result | Postures, View | None]:
-    """Read a file of any of the three schemas, and the view behind a result; a view is recovered first."""
-    from posekit.formats import own as files
-    from posekit.recovery import recover, result_of
+) -> tuple[Result | Postures | HeldPostures, View | None]:
+    """Read a file that holds postures, and the view behind a result; a view is recovered first.
 
-    name = schema_of(path)
+    Parameters
+    ----------
+    path : Path
+        The file, of any format that holds postures.
+    seen : Path, optional
+        The view that a result was recovered from.
+    explain : bool
+        Of a view: whether to list every pruned branch.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read, or holds no postures; where there is a view beside what is no result.
+    """
+    from posekit.formats import own as files
+    from posekit.formats.format import Content
+    from posekit.formats.held_postures import held_postures
+    from posekit.formats.recognising import recognise
+
+    found = recognise(path)
     behind = files.read_view(seen) if seen is not None else None
-    if name.startswith("posekit.view/"):
+    if found.holds is Content.VIEW:
+        from posekit.recovery import recover, result_of
+
         if behind is not None:
             raise InputError(
                 "--view: the file is a view itself; expected a result beside it; leave the option out"
@@ -41,8 +48,25 @@ def read_given(
         behind = files.read_view(path)
         recovery = recover(behind, group=0.05)
         return result_of(recovery, unit=behind.unit, explain=explain), behind
-    if name.startswith("posekit.result/"):
+    if found.holds is Content.RESULT:
         return files.read_result(path), behind
     if behind is not None:
         raise InputError("--view: the file holds no result; expected one, recovered from that view")
-    return files.read_postures(path), None
+    held = held_postures(path, found)
+    # Postures without frames are drawn together, and lie as they are.
+    return (held.postures if found.holds is Content.POSTURES else held), None
+
+
+def frame_count(content: Result | Postures | HeldPostures) -> int:
+    """Count the frames of what is drawn; postures without frames are one.
+
+    Parameters
+    ----------
+    content : Result, Postures or HeldPostures
+        What a file holds.
+    """
+    from posekit.formats.own import Postures, Result
+
+    if isinstance(content, Result):
+        return len(content.frames)
+    return 1 if isinstance(content, Postures) else int(content.frame.max(initial=0)) + 1

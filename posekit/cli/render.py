@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.given import read_given
+from posekit.cli.given import frame_count, read_given
 from posekit.cli.options import about, examples, numbers, progress, split
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
+    from posekit.formats.held_postures import HeldPostures
     from posekit.formats.own import Postures, Result, View
     from posekit.viewer.scene.subject import DrawnSubject, Shown
 
@@ -22,6 +23,7 @@ EXAMPLES = examples(
     "posekit render postures.json --view walk.json -o first.png --frame 1 --posture 1 --supersample 3",
     "posekit render postures.json -o all.png --layout superposed --background grey",
     "posekit render postures.json -o walk.gif --posture likeliest --fps 5",
+    "posekit render walk.bvh -o walk.html",
     "posekit render postures.json -o turn.gif --frame 2 --posture 1 --turntable 36 --size 640x480",
     "posekit render explained.json --view walk.json -o rejected.png --rejected",
 )
@@ -37,7 +39,10 @@ class Layout(StrEnum):
 def render(
     given: Annotated[
         Path,
-        typer.Argument(metavar="RESULT|POSTURES|VIEW", help="A view is recovered with default settings."),
+        typer.Argument(
+            metavar="RESULT|POSTURES|MOTION|VIEW",
+            help="A file of any format that holds postures; a view is recovered with default settings.",
+        ),
     ],
     output: Annotated[
         Path,
@@ -183,18 +188,23 @@ def render(
 
 
 def _write_page(
-    output: Path, content: Result | Postures, view: View | None, frame: str, *, title: str
+    output: Path, content: Result | Postures | HeldPostures, view: View | None, frame: str, *, title: str
 ) -> None:
-    from posekit.formats.own import Postures
     from posekit.viewer.page.page import write_page
 
-    frames = _frames(frame, 1 if isinstance(content, Postures) else len(content.frames))
+    frames = _frames(frame, frame_count(content))
     write_page(output, content, view, title=title, frames=frames)
     typer.echo(f"written: {output}")
 
 
 def _shown(
-    content: Result | Postures, view: View | None, frame: str, posture: str, rejected: bool, *, moving: bool
+    content: Result | Postures | HeldPostures,
+    view: View | None,
+    frame: str,
+    posture: str,
+    rejected: bool,
+    *,
+    moving: bool,
 ) -> tuple[DrawnSubject, list[Shown]]:
     """Choose what is drawn of a file."""
     from posekit.formats.own import Result

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
 
 import typer
 
-from posekit.cli.given import schema_of
 from posekit.cli.options import (
     AngleTolerance,
     Rules,
@@ -24,7 +23,7 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.body import Figure
-    from posekit.formats.own import Postures
+    from posekit.formats.own import Postures, Result
     from posekit.formats.own.postures_q import Configurations
     from posekit.geometry import Array
 
@@ -44,16 +43,17 @@ EXAMPLES = examples(
     "posekit validate postures.json -o report.json",
     "posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1",
     "posekit validate dataset.npz --urdf human --fail-over 1% -o report.csv",
-    "posekit validate motion.npz --urdf g1 --checks joint-range,collision",
+    "posekit validate walk.bvh --urdf g1 --checks joint-range,collision",
 )
 
 
 class _Input(NamedTuple):
-    """What a file holds: postures or configurations, frames in time, the direction up."""
+    """What a file holds: postures or configurations, frames in time, the direction up, the result they are of."""
 
     postures: Postures | Configurations
     clip: Any = None
     up: Array | None = None
+    result: Result | None = None
 
 
 def validate(
@@ -61,7 +61,8 @@ def validate(
         Path,
         typer.Argument(
             metavar="POSTURES",
-            help="posekit.postures/1 or posekit.configurations/1 (JSON, NPZ), motion capture (NPZ), or a result.",
+            help="Postures or configurations (JSON, NPZ), a result, motion (TRC, C3D, BVH, GLB, MOT, CSV, NPZ, "
+            "Parquet), survivors, or a view with truth.",
         ),
     ],
     output: Annotated[
@@ -211,10 +212,9 @@ def validate(
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
     judged = validation.JudgedWith(rigid=RIGID_TOLERANCE, angle=0.001, contact_margin=0.0, walkers="paper")
-    if schema_of(postures).startswith("posekit.result/"):
+    if given.result is not None:
         with about(postures):
-            result = files.read_result(postures)
-            own, judged = validation.recovered_with(result)
+            own, judged = validation.recovered_with(given.result)
             figure = urdf or own
     rigid_tolerance = rigid_tolerance or f"{100 * judged.rigid:g}cm"
     angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
@@ -275,24 +275,23 @@ def validate(
 
 
 def _read(path: Path) -> _Input:
-    """Read a file of whatever holds postures."""
-    from posekit.formats import own as files
-    from posekit.formats.own.npz import open_npz
-    from posekit.formats.own.postures_q import holds_configurations, read_configurations
-    from posekit.synthesis import read_capture
+    """Read a file of whatever holds postures or configurations."""
+    from posekit.formats.format import Content
+    from posekit.formats.held_postures import held_postures, postures_of_result
+    from posekit.formats.motion import UPS as DIRECTIONS
+    from posekit.formats.own import read_configurations, read_result
+    from posekit.formats.recognising import recognise
 
-    if path.suffix.lower() not in (".json", ".npz"):
-        return _Input(files.read_postures(path))
-    if holds_configurations(path):
+    found = recognise(path)
+    if found.holds is Content.RESULT:
+        result = read_result(path)
+        return _Input(postures_of_result(result).postures, result=result)
+    if found.holds is Content.CONFIGURATIONS:
         return _Input(read_configurations(path))
-    if path.suffix.lower() == ".npz":
-        with open_npz(path) as archive:
-            is_capture = "clip_fps" in archive.names and "schema" not in archive.names
-        if is_capture:
-            capture = read_capture(path)
-            joints, head = capture.points[:, :14], capture.points[:, 14:]
-            return _Input(files.Postures(joints=joints, head=head), capture.clip, capture.up)
-    return _Input(files.read_postures(path))
+    held = held_postures(path, found)
+    if found.holds is not Content.MOTION:
+        return _Input(held.postures)
+    return _Input(held.postures, held.clip, DIRECTIONS[held.up] if held.up else None)
 
 
 def _count(postures: Postures | Configurations) -> int:

@@ -6,7 +6,7 @@ import os
 import sys
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -14,13 +14,11 @@ from posekit.cli.given import read_given
 from posekit.cli.options import about, examples
 from posekit.errors import InputError
 
-if TYPE_CHECKING:
-    pass
-
 LAST_PORT = 65535
 
 EXAMPLES = examples(
     "posekit view postures.json --view walk.json",
+    "posekit view trial.trc",
     "posekit view walk.json --frames 1-20 --no-open --port 8000",
 )
 
@@ -28,7 +26,10 @@ EXAMPLES = examples(
 def view(
     given: Annotated[
         Path,
-        typer.Argument(metavar="RESULT|POSTURES|VIEW", help="A view is recovered with default settings."),
+        typer.Argument(
+            metavar="RESULT|POSTURES|MOTION|VIEW",
+            help="A file of any format that holds postures; a view is recovered with default settings.",
+        ),
     ],
     seen: Annotated[
         Path | None,

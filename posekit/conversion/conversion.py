@@ -49,6 +49,7 @@ TELLING: Final = {
     Content.RESULT: ("--posture", "--view", "--up", "--input-up"),
     Content.VIEW: ("--skeleton", "--up", "--input-up"),
     Content.POSTURES: ("--up", "--input-up"),
+    Content.CONFIGURATIONS: ("--up", "--input-up"),
 }
 """The options that say something about a kind of file."""
 

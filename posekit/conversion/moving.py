@@ -16,6 +16,7 @@ from posekit.errors import InputError
 from posekit.following import bridge
 from posekit.formats import own as files
 from posekit.formats.format import Content
+from posekit.formats.held_postures import held_postures
 from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import OpenCVModel, Result, View
@@ -203,11 +204,12 @@ def moving(
     if what.holds is Content.MOTION:
         layout = load_skeleton_map(skeleton) if skeleton else None
         return _of_motion(one_clip(read_clips(path, what, clip=clip, unit=unit, up=up)), layout)
-    if what.holds is Content.POSTURES:
-        given = files.read_postures(path)
+    if what.holds in (Content.POSTURES, Content.CONFIGURATIONS):
+        held = held_postures(path, what)
+        given = held.postures
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
         points = np.concatenate([given.joints, head], axis=1)
-        up = up or _guessed(given.joints, str(path))
+        up = up or held.up or _guessed(given.joints, str(path))
         return _recorded(points, np.arange(len(points)) / RATE, up)
     remedy = "; convert the result that it is of" if what.holds is Content.SURVIVORS else ""
     raise InputError(

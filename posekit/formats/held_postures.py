@@ -9,22 +9,34 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.motion import SurvivorTable, guess_up, postures_of, read_motion, read_survivors
 from posekit.formats.motion.motion_format import MotionFormat
-from posekit.formats.own import Postures, View, read_postures, read_result, read_view
+from posekit.formats.own import (
+    Configurations,
+    Postures,
+    Result,
+    View,
+    read_configurations,
+    read_postures,
+    read_result,
+    read_view,
+)
 from posekit.formats.recognising import Recognised
 from posekit.formats.registry import formats, names
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
+from posekit.skeleton import JOINTS
 
 POSTURE_CONTENTS: Final = (
     Content.POSTURES,
     Content.RESULT,
     Content.MOTION,
     Content.SURVIVORS,
+    Content.CONFIGURATIONS,
     Content.VIEW,
 )
 """What files hold that have postures in them."""
@@ -90,19 +102,45 @@ def held_postures(
     if found.holds is Content.POSTURES:
         return _at_once(read_postures(path))
     if found.holds is Content.RESULT:
-        frames = read_result(path).frames
-        counts = [len(frame.joints) for frame in frames]
-        joints = np.concatenate([np.empty((0, 14, 3)), *(frame.joints for frame in frames)])
-        time = np.repeat([frame.time for frame in frames], counts)
-        return _held(Postures(joints=joints), np.repeat(np.arange(len(frames)), counts), time)
-    if found.holds is Content.MOTION:
-        return _of_motion(path, found, layout, None if unit is None else str(unit), up)
+        return postures_of_result(read_result(path))
+    if found.holds is Content.CONFIGURATIONS:
+        return _of_configurations(read_configurations(path))
     if found.holds is Content.SURVIVORS:
         return _of_table(read_survivors(path))
+    if found.holds is Content.MOTION:
+        return _of_motion(path, found, layout, None if unit is None else str(unit), up)
     if found.holds is Content.VIEW:
         return _of_truth(path, read_view(path))
     known = ", ".join(names(*POSTURE_CONTENTS))
     raise refusal(path, "", found.title, f"postures, as they are in {known}", "give another file")
+
+
+def postures_of_result(result: Result) -> HeldPostures:
+    """Return the survivors of all frames of a result, in the camera's frame.
+
+    Parameters
+    ----------
+    result : Result
+        The survivors of a view.
+    """
+    counts = [len(frame.joints) for frame in result.frames]
+    joints = np.concatenate([np.empty((0, len(JOINTS), 3)), *(frame.joints for frame in result.frames)])
+    time = np.repeat([frame.time for frame in result.frames], counts)
+    return _held(Postures(joints=joints), np.repeat(np.arange(len(counts)), counts), time)
+
+
+def _of_configurations(configurations: Configurations) -> HeldPostures:
+    """Place the joints of the built-in figure, whose z points up: angles alone do not say lengths."""
+    figure = load_figure()
+    points = figure.forward_kinematics(configurations.in_order_of(tuple(figure.configuration_names)))
+    count = len(points)
+    return HeldPostures(
+        postures=Postures(joints=points[:, : len(JOINTS)], head=points[:, len(JOINTS) :]),
+        frame=np.arange(count),
+        clip=np.zeros(count, dtype=np.intp),
+        time=np.full(count, np.nan),
+        up="+z",
+    )
 
 
 def _held(postures: Postures, frame: NDArray[np.intp], time: Array) -> HeldPostures:
@@ -132,8 +170,9 @@ def _of_motion(
             found_up = guess_up(postures.joints, motion.source)
         except InputError:  # nobody stands: whoever needs to know which way is up has to say it
             found_up = ""
+    head = postures.head if np.isfinite(postures.head).any() else None
     return HeldPostures(
-        postures=Postures(joints=postures.joints, head=postures.head),
+        postures=Postures(joints=postures.joints, head=head),
         frame=np.arange(len(motion)),
         clip=motion.clip.copy(),
         time=motion.time,

@@ -447,8 +447,8 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
         there / "two.toml": ["cameras", "left: calibrated", "right: calibrated"],
         tmp_path / "person": ["motion (urdf)", "+z up"],
         tmp_path / "person" / "configurations.npz": ["3 configurations of x, y, z"],
-        tmp_path / "a.mot": ["motion (mot)", "not read by itself"],
-        tmp_path / "a.glb": ["motion (glb)", "not read by itself"],
+        tmp_path / "a.mot": ["motion (mot)", "19 points, +z up"],
+        tmp_path / "a.glb": ["motion (glb)", "+y up"],
         tmp_path / "a.bvh": ["motion (bvh)", "+y up"],
         tmp_path / "a.csv": ["motion (csv)", "-y is up by where heads and ankles are"],
     }

@@ -201,15 +201,12 @@ def test_a_head_behind_the_camera_is_refused(
     assert files_here() == ["view.json"]
 
 
-def test_more_than_100_megabytes_are_refused_unread(run, files_here, assert_refused) -> None:
+def test_more_than_500_megabytes_are_refused_unread(run, files_here, assert_refused) -> None:
     with Path("big.json").open("wb") as file:
         file.truncate(500_000_001)  # sparse: it takes no room
-    assert_refused(
-        run("recover", "big.json", "-o", "r.json"), "big.json: got 500.0 MB; expected at most 500 MB"
-    )
-    assert_refused(
-        run("validate", "big.json", "-o", "r.json"), "big.json: got 500.0 MB; expected at most 100 MB"
-    )
+    for command in ("recover", "validate"):
+        refused = run(command, "big.json", "-o", "r.json")
+        assert_refused(refused, "big.json: got 500.0 MB; expected at most 500 MB")
     assert files_here() == ["big.json"]
 
 
@@ -298,7 +295,6 @@ def test_a_bad_option_of_recover_is_refused(
         (("reproduce", "gavrila", "-o", "x"), ("'gavrila'", "lee-chen, taylor")),
         (("reproduce", "lee-chen", "-o", "view.json"), ("view.json", "folder")),
         (("demo", "-o", "view.json/x"), ("view.json/x", "folder")),
-        (("validate", "view.json", "-o", "x.json"), ("view.json: schema", "posekit.postures/1")),
     ],
 )
 def test_a_bad_command_is_refused(

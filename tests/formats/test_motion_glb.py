@@ -18,6 +18,7 @@ from posekit.formats.motion.bvh_tree import NODES, known_nodes
 from posekit.formats.motion.glb import GLB_FORMAT, write_glb, write_postures_glb
 from posekit.formats.motion.glb_capsule import AROUND, capsule_mesh
 from posekit.formats.motion.glb_file import INDICES, UINT16, GlbFile
+from posekit.formats.motion.glb_reading import read_glb
 from posekit.formats.motion.motion import UPS
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.skeleton import POINT, POINTS
@@ -231,7 +232,7 @@ class TestMotion:
 
     def test_registered(self) -> None:
         assert GLB_FORMAT.suffixes == (".glb",)
-        assert GLB_FORMAT.read is None
+        assert GLB_FORMAT.read is read_glb
         assert GLB_FORMAT.write_configurations is write_glb
 
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.motion import motion_formats, write_configurations, write_motion
+from posekit.formats.motion import write_configurations, write_motion
 from posekit.formats.motion.mot import quaternions_of, read_mot, write_mot, yaw_pitch_roll
 from posekit.formats.motion.motion import Motion
 from posekit.skeleton import JOINTS
@@ -161,4 +161,3 @@ def test_points_do_not_go_into_angles_nor_angles_into_points(tmp_path):
         write_motion(tmp_path / "a.mot", one)
     with pytest.raises(InputError, match="trc, which carries points; expected mot, "):
         write_configurations(tmp_path / "a.trc", FIGURE, *configurations(2))
-    assert motion_formats()["mot"].read is None

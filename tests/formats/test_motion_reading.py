@@ -55,7 +55,7 @@ def test_what_is_no_motion_is_refused_and_the_formats_are_named(tmp_path):
         (tmp_path / "a.txt", "no format of motion that is known; expected trc, c3d, csv, npz, parquet, mot"),
         (tmp_path / "none.trc", "No such file"),
         (tmp_path / "none", "no format of motion|No such file"),
-        (tmp_path / "a.mot", "mot: MOT, joint angles of OpenSim.*; expected points: trc, c3d"),
+        (tmp_path / "a.mot", "columns: got no torso_tx; expected the 29 columns of the figure"),
     ):
         with pytest.raises(InputError, match=words) as refused:
             read_motion(path)

@@ -216,7 +216,7 @@ class TestBadInput:
         np.testing.assert_allclose(motion.points, PERSON.forward_kinematics(q), rtol=0, atol=EXACT)
 
     def test_metres_alone(self, folder: Path) -> None:
-        with pytest.raises(InputError, match="a URDF is in metres"):
+        with pytest.raises(InputError, match="a figure is in metres"):
             read_urdf_folder(folder, "mm")
 
     def test_registered(self, folder: Path) -> None:

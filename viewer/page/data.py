@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.errors import ViewerError
+from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own.camera_model import ScaledOrthographicModel
 from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result, ResultFrame
@@ -38,7 +39,7 @@ MARGIN_UNITS: Final = {
 
 
 def page_data(
-    given: Result | Postures,
+    given: Result | Postures | HeldPostures,
     view: View | None = None,
     *,
     title: str = "posekit",
@@ -48,8 +49,8 @@ def page_data(
 
     Parameters
     ----------
-    given : Result or Postures
-        Postures are shown as the survivors of a single frame, without margins or a tree.
+    given : Result, Postures or HeldPostures
+        Postures are shown as the survivors of a single frame, or of their frames, without margins or a tree.
     view : View, optional
         What the result was recovered from: the page then shows the image and, where it is known, the truth.
     title : str
@@ -67,7 +68,7 @@ def page_data(
     ViewerError
         Where there is no posture in any frame, too many for one page, or the view has other frames.
     """
-    result = None if isinstance(given, Postures) else given
+    result = given if isinstance(given, Result) else None
     subject = subject_of(given, view)
     chosen = _chosen(len(subject.frames), frames)
     bodies = [subject.frames[index].aligned_points for index in chosen]
@@ -99,6 +100,7 @@ def page_data(
         "frames": [
             {
                 "number": index + 1,
+                **(_time(subject.frames[index]) if isinstance(given, HeldPostures) else {}),
                 "points": _steps(world.place(body)),
                 **({} if result is None else _frame(result.frames[index])),
                 **(
@@ -112,6 +114,11 @@ def page_data(
             for k, (index, body) in enumerate(zip(chosen, bodies, strict=True))
         ],
     }
+
+
+def _time(shown: Shown) -> Json:
+    """Return when postures of a file are, where it says that."""
+    return {} if isnan(shown.time) else {"time": shown.time}
 
 
 def _frame(frame: ResultFrame) -> Json:

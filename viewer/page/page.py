@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result
 from posekit.formats.own.view import View
@@ -25,7 +26,7 @@ PAGE_SCRIPTS = ("lift.js", "panel.js", "scale.js")
 
 
 def page_html(
-    given: Result | Postures,
+    given: Result | Postures | HeldPostures,
     view: View | None = None,
     *,
     title: str = "posekit",
@@ -47,7 +48,7 @@ def page_html(
 
 def write_page(
     path: str | Path,
-    given: Result | Postures,
+    given: Result | Postures | HeldPostures,
     view: View | None = None,
     *,
     title: str = "",
@@ -59,8 +60,8 @@ def write_page(
     ----------
     path : path
         The HTML file.
-    given : Result or Postures
-        Postures are shown as the survivors of a single frame.
+    given : Result, Postures or HeldPostures
+        Postures are shown as the survivors of a single frame, or of their frames.
     view : View, optional
         What the result was recovered from: the page then shows the image too and, where it is known, the truth.
     title : str

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure, with_head
 from posekit.errors import FigureError, ViewerError
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultFrame, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
@@ -117,13 +119,13 @@ class DrawnSubject:
         return np.concatenate([frame.aligned_points.reshape(-1, 3) for frame in chosen])
 
 
-def subject_of(given: Result | Postures | View, view: View | None = None) -> DrawnSubject:
+def subject_of(given: Result | Postures | HeldPostures | View, view: View | None = None) -> DrawnSubject:
     """Gather what is to be drawn.
 
     Parameters
     ----------
-    given : Result, Postures or View
-        The survivors; or postures, all in one frame; or a view: its truth, and what its camera sees.
+    given : Result, Postures, HeldPostures or View
+        The survivors; or postures, all in one frame or each in its own; or a view: its truth, and what its camera sees.
     view : View, optional
         What the result was recovered from: it gives the camera and the person's lengths.
 
@@ -134,7 +136,9 @@ def subject_of(given: Result | Postures | View, view: View | None = None) -> Dra
     """
     if isinstance(given, View):
         return _of_view(given)
-    if isinstance(given, Postures):
+    if isinstance(given, HeldPostures):
+        figure, frames = load_figure(), _of_held(given)
+    elif isinstance(given, Postures):
         frames = [_of_postures(given)]
         figure = load_figure()
     else:
@@ -156,6 +160,18 @@ def _of_postures(given: Postures) -> Shown:
     joints = np.asarray(given.joints)
     points = with_head(joints) if given.head is None else np.concatenate([joints, given.head], axis=1)
     return Shown(points=points)
+
+
+def _of_held(given: HeldPostures) -> list[Shown]:
+    """Put postures into their frames, up against the camera frame's y where the file says what is up."""
+    points = _of_postures(given.postures).points
+    if given.up:
+        points = points @ up_rotation(given.up, "-y").T
+    rows = [np.flatnonzero(given.frame == k) for k in range(int(given.frame.max(initial=-1)) + 1)]
+    return [
+        Shown(points=points[row], time=float(given.time[row[0]]) if len(row) else float("nan"))
+        for row in rows
+    ]
 
 
 def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int) -> Shown:

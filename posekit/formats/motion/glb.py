@@ -33,6 +33,7 @@ from posekit.formats.motion.bvh_tree import (
 )
 from posekit.formats.motion.glb_capsule import capsule_mesh
 from posekit.formats.motion.glb_file import INDICES, UINT16, VERTICES, GlbFile
+from posekit.formats.motion.glb_reading import read_glb
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.safe_io import refusal, shown
@@ -252,5 +253,6 @@ GLB_FORMAT: Final = MotionFormat(
     title="GLB: the moving body as glTF 2.0, for Blender, browsers and game engines",
     suffixes=(".glb",),
     looks_like=lambda given: given.start.startswith(b"glTF"),
+    read=read_glb,
     write_configurations=write_glb,
 )

@@ -30,6 +30,7 @@ from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_
 
 if TYPE_CHECKING:
     from posekit.body import Figure
+    from posekit.formats.motion.motion import Motion
 
 MAX_BYTES: Final = 500_000_000
 PLACE: Final = ("torso_tx", "torso_ty", "torso_tz")
@@ -89,6 +90,29 @@ def read_mot(path: str | Path, figure: Figure) -> tuple[Array, Array]:
         columns[:, 4:] = np.radians(columns[:, 4:])
     q = np.concatenate([columns[:, 1:4], quaternions_of(columns[:, 4:7]), columns[:, 7:]], axis=1)
     return checked_configurations(path, figure, q, columns[:, 0])
+
+
+def read_mot_motion(path: Path, unit: str | None = None) -> Motion:
+    """Read joint angles as the motion of the built-in figure's points, z up: the file says angles and no lengths.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    unit : str, optional
+        The place of the torso is in metres: any other is refused.
+
+    Raises
+    ------
+    InputError
+        Where the file is no MOT, is cut off, or has not all of the figure's angles.
+    """
+    from posekit.body import load_figure
+    from posekit.formats.motion.figure_motion import figure_motion
+
+    figure = load_figure()
+    q, time = read_mot(path, figure)
+    return figure_motion(path, figure, q, time, unit=unit, up="+z")
 
 
 def yaw_pitch_roll(quaternions: Array) -> Array:
@@ -199,8 +223,9 @@ def _number(cell: str) -> float | None:
 
 MOT_FORMAT: Final = MotionFormat(
     name="mot",
-    title="MOT, joint angles of OpenSim; read with the figure whose angles they are",
+    title="MOT, joint angles of OpenSim; read as those of the built-in figure",
     suffixes=(".mot", ".sto"),
+    read=read_mot_motion,
     write_configurations=write_mot,
     looks_like=lambda given: b"endheader" in given.start,
 )

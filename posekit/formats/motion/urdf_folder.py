@@ -25,7 +25,8 @@ import numpy as np
 from posekit.body import Figure, load_figure
 from posekit.body.figure import FRAMES
 from posekit.body.urdf import parse
-from posekit.formats.motion.bvh_tree import POINT_NODES, checked, known_nodes
+from posekit.formats.motion.bvh_tree import checked
+from posekit.formats.motion.figure_motion import figure_motion
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array
@@ -97,8 +98,6 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
         Where the URDF is no stick figure.
     """
     folder = Path(path)
-    if unit not in (None, "m"):
-        raise refusal(path, "unit", shown(unit), "m, for a URDF is in metres", "leave it out")
     if not (folder / FIGURE).is_file() or not (folder / NPZ).is_file():
         raise refusal(
             path, "", "another folder or file", f"a folder with {FIGURE} and {NPZ}", "name that folder"
@@ -115,10 +114,7 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
             place, "configuration_names", got, "those of the figure beside it", "write the folder again"
         )
     q = checked(place, figure, q[:, [names.index(name) for name in figure.configuration_names]], seconds)
-    points = figure.forward_kinematics(np.where(np.isnan(q), 0.0, q))
-    points[known_nodes(figure, q)[:, POINT_NODES] == 0] = np.nan
-    rate = (len(seconds) - 1) / (seconds[-1] - seconds[0]) if len(seconds) > 1 else 1.0
-    return Motion(names=POINTS, points=points, time=seconds, rate=float(rate), up=up, source=str(path))
+    return figure_motion(path, figure, q, seconds, unit=unit, up=up)
 
 
 def mujoco_text(figure: Figure) -> str:

@@ -1,0 +1,92 @@
+"""Every command takes every file that holds what it needs: one walk, in each format, judged and drawn alike."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posekit.formats.own import write_configurations, write_view
+from posekit.synthesis import Walker, walker_scene
+from posekit.views import view_of
+
+FORMATS = ("bvh", "trc", "c3d", "npz", "csv", "parquet", "mot", "glb", "urdf")
+FRAMES = 4
+
+
+@pytest.fixture(scope="module")
+def walks(tmp_path_factory: pytest.TempPathFactory, command: Callable[..., Any]) -> dict[str, Path]:
+    """Write one walk in each format of motion, as the truth of a view, as postures, and as configurations."""
+    folder = tmp_path_factory.mktemp("walks")
+    view = view_of(walker_scene(Walker(), frames=FRAMES))
+    write_view(folder / "view.json", view)
+    found = {"view": folder / "view.json"}
+    for name in FORMATS:
+        found[name] = folder / (f"walk.{name}" if name != "urdf" else "walk")
+        done = command("convert", folder / "view.json", found[name])
+        assert done.code == 0, done.err
+    found["postures"] = folder / "postures.npz"
+    assert command("convert", found["trc"], found["postures"], "--to", "postures").code == 0
+    arrays = (
+        np.load(found["urdf"] / "configurations.npz")
+        if (found["urdf"] / "configurations.npz").exists()
+        else None
+    )
+    if arrays is not None:
+        found["configurations"] = folder / "q.npz"
+        write_configurations(folder / "q.npz", arrays["q"], arrays["configuration_names"].tolist())
+    return found
+
+
+@pytest.mark.parametrize("name", ["view", "postures", *FORMATS])
+def test_validate_judges_a_walk_alike_in_every_format(
+    name: str, walks: dict[str, Path], command: Callable[..., Any], tmp_path: Path
+) -> None:
+    done = command("validate", walks[name], "-o", tmp_path / "report.json")
+    assert done.code == 0, done.err
+    assert f"{FRAMES} postures: {FRAMES} valid" in done.out
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["summary"]["valid"] == FRAMES
+
+    assert len(report["postures"]) == FRAMES
+
+
+@pytest.mark.parametrize("name", ["bvh", "glb"])
+def test_a_robot_is_fitted_to_motion(name: str, walks: dict[str, Path], command: Callable[..., Any]) -> None:
+    done = command("validate", walks[name], "--urdf", "human", "--checks", "reach,joint-range")
+    assert done.code in (0, 1), done.err
+    assert f"{FRAMES} postures" in done.out
+
+
+@pytest.mark.parametrize("name", ["postures", *FORMATS])
+def test_render_draws_a_page_of_every_format(
+    name: str, walks: dict[str, Path], command: Callable[..., Any], tmp_path: Path
+) -> None:
+    done = command("render", walks[name], "-o", tmp_path / "page.html")
+    assert done.code == 0, done.err
+    text = (tmp_path / "page.html").read_text()
+    start = text.index("const DATA = ") + len("const DATA = ")
+    data, _ = json.JSONDecoder().raw_decode(text[start:])
+    assert data["kind"] == "postures"
+    bodies = [body for frame in data["frames"] for body in frame["points"]]
+    assert len(bodies) == FRAMES
+    assert len(data["frames"]) == (1 if name == "postures" else FRAMES)
+    # They stand: in the page's world z is up, and heads are above ankles.
+    for body in bodies if name != "postures" else ():  # these lie as they lay in their file
+        neck, ankles = body[2], (body[3 * 12 + 2], body[3 * 13 + 2])
+        assert neck > max(ankles) + 8000
+
+
+def test_what_holds_no_posture_is_refused_with_what_does(
+    walks: dict[str, Path], command: Callable[..., Any], tmp_path: Path
+) -> None:
+    (tmp_path / "people.json").write_text(json.dumps([{"image_id": 1, "keypoints": [9, 9, 1] * 17}]))
+    for line in (("validate",), ("render", "-o", tmp_path / "x.html")):
+        done = command(line[0], tmp_path / "people.json", *line[1:])
+        assert done.code == 2
+        assert "got key points (coco-results); expected postures, as they are in" in done.err
+        assert done.err.count("\n") == 1
+    done = command("recover", walks["trc"], "-o", tmp_path / "x.npz")
+    assert done.code == 2 and "motion" in done.err and "a view or key points" in done.err
