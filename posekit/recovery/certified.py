@@ -16,7 +16,7 @@ from posekit.recovery.body import ranges_of
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
-from posekit.refinement.sight import LIMIT_DEVIATION
+from posekit.refinement.observed_frames import LIMIT_DEVIATION
 from posekit.refinement.tolerance import DEVIATIONS
 from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
 from posekit.tree import Check, Scope, screened

@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.factors import Rows
-from posekit.refinement.laying import Bases, Laid, Settings
-from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.state import moved
-from posekit.refinement.together import (
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.joint_step import (
     LimbTables,
     TrunkTables,
     gain_of,
@@ -24,6 +21,9 @@ from posekit.refinement.together import (
     limb_tables,
     trunk_tables,
 )
+from posekit.refinement.limb_fitting import Bases, LimbsOnBases, SearchSettings
+from posekit.refinement.problem import RefinementProblem
+from posekit.refinement.state import moved
 
 LAST_STEP_GAIN_RATIO = 20.0
 """Times the precision that a further step may gain where a joint step is taken for the last.
@@ -43,25 +43,25 @@ class BaseTables(NamedTuple):
     limbs: LimbTables
 
     @staticmethod
-    def of(problem: RefinementProblem, bases: Bases, laid: Laid) -> BaseTables:
+    def of(problem: RefinementProblem, bases: Bases, fitted: LimbsOnBases) -> BaseTables:
         """Tabulate trunks alone and their limbs; `problem` is that of all survivors."""
-        pulling = laid.pulling
+        pulling = fitted.pulling
         return BaseTables(
             trunk_tables(problem.take(bases.leaf), bases.found.state),
             limb_tables(pulling.problem, bases.found.state.take(pulling.base), pulling.chains),
         )
 
-    def least(self, bases: Bases, laid: Laid) -> Array:
+    def least(self, bases: Bases, fitted: LimbsOnBases) -> Array:
         """Return what chi2 of trunk and one limb can come down to, to second order (4, P)."""
-        base = laid.pulling.base
-        out = np.zeros(laid.pulling.chi2.shape)
+        base = fitted.pulling.base
+        out = np.zeros(fitted.pulling.chi2.shape)
         for kind in range(4):
-            rows = np.flatnonzero(laid.pulling.chi2[kind] > 0)
+            rows = np.flatnonzero(fitted.pulling.chi2[kind] > 0)
             gain = gain_of(
                 self.trunks.matrix[base[rows]] + self.limbs.matrix[kind, rows],
                 self.trunks.gradient[base[rows]] + self.limbs.gradient[kind, rows],
             )
-            out[kind, rows] = bases.found.chi2[base[rows]] + laid.pulling.chi2[kind, rows] - gain
+            out[kind, rows] = bases.found.chi2[base[rows]] + fitted.pulling.chi2[kind, rows] - gain
         return out
 
 
@@ -70,9 +70,9 @@ def assemble(
     before: Bases,
     base: Rows,
     leaf: Rows,
-    laid: Laid,
+    fitted: LimbsOnBases,
     slots: Rows,
-    settings: Settings,
+    settings: SearchSettings,
     tables: BaseTables | None,
 ) -> Bases:
     """Put bases together with limbs that pull at them, and refine them.
@@ -82,9 +82,11 @@ def assemble(
     problem : RefinementProblem
         Of all survivors.
     before : Bases
+        The bases of the round before.
     base, leaf : int array (G,)
         The base that each starts from, and a survivor of each.
-    laid : Laid
+    fitted : LimbsOnBases
+        The limbs on those bases.
     slots : int array (4, G)
         Limbs among those that pull, -1 for none.
     tables : BaseTables, optional
@@ -97,9 +99,9 @@ def assemble(
     for kind in range(4):
         rows = np.flatnonzero(slots[kind] >= 0)
         own = slots[kind, rows]
-        found.state.directions[kind][..., rows] = laid.pulling.chains.directions[kind][..., own]
-        found.state.limbs[kind][..., rows] = laid.pulling.chains.lengths[kind][..., own]
-        found.chi2[rows] += laid.pulling.chi2[kind, own]
+        found.state.directions[kind][..., rows] = fitted.pulling.chains.directions[kind][..., own]
+        found.state.limbs[kind][..., rows] = fitted.pulling.chains.lengths[kind][..., own]
+        found.chi2[rows] += fitted.pulling.chi2[kind, own]
     promised = found.chi2
     if tables is not None:
         promised = _step_together(part, tables, before.found.settled[base], base, slots, found, settings)
@@ -117,7 +119,7 @@ def _step_together(
     base: Rows,
     slots: Rows,
     found: DescentResult,
-    settings: Settings,
+    settings: SearchSettings,
 ) -> Array:
     """Take the joint step of trunks and limbs, in place; settled is where chi2 is then what it promised.
 

@@ -2,7 +2,7 @@ r"""The uncertainty of refined joints, to first order.
 
 With the trunk's covariance C (the inverse of its matrix when limbs and head are eliminated), a limb whose own matrix
 is H and whose coupling with its start is K moves by :math:`-H^{-1} K` per change of the start, and by
-:math:`H^{-1}` besides. So a joint with ways T of the trunk and U of the limb has
+:math:`H^{-1}` besides. So a joint with Jacobians T along the trunk and U along the limb has
 
 .. math:: (T - U H^{-1} K)\, C\, (T - U H^{-1} K)^T + U H^{-1} U^T .
 
@@ -21,9 +21,9 @@ import numpy as np
 
 from posekit.geometry import Array, dot
 from posekit.geometry.batch_last import backward, cholesky, forward, matrix_vector
-from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.descent import BLOCK_POSTURES
 from posekit.refinement.equations import Equations, assemble, linearise
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.limb_terms import LimbTerms
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, place
@@ -64,7 +64,7 @@ def _covariances(problem: RefinementProblem, state: PostureState, here: Equation
     trunk = cholesky(arrow.matrix)
     out = np.empty((14, 3, 3, n))
     # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
-    right = np.ascontiguousarray(here.trunk.ways.transpose(2, 0, 1, 3)).reshape(width, 18, n)
+    right = np.ascontiguousarray(here.trunk.jacobian.transpose(2, 0, 1, 3)).reshape(width, 18, n)
     root = forward(trunk, right).reshape(width, 6, 3, n)
     np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
     if arrow.limbs is None or arrow.starts is None:
@@ -78,7 +78,7 @@ def _covariances(problem: RefinementProblem, state: PostureState, here: Equation
     own[:] = np.eye(reach)[:, :, None, None]
     own = backward(arrow.limbs.factor, own)
     for segment, joints in ((0, LIMB_MIDDLES), (1, LIMB_ENDS)):
-        U = _limb_ways(state, limbs, segment, reach)
+        U = _limb_jacobian(state, limbs, segment, reach)
         moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
         alone = np.einsum("liun,uwln->liwn", U, own)
         both = np.concatenate([moving, alone], axis=2)
@@ -90,7 +90,7 @@ def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTer
     """Add to the limbs' matrices what is known of turns that the image does not show to first order."""
     limb = terms.matrix.copy()
     joints = place(state)
-    _, A = problem.see(joints, slice(0, 14))
+    _, A = problem.linearised_image(joints, slice(0, 14))
     for segment, ends in enumerate((LIMB_MIDDLES, LIMB_ENDS)):
         first = 2 * segment
         for i in (first, first + 1):
@@ -115,9 +115,10 @@ def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTer
 
 
 MIN_LENGTH = 1e-12
+"""Stands for zero where a vector's length is divided by: the direction is then arbitrary, and its share zero."""
 
 
-def _limb_ways(state: PostureState, terms: LimbTerms, segment: int, reach: int) -> Array:
+def _limb_jacobian(state: PostureState, terms: LimbTerms, segment: int, reach: int) -> Array:
     """Return how limbs' unknowns move their middles (segment 0) or ends (1), from their starts: (4, 3, U, N)."""
     out = np.zeros((4, 3, reach, state.root.shape[1]))
     for part in range(segment + 1):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.equations import Watch, evaluate, linearise, solve
+from posekit.refinement.equations import LimitSigns, evaluate, linearise, solve
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, moved
 
@@ -19,13 +19,16 @@ INITIAL_DAMPING = 1e-4
 """Fraction of the diagonal that is added to it, at first."""
 
 MIN_DAMPING, MAX_DAMPING = 1e-12, 1e6
+"""Below the least, damping is lost in the diagonal's rounding; beyond the most, steps are too short to change chi2."""
 
 LIGHT_DAMPING = 0.1
 """Damping up to which a small promise means that there is nothing left to gain."""
 
 DAMPING_GROWTH, DAMPING_DECAY = 8.0, 0.1
+"""What damping is multiplied with after a step that was no better, and at least after one that was."""
 
 MIN_GAIN = 1e-300
+"""Stands for a promised gain of zero, by which the actual one is divided."""
 
 BLOCK_POSTURES = 2048
 """Postures worked on at once: enough to spread the overhead of each operation."""
@@ -40,9 +43,13 @@ class DescentResult(NamedTuple):
     Attributes
     ----------
     state : PostureState
+        The postures.
     chi2 : array (N,)
+        Their sums of squares.
     steps : int array (N,)
+        How many steps each took.
     settled : bool array (N,)
+        Whether each is at a minimum.
     folds, active : int array (N,)
         How many segments are held at right angles to their rays, and how many limits are felt.
     """
@@ -109,7 +116,7 @@ class _BatchDescent:
     def __init__(self, problem: RefinementProblem, start: PostureState) -> None:
         n = start.root.shape[1]
         self.problem, self.state = problem, start.copy()
-        self.damping, self.watch = np.full(n, INITIAL_DAMPING), Watch.none(n)
+        self.damping, self.watch = np.full(n, INITIAL_DAMPING), LimitSigns.none(n)
         self.watching = np.zeros(n, dtype=np.bool_)
         self.passed = np.zeros(n, dtype=np.intp)
         chi2, active = np.empty(n), np.empty(n, dtype=np.intp)
@@ -169,7 +176,7 @@ class _BatchDescent:
         return rows
 
     def _run_into(
-        self, rows: NDArray[np.intp], passed: Watch, better: NDArray[np.bool_]
+        self, rows: NDArray[np.intp], passed: LimitSigns, better: NDArray[np.bool_]
     ) -> NDArray[np.bool_]:
         """Watch the limits that a step which was no better ran into (N,); forget them after one that was."""
         ran = np.zeros(len(rows), dtype=np.bool_)

@@ -21,17 +21,23 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError, PosekitError
-from posekit.refinement.anatomy import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.descent import CHI2_PRECISION
+from posekit.refinement.figure_numbers import (
+    LIMB_ENDS,
+    LIMB_JOINTS,
+    LIMB_MIDDLES,
+    LIMB_STARTS,
+    TRUNK_SEGMENTS,
+)
 from posekit.refinement.limb_descent import fit_limbs
 from posekit.refinement.limb_terms import Chains, limb_chi2
+from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.prior import RootPrior
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
-from posekit.refinement.sight import ObservedFrames
 from posekit.refinement.start import limb_directions, relift, state_of
 from posekit.refinement.state import parents
-from posekit.refinement.trunk import Trunks, find_trunks
+from posekit.refinement.trunks import Trunks, find_trunks
 from posekit.skeleton import SEGMENT_NAMES, segment_name
 
 MOST_FRAMES: Final = 16
@@ -56,6 +62,7 @@ MIN_UNEXPLAINED_SHARE: Final = 0.1
 """Share of frames that must be unexplained before lengths are doubted."""
 
 MAX_STEPS: Final = 8
+"""Steps of a limb on a trunk that is held: it has four unknowns."""
 
 MAX_SHOWN_SHARE: Final = 0.65
 """A segment that never shows more than this share of its length, foreshortened in every frame, is doubted..."""
@@ -106,12 +113,12 @@ class LengthDoubt:
         return f"{need} or the like ({self.least:.3f} to {self.most:.3f} m)"
 
 
-def diagnose(sight: ObservedFrames, *, level: float = REJECTION_PROBABILITY) -> list[LengthDoubt]:
+def diagnose(observed: ObservedFrames, *, level: float = REJECTION_PROBABILITY) -> list[LengthDoubt]:
     """Say which lengths would have to change, and to what, for the data to be explained.
 
     Parameters
     ----------
-    sight : ObservedFrames
+    observed : ObservedFrames
         Frames of one person, those without an acceptable posture among them; the more, the more is told. Its root
         must say where the neck is.
     level : float
@@ -128,33 +135,33 @@ def diagnose(sight: ObservedFrames, *, level: float = REJECTION_PROBABILITY) -> 
     InputError
         Where there is no root.
     """
-    if sight.root is None:
+    if observed.root is None:
         raise InputError("diagnose: no root was given; expected a RootPrior that says where necks are")
     known = np.flatnonzero(
-        np.isfinite(sight.root.mean).all(axis=1) & np.isfinite(sight.points()).any(axis=(1, 2))
+        np.isfinite(observed.root.mean).all(axis=1) & np.isfinite(observed.points()).any(axis=(1, 2))
     )
     if not len(known):
         return []
     frames = known[np.linspace(0, len(known) - 1, min(len(known), MOST_FRAMES)).round().astype(np.intp)]
-    sight = _of_frames(sight, frames)
-    factors, doubts, trunks = _trunk(sight, level)
-    figure = sight.figure.scaled({name: sight.figure.lengths[name] * f for name, f in factors.items()})
+    observed = _of_frames(observed, frames)
+    factors, doubts, trunks = _trunk(observed, level)
+    figure = observed.figure.scaled({name: observed.figure.lengths[name] * f for name, f in factors.items()})
     if len(trunks):
-        held = replace(sight, figure=figure)
+        held = replace(observed, figure=figure)
         doubts += [doubt for doubt in _limbs(held, trunks) if doubt.segment not in factors]
     return sorted(doubts, key=lambda doubt: SEGMENT_NAMES.index(doubt.segment))
 
 
-def _of_frames(sight: ObservedFrames, frames: NDArray[np.intp]) -> ObservedFrames:
+def _of_frames(observed: ObservedFrames, frames: NDArray[np.intp]) -> ObservedFrames:
     """Return some frames, their heads left out."""
-    points = sight.points()
-    deviation = np.broadcast_to(np.asarray(sight.deviation, dtype=np.float64), points.shape[:2])
-    if sight.root is None:
+    points = observed.points()
+    deviation = np.broadcast_to(np.asarray(observed.deviation, dtype=np.float64), points.shape[:2])
+    if observed.root is None:
         raise InputError("no root was given")
-    root = RootPrior(mean=sight.root.mean[frames], covariance=sight.root.covariance[frames])
+    root = RootPrior(mean=observed.root.mean[frames], covariance=observed.root.covariance[frames])
     return replace(
-        sight,
-        camera=_camera_of(sight.camera, frames),
+        observed,
+        camera=_camera_of(observed.camera, frames),
         image=points[frames],
         deviation=deviation[frames],
         root=root,
@@ -177,13 +184,15 @@ class _Trial(NamedTuple):
     trunks: Trunks
 
 
-def _trunk(sight: ObservedFrames, level: float) -> tuple[dict[str, float], list[LengthDoubt], Trunks]:
+def _trunk(observed: ObservedFrames, level: float) -> tuple[dict[str, float], list[LengthDoubt], Trunks]:
     """Vary torso and hips; return the factors of the best explanation, its doubts, and the trunks."""
-    given = _judge(sight, sight.figure, level)
-    count = len(sight.points())
+    given = _judge(observed, observed.figure, level)
+    count = len(observed.points())
     if given.left <= MIN_UNEXPLAINED_SHARE * count:
         return {}, [], given.trunks
-    few = _of_frames(sight, np.unique(np.linspace(0, count - 1, N_FRAMES_COMPARED).round().astype(np.intp)))
+    few = _of_frames(
+        observed, np.unique(np.linspace(0, count - 1, N_FRAMES_COMPARED).round().astype(np.intp))
+    )
     tried = {
         (names, f): trial.cost
         for names in _suspects()
@@ -191,7 +200,7 @@ def _trunk(sight: ObservedFrames, level: float) -> tuple[dict[str, float], list[
         if (trial := _try(few, names, f, level)) is not None
     }
     chosen, around = min(tried, key=lambda key: tried[key])
-    fine = {f: _try(sight, chosen, f, level) for f in (around * FINE_FACTORS).tolist()}
+    fine = {f: _try(observed, chosen, f, level) for f in (around * FINE_FACTORS).tolist()}
     of = {f: trial for f, trial in fine.items() if trial is not None}
     factor = min(of, key=lambda f: of[f].cost)
     best = of[factor]
@@ -199,7 +208,7 @@ def _trunk(sight: ObservedFrames, level: float) -> tuple[dict[str, float], list[
         return {}, [], given.trunks
     allowed = [f for f, trial in of.items() if trial.left <= best.left]
     counts = (count, given.left, best.left)
-    doubts = [_doubt(sight.figure, name, factor, allowed, counts) for name in chosen]
+    doubts = [_doubt(observed.figure, name, factor, allowed, counts) for name in chosen]
     return dict.fromkeys(chosen, factor), doubts, best.trunks
 
 
@@ -213,37 +222,37 @@ def _suspects() -> list[tuple[str, ...]]:
     return [*((name,) for name in TRUNK_NAMES), *sides, SEGMENT_NAMES]
 
 
-def _try(sight: ObservedFrames, names: Sequence[str], factor: float, level: float) -> _Trial | None:
+def _try(observed: ObservedFrames, names: Sequence[str], factor: float, level: float) -> _Trial | None:
     """Find trunks with some lengths changed; None where no torso or hips have such lengths."""
     try:
-        figure = sight.figure.scaled({name: sight.figure.lengths[name] * factor for name in names})
+        figure = observed.figure.scaled({name: observed.figure.lengths[name] * factor for name in names})
     except PosekitError:
         return None
-    return _judge(sight, figure, level)
+    return _judge(observed, figure, level)
 
 
-def _judge(sight: ObservedFrames, figure: Figure, level: float) -> _Trial:
-    trunks = find_trunks(replace(sight, figure=figure), level=0.0)
-    count = len(sight.points())
+def _judge(observed: ObservedFrames, figure: Figure, level: float) -> _Trial:
+    trunks = find_trunks(replace(observed, figure=figure), level=0.0)
+    count = len(observed.points())
     chi2, p = np.full(count, MAX_FRAME_CHI2), np.zeros(count)
     np.minimum.at(chi2, trunks.frame, trunks.chi2)
     np.maximum.at(p, trunks.frame, trunks.p)
     return _Trial(float(chi2.sum()), int((p < level).sum()), trunks)
 
 
-def _limbs(sight: ObservedFrames, trunks: Trunks) -> list[LengthDoubt]:
+def _limbs(observed: ObservedFrames, trunks: Trunks) -> list[LengthDoubt]:
     """Vary each limb's lengths on the best trunks."""
-    judge = _Limbs.on(sight, trunks)
+    judge = _Limbs.on(observed, trunks)
     doubts = []
     for limb, joints in enumerate(LIMB_JOINTS):
         names = [segment_name((joints[k], joints[k + 1])) for k in range(2)]
         stated = judge.explained(limb, (), 1.0)
         seen = judge.seen[limb]
-        long = _too_long(sight.figure, judge, limb, names) if seen.sum() >= MIN_FRAMES_SHOWN else []
+        long = _too_long(observed.figure, judge, limb, names) if seen.sum() >= MIN_FRAMES_SHOWN else []
         if long:
             doubts += long
         elif (seen & ~stated).sum() > MIN_UNEXPLAINED_SHARE * seen.sum():
-            doubts += _too_short(sight.figure, judge, limb, names, stated)
+            doubts += _too_short(observed.figure, judge, limb, names, stated)
     return doubts
 
 
@@ -326,13 +335,13 @@ class _Limbs(NamedTuple):
     number: int
 
     @staticmethod
-    def on(sight: ObservedFrames, trunks: Trunks) -> _Limbs:
+    def on(observed: ObservedFrames, trunks: Trunks) -> _Limbs:
         """Set limbs on trunks that are explained, or the best there are."""
         n = len(trunks)
         column = np.repeat(np.arange(n), 4)
         postures = np.full((n, 14, 3), np.nan)
         postures[:, :6] = trunks.joints
-        problem = replace(sight, length_deviation=0.0).problem(trunks.frame, trunks.root)
+        problem = replace(observed, length_deviation=0.0).problem(trunks.frame, trunks.root)
         state = state_of(problem.anatomy, postures)
         directions = limb_directions(postures, np.tile(np.arange(n), (4, 1)), state)
         start = np.ascontiguousarray(trunks.joints[:, list(LIMB_STARTS)].transpose(1, 2, 0))

@@ -14,19 +14,19 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.geometry.batch_last import backward, cholesky, forward
-from posekit.refinement.anatomy import LIMB_STARTS
+from posekit.refinement.figure_numbers import LIMB_STARTS
 from posekit.refinement.head_terms import HeadTerms, head_chi2, head_terms
 from posekit.refinement.limb_terms import Chains, LimbTerms, limb_chi2, limb_terms
 from posekit.refinement.limits import Signs
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep, parents, trunk_offsets
-from posekit.refinement.trunk_terms import TrunkTerms, spread, start_ways, trunk_chi2, trunk_terms
+from posekit.refinement.trunk_terms import TrunkTerms, start_jacobian, to_unknowns, trunk_chi2, trunk_terms
 
 DIAGONAL_FLOOR = 1e-6
 """Added to diagonals, one over rad^2 or m^2: what nothing determines does not move."""
 
 
-class Watch(NamedTuple):
+class LimitSigns(NamedTuple):
     """Limits that are passed, or would be: 1 the upper, -1 the lower, 0 neither.
 
     Attributes
@@ -34,6 +34,7 @@ class Watch(NamedTuple):
     limbs : int array (4, 4, N)
         By angle and limb.
     hips, head : int array (3, N)
+        Of pelvis and neck, by angle.
     """
 
     limbs: Signs
@@ -41,13 +42,13 @@ class Watch(NamedTuple):
     head: Signs
 
     @staticmethod
-    def none(n: int) -> Watch:
+    def none(n: int) -> LimitSigns:
         """Watch nothing."""
-        return Watch(*(np.zeros((*shape, n), dtype=np.int8) for shape in ((4, 4), (3,), (3,))))
+        return LimitSigns(*(np.zeros((*shape, n), dtype=np.int8) for shape in ((4, 4), (3,), (3,))))
 
-    def take(self, rows: NDArray[np.intp]) -> Watch:
+    def take(self, rows: NDArray[np.intp]) -> LimitSigns:
         """Return some postures."""
-        return Watch(*(array[..., rows] for array in self))
+        return LimitSigns(*(array[..., rows] for array in self))
 
     def passed(self) -> NDArray[np.intp]:
         """Count the limits of each posture (N,)."""
@@ -83,7 +84,7 @@ def chains_of(problem: RefinementProblem, state: PostureState, offsets: Array | 
     return Chains(state.root + offsets[list(LIMB_STARTS)], parent, state.directions, state.limbs)
 
 
-def linearise(problem: RefinementProblem, state: PostureState, watch: Watch | None = None) -> Equations:
+def linearise(problem: RefinementProblem, state: PostureState, watch: LimitSigns | None = None) -> Equations:
     """Linearise the problem at postures; limits that are watched are in the matrices though they are not passed."""
     trunk = trunk_terms(problem, state, watch and watch.hips)
     limbs = None
@@ -93,10 +94,10 @@ def linearise(problem: RefinementProblem, state: PostureState, watch: Watch | No
     return Equations(trunk, limbs, head)
 
 
-def evaluate(problem: RefinementProblem, state: PostureState) -> tuple[Array, Watch]:
+def evaluate(problem: RefinementProblem, state: PostureState) -> tuple[Array, LimitSigns]:
     """Return chi2 of postures (N,), infinite where a joint that was seen is behind the camera, and limits passed."""
     offsets = trunk_offsets(state)
-    passed = Watch.none(state.root.shape[1])
+    passed = LimitSigns.none(state.root.shape[1])
     chi2, hips = trunk_chi2(problem, state, offsets)
     passed.hips[...] = hips
     if not problem.trunk_only:
@@ -111,9 +112,10 @@ def evaluate(problem: RefinementProblem, state: PostureState) -> tuple[Array, Wa
 
 
 MAX_CHI2 = 1e150
+"""Sums of squares beyond this come from joints behind the camera (`problem.BEHIND_CAMERA_RESIDUAL`): infinite."""
 
 
-class Reduced(NamedTuple):
+class EliminatedBlock(NamedTuple):
     """One block after elimination.
 
     Attributes
@@ -133,19 +135,19 @@ class Reduced(NamedTuple):
 
 def eliminate(
     matrix: Array, coupling: Array, gradient: Array, damping: Array | float, floor: float
-) -> Reduced:
+) -> EliminatedBlock:
     """Factor a block (k, k, ...), damped by a fraction of its diagonal."""
     factor = matrix.copy()
     damped = _damp(factor, damping, floor)
     right = np.concatenate([coupling, gradient[:, None]], axis=1)
     return (
-        Reduced(cholesky(factor), forward(factor, right), damped)
+        EliminatedBlock(cholesky(factor), forward(factor, right), damped)
         if len(factor)
-        else Reduced(factor, right, damped)
+        else EliminatedBlock(factor, right, damped)
     )
 
 
-def left_over(reduced: Reduced, matrix: Array, gradient: Array) -> tuple[Array, Array]:
+def left_over(reduced: EliminatedBlock, matrix: Array, gradient: Array) -> tuple[Array, Array]:
     """Return what an eliminated block leaves of the matrix (6, 6, ...) and gradient (6, ...) that it touches."""
     coupling, own = reduced.right[:, :-1], reduced.right[:, -1]
     return matrix - np.einsum("ki...,kj...->ij...", coupling, coupling), gradient - np.einsum(
@@ -161,25 +163,27 @@ def _damp(matrix: Array, damping: Array | float, floor: float) -> Array:
     return np.asarray(added)
 
 
-class Arrow(NamedTuple):
+class TrunkEquations(NamedTuple):
     """The equations of the trunk when limbs and head are eliminated.
 
     Attributes
     ----------
     matrix, gradient : array (C, C, N), (C, N)
+        J'J and J'r in the trunk's C unknowns, limbs and head eliminated.
     limbs, head : Reduced or None
+        The eliminated blocks, from which their own steps follow.
     starts : array (4, 6, C, N) or None
         How the trunk's unknowns move limbs' starts and turn their parts.
     """
 
     matrix: Array
     gradient: Array
-    limbs: Reduced | None
-    head: Reduced | None
+    limbs: EliminatedBlock | None
+    head: EliminatedBlock | None
     starts: Array | None
 
 
-def assemble(here: Equations, damping: Array | float, floor: float = DIAGONAL_FLOOR) -> Arrow:
+def assemble(here: Equations, damping: Array | float, floor: float = DIAGONAL_FLOOR) -> TrunkEquations:
     """Eliminate limbs and head."""
     P, g = here.trunk.points, here.trunk.pull
     limbs = head = starts = turns = None
@@ -190,10 +194,10 @@ def assemble(here: Equations, damping: Array | float, floor: float = DIAGONAL_FL
         P, g = P.copy(), g.copy()
         P[list(LIMB_STARTS)] += start[:3, :3].transpose(2, 0, 1, 3)
         g[list(LIMB_STARTS)] += push[:3].transpose(1, 0, 2)
-        starts = start_ways(here.trunk)
+        starts = start_jacobian(here.trunk)
         if (terms.crossed != 0).any() or terms.slack.any():
             turns = start, push
-    matrix, gradient = spread(here.trunk, P, g)
+    matrix, gradient = to_unknowns(here.trunk, P, g)
     if turns is not None and starts is not None:
         _add_turns(*turns, starts, here.trunk.turns, matrix, gradient)
     if here.head is not None:
@@ -201,7 +205,7 @@ def assemble(here: Equations, damping: Array | float, floor: float = DIAGONAL_FL
         more, push = left_over(head, here.head.trunk, here.head.trunk_gradient)
         matrix[:6, :6] += more
         gradient[:6] += push
-    return Arrow(matrix, gradient, limbs, head, starts)
+    return TrunkEquations(matrix, gradient, limbs, head, starts)
 
 
 def _add_turns(
@@ -233,11 +237,11 @@ def solve(here: Equations, damping: Array | float) -> tuple[PostureStep, Array]:
     return PostureStep(trunk, limbs, head), gain - here.slack
 
 
-def follow(block: Reduced, shift: Array) -> Array:
+def follow(block: EliminatedBlock, shift: Array) -> Array:
     """Return the step of an eliminated block when what it is coupled with moves by `shift` (6, ...)."""
     right = block.right[:, -1] + np.einsum("ki...,i...->k...", block.right[:, :-1], shift)
     return -backward(block.factor, right)
 
 
-def _gain(block: Reduced, step: Array) -> Array:
+def _gain(block: EliminatedBlock, step: Array) -> Array:
     return np.asarray((block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0))

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LIMB_JOINTS
 from posekit.refinement.distinct import distinct
+from posekit.refinement.figure_numbers import LIMB_JOINTS
 
 Rows = NDArray[np.intp]
 
@@ -65,6 +65,7 @@ class LimbColumns(NamedTuple):
     Attributes
     ----------
     base : int array (M,)
+        The base of each column.
     of : tuple of 4 int arrays
         By kind, the column of each limb.
     """

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from posekit.geometry import Array, cross, dot
-from posekit.refinement.joints import neck_limits
 from posekit.refinement.limits import Signs
+from posekit.refinement.part_limits import neck_limits
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, head_points
 
@@ -19,10 +19,15 @@ class HeadTerms(NamedTuple):
     Attributes
     ----------
     chi2 : array (N,)
+        Sum of squares of the head's image points and the neck's limits.
     matrix, coupling, trunk : array (3, 3, N), (3, 6, N), (6, 6, N)
+        J'J: of the head's rotation, between that and root and torso, and of these alone.
     gradient, trunk_gradient : array (3, N), (6, N)
+        J'r of the head's rotation, and of root and torso.
     crossed : int array (3, N)
+        Limits of the neck that are passed: 1 the upper, -1 the lower.
     slack : array (N,)
+        Squares of limits that are watched, not passed: in the matrices, not in chi2.
     """
 
     chi2: Array
@@ -39,7 +44,7 @@ def head_terms(problem: RefinementProblem, state: PostureState, watch: Signs | N
     """Linearise the head."""
     n = state.root.shape[1]
     offsets = head_points(state, problem.anatomy.head)
-    residual, A = problem.see_head(state.root + offsets)
+    residual, A = problem.linearised_head(state.root + offsets)
     chi2 = np.einsum("jcn,jcn->n", residual, residual)
     turn = cross(np.broadcast_to(offsets[:, None], A.shape), A, axis=-2)
     J = np.concatenate([turn, A], axis=2)  # along its rotation, then the root

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.anatomy import LIMB_JOINTS, TRUNK_SEGMENTS
+from posekit.refinement.figure_numbers import LIMB_JOINTS, TRUNK_SEGMENTS
 from posekit.refinement.prior import RootPrior
 from posekit.skeleton import SEGMENT_NAMES, segment_name
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array, dot
-from posekit.refinement.anatomy import LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.limits import Outside, Signs, limb_angles, limb_limits, limb_rows, tangents_of
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import place_limbs
@@ -34,7 +34,9 @@ class Chains(NamedTuple):
     parent : array (4, 3, 3, N)
         Rotations of the parts on which they hang.
     directions : array (4, 2, 3, N)
+        Unit vectors of upper and lower segments, camera frame.
     lengths : array (4, 2, N)
+        Of upper and lower segments, metres.
     """
 
     start: Array
@@ -53,13 +55,17 @@ class LimbTerms(NamedTuple):
     Attributes
     ----------
     chi2 : array (4, N)
+        Each limb's sum of squares: image points, limits, lengths.
     matrix : array (U, U, 4, N)
+        J'J of the limb's own unknowns, with the curvature of turning.
     coupling : array (U, 6, 4, N)
         With the start's place and its part's rotation vector.
     start : array (6, 6, 4, N)
         Of those two.
     gradient, start_gradient : array (U, 4, N), (6, 4, N)
+        J'r of its own unknowns, and of the start's place and its part's rotation.
     tangents : array (4, 2, 2, 3, N)
+        Unit vectors along which its two segments turn, two each.
     folds : bool array (4, 2, N)
         Segments that are held at a right angle to their ray by an image beyond their reach.
     crossed : int array (4, 4, N)
@@ -88,7 +94,7 @@ def limb_terms(problem: RefinementProblem, chains: Chains, watch: Signs | None =
     n = chains.start.shape[2]
     points = np.empty((8, 3, n))
     place_limbs(chains.start, chains.directions, chains.lengths, points)
-    residual, jacobian = problem.see(points, slice(6, 14))
+    residual, jacobian = problem.linearised_image(points, slice(6, 14))
     A_middle, A_end = jacobian[_MIDDLE], jacobian[_END]
     r_middle, r_end = residual[_MIDDLE], residual[_END]
     chi2 = np.einsum("lcn,lcn->ln", r_middle, r_middle) + np.einsum("lcn,lcn->ln", r_end, r_end)
@@ -96,10 +102,10 @@ def limb_terms(problem: RefinementProblem, chains: Chains, watch: Signs | None =
     tangents = tangents_of(found, chains.directions[:, 0])
     reach = problem.limb_width
     rows = np.zeros((4, 4, reach, n))
-    ways = chains.lengths[:, :, None, None] * tangents
-    rows[:, :2, :2] = np.einsum("lcin,ltin->lctn", A_middle, ways[:, 0])
-    rows[:, 2:, :2] = np.einsum("lcin,ltin->lctn", A_end, ways[:, 0])
-    rows[:, 2:, 2:4] = np.einsum("lcin,ltin->lctn", A_end, ways[:, 1])
+    levers = chains.lengths[:, :, None, None] * tangents
+    rows[:, :2, :2] = np.einsum("lcin,ltin->lctn", A_middle, levers[:, 0])
+    rows[:, 2:, :2] = np.einsum("lcin,ltin->lctn", A_end, levers[:, 0])
+    rows[:, 2:, 2:4] = np.einsum("lcin,ltin->lctn", A_end, levers[:, 1])
     if reach > 4:
         along = chains.lengths[:, :, None] * chains.directions
         rows[:, :2, 4] = np.einsum("lcin,lin->lcn", A_middle, along[:, 0])
@@ -165,7 +171,7 @@ def limb_chi2(problem: RefinementProblem, chains: Chains) -> tuple[Array, Signs]
     n = chains.start.shape[2]
     points = np.empty((8, 3, n))
     place_limbs(chains.start, chains.directions, chains.lengths, points)
-    residual = problem.miss(points, slice(6, 14))
+    residual = problem.image_residuals(points, slice(6, 14))
     each = np.einsum("jcn,jcn->jn", residual, residual)
     chi2 = each[_MIDDLE] + each[_END]
     if problem.limb_weight is not None:

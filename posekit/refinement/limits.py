@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array, cross, dot
-from posekit.refinement.anatomy import Bounds
+from posekit.refinement.figure_numbers import Bounds
 
 LEAST = 0.05
 """Cosine of the second angle down to which its tangent is taken as it is in derivatives."""

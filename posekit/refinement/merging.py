@@ -65,6 +65,7 @@ def merge(
     Parameters
     ----------
     refined : Refined
+        Survivors of any number of frames, refined.
     within : float
         Metres that no joint may be apart.
     keep : bool array (N,), optional

@@ -70,6 +70,7 @@ class RootPrior:
         Parameters
         ----------
         camera : Camera
+            A pinhole camera, or one whose rays are parallel to z.
         mean : array (F, 3)
             Camera frame, metres.
         depth, lateral : float or array (F,)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import FigureNumbers
+from posekit.refinement.figure_numbers import FigureNumbers
 from posekit.refinement.optics import Optics
 from posekit.refinement.walls import Walls
 
@@ -20,7 +20,9 @@ class RefinementProblem:
     Parameters
     ----------
     anatomy : FigureNumbers
+        The figure's lengths and limits.
     optics : Optics
+        The camera, with the batch as its last axis.
     image, weight : array (14, 2, N), (14, N)
         Pixels, and one over their standard deviation; zero where a joint was not seen.
     head_image, head_weight : array (5, 2, N), (5, N), optional
@@ -68,19 +70,19 @@ class RefinementProblem:
         """Return the same problem with the limbs left out."""
         return replace(self, trunk_only=True)
 
-    def see(self, points: Array, joints: slice) -> tuple[Array, Array]:
+    def linearised_image(self, points: Array, joints: slice) -> tuple[Array, Array]:
         """Return residuals (J, 2, N) of some joints' image points, and their derivative (J, 2, 3, N) along the joints.
 
         Residuals are huge, and derivatives zero, where a joint that was seen is behind the camera.
         """
         return _whitened(*self.optics.project(points), self.image[joints], self.weight[joints])
 
-    def miss(self, points: Array, joints: slice) -> Array:
+    def image_residuals(self, points: Array, joints: slice) -> Array:
         """Return the residuals alone."""
         return _residual(self.optics.image(points), self.image[joints], self.weight[joints])
 
-    def see_head(self, points: Array) -> tuple[Array, Array]:
-        """Do for the head's points (5, 3, N) what `see` does for joints."""
+    def linearised_head(self, points: Array) -> tuple[Array, Array]:
+        """Do for the head's points (5, 3, N) what `linearised_image` does for joints."""
         image, jacobian = self.optics.project(points)
         if self.head_image is None or self.head_weight is None:
             return np.zeros((0, 2, points.shape[2])), jacobian[:0]

@@ -11,10 +11,10 @@ from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.factors import factor_postures
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.inputs import frames_of, numbers
+from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import Refined
-from posekit.refinement.search import SearchResult, search
-from posekit.refinement.sight import ObservedFrames
+from posekit.refinement.shared_search import SearchResult, search
 from posekit.refinement.state import head_points, place
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -26,7 +26,7 @@ UNPLACED_METRES = 1e3
 
 
 def refine(
-    sight: ObservedFrames,
+    observed: ObservedFrames,
     postures: ArrayLike,
     *,
     frame: ArrayLike | None = None,
@@ -45,11 +45,11 @@ def refine(
               + \sum_s \frac{\ln^2(l_s / \bar l_s)}{\rho_s^2} + \sum_i \frac{v_i^2}{\sigma_{limit}^2}
 
     over the configuration, and the lengths where their uncertainty is given; v is how far a joint is outside its
-    limits. See `posekit.refinement.search` for the way.
+    limits. See `posekit.refinement.shared_search` for the way.
 
     Parameters
     ----------
-    sight : ObservedFrames
+    observed : ObservedFrames
         What was seen.
     postures : array (N, 14, 3) or (N, nq)
         Survivors, camera frame, metres; or configurations. NaN for joints that are not known; a survivor without a
@@ -76,21 +76,21 @@ def refine(
         Where a shape is wrong, a deviation is not positive, or a name is unknown.
     """
     given = np.asarray(postures, dtype=np.float64)
-    figure = sight.figure
+    figure = observed.figure
     if given.ndim == 2 and given.shape[1] == figure.model.nq:
         given = figure.forward_kinematics(given)[:, : len(JOINTS)]
     positions = numbers("postures", given, (None, len(JOINTS), 3))
-    count = len(sight.points())
+    count = len(observed.points())
     frames = frames_of(frame, len(positions), count)
     near = ~(np.abs(positions) > MAX_COORDINATE_METRES).any(axis=(1, 2))
     placeable = np.asarray(np.isfinite(positions[:, 0]).all(axis=1) & near)
     positions = np.where(placeable[:, None, None], positions, UNPLACED_METRES)
-    problem = sight.problem(frames, positions[:, 0])
-    skull = None if head is None else _heads(head, count, frames)
+    problem = observed.problem(frames, positions[:, 0])
+    heads = None if head is None else _heads(head, count, frames)
     factors = factor_postures(frames, positions)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of joints at the very lens
         found = search(
-            problem, positions, skull, factors, steps=steps, precision=precision, hopeless=hopeless
+            problem, positions, heads, factors, steps=steps, precision=precision, hopeless=hopeless
         )
     return _refined(figure, problem, frames, found, placeable)
 

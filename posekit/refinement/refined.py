@@ -28,6 +28,7 @@ class Refined:
     Parameters
     ----------
     figure : Figure
+        The person, whose lengths were held or varied.
     frame : int array (N,)
         The frame of each survivor.
     joints : array (N, 14, 3)
@@ -43,6 +44,7 @@ class Refined:
     start_chi2 : array (N,)
         The same before refinement; never less.
     steps : int array (N,)
+        How many steps of the search each survivor took.
     converged : bool array (N,)
         Whether a minimum was reached.
     """

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array, dot, fit_rotation
-from posekit.refinement.anatomy import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, FigureNumbers
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, FigureNumbers
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import RefinementProblem
@@ -38,11 +38,11 @@ def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None)
         own = np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]])
         hips[part] = _laid(own, offsets[part, 4:6] - offsets[part, 3:4])
         hips = np.where(np.isnan(hips), torso, hips)
-    skull = torso
+    turned_head = torso
     if head is not None:
-        skull = _laid(anatomy.head, head - postures[:, :1])
-        skull = np.where(np.isnan(skull), torso, skull)
-    rotations = [_batch_last(rotation) for rotation in (torso, hips, skull)]
+        turned_head = _laid(anatomy.head, head - postures[:, :1])
+        turned_head = np.where(np.isnan(turned_head), torso, turned_head)
+    rotations = [_batch_last(rotation) for rotation in (torso, hips, turned_head)]
     return PostureState(
         root=postures[:, 0].T.copy(),
         torso=rotations[0],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, unit
 from posekit.geometry.batch_last import matrix_product, matrix_vector, step_rotation
-from posekit.refinement.anatomy import ARM_LIMBS, LEG_LIMBS, LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.figure_numbers import ARM_LIMBS, LEG_LIMBS, LIMB_ENDS, LIMB_MIDDLES
 
 Rows = NDArray[np.intp]
 
@@ -32,7 +32,7 @@ class PostureState(NamedTuple):
     directions : array (4, 2, 3, N)
         Unit vectors of the limbs' upper and lower segments, camera frame.
     shape : array (9, N)
-        See `posekit.refinement.anatomy.FigureNumbers`, metres.
+        See `posekit.refinement.figure_numbers.FigureNumbers`, metres.
     limbs : array (4, 2, N)
         Lengths of the limbs' segments, metres.
     """

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, dot
 from posekit.geometry.batch_last import matrix_vector
-from posekit.refinement.anatomy import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
-from posekit.refinement.joints import pelvis_limits
+from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.limits import Ball, Signs
+from posekit.refinement.part_limits import pelvis_limits
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, trunk_offsets
 
@@ -22,17 +22,19 @@ class TrunkTerms(NamedTuple):
     Attributes
     ----------
     chi2 : array (N,)
+        Sum of squares of image points, root, limits of the hips, and distances.
     matrix, gradient : array (C, C, N), (C, N)
         Of prior, limits and distances.
     points, pull : array (6, 3, 3, N), (6, 3, N)
         J'J and J'r of the trunk's image points, along their joints.
-    ways : array (6, 3, C, N)
-        How the unknowns move the joints.
+    jacobian : array (6, 3, C, N)
+        How the unknowns move the joints, metres for each unit of an unknown.
     offsets : array (6, 3, N)
         The joints from the root.
     crossed : int array (3, N)
         Limits of the hips that are passed.
     slack : array (N,)
+        Squares of limits that are watched, not passed: in the matrices, not in chi2.
     turns : tuple of 4 slices
         Which unknowns turn the part by which each limb is judged.
     """
@@ -42,7 +44,7 @@ class TrunkTerms(NamedTuple):
     gradient: Array
     points: Array
     pull: Array
-    ways: Array
+    jacobian: Array
     offsets: Array
     crossed: Signs
     slack: Array
@@ -52,7 +54,7 @@ class TrunkTerms(NamedTuple):
 def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | None = None) -> TrunkTerms:
     """Linearise the trunk."""
     offsets = trunk_offsets(state)
-    residual, A = problem.see(state.root + offsets, slice(0, 6))
+    residual, A = problem.linearised_image(state.root + offsets, slice(0, 6))
     n, width = state.root.shape[1], problem.trunk_width
     matrix, gradient = np.zeros((width, width, n)), np.zeros((width, n))
     W, away = problem.root_weight, _root(problem, state)
@@ -79,7 +81,7 @@ def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | 
         gradient=gradient,
         points=np.einsum("jcin,jckn->jikn", A, A),
         pull=np.einsum("jcin,jcn->jin", A, residual),
-        ways=_ways(problem, state, offsets),
+        jacobian=_joint_jacobian(problem, state, offsets),
         offsets=offsets,
         crossed=crossed,
         slack=slack,
@@ -89,7 +91,7 @@ def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | 
 
 def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) -> tuple[Array, Signs]:
     """Return the trunk's chi2 (N,) and the limits of the hips that are passed (3, N)."""
-    residual, away = problem.miss(state.root + offsets, slice(0, 6)), _root(problem, state)
+    residual, away = problem.image_residuals(state.root + offsets, slice(0, 6)), _root(problem, state)
     chi2 = np.einsum("jcn,jcn->n", residual, residual) + np.einsum("kn,kn->n", away, away)
     crossed = np.zeros((3, len(chi2)), dtype=np.int8)
     if problem.limited:
@@ -102,15 +104,15 @@ def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) 
     return chi2, crossed
 
 
-def spread(terms: TrunkTerms, P: Array, g: Array) -> tuple[Array, Array]:
+def to_unknowns(terms: TrunkTerms, P: Array, g: Array) -> tuple[Array, Array]:
     """Carry matrices (6, 3, 3, N) and gradients (6, 3, N) at the trunk's joints to its unknowns, with its own terms.
 
     With the curvature of turning: a joint at x from the axis, pushed outward, resists as `limb_terms` says.
     """
-    moving = np.einsum("jikn,jkcn->jicn", P, terms.ways)
-    matrix = np.einsum("jicn,jidn->cdn", terms.ways, moving)
+    moving = np.einsum("jikn,jkcn->jicn", P, terms.jacobian)
+    matrix = np.einsum("jicn,jidn->cdn", terms.jacobian, moving)
     matrix += terms.matrix
-    gradient = np.einsum("jicn,jin->cn", terms.ways, g)
+    gradient = np.einsum("jicn,jin->cn", terms.jacobian, g)
     gradient += terms.gradient
     x, y = terms.offsets[1:4], terms.offsets[4:] - terms.offsets[3]
     torso = g[1:4].copy()
@@ -126,11 +128,11 @@ def spread(terms: TrunkTerms, P: Array, g: Array) -> tuple[Array, Array]:
     return matrix, gradient
 
 
-def start_ways(terms: TrunkTerms) -> Array:
+def start_jacobian(terms: TrunkTerms) -> Array:
     """Return how the trunk's unknowns move limbs' starts and turn their parts (4, 6, C, N)."""
-    width, n = terms.ways.shape[2:]
+    width, n = terms.jacobian.shape[2:]
     out = np.zeros((4, 6, width, n))
-    out[:, :3] = terms.ways[list(LIMB_STARTS)]
+    out[:, :3] = terms.jacobian[list(LIMB_STARTS)]
     for limb in range(4):
         for i, column in enumerate(range(9)[terms.turns[limb]]):
             out[limb, 3 + i, column] = 1.0
@@ -149,16 +151,16 @@ def _root(problem: RefinementProblem, state: PostureState) -> Array:
     return matrix_vector(problem.root_weight, state.root - problem.root)
 
 
-def _ways(problem: RefinementProblem, state: PostureState, offsets: Array) -> Array:
-    ways = np.zeros((6, 3, problem.trunk_width, state.root.shape[1]))
+def _joint_jacobian(problem: RefinementProblem, state: PostureState, offsets: Array) -> Array:
+    jacobian = np.zeros((6, 3, problem.trunk_width, state.root.shape[1]))
     for i in range(3):
-        ways[:, i, i] = 1.0
-    _turning(offsets[1:4], ways[1:4, :, 3:6])
-    _turning(offsets[[3, 3]], ways[4:, :, 3:6])
-    _turning(offsets[4:] - offsets[3], ways[4:, :, 6:9])
+        jacobian[:, i, i] = 1.0
+    _turning(offsets[1:4], jacobian[1:4, :, 3:6])
+    _turning(offsets[[3, 3]], jacobian[4:, :, 3:6])
+    _turning(offsets[4:] - offsets[3], jacobian[4:, :, 6:9])
     if problem.shape_weight is not None:
-        ways[..., 9:, :] = shape_ways(state)
-    return ways
+        jacobian[..., 9:, :] = shape_jacobian(state)
+    return jacobian
 
 
 def _turning(x: Array, out: Array) -> None:
@@ -181,16 +183,20 @@ def _add_ball(ball: Ball, squared: float, matrix: Array, gradient: Array) -> Non
     gradient[hips] += push
 
 
-def shape_ways(state: PostureState) -> Array:
+def shape_jacobian(state: PostureState) -> Array:
     """Return how the nine numbers of the shape move the trunk's joints (6, 3, 9, N)."""
-    ways = np.zeros((6, 3, 9, state.root.shape[1]))
+    jacobian = np.zeros((6, 3, 9, state.root.shape[1]))
     forward, left, up = state.torso[:, 0], state.torso[:, 1], state.torso[:, 2]
-    ways[3:, :, 0] = -up
+    jacobian[3:, :, 0] = -up
     for shoulder, first in ((1, 2), (2, 4)):
-        ways[shoulder, :, 1], ways[shoulder, :, first], ways[shoulder, :, first + 1] = forward, left, up
-    ways[4:, :, 6] = -state.hips[:, 2]
-    ways[4, :, 7] = ways[5, :, 8] = state.hips[:, 1]
-    return ways
+        jacobian[shoulder, :, 1], jacobian[shoulder, :, first], jacobian[shoulder, :, first + 1] = (
+            forward,
+            left,
+            up,
+        )
+    jacobian[4:, :, 6] = -state.hips[:, 2]
+    jacobian[4, :, 7] = jacobian[5, :, 8] = state.hips[:, 1]
+    return jacobian
 
 
 def _distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:

@@ -42,7 +42,7 @@ class Walls(Protocol):
         Parameters
         ----------
         limb : int
-            Of `posekit.refinement.anatomy.LIMB_JOINTS`.
+            Of `posekit.refinement.figure_numbers.LIMB_JOINTS`.
         upper, lower : array (M, 3)
             Unit directions of the segments, in the frame of the part by which the limb is judged.
 

@@ -12,11 +12,11 @@ from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import unit
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.refinement import ObservedFrames
-from posekit.refinement.anatomy import LIMB_JOINTS
 from posekit.refinement.equations import evaluate, linearise
+from posekit.refinement.figure_numbers import LIMB_JOINTS
 from posekit.refinement.start import limb_directions, state_of
 from posekit.refinement.state import PostureStep, moved
-from posekit.refinement.trunk_terms import start_ways
+from posekit.refinement.trunk_terms import start_jacobian
 from posekit.skeleton import HIPS, JOINT, TORSO
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validators import judge, load_ranges
@@ -102,9 +102,9 @@ def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Ge
     assert step.head is not None
     trunk, limbs, head = here.trunk, here.limbs, here.head
     slope = np.einsum("cn,cn->n", trunk.gradient, step.trunk)
-    slope += np.einsum("jin,jicn,cn->n", trunk.pull, trunk.ways, step.trunk)
+    slope += np.einsum("jin,jicn,cn->n", trunk.pull, trunk.jacobian, step.trunk)
     slope += np.einsum("uln,uln->n", limbs.gradient, step.limbs)
-    slope += np.einsum("iln,licn,cn->n", limbs.start_gradient, start_ways(trunk), step.trunk)
+    slope += np.einsum("iln,licn,cn->n", limbs.start_gradient, start_jacobian(trunk), step.trunk)
     slope += np.einsum("in,in->n", head.gradient, step.head)
     slope += np.einsum("in,in->n", head.trunk_gradient, step.trunk[:6])
 

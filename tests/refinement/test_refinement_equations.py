@@ -17,7 +17,7 @@ from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, state_of
 from posekit.refinement.state import PostureState, PostureStep, head_points, moved, place
-from posekit.refinement.trunk_terms import start_ways
+from posekit.refinement.trunk_terms import start_jacobian
 from posekit.skeleton import JOINTS
 from posekit.synthesis import SyntheticScene, random_views
 
@@ -43,8 +43,13 @@ def sight_of(
     camera = camera or view.camera
     image = camera.project(view.joints_cam)
     return ObservedFrames(
-        figure=view.figure, camera=camera, image=image, deviation=pixels, root=root, **other
-    )  # type: ignore[arg-type]
+        figure=view.figure,
+        camera=camera,
+        image=image,
+        deviation=pixels,
+        root=root,
+        **other,  # type: ignore[arg-type]
+    )
 
 
 def somewhere(
@@ -74,9 +79,9 @@ def slope_along(problem: RefinementProblem, state: PostureState, step: PostureSt
     trunk, limbs, head = here.trunk, here.limbs, here.head
     assert limbs is not None and step.limbs is not None
     slope = np.einsum("cn,cn->n", trunk.gradient, step.trunk)
-    slope += np.einsum("jin,jicn,cn->n", trunk.pull, trunk.ways, step.trunk)
+    slope += np.einsum("jin,jicn,cn->n", trunk.pull, trunk.jacobian, step.trunk)
     slope += np.einsum("uln,uln->n", limbs.gradient, step.limbs)
-    slope += np.einsum("iln,licn,cn->n", limbs.start_gradient, start_ways(trunk), step.trunk)
+    slope += np.einsum("iln,licn,cn->n", limbs.start_gradient, start_jacobian(trunk), step.trunk)
     if head is not None and step.head is not None:
         slope += np.einsum("in,in->n", head.gradient, step.head)
         slope += np.einsum("in,in->n", head.trunk_gradient, step.trunk[:6])
@@ -142,7 +147,7 @@ def test_the_arrow_solves_what_the_whole_matrix_would(rng: np.random.Generator) 
         def residuals(h: float, flat: np.ndarray = flat) -> np.ndarray:
             at = moved(state, PostureStep(h * flat[:9], h * flat[9:].reshape(4, 4, 6)), tangents)
             joints = place(at)
-            seen = problem.miss(joints, slice(0, 14))
+            seen = problem.image_residuals(joints, slice(0, 14))
             root = np.einsum("ijn,jn->in", problem.root_weight, at.root - problem.root)
             return np.concatenate([seen.reshape(28, 6), root])
 
@@ -150,7 +155,7 @@ def test_the_arrow_solves_what_the_whole_matrix_would(rng: np.random.Generator) 
     J = np.stack(columns, axis=1)
     r = np.concatenate(
         [
-            problem.miss(place(state), slice(0, 14)).reshape(28, 6),
+            problem.image_residuals(place(state), slice(0, 14)).reshape(28, 6),
             np.einsum("ijn,jn->in", problem.root_weight, state.root - problem.root),
         ]
     )
@@ -227,7 +232,7 @@ def test_freedom_is_residuals_less_rank(perspective: bool, rng: np.random.Genera
         flat = np.zeros((25, 40))
         flat[unknown] = 1e-6
         sides = [
-            problem.miss(
+            problem.image_residuals(
                 place(
                     moved(
                         state, PostureStep(s * flat[:9], s * flat[9:].reshape(4, 4, 40)), here.limbs.tangents

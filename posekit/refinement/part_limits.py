@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from posekit.geometry import Array
-from posekit.refinement.anatomy import Bounds
+from posekit.refinement.figure_numbers import Bounds
 from posekit.refinement.limits import Ball, Signs, ball_limits
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState

@@ -13,7 +13,7 @@ from posekit.body.angles import Limits
 from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.anatomy import FigureNumbers
+from posekit.refinement.figure_numbers import FigureNumbers
 from posekit.refinement.inputs import batch_last, length_weights, numbers, root_of, weights
 from posekit.refinement.optics import optics_of
 from posekit.refinement.prior import RootPrior
@@ -38,6 +38,7 @@ class ObservedFrames:
     Parameters
     ----------
     figure : Figure
+        The person: lengths, limits, the head's points.
     camera : Camera
         A pinhole or scaled orthographic one; its first axis, where it has one, counts frames.
     image : array (F, 14, 2)

@@ -28,9 +28,9 @@ from posekit.refinement.descent import BLOCK_POSTURES, descend
 from posekit.refinement.equations import evaluate
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.merging import groups_of
+from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
-from posekit.refinement.sight import ObservedFrames
 from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureState, trunk_offsets
 from posekit.refinement.survival import chi2_survival
@@ -40,6 +40,7 @@ N_CHOICES_FOLLOWED = 2
 """Near and far choices that are followed to their minima, the likeliest first."""
 
 MAX_STEPS = 12
+"""Steps of each search for a trunk: what it finds is a start, refined again with its limbs."""
 
 SAME_TRUNK_METRES = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
@@ -61,6 +62,7 @@ class Trunks:
     Parameters
     ----------
     frame : int array (H,)
+        The frame of each trunk.
     joints : array (H, 6, 3)
         Neck, shoulders, pelvis and hips, camera frame, metres.
     image : array (H, 14, 2)
@@ -106,6 +108,7 @@ class Trunks:
         hypothesis : int array (N,)
             The trunk of each leaf.
         postures : array (N, 14, 3)
+            Leaves of a tree that was grown from trunks, camera frame, metres.
         """
         apart = postures[:, :N_TRUNK_JOINTS] - self.joints[hypothesis]
         with np.errstate(invalid="ignore"):
@@ -113,13 +116,13 @@ class Trunks:
 
 
 def find_trunks(
-    sight: ObservedFrames, *, level: float = REJECTION_PROBABILITY, within: float = SAME_TRUNK_METRES
+    observed: ObservedFrames, *, level: float = REJECTION_PROBABILITY, within: float = SAME_TRUNK_METRES
 ) -> Trunks:
     """Find the trunks that the noise can explain.
 
     Parameters
     ----------
-    sight : ObservedFrames
+    observed : ObservedFrames
         Its root must say where the neck is, however roughly.
     level : float
         Probability with which noise alone gives a trunk that is left out.
@@ -136,14 +139,14 @@ def find_trunks(
     InputError
         Where there is no root.
     """
-    if sight.root is None:
+    if observed.root is None:
         raise InputError("find_trunks: no root was given; expected a RootPrior that says where necks are")
-    in_front = isinstance(sight.camera, ScaledOrthographicCamera) | (sight.root.mean[:, 2] > 0)
-    known = np.flatnonzero(np.isfinite(sight.root.mean).all(axis=1) & in_front)
-    starts = _lifts(sight, known)
+    in_front = isinstance(observed.camera, ScaledOrthographicCamera) | (observed.root.mean[:, 2] > 0)
+    known = np.flatnonzero(np.isfinite(observed.root.mean).all(axis=1) & in_front)
+    starts = _lifts(observed, known)
     frames = np.repeat(known, starts.shape[1])
     flat = starts.reshape(-1, 14, 3)
-    one = sight.problem(known, sight.root.mean[known]).trunk_alone()
+    one = observed.problem(known, observed.root.mean[known]).trunk_alone()
     begin = state_of(one.anatomy, flat)
     chi2 = np.empty(len(frames))
     every = np.repeat(np.arange(len(known)), starts.shape[1])
@@ -178,11 +181,11 @@ def find_trunks(
     keep = keep[np.lexsort((value[keep], known[row[keep]]))]
     leader = groups_of(known[row[keep]], joints[keep], within)
     keep = keep[leader == np.arange(len(keep))]
-    return _trunks(sight, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
+    return _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
 
 
 def _trunks(
-    sight: ObservedFrames,
+    observed: ObservedFrames,
     one: RefinementProblem,
     frame: NDArray[np.intp],
     joints: Array,
@@ -191,20 +194,20 @@ def _trunks(
     p: Array,
     row: NDArray[np.intp],
 ) -> Trunks:
-    image = sight.points()[frame].copy()
+    image = observed.points()[frame].copy()
     projected = one.optics.take(row).image(joints.transpose(1, 2, 0)).transpose(2, 0, 1)
     image[:, :6] = np.where(np.isnan(image[:, :6]), np.nan, projected)
     return Trunks(frame=frame, joints=joints, image=image, chi2=chi2, dof=dof, p=p)
 
 
-def _lifts(sight: ObservedFrames, frames: NDArray[np.intp]) -> Array:
+def _lifts(observed: ObservedFrames, frames: NDArray[np.intp]) -> Array:
     """Lift trunks by every near and far choice, (len(frames), 32, 14, 3): out of reach means nearest to the ray."""
-    problem = sight.problem(frames, np.zeros((len(frames), 3)))
+    problem = observed.problem(frames, np.zeros((len(frames), 3)))
     image, optics = problem.image[:6], problem.optics
     seen = problem.weight[:6] > 0
     placed: list[Array] = [problem.root[None]]  # by joint (choices, 3, N), as the bits of its path
     for joint, (parent, _) in enumerate(TREE_SEGMENTS[:5], start=1):
-        length = sight.figure.lengths[segment_name((parent, joint))]
+        length = observed.figure.lengths[segment_name((parent, joint))]
         start = placed[parent]
         pixels = np.broadcast_to(image[joint], (len(start), *image.shape[1:]))
         ray, foot = optics.rays(pixels, start)

@@ -2,7 +2,7 @@
 
 A limb that meets its image within its limits pulls at nothing. So survivors that differ only in such limbs share
 everything else: each trunk with those limbs that do pull is refined once (`bases`), and the others are laid on their
-rays from where it ends (`laying`). One that no longer can be joins those that pull, in the next round.
+rays from where it ends (`limb_fitting`). One that no longer can be joins those that pull, in the next round.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from posekit.refinement.bases import BaseTables, assemble
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import chains_of, evaluate
 from posekit.refinement.factors import Factors, LimbColumns, Rows, columns_of
-from posekit.refinement.laying import Bases, InitialLimbs, Laid, Settings, lay
+from posekit.refinement.limb_fitting import Bases, InitialLimbs, LimbsOnBases, SearchSettings, fit_on_bases
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, sides, state_of
@@ -37,7 +37,7 @@ class SearchResult(NamedTuple):
 def search(
     problem: RefinementProblem,
     postures: Array,
-    skull: Array | None,
+    head: Array | None,
     factors: Factors,
     *,
     steps: int,
@@ -45,9 +45,9 @@ def search(
     hopeless: float,
 ) -> SearchResult:
     """Refine postures (N, 14, 3) and heads (N, 5, 3); chi2 is never more than it was."""
-    settings = Settings(steps, precision, hopeless)
+    settings = SearchSettings(steps, precision, hopeless)
     one = factors.trunk
-    begin = state_of(problem.anatomy, postures[one], None if skull is None else skull[one])
+    begin = state_of(problem.anatomy, postures[one], None if head is None else head[one])
     own = np.repeat(one[None], 4, axis=0)
     begin = begin._replace(directions=limb_directions(postures, own, begin))
     alone = problem.take(one).trunk_alone()
@@ -91,7 +91,7 @@ def _grow(
     base_of: Rows,
     columns: LimbColumns,
     origin: Rows,
-    settings: Settings,
+    settings: SearchSettings,
 ) -> tuple[DescentResult, Rows]:
     """Refine survivors (N,) from their bases outward, round by round; their limbs are `limbs` at `origin` (4, N).
 
@@ -102,34 +102,36 @@ def _grow(
     leaves, column, late = np.arange(n), origin, np.arange(0)
     which = np.repeat(np.arange(len(columns.base))[None], 4, axis=0)
     for turn in range(MAX_PULLING_ROUNDS + 1):
-        laid = lay(problem, bases, columns, limbs.gather(which), settings)
-        each = _at(laid.chi2, column, 0.0)
+        fitted = fit_on_bases(problem, bases, columns, limbs.gather(which), settings)
+        each = _at(fitted.chi2, column, 0.0)
         pull = each > settings.precision
         total = bases.found.chi2[base_of] + each.sum(axis=0)
         over = ~np.isfinite(total) | ~bases.open(settings)[base_of]
         tables = None
         if turn == 0 and pull.any():
-            tables = BaseTables.of(problem, bases, laid)
-            least = _at(tables.least(bases, laid), _at(laid.place, np.where(pull, column, -1), -1), 0.0)
+            tables = BaseTables.of(problem, bases, fitted)
+            least = _at(tables.least(bases, fitted), _at(fitted.place, np.where(pull, column, -1), -1), 0.0)
             over |= (least > settings.hopeless).any(axis=0)
         going = pull.any(axis=0) & ~over
         if turn == MAX_PULLING_ROUNDS:
             late, going = leaves[going], np.zeros_like(going)
         done = np.flatnonzero(~going)
-        _write(found, leaves[done], bases, base_of[done], laid, column[:, done], total[done])
+        _write(found, leaves[done], bases, base_of[done], fitted, column[:, done], total[done])
         found.settled[leaves[done]] &= ~pull[:, done].any(axis=0)
         left = np.flatnonzero(going)
         if not left.size:
             break
         leaves, base_of, column, pull = leaves[left], base_of[left], column[:, left], pull[:, left]
-        group, one, slots = _groups(base_of, column, pull, laid)
-        bases = assemble(problem, bases, base_of[one], leaves[one], laid, slots, settings, tables)
+        group, one, slots = _groups(base_of, column, pull, fitted)
+        bases = assemble(problem, bases, base_of[one], leaves[one], fitted, slots, settings, tables)
         base_of = group
         columns, column, which = _columns(np.where(pull, -1, column), origin[:, leaves], base_of, len(one))
     return found, late
 
 
-def _groups(base_of: Rows, column: Rows, pull: NDArray[np.bool_], laid: Laid) -> tuple[Rows, Rows, Rows]:
+def _groups(
+    base_of: Rows, column: Rows, pull: NDArray[np.bool_], fitted: LimbsOnBases
+) -> tuple[Rows, Rows, Rows]:
     """Group survivors (n,) by their bases and by those of their limbs that pull.
 
     Returns
@@ -140,8 +142,8 @@ def _groups(base_of: Rows, column: Rows, pull: NDArray[np.bool_], laid: Laid) ->
     slots : int array (4, G)
         Its limbs among those that pull, -1 where one does not.
     """
-    slots = _at(laid.place, np.where(pull, column, -1), -1)
-    rank = np.where(pull, slots - np.searchsorted(laid.pulling.base, base_of) + 1, 0)
+    slots = _at(fitted.place, np.where(pull, column, -1), -1)
+    rank = np.where(pull, slots - np.searchsorted(fitted.pulling.base, base_of) + 1, 0)
     most = int(rank.max()) + 1
     key = base_of.astype(np.int64)
     for kind in range(4):
@@ -178,14 +180,20 @@ def _columns(column: Rows, origin: Rows, base_of: Rows, count: int) -> tuple[Lim
 
 
 def _write(
-    found: DescentResult, rows: Rows, bases: Bases, base: Rows, laid: Laid, column: Rows, total: Array
+    found: DescentResult,
+    rows: Rows,
+    bases: Bases,
+    base: Rows,
+    fitted: LimbsOnBases,
+    column: Rows,
+    total: Array,
 ) -> None:
     """Write down survivors: their bases, and the limbs in `column` (4, n) that those do not hold."""
     part = bases.found.take(base)
     for kind in range(4):
         own = np.flatnonzero(column[kind] >= 0)
-        part.state.directions[kind][..., own] = laid.chains.directions[kind][..., column[kind, own]]
-        part.state.limbs[kind][..., own] = laid.chains.lengths[kind][..., column[kind, own]]
+        part.state.directions[kind][..., own] = fitted.chains.directions[kind][..., column[kind, own]]
+        part.state.limbs[kind][..., own] = fitted.chains.lengths[kind][..., column[kind, own]]
     part.chi2[...] = total
     found.put(rows, part)
 

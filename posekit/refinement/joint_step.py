@@ -20,7 +20,7 @@ from posekit.refinement.equations import DIAGONAL_FLOOR, assemble, eliminate, le
 from posekit.refinement.limb_terms import Chains, limb_terms
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, PostureStep
-from posekit.refinement.trunk_terms import start_ways, trunk_terms
+from posekit.refinement.trunk_terms import start_jacobian, trunk_terms
 
 
 class TrunkTables(NamedTuple):
@@ -29,6 +29,7 @@ class TrunkTables(NamedTuple):
     Attributes
     ----------
     matrix, gradient : array (T, C, C), (T, C)
+        The quadratic of each trunk: half its Hessian, and half its slope.
     head, head_slope : array (T, 3), (T, 3, 6), or (T, 0), (T, 0, 6) without a head
         The head's own step, and how that follows the trunk's.
     """
@@ -49,6 +50,7 @@ class LimbTables(NamedTuple):
     step, slope : array (4, M, U), (4, M, U, C)
         Its own step, and how that follows the trunk's.
     tangents : array (4, 2, 2, 3, M)
+        Unit vectors along which the limbs' upper and lower segments turn, two each.
     folds, active : int array (4, M)
         Its segments at right angles to their rays, its limits that are felt.
     """
@@ -130,12 +132,12 @@ def limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains
         block = eliminate(terms.matrix, terms.coupling, terms.gradient, 0.0, DIAGONAL_FLOOR)
         start, push = left_over(block, terms.start, terms.start_gradient)
         trunk = trunk_terms(part, trunks.take(rows))
-        ways = start_ways(trunk)
-        carried = np.einsum("ijln,ljcn->licn", start[:, :3], ways[:, :3])
+        jacobian = start_jacobian(trunk)
+        carried = np.einsum("ijln,ljcn->licn", start[:, :3], jacobian[:, :3])
         for limb in range(4):
             carried[limb, :, trunk.turns[limb]] += start[:, 3:, limb]
-        matrix = np.einsum("licn,lidn->lcdn", ways[:, :3], carried[:, :3])
-        gradient = np.einsum("licn,iln->lcn", ways[:, :3], push[:3])
+        matrix = np.einsum("licn,lidn->lcdn", jacobian[:, :3], carried[:, :3])
+        gradient = np.einsum("licn,iln->lcn", jacobian[:, :3], push[:3])
         for limb in range(4):
             matrix[limb, trunk.turns[limb]] += carried[limb, 3:]
             gradient[limb, trunk.turns[limb]] += push[3:, limb]
@@ -145,7 +147,7 @@ def limb_tables(problem: RefinementProblem, trunks: PostureState, chains: Chains
                 np.ascontiguousarray(matrix.transpose(0, 3, 1, 2)),
                 np.ascontiguousarray(gradient.transpose(0, 2, 1)),
                 np.ascontiguousarray(slope[:, -1].transpose(1, 2, 0)),
-                np.ascontiguousarray(np.einsum("uiln,licn->lnuc", slope[:, :-1], ways)),
+                np.ascontiguousarray(np.einsum("uiln,licn->lnuc", slope[:, :-1], jacobian)),
                 terms.tangents,
                 terms.folds.sum(axis=1),
                 (terms.crossed != 0).sum(axis=0),

@@ -20,7 +20,7 @@ MAX_LIMB_STEPS = 6
 """The most steps of a limb alone: it goes on together with its trunk."""
 
 
-class Settings(NamedTuple):
+class SearchSettings(NamedTuple):
     """See `posekit.refinement.refine`."""
 
     steps: int
@@ -34,6 +34,7 @@ class Bases(NamedTuple):
     Attributes
     ----------
     found : DescentResult
+        The trunks, refined with those limbs.
     leaf : int array (B,)
         A survivor of each.
     held : bool array (4, B)
@@ -44,7 +45,7 @@ class Bases(NamedTuple):
     leaf: Rows
     held: NDArray[np.bool_]
 
-    def open(self, settings: Settings) -> NDArray[np.bool_]:
+    def open(self, settings: SearchSettings) -> NDArray[np.bool_]:
         """Return which are at a minimum, or may yet be explained (B,)."""
         return np.asarray(self.found.settled | (self.found.chi2 <= settings.hopeless))
 
@@ -55,6 +56,7 @@ class InitialLimbs(NamedTuple):
     Attributes
     ----------
     directions : array (4, 2, 3, M)
+        Unit vectors of upper and lower segments, camera frame.
     far : bool array (4, 2, M)
         See `posekit.refinement.start.sides`.
     """
@@ -69,7 +71,7 @@ class InitialLimbs(NamedTuple):
         )
 
 
-class Pulling(NamedTuple):
+class PullingLimbs(NamedTuple):
     """Limbs that do not meet their image within their limits.
 
     Attributes
@@ -77,7 +79,9 @@ class Pulling(NamedTuple):
     base : int array (P,)
         Of each column.
     problem : RefinementProblem
+        The data of each column.
     chains : Chains
+        The limbs where they were fitted alone.
     chi2 : array (4, P)
         Zero where a column has none.
     """
@@ -88,7 +92,7 @@ class Pulling(NamedTuple):
     chi2: Array
 
 
-class Laid(NamedTuple):
+class LimbsOnBases(NamedTuple):
     """Limbs on their bases.
 
     Attributes
@@ -96,20 +100,26 @@ class Laid(NamedTuple):
     chains : Chains
         Of M columns.
     chi2 : array (4, M)
+        What each limb adds to its base's chi2; zero where a column has none.
     pulling : Pulling
+        Those that do not meet their image.
     place : int array (4, M)
         The columns of limbs among those that pull, -1 for the others.
     """
 
     chains: Chains
     chi2: Array
-    pulling: Pulling
+    pulling: PullingLimbs
     place: Rows
 
 
-def lay(
-    problem: RefinementProblem, bases: Bases, columns: LimbColumns, limbs: InitialLimbs, settings: Settings
-) -> Laid:
+def fit_on_bases(
+    problem: RefinementProblem,
+    bases: Bases,
+    columns: LimbColumns,
+    limbs: InitialLimbs,
+    settings: SearchSettings,
+) -> LimbsOnBases:
     """Lay limbs (M columns) on their rays from where their bases are, and fit those that do not meet their image.
 
     `problem` is that of all survivors.
@@ -126,7 +136,9 @@ def lay(
     pulled = columns_of([columns.base[own] for own in mine], len(bases.leaf))
     place = np.full(chi2.shape, -1)
     on = chains_of(problem, bases.found.state.take(pulled.base))
-    fit = Pulling(pulled.base, problem.take(bases.leaf[pulled.base]), on, np.zeros((4, len(pulled.base))))
+    fit = PullingLimbs(
+        pulled.base, problem.take(bases.leaf[pulled.base]), on, np.zeros((4, len(pulled.base)))
+    )
     for kind, (own, to) in enumerate(zip(mine, pulled.of, strict=True)):
         place[kind, own] = to
         on.directions[kind][..., to] = chains.directions[kind][..., own]
@@ -138,4 +150,4 @@ def lay(
         chains.directions[kind][..., own] = on.directions[kind][..., to]
         chains.lengths[kind][..., own] = on.lengths[kind][..., to]
         chi2[kind, own] = fit.chi2[kind, to]
-    return Laid(chains, chi2, fit, place)
+    return LimbsOnBases(chains, chi2, fit, place)
