@@ -14,8 +14,8 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.cameras.lens import project
 from posekit.errors import InputError
 from posekit.formats.cameras import read_cameras, write_cameras
-from posekit.formats.cameras.yaml_subset import parse_yaml
 from posekit.geometry import rotation_from_vector
+from posekit.safe_io.yaml_file import parse_yaml
 
 K = np.array([[1010.25, 0.0, 640.5], [0.0, 1012.75, 360.25], [0.0, 0.0, 1.0]])
 DIST = np.array([-0.21, 0.05, 0.001, -0.002, 0.01])
@@ -426,7 +426,7 @@ def test_damaged_colmap_pictures(text: str, says: str, tmp_path: Path) -> None:
     ("name", "text", "says"),
     [
         ("a.yml", "%YAML:1.0\n---\nimage_width: 3\n", "no 3x3 matrix"),
-        ("a.yml", "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   data: [ 1, 0, 0, 0, 1", "not closed"),
+        ("a.yml", "camera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   data: [ 1, 0, 0, 0, 1", "did not find"),
         ("a.yml", "K: [1, 0, 0, 0, -1, 0, 0, 0, 1]", "focal"),
         ("a.yml", "K: [.Nan, 0, 0, 0, 1, 0, 0, 0, 1]", "not finite"),
         ("a.yml", "K: {rows: 1000000000, cols: 3, data: [1, 0, 0, 0, 1, 0, 0, 0, 1]}", "rows, cols and data"),
@@ -437,10 +437,15 @@ def test_damaged_colmap_pictures(text: str, says: str, tmp_path: Path) -> None:
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nfisheye: maybe", "0 or 1"),
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\ndistortion_model: omnidir", "undistort"),
         ("a.yml", "K: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nk: [1, 0, 0, 0, 1, 0, 0, 0, 1]\nK: 3", "twice"),
-        ("a.yml", "a: &x 1\nb: *x\n", "no use for"),
+        ("a.yml", "a: &x 1\nb: *x\n", "an anchor or an alias"),
         ("a.yml", "- 1\n- 2\n", "no 3x3 matrix"),
         ("a.yml", "just words", "named fields"),
-        ("a.yml", "\t\n\n# nothing\n", "comments"),
+        ("a.yml", "\n\n# nothing\n", "comments"),
+        ("a.yml", "a: 1\na: 2\n", "line 2: got \"a\" twice"),
+        ("a.yml", "a: 1\n---\nb: 2\n", "2 documents"),
+        ("a.yml", "[1, 2]: 3\n", "as a key"),
+        ("a.yml", "a: !!python/object/apply:os.system [ls]\n", "no 3x3 matrix"),
+        ("a.yml", "a: \x07\n", "does not print"),
         ("a.yml", "a: " + "[" * 40 + "]" * 40, "nested"),
         ("a.yml", "".join(f"{' ' * k}a:\n" for k in range(40)), "nested"),
         ("a.xml", "<?xml version='1.0'?><other/>", "opencv_storage"),
@@ -533,3 +538,21 @@ def test_project_agrees_with_opencv_for_a_posed_camera(tmp_path: Path, rng: np.r
         world, np.array([1.349, 1.596, -1.198]), camera.t.copy(), camera.K.copy(), camera.distortion.copy()
     )[0][:, 0]
     np.testing.assert_allclose(project(camera, world @ camera.R.T + camera.t), expected, atol=1e-8)
+
+
+def test_a_word_means_what_opencv_and_ros_mean_by_it() -> None:
+    text = "a: 1e-05\nb: 1:30\nc: 012\nd: yes\ne: 2020-01-02\nf: '3'\ng: -.5\nh: 1_000\n"
+    assert parse_yaml(text, "x") == {
+        **{"a": 1e-05, "b": "1:30", "c": 12, "d": "yes", "e": "2020-01-02"},
+        **{"f": "3", "g": -0.5, "h": "1_000"},
+    }
+
+
+def test_bombs_are_refused_at_once() -> None:
+    unfolding = "a: &a [x]\n" + "".join(
+        f"{b}: &{b} [*{a}, *{a}, *{a}]\n" for a, b in zip("abcdef", "bcdefg", strict=True)
+    )
+    for text in (unfolding, "- " * 100_000, "[" * 1_000_000, "{a: " * 1_000_000, "? " * 100_000):
+        with pytest.raises(InputError) as refused:
+            parse_yaml(text, "text")
+        assert "\n" not in str(refused.value)

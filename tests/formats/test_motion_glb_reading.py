@@ -41,7 +41,7 @@ def test_what_is_written_is_read_again(tmp_path: Path, rng: np.random.Generator,
 def test_a_body_that_stands_is_where_trimesh_finds_it(tmp_path: Path, rng: np.random.Generator) -> None:
     write_glb(tmp_path / "a.glb", load_figure(), some_q(rng, 1), np.zeros(1))
     motion = read_motion(tmp_path / "a.glb")
-    scene = trimesh.load(tmp_path / "a.glb")
+    scene: Any = trimesh.load(tmp_path / "a.glb")
     for k, name in enumerate(motion.names):
         if name in scene.graph.nodes:
             np.testing.assert_allclose(

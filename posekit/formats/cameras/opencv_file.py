@@ -17,9 +17,9 @@ from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError
 from posekit.formats.cameras.camera_format import CameraFormat, has_intrinsics
 from posekit.formats.cameras.fields import METRES, cameras_of, made, numbers
-from posekit.formats.cameras.yaml_subset import parse_yaml
 from posekit.formats.given_file import GivenFile
 from posekit.safe_io import one_line, read_json, read_text, read_xml, refusal, shown, write_text
+from posekit.safe_io.yaml_file import parse_yaml
 
 MAX_BYTES: Final = 10_000_000
 
