@@ -119,7 +119,9 @@ def write_picture(
     frames : sequence of Shown, optional
         Those of the subject, or some of them, with some of their postures, or rejected branches.
     style : Style, optional
+        How the postures are composed; as `Style` has it if not given.
     shot : Shot, optional
+        The picture's size, and from where it is taken; as `Shot` has it if not given.
     title : str
         Of a page.
     progress : callable, optional

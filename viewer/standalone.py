@@ -70,6 +70,7 @@ def standalone_page(
     Parameters
     ----------
     scene : Scene
+        What the page shows.
     eye : Eye
         Where one looks from at first.
     title : str

@@ -73,6 +73,7 @@ def certify(
     joints : array (N, 14, 3)
         Metres.
     figure : Figure
+        The person, whose lengths and limits they are measured against.
     ranges : Ranges or None
         Those that pruned; None where joint ranges were not among the checks.
     tolerance : Tolerance

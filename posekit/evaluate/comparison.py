@@ -25,6 +25,7 @@ class Comparison:
     Parameters
     ----------
     survivors : int array (F,)
+        How many survivors each frame has.
     best, first, middle : array (F, 3)
         Of the best survivor by that measure, of the likeliest (`posekit.recovery.ranked`), and the median over all;
         NaN where there is no survivor or no truth.

@@ -52,6 +52,7 @@ def best_of_frames(errors: Array, offsets: NDArray[np.intp]) -> Array:
     Parameters
     ----------
     errors : array (N, 5)
+        The five measures of every survivor, metres, frame by frame.
     offsets : int array (F + 1,)
         Where each frame's survivors start and the last ends.
     """
@@ -68,6 +69,7 @@ def best_rows(error: Array, offsets: NDArray[np.intp]) -> NDArray[np.intp]:
     Parameters
     ----------
     error : array (N,)
+        One measure of every survivor, frame by frame; NaN where it is not known.
     offsets : int array (F + 1,)
         Where each frame's survivors start and the last ends.
     """

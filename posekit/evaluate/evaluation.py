@@ -35,6 +35,7 @@ class Evaluation:
     frames : EvaluatedFrames
         Every frame at every level of noise.
     material : Material
+        What was evaluated, and what was left out.
     settings : mapping
         Everything that decided the numbers, of plain values.
     """
@@ -65,6 +66,7 @@ def evaluate(
     sweep : Sweep, optional
         The cameras of a motion.
     method : Method, optional
+        How frames are recovered and ranked, and under which noise.
     jobs : int
         Processes, at most one a core. With more than one, what the method holds must be found by its name (no lambdas),
         and a script that calls this needs ``if __name__ == "__main__"``.

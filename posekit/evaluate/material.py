@@ -34,6 +34,7 @@ class Material:
     Parameters
     ----------
     works : tuple of Work
+        The pieces: what one process does at a time.
     clips, actions : tuple of str
         By the clip's number.
     left_out : tuple of str

@@ -34,6 +34,7 @@ class SweepCameras(NamedTuple):
     Attributes
     ----------
     R_cam_world : array (C, F, 3, 3)
+        Rotations from the world into each camera's frame.
     position : array (C, F, 3)
         Optical centres, metres.
     """
@@ -118,6 +119,7 @@ class Sweep:
         middle, forward : array (F, 3)
             The body's middle (m), and where it faces: horizontal unit vectors.
         up : array (3,)
+            The direction against gravity, world frame, unit length.
         ground : float
             Height of the ground along `up`, metres.
 

@@ -58,6 +58,7 @@ class Beam:
         Parameters
         ----------
         cost : array (S,)
+            Of each path so far, infinite for one that is not to be followed.
         fresh : bool array (S,)
             Those that are compared with each other only: a dearer path that goes elsewhere is not to be crowded out.
         least : int

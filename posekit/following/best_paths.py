@@ -46,6 +46,7 @@ def best_paths(
     k : int
         How many paths; fewer are returned where there are not so many.
     model : MotionModel, optional
+        How bodies move: what steps and turns cost.
     beam : Beam, optional
         Which paths are followed while searching.
     apart : float
@@ -82,6 +83,7 @@ def best_paths(
     along: list[tuple[Array, NDArray[np.bool_]]] = []
     exact = False
     for number in range(k):
+        # After the first, only paths through a survivor that is new to all paths found before are looked for.
         new = None if number == 0 else [_new(frame, at, along, apart) for at, frame in enumerate(frames)]
         found = _cheapest(frames, model, beam, new, _after(progress, number * len(frames), k * len(frames)))
         if found is None:

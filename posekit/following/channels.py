@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
 
+# The joints at both ends of each segment, in tree order.
 SEGMENT_STARTS: Final = np.array([start for start, _ in TREE_SEGMENTS])
 SEGMENT_ENDS: Final = np.array([end for _, end in TREE_SEGMENTS])
 N_JOINTS: Final = len(JOINTS)

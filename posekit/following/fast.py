@@ -23,7 +23,7 @@ CHANNEL_ORDER: Final = np.array(
 """Channels as they are asked: first those that most often tell that a survivor is too far off."""
 
 CHANNEL_RANKS: Final = np.argsort(CHANNEL_ORDER)
-"""Where each channel is then."""
+"""Where each channel is in that order."""
 
 
 def find(

@@ -67,6 +67,7 @@ class Follower:
     lag : int
         Frames, zero or more.
     model : MotionModel, optional
+        How bodies move: what steps and turns cost.
     beam : Beam, optional
         Which paths are followed: `LIVE_BEAM` unless told otherwise.
 

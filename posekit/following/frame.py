@@ -16,7 +16,7 @@ MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a joint is taken for a mistake."""
 
 MAX_DEVIATION_METRES = 1e3
-"""Metres beyond which a deviation is."""
+"""Metres beyond which a standard deviation is taken for a mistake."""
 
 
 def _none() -> Array:

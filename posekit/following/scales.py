@@ -26,7 +26,9 @@ class ScaleChoice:
     scales : array (S,)
         Ascending.
     cost : array (S,)
+        Of the cheapest path under each scale.
     paths : tuple of Paths (S,)
+        The paths under each scale.
     """
 
     scales: Array
@@ -82,7 +84,9 @@ def choose_scale(
     sets : mapping
         The scale to the frames, the same times in all.
     model : MotionModel, optional
+        How bodies move: what steps and turns cost.
     beam : Beam, optional
+        Which paths are followed while searching.
 
     Raises
     ------

@@ -24,7 +24,10 @@ from posekit.following.states import States
 from posekit.geometry import Array
 
 MISSING_JOINT_COST: Final = 5.0
-"""Cost of each joint that a survivor does not know and another of its frame does."""
+"""Cost of each joint that a survivor does not know and another of its frame does.
+
+Without it a survivor would be the cheaper the less of it is known, since unknown joints make no steps.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,9 +62,13 @@ def advance(
     Parameters
     ----------
     states : States
+        The ends of the paths so far.
     frame : SurvivorFrame
+        The next frame, with N survivors.
     model : MotionModel
+        How bodies move: what steps and turns cost.
     beam : Beam
+        Which paths are followed.
     fresh : bool array (N,), optional
         Survivors that make a path fresh.
     """
@@ -80,7 +87,8 @@ def advance(
     new = np.zeros(len(usable), dtype=np.bool_) if fresh is None else fresh[usable]
     to = NextSurvivors(channels=channels, time=frame.time, cost=own[usable], fresh=new)
     came, went, cost, left_out = arrivals(states, to, model=model, beam=beam)
-    # Once a path has a velocity, the beam is no wider than it is said to be.
+    # Paths without a velocity cost next to nothing: until some path has one, all survivors are followed. From then on
+    # the beam is no wider than it is said to be.
     seen = np.isfinite(states.time[:N_JOINTS]).any(axis=1) & channels.known[:N_JOINTS].any(axis=1)
     still = not (np.isfinite(states.interval).any() or (len(came) and seen.any()))
     rows, lost = beam.keep(

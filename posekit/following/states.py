@@ -20,6 +20,7 @@ class Heading(NamedTuple):
     known : bool array (14, S)
         Whether there is a velocity.
     place : array (14, S, 3)
+        Where each joint would be, camera frame, metres.
     weight : array (14, S)
         The square of the acceleration that a metre away is, per second squared.
     variance : array (14, S)
@@ -49,6 +50,7 @@ class States:
     time : array (27, S)
         When that was, seconds; NaN where a channel was never known.
     variance : array (27, S)
+        Of each coordinate of the position: square metres, square radians for directions.
     velocity : array (14, S, 3)
         Of the joints, arriving there.
     interval : array (14, S)

@@ -26,6 +26,7 @@ class Switch(NamedTuple):
     frame : int
         The frame after it.
     segment : str
+        Its name, ``a-b``.
     far : bool
         Whether it changed to far.
     angle : float

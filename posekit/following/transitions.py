@@ -25,11 +25,13 @@ class Target:
     Parameters
     ----------
     channels : Channels
+        The N survivors.
     time : float
         Seconds.
     centre : array (27, 3)
         Taken off all values, so that no digits are lost far from the origin.
     columns : array (27, 7, N)
+        The channels as `posekit.following.student.columns` lays them out.
     """
 
     channels: Channels

@@ -18,6 +18,7 @@ NEAREST_TO_RIGHT_ANGLE = 1e-3
 
 N_UNIFORM_POINTS = 160
 """Points of the grid that are evenly spaced."""
+
 NEAR_BOUND = np.geomspace(1e-5, 0.03, 36)
 """Points that resolve the corners of segments that are almost at the bound themselves."""
 

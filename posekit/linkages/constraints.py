@@ -21,7 +21,9 @@ from posekit.linkages.flips import FlipCodes, number_flips
 from posekit.linkages.residuals import Flatness, LoopClosure, Perpendicularity, Residual, Slice
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")
+
 MIN_CONSTRAINT_POINTS: Final = {"coplanar": 4, "collinear": 3}
+"""Three points always lie in a plane, and two on a line: fewer seen points say nothing."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +33,7 @@ class Constraints:
     Parameters
     ----------
     family : LinkageFamily
+        The linkage in its image.
     segments : int array (k,)
         The segments that matter: the residuals depend on no other.
     angle : BoundAngle
@@ -56,7 +59,9 @@ class Constraints:
         Parameters
         ----------
         signs : array (..., k)
+            The flips of the segments that matter, -1 or 1.
         psi : array broadcastable to (...)
+            The angle that stands for the scale, radians.
         """
         dZ, slope = self.angle.foreshortening(psi)
         return self.of(Slice(signs * dZ, signs * slope, np.cos(psi), -np.sin(psi)))
@@ -88,6 +93,7 @@ def put_together(
     Parameters
     ----------
     family : LinkageFamily
+        The linkage in its image.
     weights : mapping
         ``"closure"``, ``"coplanar"``, ``"perpendicular"``, ``"collinear"`` to a weight above zero.
     nearer : mapping, optional

@@ -35,6 +35,7 @@ class LinkageFamily:
     Parameters
     ----------
     linkage : Linkage
+        The object.
     image : array (P, 2)
         Its points in the image, pixels; NaN where one is not seen.
     aspect : float
@@ -190,6 +191,7 @@ class LinkageFamily:
         Parameters
         ----------
         s : float or array (...)
+            Scales, pixels a unit of length, at or above the bound.
         flips : array (..., S)
             +1 where the first end of a segment is nearer, -1 where its second is; 0 only where it is
             foreshortened to nothing or not seen.

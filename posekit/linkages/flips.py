@@ -71,6 +71,7 @@ def number_flips(
     Parameters
     ----------
     k : int
+        How many segments there are.
     blocks : sequence of sequence of int
         Which of them share constraints.
     given : array (k,)

@@ -61,7 +61,9 @@ def incidence(linkage: Linkage, seen: Sequence[bool]) -> Incidence:
     Parameters
     ----------
     linkage : Linkage
+        The object.
     seen : sequence of bool (S,)
+        Whether each segment is seen at both ends.
     """
     n_points, n_nodes, n_segments = len(linkage.points), len(linkage.nodes), len(linkage.segments)
     weights = linkage.place_nodes(np.eye(n_points))

@@ -28,6 +28,7 @@ class Minima:
     s : array (M,)
         Scales, pixels a unit of length.
     residual : array (M,)
+        The weighted sum of squares that the constraints leave there, dimensionless.
     flips : int array (M, S)
         +1 where the first end of a segment is nearer, -1 where its second is, 0 where it does not matter: the
         constraints do not read the segment, or it is foreshortened to nothing.

@@ -74,6 +74,7 @@ class Flatness:
     place : array (n, 2)
         The points in the image at the bound, relative to their mean.
     rank : {1, 2}
+        How many dimensions the points should have: a plane has 2, a line 1.
     """
 
     spread: Array

@@ -37,6 +37,7 @@ class Carried:
     Parameters
     ----------
     model : pinocchio.Model
+        The robot.
     names : tuple of str
         Frames of the model.
     extra : tuple of (int, array (3,))
@@ -144,6 +145,7 @@ def linkage_of(robot: Robot, *, points: Sequence[str] | None = None) -> Linkage:
     Parameters
     ----------
     robot : Robot
+        The robot, with or without a free base.
     points : sequence of str, optional
         Links or joints to take instead, as `Robot.frame_names` has them.
 

@@ -58,6 +58,7 @@ def search(
     Parameters
     ----------
     family : LinkageFamily
+        The linkage in its image.
     weights : mapping
         ``"closure"`` (squared distance of the ends of each loop, cut open), ``"coplanar"`` (sum of squared
         distances to the best plane), ``"perpendicular"`` (squared cosine), ``"collinear"`` (sum of squared distances

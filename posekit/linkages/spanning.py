@@ -29,6 +29,7 @@ class SpanningTree:
     Parameters
     ----------
     linkage : Linkage
+        The object whose points the tree lifts.
     tree : InterpretationTree
         Lengths in the linkage's own unit.
     nodes : tuple of int (J,)
@@ -96,6 +97,7 @@ def span(linkage: Linkage, root: str | None = None) -> SpanningTree:
     Parameters
     ----------
     linkage : Linkage
+        The object whose points are to be lifted.
     root : str, optional
         The point to start from; by default the first.
 

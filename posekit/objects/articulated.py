@@ -29,6 +29,7 @@ class ArticulatedObject:
     Parameters
     ----------
     linkage : Linkage
+        Its points, its segments and their lengths.
     robot : Robot, optional
         Free-flying; the linkage's points are links or joints of it.
 
@@ -121,6 +122,7 @@ def tolerance_of(
     Parameters
     ----------
     thing : ArticulatedObject
+        The object, whose unit the tolerance gets.
     rigid, tangent : float, optional
         Metres; as for measured points where one is not given. Points may be off by half of `tangent`.
 

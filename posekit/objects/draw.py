@@ -24,8 +24,11 @@ def draw_configurations(robot: Robot, count: int, rng: np.random.Generator) -> A
     Parameters
     ----------
     robot : Robot
+        The robot, whose limits are kept.
     count : int
+        How many configurations are drawn: N.
     rng : numpy.random.Generator
+        Seeded by the caller.
     """
     space = ConfigurationSpace(robot.model)
     q = np.tile(pin.neutral(robot.model), (count, 1))
@@ -58,7 +61,9 @@ def draw_view(
     thing : ArticulatedObject
         With a robot.
     count : int
+        How many frames are drawn.
     rng : numpy.random.Generator
+        Seeded by the caller.
     noise : float
         Standard deviation of the image points, pixels.
     scale_known : bool

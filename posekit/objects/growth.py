@@ -36,12 +36,15 @@ class GrownObject:
     Parameters
     ----------
     plan : ObjectPlan
+        What was grown: the tree over the points that are seen.
     parts : tuple of (Leaves, int)
         Trees grown together, each with the number of its first scale.
     checks : list of Check
         Those that pruned them.
     tolerance : ObjectTolerance
+        What it was judged with, working units.
     judged : str
+        What that is called in the result.
     """
 
     plan: ObjectPlan
@@ -151,9 +154,11 @@ def grow(
     Parameters
     ----------
     plan : ObjectPlan
+        The tree over the points that are seen.
     image : array (P, 2)
         Of all points of the object.
     aspect : float
+        Width of a pixel over its height.
     scales : array (H,)
         Pixels a working unit.
     tolerance : ObjectTolerance

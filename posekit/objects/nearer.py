@@ -70,6 +70,7 @@ class NearerEnds:
         Parameters
         ----------
         leaves : Leaves
+            Survivors of the tree.
         frames : int array (H,)
             The view's frame of each hypothesis of the leaves.
         """

@@ -28,6 +28,7 @@ class ObjectPlan:
     Parameters
     ----------
     thing : ArticulatedObject
+        The object, with its robot where it has one.
     linkage : Linkage
         As much of it as is seen, in working units.
     columns : tuple of int
@@ -101,6 +102,7 @@ class ObjectPlan:
         Parameters
         ----------
         tolerance : ObjectTolerance
+            By how much loops and shapes may be off, working units.
         spread : ImageSpread, optional
             How far depths may be off; absent where the image is exact.
         """

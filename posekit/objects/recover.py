@@ -39,6 +39,7 @@ def recover_object(
     Parameters
     ----------
     view : ObjectView
+        The image points of its frames, and the camera's aspect.
     thing : ArticulatedObject
         The linkage, and its robot where it has one: see `load_object`.
     scale : Scale, optional

@@ -45,6 +45,7 @@ def family_of(
     Parameters
     ----------
     plan : ObjectPlan
+        The tree over the points that are seen.
     image : array (P, 2)
         Of all points of the object.
     camera : ScaledOrthographicModel

@@ -26,6 +26,7 @@ class ImageSpread:
     Parameters
     ----------
     parents : tuple of int (J,)
+        The parent of each of the tree's joints; -1 for the root.
     edges : array (J,)
         By how much the depth across the segment to each joint's parent may be off, working units.
     beside : float
@@ -77,6 +78,7 @@ class Loose(Check):
     check : Check
         Of the distance of two points, of a flip, or of a shape (`posekit.objects.shape`).
     spread : ImageSpread
+        By how much the depths of points may be off.
     """
 
     check: Check

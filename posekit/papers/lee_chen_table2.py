@@ -24,8 +24,11 @@ class CameraEstimate:
     Parameters
     ----------
     way : str
+        How the camera was found, as the table's row is called.
     f : float
+        Focal length.
     position : array (3,)
+        Where the camera stands, head-centred frame.
     off : float
         Distance of the position from (400, 0, 0).
     misfit : str or None

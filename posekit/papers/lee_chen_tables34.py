@@ -34,6 +34,7 @@ class Sequence1985:
     Parameters
     ----------
     name : str
+        ``seq1`` or ``seq2``.
     velocity : float
         Leg lengths a second.
     phase : float
@@ -73,6 +74,7 @@ def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = N_PH
     Parameters
     ----------
     name : {"seq1", "seq2"}
+        Which sequence.
     velocity : float
         Leg lengths a second.
     phase0 : float

@@ -41,6 +41,7 @@ class Constrained:
     printed : float
         Degrees: the paper's largest difference between an angle recovered and measured.
     linkage : Linkage
+        The object, with its constraint.
     points : array (P, 3)
         The true posture, camera frame.
     worst : array (N,)

@@ -114,8 +114,11 @@ def accuracy(
     Parameters
     ----------
     human : Human
+        Taylor's human: its points and segments.
     seen : iterable of StudyPictures
+        The pictures, with the truth.
     tolerance : Tolerance
+        What the checks allow.
     ranges : Ranges, optional
         The figure's own unless told otherwise.
 

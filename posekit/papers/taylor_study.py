@@ -49,7 +49,9 @@ class Photographed:
     short : float
         Share of the pictures in which s as told is below its lower bound.
     survival : tuple of Survival
+        What each check leaves.
     accuracy : tuple of Accuracy
+        How near the truth the answers are.
     """
 
     proportions: Proportions
@@ -92,6 +94,7 @@ class Study:
     title : str
         What postures, and what they are.
     pictures : int
+        How many pictures there are.
     exact : tuple of Survival
         Scaled orthographic pictures, true s, the frame's own lengths.
     photographs : tuple of Photographed
@@ -150,7 +153,9 @@ def synthetic_study(pictures: int = 300, seed: int = 0) -> Study:
     Parameters
     ----------
     pictures : int
+        How many postures are drawn, each for one picture.
     seed : int
+        Of postures, cameras and noise.
     """
     person = load_figure().from_stature(STATURE_METRES)
     scenes = (random_views(person, pictures, np.random.default_rng(seed), CAMERA_SPHERE),)
@@ -171,7 +176,9 @@ def capture_study(capture: Path, pictures: int = 1000, seed: int = 0) -> Study:
     capture : Path
         An NPZ as `posekit.synthesis.read_capture` reads it.
     pictures : int
+        How many frames are drawn, each for one picture.
     seed : int
+        Of cameras and noise.
 
     Raises
     ------

@@ -98,9 +98,11 @@ def survival(
     Parameters
     ----------
     human : Human
+        Taylor's human: its points and segments.
     seen : iterable of StudyPictures
         All pictures count alike.
     tolerance : Tolerance
+        What the checks allow.
     ranges : sequence of str
         Names of joint-range tables, each a row alone and a row with all other checks.
 

@@ -75,6 +75,7 @@ def exact_views(human: Human, scenes: Iterable[SyntheticScene]) -> list[StudyPic
     Parameters
     ----------
     human : Human
+        Taylor's human: its points and segments.
     scenes : iterable of SyntheticScene
         Their cameras' axes are the directions of view; their figures are judged by.
     """
@@ -109,6 +110,7 @@ def photographs(
     Parameters
     ----------
     human : Human
+        Taylor's human: its points and segments.
     scenes : iterable of SyntheticScene
         Their figures are the people; the stature follows from the limbs (`posekit.body.stature_from_lengths`).
     noise : float

@@ -17,10 +17,12 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINT, SIDES
 
 HEAD_MASS: Final = 0.0681
-HEAD_ABOVE_NECK: Final = 0.203
-"""In lengths of the trunk."""
 TRUNK_MASS: Final = 0.43015
+"""Fractions of the body's mass."""
+
+HEAD_ABOVE_NECK: Final = 0.203
 TRUNK_BELOW_NECK: Final = 0.5051
+"""Where their centres are on the line from the neck to the middle of the hips, in its lengths."""
 
 LIMB_MASSES: Final = (
     ("shoulder", "elbow", 0.0263, 0.5763),

@@ -25,7 +25,11 @@ BLUR_RADIANS: Final = 0.1
 """Added to the deviation of each component, radians: other people, and other ways to place their joints."""
 
 PRIOR_DEGREES_OF_FREEDOM: Final = 4.0
+"""Degrees of freedom of the t distributions: postures far from those that were recorded are rare, not impossible."""
+
 DEFAULT_TEMPERATURE: Final = 0.008
+"""Metres: see `posekit.ranking.prior.Prior`."""
+
 BALANCE_SCALE_METRES, CONTACT_SCALE_METRES = 0.10, 0.06
 """Metres: see `posekit.ranking.prior.SmallDistancePrior`."""
 
@@ -57,8 +61,11 @@ def fit_prior(
     blocks : sequence of sequence of str
         The directions that are judged together, by name.
     blur : float
+        Added to the deviation of each component, radians.
     dof : float
+        Degrees of freedom of the t distributions.
     temperature : float
+        Metres: see `Prior`.
     source : str
         What the postures are.
 
@@ -79,6 +86,7 @@ def fit_prior(
     whole = np.isfinite(found).all(axis=(0, 1)) & (share > 0)
     if not whole.any():
         raise InputError("no posture has all joints; expected motion capture of whole bodies")
+    # Each posture counts twice, as it is and in the mirror: the prior is then as likely for left as for right.
     flat = np.concatenate([found[..., whole], mirrored(found[..., whole])], axis=2).reshape(
         3 * len(DIRECTION_NAMES), -1
     )

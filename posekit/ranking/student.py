@@ -27,6 +27,7 @@ class Student:
     Parameters
     ----------
     mean : array (d,)
+        The middle of the distribution: m.
     scale : array (d, d)
         Symmetric, positive definite: S.
     dof : float
@@ -99,6 +100,7 @@ def excess(squared: Array, count: int, dof: float) -> Array:
     count : int
         Of coordinates.
     dof : float
+        Degrees of freedom: the fewer, the heavier the tails.
     """
     power = (dof + count) / 2
     return np.asarray(power * (digamma(power) - digamma(dof / 2)) - power * np.log1p(squared / dof))

@@ -23,6 +23,7 @@ class CameraPlacements(NamedTuple):
     Attributes
     ----------
     R_cam_world : array (N, 3, 3)
+        Rotations from the world into each camera's frame.
     position : array (N, 3)
         Optical centres, world frame, metres.
     """
@@ -82,6 +83,7 @@ class CameraSphere:
         up : array (3,)
             The world's up.
         rng : Generator
+            Seeded by the caller.
 
         Raises
         ------

@@ -31,6 +31,7 @@ def read_capture(
     Parameters
     ----------
     path : path
+        An NPZ file.
     format, unit, up : str, optional
         Where the file's own are wrong or missing; see `posekit.formats.motion.read_motion`. A way up that neither
         says is guessed from necks and ankles, and the capture says so.

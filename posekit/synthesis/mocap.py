@@ -48,6 +48,7 @@ def mocap_scene(
     Parameters
     ----------
     capture : Capture
+        Recorded motion of one or several clips.
     clip : str
         Its name.
     rng : Generator
@@ -120,11 +121,14 @@ def mocap_scenes(
     Parameters
     ----------
     capture : Capture
+        Recorded motion of one or several clips.
     n : int
         Frames; each clip gives its share, n over the number of clips, spread over its length. Only frames
         with all 14 joints are taken, and all of a clip that has fewer than its share.
     rng : Generator
+        Seeded by the caller: it draws the cameras.
     sphere : CameraSphere, optional
+        Where cameras may stand, and what they are.
     figure : Figure, optional
         The figure to scale to each clip's median lengths.
 

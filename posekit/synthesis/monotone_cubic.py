@@ -32,6 +32,7 @@ class PeriodicMonotoneCubic:
     y : array (K,)
         The values there; the curve has y[0] again at x[0] + period.
     period : float
+        What x is increased by until the curve repeats.
 
     Raises
     ------

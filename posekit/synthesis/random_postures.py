@@ -27,6 +27,7 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
     figure : Figure
         `Figure.with_limits` narrows the ranges.
     n : int
+        How many postures are drawn.
     rng : Generator
         The same seed gives the same postures.
 
@@ -70,7 +71,9 @@ def random_views(
     Parameters
     ----------
     figure : Figure
+        The person: lengths, limits and capsules.
     n : int
+        How many postures are drawn, each seen by a camera of its own.
     rng : Generator
         The same seed gives the same views.
     sphere : CameraSphere, optional

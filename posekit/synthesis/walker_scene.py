@@ -52,6 +52,7 @@ def walker_scene(
     Parameters
     ----------
     walker : Walker
+        Who walks, and how fast.
     camera : array (3,)
         The camera's position as the paper counts it: the origin of the image plane, head-centred frame (x
         forward, y up, z right), metres. The optical centre is f further back.
@@ -60,6 +61,7 @@ def walker_scene(
     f : float
         From the centre of projection to the image plane, metres.
     frames : int
+        How many frames are made.
     dt : float
         Seconds between frames.
     phase0 : float

@@ -87,6 +87,7 @@ class Studio:
         Parameters
         ----------
         scene : Scene
+            What is drawn.
         eye : Eye, ViewEye or ParallelEye
             Where it is looked at from.
         size : (int, int)

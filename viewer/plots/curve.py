@@ -30,6 +30,7 @@ def plot_curve(scale: Array, residual: Array, *, minima: tuple[Array, Array], ti
     minima : tuple of array (M,)
         Scales and residuals of the local minima.
     title : str
+        What the drawing is headed with.
 
     Returns
     -------

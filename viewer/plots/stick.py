@@ -40,6 +40,7 @@ def draw_stick(
     Parameters
     ----------
     axes : matplotlib.axes.Axes
+        Where it is drawn.
     points : array (14, 2)
         Joints in the plane of the drawing; a segment with an unknown end (NaN) is left out.
     extent : float

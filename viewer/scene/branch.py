@@ -92,9 +92,11 @@ def lift_branch(
     Parameters
     ----------
     camera : Camera
+        A calibrated camera, or a scaled orthographic one.
     root : array (3,)
         The neck, camera frame, metres.
     image : array (14, 2)
+        Image points of the joints, y down, in the camera's unit; NaN where not seen.
     lengths : array (13,)
         Of the segments in tree order, metres.
     bits : str

@@ -45,6 +45,7 @@ class Style:
     Parameters
     ----------
     layout : {"side-by-side", "superposed"}
+        Whether several postures stand beside each other or in each other.
     look : Look, optional
         Of the bodies; by default translucent.
     background : str
@@ -86,7 +87,9 @@ def compose(
     shown : Shown
         One posture or more; those without any known joint are left out.
     figure : Figure
+        Whose capsules are drawn.
     world : World
+        The frame in which they stand.
     style : Style
         What superposed bodies have in common is drawn once. Where they are of several groups, what is one
         group's alone has its colour and what several share is grey; else all has its side's colour. Side by

@@ -88,6 +88,7 @@ class ViewEye:
     K : array (3, 3)
         Intrinsics in pixels of the picture, whose first pixel is centred on (0, 0).
     world : World
+        Where the view's camera stands.
     """
 
     K: Array
@@ -114,6 +115,7 @@ class ParallelEye:
         Where the origin of the camera's frame is seen, in pixels of the picture, whose first pixel is centred on
         (0, 0).
     world : World
+        Where the view's camera stands.
     """
 
     scale: Array

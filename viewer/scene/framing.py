@@ -31,6 +31,7 @@ def fitted_eye(
     points : array (M, 3)
         World, metres; NaN where unknown.
     world : World
+        The frame of the points, which says where the view's camera looks.
     azimuth, elevation : float
         Degrees. At azimuth 0 one stands where the view's camera does, at 90 on its right-hand side.
     fov : float
@@ -76,7 +77,9 @@ def view_eye(sight: ImageSight | None, world: World, size: tuple[int, int]) -> C
     Parameters
     ----------
     sight : ImageSight
+        What the view's camera sees; None where that is not known.
     world : World
+        Where the view's camera stands.
     size : (int, int)
         Width and height of the picture, pixels.
 

@@ -43,14 +43,17 @@ def add_region(
     Parameters
     ----------
     scene : Scene
+        What the box is added to.
     path : str
         Below ``/meshcat``.
     inferred : Inferred
         Its box lies along the camera's axes.
     world : World
+        The frame in which the box stands.
     shift : array (3,)
         Moves the box in the world, metres.
     colour : (r, g, b)
+        Of faces and edges, each 0 to 1.
     """
     if np.max(inferred.upper - inferred.lower) < SAME_POSITION_METRES:
         return

@@ -103,7 +103,9 @@ def add_sight(
     Parameters
     ----------
     sight : ImageSight
+        What the camera sees.
     world : World
+        The frame in which the camera stands.
     points : array (..., 14, 3) or (..., 19, 3), optional
         The postures, camera frame, metres: rays end where they pass the last of them; without them all rays
         end beyond the image plane.

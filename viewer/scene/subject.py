@@ -33,6 +33,7 @@ class Shown:
     q : array (N, nq), optional
         Their configurations.
     groups : int array (N,), optional
+        The group that each is of, counted from 0.
     reasons : sequence of N str
         Why each was rejected; empty texts for those that were not.
     sight : ImageSight, optional
@@ -104,7 +105,9 @@ class DrawnSubject:
     Parameters
     ----------
     figure : Figure
+        Whose capsules are drawn.
     frames : sequence of Shown
+        What is drawn of each frame.
     R_cam_world : array (3, 3), optional
         The view's rotation from a world whose z is up.
     """

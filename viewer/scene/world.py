@@ -23,6 +23,7 @@ class World:
     Parameters
     ----------
     R_world_cam : array (3, 3)
+        Rotation from the view's camera frame into the world.
     t_world_cam : array (3,)
         ``p_world = R_world_cam p_cam + t_world_cam``.
     """
