@@ -25,8 +25,8 @@ from posekit.formats.cameras import read_cameras
 from posekit.formats.markdown import table_lines
 from posekit.formats.motion import postures_of, read_motion
 from posekit.recovery import recover
-from posekit.views import given_views
-from posekit.views.opening import Opened
+from posekit.views.given_views import given_views
+from posekit.views.opened import Opened
 from posekit.views.source import Source
 
 

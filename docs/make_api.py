@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[1]
 SECTIONS: Final = (
     ("From Python", "posekit"),
     ("Errors", "posekit.errors"),
+    ("Names loaded on demand", "posekit.on_demand"),
     ("Names of joints", "posekit.skeleton"),
     ("Vectors and rotations", "posekit.geometry"),
     ("Settings", "posekit.settings"),

@@ -2,13 +2,18 @@
 
 import importlib.metadata
 import importlib.util
+import inspect
+import re
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
+
+import posekit
 
 ROOT = Path(__file__).resolve().parents[1]
 LINKED = ("urdf", "validators", "viewer")
@@ -101,3 +106,26 @@ def test_the_api_page_lists_every_module() -> None:
     assert (ROOT / "docs" / "api.md").read_text(encoding="utf-8") == page.text(), (
         "run: python docs/make_api.py"
     )
+
+
+def lazy_packages() -> list[str]:
+    """Name the packages whose names are loaded on demand."""
+    root = Path(posekit.__file__).parent
+    return sorted(
+        ".".join(("posekit", *path.parent.relative_to(root).parts))
+        for path in [*root.rglob("__init__.py"), *(root / "validators").rglob("__init__.py")]
+        if "on_demand(" in path.read_text(encoding="utf-8")
+    )
+
+
+@pytest.mark.parametrize("package", lazy_packages())
+def test_names_that_are_loaded_on_demand_are_those_that_types_are_checked_by(package: str) -> None:
+    module = import_module(package)
+    source = Path(str(module.__file__)).read_text(encoding="utf-8")
+    said = re.findall(rf"^    from {re.escape(package)}\.(\S+) import (\w+) as \2$", source, re.MULTILINE)
+    offered = inspect.getclosurevars(module.__getattr__).nonlocals["home"]
+    assert offered == {name: f"{package}.{inside}" for inside, name in said}
+    for name, home in offered.items():
+        assert getattr(module, name) is getattr(import_module(home), name)
+        with pytest.raises(ImportError):  # the import system would set such a name to the module
+            import_module(f"{package}.{name}")

@@ -5,6 +5,9 @@ the interpretation tree asks as soon as those points are known, and `Validator` 
 has them by name; a check of your own inherits from `Check` (docs, "Write your own check").
 """
 
+from typing import TYPE_CHECKING
+
+from posekit.on_demand import on_demand
 from posekit.tree import Check as Check
 from posekit.tree import Findings as Findings
 from posekit.tree import Loosening as Loosening
@@ -12,19 +15,47 @@ from posekit.tree import Place as Place
 from posekit.tree import Scope as Scope
 from posekit.validators.collision import collision as collision
 from posekit.validators.joint_range import joint_range as joint_range
-from posekit.validators.options import CheckOptions as CheckOptions
-from posekit.validators.ranges import Ranges as Ranges
-from posekit.validators.ranges import load_ranges as load_ranges
-from posekit.validators.registry import CHECKS as CHECKS
-from posekit.validators.registry import PHYSICAL as PHYSICAL
-from posekit.validators.registry import AnyCheck as AnyCheck
-from posekit.validators.registry import check_names as check_names
-from posekit.validators.registry import chosen_checks as chosen_checks
-from posekit.validators.registry import make_checks as make_checks
 from posekit.validators.rigid_parts import rigid_parts as rigid_parts
-from posekit.validators.robot.report import Report as Report
-from posekit.validators.suite import Judgement as Judgement
-from posekit.validators.suite import judge as judge
-from posekit.validators.suite import worst_margins as worst_margins
-from posekit.validators.validator import Validator as Validator
 from posekit.validators.walking import walking as walking
+
+if TYPE_CHECKING:
+    from posekit.validators.options import CheckOptions as CheckOptions
+    from posekit.validators.ranges import Ranges as Ranges
+    from posekit.validators.ranges import load_ranges as load_ranges
+    from posekit.validators.registry import CHECKS as CHECKS
+    from posekit.validators.registry import PHYSICAL as PHYSICAL
+    from posekit.validators.registry import AnyCheck as AnyCheck
+    from posekit.validators.registry import check_names as check_names
+    from posekit.validators.registry import chosen_checks as chosen_checks
+    from posekit.validators.registry import make_checks as make_checks
+    from posekit.validators.robot.report import Report as Report
+    from posekit.validators.suite import Judgement as Judgement
+    from posekit.validators.suite import judge as judge
+    from posekit.validators.suite import worst_margins as worst_margins
+    from posekit.validators.validator import Validator as Validator
+else:
+    __getattr__ = on_demand(
+        __name__,
+        {
+            "options": ("CheckOptions",),
+            "ranges": (
+                "Ranges",
+                "load_ranges",
+            ),
+            "registry": (
+                "CHECKS",
+                "PHYSICAL",
+                "AnyCheck",
+                "check_names",
+                "chosen_checks",
+                "make_checks",
+            ),
+            "robot.report": ("Report",),
+            "suite": (
+                "Judgement",
+                "judge",
+                "worst_margins",
+            ),
+            "validator": ("Validator",),
+        },
+    )

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from posekit.recovery.recovery import Recovery
     from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.settings import RecoverSettings
-    from posekit.views.opening import Opened
+    from posekit.views.opened import Opened
 
 
 def settings_of(

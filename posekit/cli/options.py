@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -130,12 +131,30 @@ def progress_so_far(label: str) -> Iterator[Any]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
+def on_terminal() -> bool:
+    """Tell whether stderr is a terminal."""
+    return sys.stderr.isatty()
+
+
+class _NoBar:
+    """A bar that nobody sees: where there is no terminal, what draws one is not even loaded."""
+
+    def advance(self, task: Any, advance: float) -> None:
+        """Do nothing."""
+
+    def update(self, task: Any, **fields: Any) -> None:
+        """Do nothing."""
+
+
 @contextmanager
 def _bar(label: str, total: int | None) -> Iterator[tuple[Any, Any]]:
+    if not on_terminal():
+        yield _NoBar(), None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
     console = Console(stderr=True)
     columns = (TextColumn(label), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=console, transient=True) as bar:
         yield bar, bar.add_task(label, total=total)

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from posekit.formats.own import View
     from posekit.recovery.recovery import Recovery
     from posekit.recovery.scaled_sequences import ScaledFollowing
-    from posekit.views.opening import Opened
+    from posekit.views.opened import Opened
 
 EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
@@ -138,7 +138,6 @@ def recover(
     ] = False,
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
-    from posekit.conversion.conversion import of_person
     from posekit.formats import own as files
     from posekit.recovery.conductor import recover as recover_view
     from posekit.recovery.result import result_of
@@ -184,10 +183,14 @@ def recover(
     for one, recovery, scaled in recovered:
         for line in one.says:
             typer.echo(line)
-        alone = len(people) == 1
-        if write_urdf is not None:
-            recovery.figure.write(of_person(write_urdf, one, alone=alone))
-        path = of_person(output, one, alone=alone)
+        path, figure_path = output, write_urdf
+        if len(people) > 1:
+            from posekit.conversion.conversion import of_person
+
+            path = of_person(output, one, alone=False)
+            figure_path = None if write_urdf is None else of_person(write_urdf, one, alone=False)
+        if figure_path is not None:
+            recovery.figure.write(figure_path)
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
         files.write_result(path, result)

@@ -24,7 +24,8 @@ from posekit.formats.motion import UPS, motion_formats
 from posekit.formats.own import View
 from posekit.formats.recognising import recognise
 from posekit.safe_io import nearest, refusal, shown
-from posekit.views.opening import Opened, open_views
+from posekit.views.opened import Opened
+from posekit.views.opening import open_views
 from posekit.views.source import Source
 
 OWN: Final = ("view", "postures")

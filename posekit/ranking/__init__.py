@@ -4,18 +4,48 @@
 uses, `fit_prior` and `fit_weights` make one.
 """
 
+from typing import TYPE_CHECKING
+
+from posekit.on_demand import on_demand
 from posekit.ranking.centre_of_mass import centre_of_mass as centre_of_mass
-from posekit.ranking.depth import Depth as Depth
-from posekit.ranking.deviation import deviation_of_noise as deviation_of_noise
-from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
-from posekit.ranking.evidence import RankingEvidence as RankingEvidence
-from posekit.ranking.fitting import fit_prior as fit_prior
-from posekit.ranking.prior import TERM_NAMES as TERM_NAMES
-from posekit.ranking.prior import Prior as Prior
-from posekit.ranking.prior_file import load_prior as load_prior
-from posekit.ranking.prior_file import write_prior as write_prior
-from posekit.ranking.rank import Term as Term
 from posekit.ranking.rank import rank as rank
-from posekit.ranking.ranking import Ranking as Ranking
-from posekit.ranking.upright import Up as Up
-from posekit.ranking.weights import fit_weights as fit_weights
+
+if TYPE_CHECKING:
+    from posekit.ranking.depth import Depth as Depth
+    from posekit.ranking.deviation import deviation_of_noise as deviation_of_noise
+    from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
+    from posekit.ranking.evidence import RankingEvidence as RankingEvidence
+    from posekit.ranking.fitting import fit_prior as fit_prior
+    from posekit.ranking.prior import TERM_NAMES as TERM_NAMES
+    from posekit.ranking.prior import Prior as Prior
+    from posekit.ranking.prior_file import load_prior as load_prior
+    from posekit.ranking.prior_file import write_prior as write_prior
+    from posekit.ranking.rank import Term as Term
+    from posekit.ranking.ranking import Ranking as Ranking
+    from posekit.ranking.upright import Up as Up
+    from posekit.ranking.weights import fit_weights as fit_weights
+else:
+    __getattr__ = on_demand(
+        __name__,
+        {
+            "depth": ("Depth",),
+            "deviation": (
+                "deviation_of_noise",
+                "deviation_of_tolerance",
+            ),
+            "evidence": ("RankingEvidence",),
+            "fitting": ("fit_prior",),
+            "prior": (
+                "TERM_NAMES",
+                "Prior",
+            ),
+            "prior_file": (
+                "load_prior",
+                "write_prior",
+            ),
+            "rank": ("Term",),
+            "ranking": ("Ranking",),
+            "upright": ("Up",),
+            "weights": ("fit_weights",),
+        },
+    )

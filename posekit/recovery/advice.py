@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from posekit.recovery.least_violation import least_violation
-from posekit.recovery.length_diagnosis import doubt_lines
 from posekit.recovery.recovery import Recovery
 from posekit.settings import MEASURED_TOLERANCE
 
@@ -24,6 +22,8 @@ def advice_lines(recovery: Recovery) -> list[str]:
         return []
     empty = [k for k, frame in enumerate(recovery.frames) if not len(frame) and not frame.reason]
     lines = []
+    if empty:
+        from posekit.recovery.least_violation import least_violation
     for k in empty[:NAMED]:
         frame = recovery.frames[k]
         allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
@@ -43,5 +43,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
         if not len(frame) and (not frame.reason or frame.placement is not None)
     ]
     if len(lost) > len(recovery.frames) / 2:
+        from posekit.recovery.length_diagnosis import doubt_lines
+
         lines += doubt_lines(recovery, grower, lost)
     return lines

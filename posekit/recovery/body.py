@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from posekit.body import Figure
 from posekit.geometry import Array
-from posekit.linkages import Linkage
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves
 from posekit.validators import CheckOptions, Ranges, chosen_checks, load_ranges, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
 from posekit.validators.walking import thresholds_of
+
+if TYPE_CHECKING:
+    from posekit.linkages import Linkage
 
 
 def ranges_of(settings: RecoverSettings) -> Ranges:
@@ -122,6 +124,8 @@ class FigureBody:
     @cached_property
     def linkage(self) -> Linkage:
         """All 17 lengths: torso and hips are closed loops."""
+        from posekit.linkages import Linkage
+
         return Linkage(
             name="figure",
             points=JOINTS,

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera, lee_chen
-from posekit.cameras.head import HeadPoints, HeadPose, calibrate, solve_pose
-from posekit.cameras.neck import Placement
 from posekit.compiled.compiling import n_threads
 from posekit.errors import HeadError, InputError
-from posekit.formats.own import Family, LeeChenModel, OpenCVModel, View
+from posekit.formats.own import Family, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.recovery.observed import NO_NECK, neckless
 from posekit.recovery.rooting import place_roots
 from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, HEAD_POINTS
+
+if TYPE_CHECKING:
+    from posekit.cameras.head import HeadPose
+    from posekit.cameras.neck import Placement
 
 ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 """Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
@@ -102,29 +105,16 @@ def fit_camera(
     """
     n = len(view.time)
     shown = ~neckless(view)
-    names = ("neck", *HEAD_POINTS)
-    points = {name: figure.head_points[k] for k, name in enumerate(names)} | dict(view.head_points or {})
-    head_points = HeadPoints.from_mapping(points)
     image = np.concatenate([view.image[:, :1], view.head_image], axis=1)
     image[~shown] = np.nan
-    seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= len(names)
+    seen = np.isfinite(image).all(axis=-1).sum(axis=1) >= 1 + len(HEAD_POINTS)
     rooting = rooting or Rooting()
     # A neck that was put between the shoulders is no point of the head. Where all necks are given, it is only turned.
     trusted = rooting.trust_head or np.isfinite(view.root[shown]).all()
     if "neck" in view.derived or rooting.method != "auto" or not trusted:
         seen[:] = False
-    pose: HeadPose | None = None
     model = view.camera
-    if isinstance(model, LeeChenModel):
-        pose = None
-        if seen.any() or model.f is None:
-            pose = calibrate(head_points, image, f=model.f, threads=n_threads())
-        camera = lee_chen.pinhole(_recovered_f(pose) if model.f is None else model.f)
-    elif isinstance(model, OpenCVModel):
-        camera = PinholeCamera(K=model.K, distortion=model.distortion)
-        pose = solve_pose(head_points, image, camera, threads=n_threads()) if seen.any() else None
-    else:
-        raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
+    camera, pose = _head_pose(view, figure, image, worth=bool(seen.any()))
     root = np.where(shown[:, None], view.root, np.nan)
     head = np.full((n, len(HEAD), 3), np.nan)
     reasons = ["" if there else f"frames[{k}]: {NO_NECK}" for k, there in enumerate(shown.tolist())]
@@ -157,6 +147,31 @@ def fit_camera(
         reasons=reasons,
         placements=placements,
     )
+
+
+def _head_pose(
+    view: View, figure: Figure, image: Array, *, worth: bool
+) -> tuple[PinholeCamera, HeadPose | None]:
+    """Find the camera, and where it sees the head (F, 6, 2) wherever that is worth it or tells the focal length."""
+    model = view.camera
+    if isinstance(model, ScaledOrthographicModel):
+        raise InputError("camera.model is scaled-orthographic, which has no head to fit; use fit_scale")
+    unknown = isinstance(model, LeeChenModel) and model.f is None
+    pose: HeadPose | None = None
+    if worth or unknown or view.head_points:
+        from posekit.cameras.head import HeadPoints, calibrate, solve_pose
+
+        names = ("neck", *HEAD_POINTS)
+        own = {name: figure.head_points[k] for k, name in enumerate(names)}
+        points = HeadPoints.from_mapping(own | dict(view.head_points or {}))
+        if isinstance(model, LeeChenModel) and (worth or unknown):
+            pose = calibrate(points, image, f=model.f, threads=n_threads())
+        elif isinstance(model, OpenCVModel) and worth:
+            camera = PinholeCamera(K=model.K, distortion=model.distortion)
+            return camera, solve_pose(points, image, camera, threads=n_threads())
+    if isinstance(model, OpenCVModel):
+        return PinholeCamera(K=model.K, distortion=model.distortion), None
+    return lee_chen.pinhole(_recovered_f(pose) if model.f is None else model.f), pose
 
 
 def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Placement | None]:

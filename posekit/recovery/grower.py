@@ -6,6 +6,7 @@ import warnings
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,14 +14,16 @@ from numpy.typing import NDArray
 from posekit.cameras import Camera
 from posekit.formats.own import View
 from posekit.geometry import Array
-from posekit.hidden import CompletedSurvivors, complete, reject
-from posekit.objects.nearer import NearerEnds
 from posekit.recovery.body import Body, FigureBody, suite_of
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
 from posekit.settings import EXACT_TOLERANCE, Judged, RecoverSettings, Tolerance
 from posekit.skeleton import JOINT, TORSO
 from posekit.tree import Check, InterpretationTree, Leaves, Scope
+
+if TYPE_CHECKING:
+    from posekit.hidden import CompletedSurvivors
+    from posekit.objects.nearer import NearerEnds
 
 MOST_HIDDEN = 1000
 """Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
@@ -147,6 +150,8 @@ class Grower:
         worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
         if not (self.settings.infer and isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
+        from posekit.hidden import complete, reject
+
         part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
         done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
         return reject(leaves, done.among(leaves.postures(), worth))

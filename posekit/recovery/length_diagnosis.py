@@ -15,7 +15,8 @@ from posekit.formats.own import OpenCVModel
 from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.grower import Grower
-from posekit.recovery.noise import TRUNK, Noise, ObservedHypotheses
+from posekit.recovery.hypotheses import ObservedHypotheses
+from posekit.recovery.noise import TRUNK, Noise
 from posekit.recovery.recovery import Recovery
 from posekit.refinement import LengthDoubt, diagnose
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS, segment_name

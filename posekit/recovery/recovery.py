@@ -7,27 +7,29 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
-from posekit.cameras.neck import Placement
 from posekit.formats.own import Family, Inferred, Root
 from posekit.geometry import Array
-from posekit.hidden import CompletedSurvivors
 from posekit.ranking import Ranking, deviation_of_tolerance
 from posekit.recovery.camera_record import CameraRecords
-from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.grouping import group_postures
-from posekit.recovery.grower import Grower
 from posekit.recovery.ranked import ranked
-from posekit.recovery.refined import RefinedSurvivors
 from posekit.recovery.rooting import root_of
 from posekit.recovery.trees import Batch
 from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS
+
+if TYPE_CHECKING:
+    from posekit.cameras.neck import Placement
+    from posekit.hidden import CompletedSurvivors
+    from posekit.recovery.fit_camera import CameraFit
+    from posekit.recovery.grower import Grower
+    from posekit.recovery.refined import RefinedSurvivors
 
 
 def _inferred(completion: CompletedSurvivors, row: int) -> dict[str, Inferred]:

@@ -25,8 +25,9 @@ from posekit.recovery.certified import Contradiction, certified_within, certifyi
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
+from posekit.recovery.hypotheses import ObservedHypotheses
 from posekit.recovery.limb_walls import LimbWalls
-from posekit.recovery.noise import Noise, ObservedHypotheses
+from posekit.recovery.noise import Noise
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from posekit.following.following import Following
 from posekit.formats.own import Result, ResultFrame
 from posekit.formats.own.column import columns_in
 from posekit.formats.own.paths import FollowedPaths
@@ -15,6 +14,9 @@ from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
+
+if TYPE_CHECKING:
+    from posekit.following.following import Following
 
 
 def result_of(

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck import DETECTED_DEVIATION, DETECTED_OFFSET, Placement, place
 from posekit.formats.own import LeeChenModel, Root, View
 from posekit.settings import Rooting, Tolerance
+from posekit.settings.rooting import DETECTED_DEVIATION, DETECTED_OFFSET
+
+if TYPE_CHECKING:
+    from posekit.cameras.neck import Placement
 
 DEVIATION: Final = 2.0
 """Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
@@ -39,6 +42,8 @@ def place_roots(
 
     A view with derived joints is a detector's, whose points are farther off, of a body that gives.
     """
+    from posekit.cameras.neck import place
+
     detected = bool(view.derived)
     deviation = rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEVIATION)
     if isinstance(view.camera, LeeChenModel):

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from posekit.following.following import Following
 from posekit.recovery.recovery import FrameRecovery, Recovery
+
+if TYPE_CHECKING:
+    from posekit.following.following import Following
 
 SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Configurations
 from posekit.body.closed_form import Alike
 from posekit.geometry import Array
-from posekit.hidden import CompletedSurvivors
 from posekit.objects.mirror import mirrored
-from posekit.recovery.body import Body
-from posekit.recovery.fit_camera import CameraFit
-from posekit.recovery.refined import RefinedSurvivors
 from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINTS, SEGMENTS, segment_name
 from posekit.tree import Check, Leaves
 from posekit.validators import worst_margins
+
+if TYPE_CHECKING:
+    from posekit.body import Configurations
+    from posekit.hidden import CompletedSurvivors
+    from posekit.recovery.body import Body
+    from posekit.recovery.fit_camera import CameraFit
+    from posekit.recovery.refined import RefinedSurvivors
 
 LEVEL_METRES = 5e-10
 """Metres of depth up to which neither end of a segment is nearer: rounding."""

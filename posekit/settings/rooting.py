@@ -12,6 +12,12 @@ RootMethod = Literal["auto", "head", "torso", "search"]
 MAX_DEVIATION_PIXELS: Final = 1000.0
 """The largest standard deviation of image points that is taken for one."""
 
+DETECTED_DEVIATION: Final = 5.0
+"""Pixels: a detector's points, of a person some 700 pixels tall (docs, "Where the body is": 4 keep all, 3 do not)."""
+
+DETECTED_OFFSET: Final = 0.01
+"""Metres by which the trunk of a person differs from a rigid one, and a detector's joints from the figure's."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Rooting:

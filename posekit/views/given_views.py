@@ -11,13 +11,11 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.formats.format import Content
-from posekit.formats.motion import postures_of, read_motion
 from posekit.formats.own import read_view
 from posekit.formats.recognising import recognise
 from posekit.skeleton import JOINT
-from posekit.views.opening import Opened, open_views
+from posekit.views.opened import Opened
 from posekit.views.source import Source
-from posekit.views.truth import with_truth
 
 OF_VIEWS: Final = ("--proportions", "--deviation")
 """Options that say something of a view too."""
@@ -53,7 +51,11 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
             )
         opened = [Opened(person=0, view=read_view(path), says=())]
     elif what.holds is Content.KEY_POINTS:
+        from posekit.views.opening import open_views
+
         if truth is not None and source.rate is None:
+            from posekit.formats.motion import read_motion
+
             source = replace(source, rate=read_motion(truth).rate)
         opened = open_views(path, source)
     else:
@@ -79,6 +81,9 @@ def _with_truth_if_theirs(one: Opened, truth: Path) -> Opened:
 
 def _with_truth(one: Opened, truth: Path) -> Opened:
     """Give a view the joints that its truth itself has: what would be derived is no truth."""
+    from posekit.formats.motion import postures_of, read_motion
+    from posekit.views.truth import with_truth
+
     motion = read_motion(truth)
     found = postures_of(motion)
     joints = found.joints.copy()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -12,34 +11,16 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people, read_keypoints, swap
 from posekit.formats.keypoints.persons import RULES
-from posekit.formats.own import View
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import shown
 from posekit.views.camera import in_pixels, sighting
+from posekit.views.opened import Opened
 from posekit.views.person import person
 from posekit.views.person_view import person_view
 from posekit.views.source import Source
 
 MOST: Final = 10
 """Numbers of people that are listed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Opened:
-    """One person's view.
-
-    Parameters
-    ----------
-    person : int
-        The number to choose them by.
-    view : View
-    says : tuple of str
-        What it was made of, a line each: format, person, camera, lengths.
-    """
-
-    person: int
-    view: View
-    says: tuple[str, ...]
 
 
 def read_detections(path: str | Path, source: Source) -> KeyPoints:

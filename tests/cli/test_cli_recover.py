@@ -142,6 +142,7 @@ def test_following_shows_how_far_it_is_on_a_terminal_alone(
 ) -> None:
     command = ("recover", write(walk), "-o", "r.json", "--follow", "2")
     assert run(*command).err == ""
+    monkeypatch.setattr("posekit.cli.options.on_terminal", lambda: True)
     monkeypatch.setattr("rich.console.Console.is_terminal", property(lambda _: True))
     shown = run(*command)
     assert shown.code == 0

@@ -15,7 +15,8 @@ import pytest
 from posekit.body import load_figure
 from posekit.formats.own import read_report, schema
 from posekit.formats.own.postures_q import Configurations, read_configurations, write_configurations
-from posekit.robots import find, load_robot
+from posekit.robots import load_robot
+from posekit.robots.find import find
 from posekit.skeleton import JOINTS
 from posekit.validation import validate as pipeline_validate
 from posekit.validators import Validator

@@ -9,7 +9,8 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
-from posekit.robots import QuaternionWarning, find, load_robot
+from posekit.robots import QuaternionWarning, load_robot
+from posekit.robots.find import find
 from posekit.robots.joint_map import load_joint_map
 from posekit.validators import Validator
 from posekit.validators.robot import ROBOT_CHECKS, ROBOT_DEFAULT

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, Final, get_args
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,12 +33,6 @@ REACH = 0.05
 
 MOST = 12
 """The most necks a frame."""
-
-DETECTED_DEVIATION: Final = 5.0
-"""Pixels: a detector's points, of a person some 700 pixels tall (docs, "Where the body is": 4 keep all, 3 do not)."""
-
-DETECTED_OFFSET: Final = 0.01
-"""Metres by which the trunk of a person differs from a rigid one, and a detector's joints from the figure's."""
 
 
 def place(
@@ -76,11 +70,11 @@ def place(
     method : {"auto", "head", "torso", "search"}
     deviation : float, array (19,) or (F, 19)
         Standard deviation of each coordinate of each image point, joints then head points, pixels; for a detector's
-        `DETECTED_DEVIATION`.
+        `posekit.settings.rooting.DETECTED_DEVIATION`.
     offset : float or array (19,)
         Standard deviation, in metres, of what a point's image shows from the figure's own point: of a neck that is
         really the middle of the shoulders. The neck's own also stands for a head that nods. For detections of a person
-        `DETECTED_OFFSET`.
+        `posekit.settings.rooting.DETECTED_OFFSET`.
     tolerance, tangent : float, optional
         Metres by which the distances inside torso and hips may be off, and a segment too short for its image; by
         default what the deviations lead to (`posekit.cameras.neck.allowance`). A tree that grows from these necks wants

@@ -1,0 +1,25 @@
+"""One person's view, and what it was made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from posekit.formats.own import View
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opened:
+    """One person's view.
+
+    Parameters
+    ----------
+    person : int
+        The number to choose them by.
+    view : View
+    says : tuple of str
+        What it was made of, a line each: format, person, camera, lengths.
+    """
+
+    person: int
+    view: View
+    says: tuple[str, ...]
