@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array, cross
+from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
 FREE = 1e-6
 """Sine below which an angle is free: the limb is straight, or points along the abduction axis.
@@ -28,9 +29,6 @@ STRAIGHT = 1e-10
 
 LIMB = 4
 """Angles of a whole limb: three of its ball joint and one of its hinge."""
-
-TIE = 1e-8
-"""Radians within which branches violate the limits equally, as both do where the hinge is the worst of the four."""
 
 WORTH = 1e-5
 """Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
@@ -203,10 +201,10 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least; the first of those within `TIE`."""
+    """Choose among branches (N, B, K) the one that violates the limits least; the first of those within `TIED_ANGLES_RADIANS`."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)
     least = violation.min(axis=1, keepdims=True)
-    best = np.argmax(violation <= least + np.where(least > 0, TIE, 0.0), axis=1)
+    best = np.argmax(violation <= least + np.where(least > 0, TIED_ANGLES_RADIANS, 0.0), axis=1)
     return np.take_along_axis(angles, best[:, None, None], axis=1)[:, 0]

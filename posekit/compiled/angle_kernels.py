@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from posekit.body.angles import TIE
 from posekit.compiled.frame_kernels import ROOM
 from posekit.compiled.rigid_kernels import between, hips, torso, unit, unknown
 from posekit.compiled.verdicts import PASSED, UNSURE
 from posekit.geometry import Array
+from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
 CLEAR = 1e-9
 """Radians, or what is compared with them, within which nothing is clear: a million times the rounding."""
@@ -53,7 +53,7 @@ def verdict(w: Array, count: int, width: int, tolerance: Any, loose: Any) -> Any
     ----------
     count, width : int
         How many branches and angles are written down. The first branch that is inside is chosen, else the one that is
-        least far (`TIE`).
+        least far (`TIED_ANGLES_RADIANS`).
     tolerance, loose : float
         How far outside is no violation; `loose` for the third angle, infinite where it is not judged.
     """
@@ -66,9 +66,9 @@ def verdict(w: Array, count: int, width: int, tolerance: Any, loose: Any) -> Any
         return PASSED
     chosen = -1
     for b in range(count):
-        if abs(w[COST + b] - least - TIE) <= CLEAR:
+        if abs(w[COST + b] - least - TIED_ANGLES_RADIANS) <= CLEAR:
             return UNSURE
-        if chosen < 0 and w[COST + b] < least + TIE:
+        if chosen < 0 and w[COST + b] < least + TIED_ANGLES_RADIANS:
             chosen = b
     for k in range(width):
         beyond = w[OVER + 4 * chosen + k] - (loose if k == 2 else tolerance)
@@ -257,7 +257,7 @@ def limb(w: Array, at: int) -> Any:
         if math.isnan(first + second + first_turned + second_turned + bent + back):
             return UNSURE
         least = min(max(first, second), max(first_turned, second_turned))
-        least = max(least, min(bent, back), 0.0) + STRAIGHT_COSTS * loose + 2 * TIE
+        least = max(least, min(bent, back), 0.0) + STRAIGHT_COSTS * loose + 2 * TIED_ANGLES_RADIANS
         clear = tolerance > unseen * loose * (1 + CLEAR) and least < tolerance - CLEAR
         return PASSED if clear else UNSURE
     loose = tolerance / bend

@@ -8,6 +8,9 @@ from posekit.geometry.arrays import Array
 from posekit.geometry.quaternions import quaternion_from_rotation, quaternion_log
 from posekit.geometry.vectors import cross, dot
 
+TIED_ANGLES_RADIANS = 1e-8
+"""Radians within which two ways to write a limb violate its limits equally, as both do where the hinge is the worst."""
+
 
 def cross_matrix(vectors: Array) -> Array:
     """Return the matrices (..., 3, 3) that take p to ``v x p``, of vectors v (..., 3)."""
