@@ -6,6 +6,7 @@ as ``package.module:Class``; or they are given as objects (docs, "Write your own
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
@@ -20,8 +21,7 @@ from posekit.safe_io import cut
 from posekit.settings import CheckSettings
 from posekit.settings.check import check_settings
 from posekit.skeleton import POINTS
-from posekit.tree import Check, Scope
-from posekit.tree.check import given_check
+from posekit.tree import Check, Scope, given_check
 from posekit.validators.collision import collision
 from posekit.validators.joint_range import joint_range
 from posekit.validators.options import CheckOptions
@@ -31,6 +31,10 @@ from posekit.validators.walking import walking
 ENTRY_POINTS: Final = "posekit.checks"
 """The entry-point group of other packages' checks: a subclass of `posekit.tree.Check`, or a function that makes one or
 several of a figure and parameters."""
+
+
+CHECK_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+"""What a check may be called: files have columns and members of that name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,6 +195,10 @@ def _proven(check: Check, figure: Figure) -> Check:
     missing = [name for name in ("name", "unit", "places", "points") if not hasattr(check, name)]
     if missing:
         raise InputError(f"--checks: {kind} does not say its {missing[0]}")
+    if not CHECK_NAME.fullmatch(check.name):
+        raise InputError(
+            f"--checks: {cut(repr(check.name))} is no name of a check; expected letters, digits, - and _"
+        )
     wrong = [point for point in check.points if not 0 <= point < len(POINTS)]
     if wrong or not check.points or not check.places:
         raise InputError(

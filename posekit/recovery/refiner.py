@@ -35,7 +35,7 @@ from posekit.refinement.tolerance import DEVIATIONS
 from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
-from posekit.tree import Check, InterpretationTree, Leaves, Scope
+from posekit.tree import Check, InterpretationTree, Leaves, Loosening, Scope
 
 NOISE_UNIT_DEGREES: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
@@ -185,7 +185,9 @@ class Refiner:
         if self.grower.nearer is not None:
             leaves = self.grower.nearer.prune(leaves, fit.frame[own])
         physical = leaves.counts()
-        suite, _ = self.grower.suites_of(tolerance)
+        suite = [
+            check for check in self.grower.suites_of(tolerance)[0] if check.noise is not Loosening.REFINED
+        ]
         leaves = self.grower.body.tree.prune(
             leaves, [check for check in suite if check.scope is Scope.MOTION]
         )

@@ -140,13 +140,14 @@ class NoisyRange(Check):
 
 
 def under_noise(checks: Sequence[Check], bound: float, *, perspective: bool = True) -> list[Check]:
-    """Let those of some checks that noise loosens by `Loosening.DIRECTIONS` allow for it.
+    """Loosen checks as they say, for postures that are not refined yet.
 
-    They must have a tolerance of a degree.
+    Those of `Loosening.DIRECTIONS` must have a tolerance of a degree; those of `Loosening.REFINED` are left out.
     """
     return [
         NoisyRange(inner=check, bound=bound, perspective=perspective)
         if check.noise is Loosening.DIRECTIONS
         else check
         for check in checks
+        if check.noise is not Loosening.REFINED
     ]

@@ -7,6 +7,7 @@ from posekit.tree.check import Loosening as Loosening
 from posekit.tree.check import Place as Place
 from posekit.tree.check import Rule as Rule
 from posekit.tree.check import Scope as Scope
+from posekit.tree.check import given_check as given_check
 from posekit.tree.enumeration import enumerate_leaves as enumerate_leaves
 from posekit.tree.interpretation_tree import InterpretationTree as InterpretationTree
 from posekit.tree.leaves import Leaves as Leaves

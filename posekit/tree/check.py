@@ -107,7 +107,10 @@ class Loosening(Enum):
     TOLERANCE = "tolerance"
     """Nothing: the check is judged with its own tolerance."""
     DIRECTIONS = "directions"
-    """It judges angles: each is allowed what the noise may turn its segments by (`posekit.refinement.under_noise`)."""
+    """It judges angles: its tolerance is times the degrees by which noise may turn its segments
+    (`posekit.refinement.under_noise`)."""
+    REFINED = "refined"
+    """It is not asked before: of refined postures alone."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
