@@ -201,7 +201,7 @@ def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:
 
 
 def _least_violating(candidates: Array, limits: Limits) -> Array:
-    """Choose among branches (N, B, K) the one that violates the limits least; the first of those within `TIED_ANGLES_RADIANS`."""
+    """Choose among branches (N, B, K) the one that violates the limits least, of those that tie the first."""
     angles = limits.nearest_turn(candidates)
     violation = limits.cost(angles)
     violation = np.where(np.isnan(violation), np.inf, violation)
