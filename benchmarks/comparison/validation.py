@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from benchmarks.comparison.measure import Chart, Section, Sizes, least, microseconds
 from posekit.body.pool import make_pool, n_threads
-from posekit.formats.own.postures_q import Configurations
+from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.robots import load_robot
 from posekit.validation import validate
 from posekit.validators import Validator
@@ -39,7 +39,7 @@ def section(sizes: Sizes) -> Section:
         expected, report = bare(), validator.check(q=q)
         margin = np.abs(np.min([one.margin.min(axis=1) for one in report.judgements[:1]], axis=0))
         equal = (report.invalid == expected) | (margin < 0.01)  # the tolerance of the limits
-        given = Configurations(q=q)
+        given = NamedConfigurations(q=q)
         with one_core():
             bare = bare_way(validator, q)
             costs = least(

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.batch.image_rows import IMAGE, ImageRows
+from posekit.batch.image_rows import N_IMAGE_POINTS, ImageRows
 from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
 from posekit.formats.motion.survivors import COORDINATES
@@ -24,11 +24,11 @@ from posekit.recovery.trees import Batch
 from posekit.safe_io import extra
 from posekit.skeleton import JOINTS
 
-TEXTS: Final = ("input", "judged", "reason", "inferred", "rejected")
+TEXT_COLUMNS: Final = ("input", "judged", "reason", "inferred", "rejected")
 """Columns of few different texts."""
 NO_SURVIVOR: Final = -1
-UNKNOWN: Final = "root/not_known"
-LEAVES: Final = 8192
+NOT_GROWN: Final = "root/not_known"
+N_LEAVES: Final = 8192
 
 BATCH_COLUMNS: Final = sorted(
     (
@@ -45,7 +45,7 @@ Letters = NDArray[np.uint8]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frames:
+class ShardFrames:
     """F frames and their N survivors, in the frames' order.
 
     Parameters
@@ -75,7 +75,7 @@ class Frames:
     joints: Array = field(default_factory=lambda: np.empty((0, len(JOINTS), 3)))
     values: dict[str, Array] = field(default_factory=dict)
 
-    def with_part(self, rows: NDArray[np.intp], part: Frames) -> Frames:
+    def with_part(self, rows: NDArray[np.intp], part: ShardFrames) -> ShardFrames:
         """Put frames that were recovered in the place of some that were not."""
         texts: dict[str, Any] = {}
         for name in ("judged", "reason", "inferred", "rejected"):
@@ -89,11 +89,11 @@ class Frames:
             self, count=count, branches=part.branches, joints=part.joints, values=part.values, **texts
         )
 
-    def followed_by(self, other: Frames) -> Frames:
+    def followed_by(self, other: ShardFrames) -> ShardFrames:
         """Lay other frames behind these."""
         names = dict.fromkeys([*self.values, *other.values])
         sizes = len(self.joints), len(other.joints)
-        return Frames(
+        return ShardFrames(
             frame=np.concatenate([self.frame, other.frame]),
             time=np.concatenate([self.time, other.time]),
             count=np.concatenate([self.count, other.count]),
@@ -115,34 +115,34 @@ class Frames:
         )
 
 
-def unrecovered(rows: ImageRows, reason: str) -> Frames:
+def unrecovered(rows: ImageRows, reason: str) -> ShardFrames:
     """Make frames in which nothing was grown, and say why."""
     count = len(rows)
-    return Frames(
+    return ShardFrames(
         frame=rows.frame,
         time=rows.time,
         count=np.zeros(count, dtype=np.int64),
         judged=("",) * count,
         reason=(reason,) * count,
         inferred=("",) * count,
-        rejected=(json.dumps({UNKNOWN: LEAVES}),) * count,
+        rejected=(json.dumps({NOT_GROWN: N_LEAVES}),) * count,
     )
 
 
-def frames_of(rows: ImageRows, recovery: Recovery, recipe: Recipe) -> Frames:
+def frames_of(rows: ImageRows, recovery: Recovery, recipe: Recipe) -> ShardFrames:
     """Gather what a recovery of these rows found."""
     frames = recovery.frames
     joints, branches, values = _survivors(frames, recipe)
     if recipe.rank and len(joints):
         values["probability"] = np.concatenate(recovery.probability)
-    unseen = np.isnan(rows.points[:, :IMAGE, 0])
+    unseen = np.isnan(rows.points[:, :N_IMAGE_POINTS, 0])
     inferred = [
         ",".join(name for name, lacks in zip(JOINTS, row, strict=True) if lacks)
         if recipe.settings.infer and any(row)
         else ""
         for row in unseen.tolist()
     ]
-    return Frames(
+    return ShardFrames(
         frame=rows.frame,
         time=rows.time,
         count=np.array([len(frame) for frame in frames], dtype=np.int64),
@@ -189,12 +189,12 @@ def schema_of(recipe: Recipe) -> Any:
             ("survivor", pa.int32()),
             ("branches", pa.string()),
             *((name, pa.float64()) for name in (*COORDINATES, *value_columns(recipe))),
-            *((name, text) for name in TEXTS if name != "input"),
+            *((name, text) for name in TEXT_COLUMNS if name != "input"),
         ]
     )
 
 
-def table_of(frames: Frames, input: str, person: int, schema: Any) -> Any:
+def table_of(frames: ShardFrames, input: str, person: int, schema: Any) -> Any:
     """Lay frames out as rows of a pyarrow table."""
     pa = extra("pyarrow", "parquet", "writing Parquet")
     repeated = np.maximum(frames.count, 1)
@@ -212,7 +212,7 @@ def table_of(frames: Frames, input: str, person: int, schema: Any) -> Any:
         "survivor": survivor.astype(np.int32),
         "branches": _strings(pa, frames.branches, filled),
         **{name: _scattered(flat[:, k], filled) for k, name in enumerate(COORDINATES)},
-        **{name: _dictionary(pa, getattr(frames, name), of_row) for name in TEXTS if name != "input"},
+        **{name: _dictionary(pa, getattr(frames, name), of_row) for name in TEXT_COLUMNS if name != "input"},
     }
     for name in schema.names:
         if name not in columns:

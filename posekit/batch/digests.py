@@ -12,13 +12,13 @@ from posekit.formats.given_file import GivenFile
 from posekit.safe_io import open_file
 from posekit.safe_io.regular_file import unreadable
 
-LETTERS: Final = 16
+DIGEST_LETTERS: Final = 16
 """Of a hash that is part of a name: 64 bits."""
 
 AT_ONCE: Final = 1 << 20
 """Bytes."""
 
-LARGEST: Final = 1 << 62
+MAX_INPUT_BYTES: Final = 1 << 62
 """Bytes: how large a file may be is for its reader to say."""
 
 
@@ -31,7 +31,7 @@ def of_file(path: Path) -> str:
         Where it cannot be read.
     """
     content = hashlib.sha256()
-    with open_file(path, limit=LARGEST) as file:
+    with open_file(path, limit=MAX_INPUT_BYTES) as file:
         try:
             while piece := file.read(AT_ONCE):
                 content.update(piece)
@@ -53,4 +53,4 @@ def of_input(path: Path) -> str:
 def of_values(*values: Mapping[str, Any] | list[Any] | str | int) -> str:
     """Return a short hash of plain values: the same for equal ones, in whichever order mappings hold them."""
     text = json.dumps(values, sort_keys=True, ensure_ascii=True)
-    return hashlib.sha256(text.encode()).hexdigest()[:LETTERS]
+    return hashlib.sha256(text.encode()).hexdigest()[:DIGEST_LETTERS]

@@ -14,10 +14,10 @@ from typing import BinaryIO, Final
 from posekit.errors import PosekitError
 from posekit.safe_io import cut, refusal
 
-PARTS: Final = ".parts"
+PARTS_FOLDER: Final = ".parts"
 """The folder beside the results in which files grow before they are renamed."""
 
-FULL: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+DISK_FULL_ERRORS: Final = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class OutputError(PosekitError):
@@ -62,7 +62,7 @@ def writing(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         reason = cut(error.strerror or str(error))
-        remedy = "make space" if error.errno in FULL else "check the folder and its permissions"
+        remedy = "make space" if error.errno in DISK_FULL_ERRORS else "check the folder and its permissions"
         raise OutputError(
             str(refusal(path, "", reason, "a file that can be written", f"{remedy}, and run it again"))
         ) from None

@@ -15,7 +15,7 @@ from posekit.geometry import Array
 from posekit.recovery.observed import NECK_LOST, NO_NECK, ROOT_LOST
 from posekit.skeleton import HEAD, JOINTS, POINTS
 
-IMAGE: Final = len(JOINTS)
+N_IMAGE_POINTS: Final = len(JOINTS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,7 +77,7 @@ class ImageRows:
 
     def usable(self, head: View) -> NDArray[np.bool_]:
         """Tell which frames (F,) a tree can grow in: those that show the neck; uncalibrated ones any joint."""
-        seen = np.isfinite(self.points[:, :IMAGE, 0])
+        seen = np.isfinite(self.points[:, :N_IMAGE_POINTS, 0])
         uncalibrated = isinstance(head.camera, ScaledOrthographicModel)
         return np.asarray(seen.any(axis=1) if uncalibrated else seen[:, 0])
 
@@ -98,7 +98,7 @@ class ImageRows:
         return replace(
             head,
             time=self.time,
-            image=self.points[:, :IMAGE],
+            image=self.points[:, :N_IMAGE_POINTS],
             head_image=self.points[:, HEAD],
             confidence=self.confidence,
             root=self.root,

@@ -14,7 +14,7 @@ from posekit.formats.recognising import recognise
 from posekit.safe_io import cut, refusal
 from posekit.safe_io.regular_file import unreadable
 
-SUFFIXES: Final = (".json", ".csv", ".h5", ".npz", ".parquet", ".pq")
+INPUT_SUFFIXES: Final = (".json", ".csv", ".h5", ".npz", ".parquet", ".pq")
 """Of the files in a folder that are taken; others in it are somebody else's."""
 
 
@@ -81,7 +81,7 @@ def list_inputs(given: Sequence[Path], output: Path, root: Path | None = None) -
             cut(names),
             "",
             "no input",
-            f"views or key points: {', '.join(SUFFIXES)}",
+            f"views or key points: {', '.join(INPUT_SUFFIXES)}",
             "name the files, or a folder of them",
         )
     places = sorted(found)
@@ -121,7 +121,7 @@ def _of_folder(folder: Path, output: Path) -> Iterator[Path]:
         if one.is_dir():
             if one.resolve() != output and not one.is_symlink():
                 yield from _of_folder(one, output)
-        elif one.suffix.lower() in SUFFIXES:
+        elif one.suffix.lower() in INPUT_SUFFIXES:
             yield one
 
 

@@ -15,19 +15,19 @@ from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Any, Final, TypeVar
 
-from posekit.batch.pool import Outcome, Report, attempt
+from posekit.batch.pool import Outcome, PoolReport, attempt
 from posekit.errors import InputError
 
 T = TypeVar("T")
 R = TypeVar("R")
-THREADS: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """What libraries read when they are loaded: a process is one thread, and processes are as many as cores."""
-MEMORY: Final = {"MALLOC_MMAP_THRESHOLD_": "33554432", "MALLOC_TRIM_THRESHOLD_": "67108864"}
+MALLOC_VARIABLES: Final = {"MALLOC_MMAP_THRESHOLD_": "33554432", "MALLOC_TRIM_THRESHOLD_": "67108864"}
 """What glibc's malloc reads (mallopt(3)), bytes: arrays that come and go with every piece of a shard stay the process's
 own, instead of being given back and asked of the system, page by page, again; at most so much is kept."""
-STARTS: Final = 5
+MAX_FAILED_STARTS: Final = 5
 """Processes in a row that end before they are ready, after which none is started any more."""
-READY: Final = b"ready"
+READY_SIGNAL: Final = b"ready"
 
 
 @dataclass(eq=False)
@@ -135,7 +135,7 @@ class LocalPool:
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):  # it died: its end is noticed below
             worker.pipe.send((worker.work, worker.item))
 
-    def _reports(self) -> Iterator[tuple[_Worker, Report | None]]:
+    def _reports(self) -> Iterator[tuple[_Worker, PoolReport | None]]:
         """Wait, and yield who is done with what; None where the process has died."""
         by_pipe = {worker.pipe: worker for worker in self.workers if worker.busy}
         for pipe in connection.wait(list(by_pipe)):
@@ -145,7 +145,7 @@ class LocalPool:
             except (EOFError, OSError, pickle.UnpicklingError):
                 yield from self._died(worker)
                 continue
-            if message == READY:
+            if message == READY_SIGNAL:
                 worker.ready, self.failed_starts = True, 0
                 self._send(worker)
             else:
@@ -158,9 +158,10 @@ class LocalPool:
             yield worker, None
             return
         self.failed_starts += 1
-        if self.failed_starts >= STARTS:
+        if self.failed_starts >= MAX_FAILED_STARTS:
             raise InputError(
-                f"--jobs: {STARTS} processes in a row ended before they began ({_end_of(worker.process)}); expected "
+                f"--jobs: {MAX_FAILED_STARTS} processes in a row ended before they began "
+                f"({_end_of(worker.process)}); expected "
                 "memory for them, and `if __name__ == '__main__'` in a script; take fewer jobs"
             )
         fresh = _start()
@@ -181,9 +182,11 @@ def _start() -> _Worker:
     context = get_context("spawn")  # a fork after OpenMP was used hangs the child
     ours, theirs = context.Pipe()
     process = context.Process(target=serve, args=(theirs,), daemon=True)
-    kept = {name: os.environ.get(name) for name in (*THREADS, *MEMORY)}
-    os.environ.update({**MEMORY, **{name: value for name, value in kept.items() if value is not None}})
-    os.environ.update(dict.fromkeys(THREADS, "1"))
+    kept = {name: os.environ.get(name) for name in (*THREAD_VARIABLES, *MALLOC_VARIABLES)}
+    os.environ.update(
+        {**MALLOC_VARIABLES, **{name: value for name, value in kept.items() if value is not None}}
+    )
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         process.start()
@@ -203,7 +206,7 @@ def serve(pipe: Connection) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_follow_parent, daemon=True).start()
     try:
-        pipe.send(READY)
+        pipe.send(READY_SIGNAL)
         while True:
             work, item = pipe.recv()
             pipe.send(attempt(work, item))

@@ -13,12 +13,12 @@ from posekit.safe_io import cut, one_line
 
 T = TypeVar("T")
 R = TypeVar("R")
-LONGEST = 500
+MAX_ERROR_CHARACTERS = 500
 """Characters of an error that are kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class PoolReport:
     """What a piece of work ended with.
 
     Parameters
@@ -94,17 +94,17 @@ class Pool(Protocol):
         ...
 
 
-def attempt(work: Callable[[T], R], item: T) -> Report:
+def attempt(work: Callable[[T], R], item: T) -> PoolReport:
     """Do a piece of work and say what came of it: no error may end the process that others wait for."""
     try:
-        return Report(value=work(item), peak=peak_memory())
+        return PoolReport(value=work(item), peak=peak_memory())
     except OutputError as error:
-        return Report(error=str(error), fatal=True, peak=peak_memory())
+        return PoolReport(error=str(error), fatal=True, peak=peak_memory())
     except PosekitError as error:
-        return Report(error=one_line(str(error))[:LONGEST], peak=peak_memory())
+        return PoolReport(error=one_line(str(error))[:MAX_ERROR_CHARACTERS], peak=peak_memory())
     except Exception as error:  # a defect, or too little memory: of this item, not of the run
         what = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        return Report(error=one_line(f"unexpected {what}")[:LONGEST], peak=peak_memory())
+        return PoolReport(error=one_line(f"unexpected {what}")[:MAX_ERROR_CHARACTERS], peak=peak_memory())
 
 
 def peak_memory() -> int:

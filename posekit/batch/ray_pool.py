@@ -21,13 +21,13 @@ from posekit.safe_io import extra
 
 T = TypeVar("T")
 R = TypeVar("R")
-LOCAL: Final = "local"
+LOCAL_CLUSTER: Final = "local"
 """Instead of an address: a cluster of this machine alone, started and ended with the run."""
-AHEAD: Final = 2
+TASKS_AHEAD: Final = 2
 """Tasks in flight for each core of the cluster: one that runs and one that waits."""
 ANSWERS_WITHIN: Final = 10.0
 """Seconds for a cluster to answer at all: Ray itself waits for minutes, and complains meanwhile."""
-LEAST: Final = (2, 55)
+LEAST_RAY_VERSION: Final = (2, 55)
 """The oldest version whose retries are relied on."""
 
 
@@ -38,7 +38,7 @@ class RayPool:
     Parameters
     ----------
     address : str
-        As ``ray.init`` takes it, or `LOCAL`.
+        As ``ray.init`` takes it, or `LOCAL_CLUSTER`.
     jobs : int
         Cores of a local cluster.
     retries : int
@@ -59,15 +59,16 @@ class RayPool:
             Where Ray is not installed or too old, or nothing answers there.
         """
         self.ray = extra("ray", "ray", "--cluster")
-        if tuple(int(part) for part in self.ray.__version__.split(".")[:2]) < LEAST:
+        if tuple(int(part) for part in self.ray.__version__.split(".")[:2]) < LEAST_RAY_VERSION:
             raise InputError(
-                f"--cluster: ray is {self.ray.__version__}; expected {LEAST[0]}.{LEAST[1]} or later; update it"
+                f"--cluster: ray is {self.ray.__version__}; expected {'.'.join(map(str, LEAST_RAY_VERSION))} or later; "
+                "update it"
             )
         self._call()
         common: dict[str, Any] = {"log_to_driver": False, "logging_level": "error", "configure_logging": True}
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # nobody is told of the run
         try:
-            if self.address == LOCAL:
+            if self.address == LOCAL_CLUSTER:
                 self.ray.init(num_cpus=self.jobs, include_dashboard=False, **common)
             else:
                 self.ray.init(address=self.address, **common)
@@ -103,7 +104,7 @@ class RayPool:
     def run(self, work: Callable[[T], R], items: Iterable[T]) -> Iterator[Outcome[T, R]]:
         """Do the work; see `posekit.batch.pool.Pool`."""
         task = self.ray.remote(num_cpus=1, max_retries=self.retries)(attempt)
-        limit = AHEAD * max(1, int(self.ray.cluster_resources().get("CPU", 1)))
+        limit = TASKS_AHEAD * max(1, int(self.ray.cluster_resources().get("CPU", 1)))
         waiting = iter(items)
         flying: dict[Any, T] = {task.remote(work, item): item for item in islice(waiting, limit)}
         while flying:

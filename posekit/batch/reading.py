@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.batch.shard import SHARDS
+from posekit.batch.shard import SHARDS_FOLDER
 from posekit.formats.motion.parquet import opened
 from posekit.safe_io import extra, refusal
 
@@ -34,10 +34,10 @@ def shard_paths(folder: str | Path) -> list[Path]:
     InputError
         Where the folder is none of a run.
     """
-    shards = Path(folder) / SHARDS
+    shards = Path(folder) / SHARDS_FOLDER
     if not shards.is_dir():
         raise refusal(
-            folder, "", f"no folder {SHARDS} in it", "the output of posekit batch", "check the name"
+            folder, "", f"no folder {SHARDS_FOLDER} in it", "the output of posekit batch", "check the name"
         )
     return sorted(shards.glob("*.parquet"))
 

@@ -24,7 +24,7 @@ from posekit.batch.shard import Finished, Shard, run_shard
 from posekit.errors import InputError
 from posekit.safe_io import extra
 
-RETRIES: Final = 2
+DEFAULT_RETRIES: Final = 2
 """Times that a shard is tried again whose process died."""
 
 
@@ -34,7 +34,7 @@ def run_batch(
     recipe: Recipe | None = None,
     *,
     jobs: int | None = None,
-    retries: int = RETRIES,
+    retries: int = DEFAULT_RETRIES,
     cluster: str = "",
     overwrite: bool = False,
     mixed: bool = False,

@@ -11,19 +11,19 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from posekit.batch.durable import PARTS, clear, write_document, writing
-from posekit.batch.shard import SHARDS
-from posekit.batch.staging import STAGED
+from posekit.batch.durable import PARTS_FOLDER, clear, write_document, writing
+from posekit.batch.shard import SHARDS_FOLDER
+from posekit.batch.staging import STAGED_FOLDER
 from posekit.errors import InputError
 from posekit.safe_io import read_json, refusal
 from posekit.safe_io.writing import make_folder
 
 SCHEMA: Final = "posekit.batch/1"
 MANIFEST_SCHEMA: Final = "posekit.batch_manifest/1"
-ASKED: Final = "batch.json"
-MANIFEST: Final = "manifest.json"
-LOCK: Final = ".lock"
-OWN: Final = (ASKED, MANIFEST, LOCK, PARTS, STAGED, SHARDS)
+ASKED_FILE: Final = "batch.json"
+MANIFEST_FILE: Final = "manifest.json"
+LOCK_FILE: Final = ".lock"
+OWN_ENTRIES: Final = (ASKED_FILE, MANIFEST_FILE, LOCK_FILE, PARTS_FOLDER, STAGED_FOLDER, SHARDS_FOLDER)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,12 +101,12 @@ class RunFolder:
     @property
     def parts(self) -> Path:
         """Where files grow."""
-        return self.path / PARTS
+        return self.path / PARTS_FOLDER
 
     def write_asked(self, asked: Asked) -> None:
         """Note what is asked, of which contents."""
         document = {"schema": SCHEMA, **asdict(asked), "root": str(asked.root)}
-        write_document(self.path / ASKED, document, self.parts)
+        write_document(self.path / ASKED_FILE, document, self.parts)
 
     def asked(self) -> Asked | None:
         """Return what was asked of the run that was here; None where there was none.
@@ -116,7 +116,7 @@ class RunFolder:
         InputError
             Where the note is not one of a run's.
         """
-        file = self.path / ASKED
+        file = self.path / ASKED_FILE
         if not file.is_file():
             return None
         document = read_json(file)
@@ -136,11 +136,11 @@ class RunFolder:
             **totals,
             "failed": [one.document() for one in failures],
         }
-        write_document(self.path / MANIFEST, document, self.parts)
+        write_document(self.path / MANIFEST_FILE, document, self.parts)
 
     def remove_others(self, names: set[str]) -> int:
         """Remove results that are not among these, and say how many there were."""
-        others = [one for one in (self.path / SHARDS).iterdir() if one.name not in names]
+        others = [one for one in (self.path / SHARDS_FOLDER).iterdir() if one.name not in names]
         for one in others:
             with writing(one):
                 one.unlink()
@@ -148,7 +148,7 @@ class RunFolder:
 
     def remove_staged(self) -> None:
         """Remove the tables of image points; what they held is done."""
-        for one in (self.path / STAGED).glob("*.parquet"):
+        for one in (self.path / STAGED_FOLDER).glob("*.parquet"):
             one.unlink(missing_ok=True)
 
 
@@ -165,12 +165,12 @@ def run_folder(path: Path) -> Iterator[RunFolder]:
         raise refusal(path, "", "a file", "a folder", "choose another name")
     make_folder(path)
     try:
-        strange = sorted(one.name for one in path.iterdir() if one.name not in OWN)
+        strange = sorted(one.name for one in path.iterdir() if one.name not in OWN_ENTRIES)
     except OSError as error:
         raise refusal(
             path, "", error.strerror or str(error), "a folder that can be read", "choose another"
         ) from None
-    if strange and not (path / ASKED).is_file():
+    if strange and not (path / ASKED_FILE).is_file():
         raise refusal(
             path,
             "",
@@ -178,8 +178,8 @@ def run_folder(path: Path) -> Iterator[RunFolder]:
             "a new or empty one, or a run's own",
             "choose another name",
         )
-    with writing(path / LOCK):
-        handle = os.open(path / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    with writing(path / LOCK_FILE):
+        handle = os.open(path / LOCK_FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -188,7 +188,7 @@ def run_folder(path: Path) -> Iterator[RunFolder]:
                 f"{path}: another run is writing there; expected none; wait for it, or choose another folder"
             ) from None
         folder = RunFolder(path=path.resolve())
-        for name in (PARTS, STAGED, SHARDS):
+        for name in (PARTS_FOLDER, STAGED_FOLDER, SHARDS_FOLDER):
             with writing(path / name):
                 (path / name).mkdir(exist_ok=True)
         clear(folder.parts)

@@ -17,7 +17,7 @@ from posekit.batch.shard import Finished, Shard, finished, shards_of
 from posekit.batch.staging import Staged, Staging, stage
 from posekit.errors import InputError
 
-NOTED: Final = 5.0
+NOTE_SECONDS: Final = 5.0
 """Seconds between two notes of failures in the manifest."""
 MOST_WARNINGS: Final = 20
 
@@ -169,7 +169,7 @@ class Run:
                 done += outcome.value.frames
             else:
                 self._fail(outcome, outcome.item.input, outcome.item)
-            if len(self.failures) > known and time.monotonic() - noted > NOTED:
+            if len(self.failures) > known and time.monotonic() - noted > NOTE_SECONDS:
                 self.note()
                 noted, known = time.monotonic(), len(self.failures)
             self.progress(

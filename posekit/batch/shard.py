@@ -14,8 +14,16 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.batch import digests
-from posekit.batch.columns import LEAVES, TEXTS, Frames, frames_of, schema_of, table_of, unrecovered
-from posekit.batch.durable import PARTS, whole, writing
+from posekit.batch.columns import (
+    N_LEAVES,
+    TEXT_COLUMNS,
+    ShardFrames,
+    frames_of,
+    schema_of,
+    table_of,
+    unrecovered,
+)
+from posekit.batch.durable import PARTS_FOLDER, whole, writing
 from posekit.batch.image_rows import ImageRows, read_head
 from posekit.batch.recipe import Recipe
 from posekit.batch.staging import Staged, StagedTable, stem_of
@@ -26,17 +34,17 @@ from posekit.recovery.conductor import recover
 from posekit.safe_io import extra
 from posekit.skeleton import JOINTS
 
-SHARDS: Final = "shards"
+SHARDS_FOLDER: Final = "shards"
 """The folder of a run that holds the results."""
 FRAMES_AT_ONCE: Final = 500
 """Frames that are recovered together where all joints are seen: what compiled loops take in one go."""
-SCHEMA: Final = "posekit.batch_shard/1"
-KEY: Final = b"posekit.batch"
-NOISY: Final = 3
+SHARD_SCHEMA: Final = "posekit.batch_shard/1"
+METADATA_KEY: Final = b"posekit.batch"
+NOISY_WEIGHT: Final = 3
 """Frames without noise that take the memory of one with noise, about."""
-FREE, HIDDEN = 2, 4
+FREE_HIDDEN_JOINTS, HIDDEN_JOINT_FACTOR = 2, 4
 """Joints that may be hidden at no cost, and by what each further one multiplies the memory that a frame takes."""
-MOST: Final = 5
+MAX_WARNINGS: Final = 5
 """Warnings that are kept of one shard."""
 
 
@@ -82,13 +90,13 @@ class Shard:
     @property
     def path(self) -> Path:
         """The file."""
-        return self.folder / SHARDS / self.name
+        return self.folder / SHARDS_FOLDER / self.name
 
     @property
     def says(self) -> dict[str, Any]:
         """What the file says of itself."""
         return {
-            "schema": SCHEMA,
+            "schema": SHARD_SCHEMA,
             "input": self.input,
             "content": self.digest,
             "person": self.table.person,
@@ -149,9 +157,9 @@ def run_shard(shard: Shard) -> Finished:
     frames = survivors = empty = 0
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        with whole(shard.path, shard.folder / PARTS) as file:
+        with whole(shard.path, shard.folder / PARTS_FOLDER) as file:
             with writing(shard.path):
-                writer = pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=list(TEXTS))
+                writer = pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=list(TEXT_COLUMNS))
             try:
                 for piece in _pieces(shard, head):
                     table = table_of(piece, shard.input, shard.table.person, schema)
@@ -161,13 +169,13 @@ def run_shard(shard: Shard) -> Finished:
                     survivors += int(piece.count.sum())
                     empty += int((piece.count == 0).sum())
                 totals = {"frames": frames, "survivors": survivors, "empty": empty}
-                writer.add_key_value_metadata({KEY: json.dumps({**shard.says, **totals}).encode()})
+                writer.add_key_value_metadata({METADATA_KEY: json.dumps({**shard.says, **totals}).encode()})
             finally:
                 with writing(shard.path):
                     writer.close()
     says = [str(one.message) for one in caught if issubclass(one.category, UserWarning)]
     return Finished(
-        frames=frames, survivors=survivors, empty=empty, warnings=tuple(dict.fromkeys(says))[:MOST]
+        frames=frames, survivors=survivors, empty=empty, warnings=tuple(dict.fromkeys(says))[:MAX_WARNINGS]
     )
 
 
@@ -178,7 +186,7 @@ def finished(shard: Shard) -> Finished | None:
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
     pa = extra("pyarrow", "parquet", "reading Parquet")
     try:
-        said = json.loads((pq.read_metadata(shard.path).metadata or {}).get(KEY, b"{}"))
+        said = json.loads((pq.read_metadata(shard.path).metadata or {}).get(METADATA_KEY, b"{}"))
     except (pa.ArrowException, OSError, ValueError):
         return None
     if said.get("frames") != len(shard) or any(said.get(name) != value for name, value in shard.says.items()):
@@ -186,7 +194,7 @@ def finished(shard: Shard) -> Finished | None:
     return Finished(frames=said["frames"], survivors=said["survivors"], empty=said["empty"])
 
 
-def _pieces(shard: Shard, head: View) -> Iterator[Frames]:
+def _pieces(shard: Shard, head: View) -> Iterator[ShardFrames]:
     """Recover the frames of a shard piece by piece."""
     noisy = bool(head.derived or head.deviation or shard.recipe.source.deviation)
     for rows in read_rows(Path(shard.table.path), shard.start, shard.stop):
@@ -194,7 +202,7 @@ def _pieces(shard: Shard, head: View) -> Iterator[Frames]:
             part = rows.part(piece)
             usable = np.flatnonzero(part.usable(head))
             reason, lost_to = part.lacking(head)
-            rejected = (json.dumps({lost_to: LEAVES}),) * len(part)
+            rejected = (json.dumps({lost_to: N_LEAVES}),) * len(part)
             found = replace(unrecovered(part, reason), rejected=rejected)
             yield (
                 found.with_part(usable, _recovered(part.part(usable), head, shard)) if len(usable) else found
@@ -209,7 +217,9 @@ def portions(rows: ImageRows, *, noisy: bool) -> Iterator[slice]:
     """
     unseen = np.isnan(rows.points[:, : len(JOINTS), 0]).sum(axis=1)
     unseen[unseen == len(JOINTS)] = 0  # nothing is grown there
-    weight = (NOISY if noisy else 1) * HIDDEN ** np.clip(unseen - FREE, 0, 8).astype(np.float64)
+    weight = (NOISY_WEIGHT if noisy else 1) * HIDDEN_JOINT_FACTOR ** np.clip(
+        unseen - FREE_HIDDEN_JOINTS, 0, 8
+    ).astype(np.float64)
     start, taken = 0, 0.0
     for k, each in enumerate(weight.tolist()):
         if k > start and taken + each > FRAMES_AT_ONCE:
@@ -219,7 +229,7 @@ def portions(rows: ImageRows, *, noisy: bool) -> Iterator[slice]:
     yield slice(start, len(rows))
 
 
-def _recovered(rows: ImageRows, head: View, shard: Shard) -> Frames:
+def _recovered(rows: ImageRows, head: View, shard: Shard) -> ShardFrames:
     """Recover frames; where none of several can be, each by itself, so that each has its own reason."""
     try:
         with _numbered(rows):

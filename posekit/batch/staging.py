@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.batch import digests
-from posekit.batch.durable import PARTS, whole, write_document
+from posekit.batch.durable import PARTS_FOLDER, whole, write_document
 from posekit.batch.image_rows import ImageRows, first_usable, head_text, nothing_seen, read_head
 from posekit.batch.recipe import Recipe
 from posekit.batch.view_arrays import is_view_arrays, read_view_arrays
@@ -44,14 +44,14 @@ from posekit.views.person import person
 from posekit.views.person_view import person_view, times
 from posekit.views.source import Source
 
-STAGED: Final = ".staged"
+STAGED_FOLDER: Final = ".staged"
 """The folder beside the results that holds the tables."""
-SCHEMA: Final = "posekit.batch_input/1"
-VIEWS: Final = "views"
+STAGED_SCHEMA: Final = "posekit.batch_input/1"
+VIEWS_FOLDER: Final = "views"
 """What inputs are called that say camera and person themselves."""
-MIDDLES: Final = {f"mid_{part}s": (f"right_{part}", f"left_{part}") for part in ("shoulder", "hip")}
-NECK: Final = (LANDMARK["neck"], LANDMARK["mid_shoulders"])
-MOST: Final = 20
+MIDDLE_POINTS: Final = {f"mid_{part}s": (f"right_{part}", f"left_{part}") for part in ("shoulder", "hip")}
+NECK_POINTS: Final = (LANDMARK["neck"], LANDMARK["mid_shoulders"])
+MAX_STAGED_WARNINGS: Final = 20
 """Warnings that are kept of one input."""
 
 
@@ -112,7 +112,7 @@ class Staged:
     digest : str
         SHA-256 of its content.
     kind : str
-        What it is: `VIEWS`, or the format and layout of its key points.
+        What it is: `VIEWS_FOLDER`, or the format and layout of its key points.
     tables : tuple of StagedTable
     warnings : tuple of str
     """
@@ -142,7 +142,7 @@ def stage(job: Staging) -> Staged:
     job.recipe.check_versions()
     digest = digests.of_input(job.path)
     key = digests.of_values(job.name, str(job.path.resolve()), digest, job.reading)
-    base = job.folder / STAGED / f"{stem_of(job.name)}.{key}"
+    base = job.folder / STAGED_FOLDER / f"{stem_of(job.name)}.{key}"
     index = base.with_name(f"{base.name}.json")
     known = None if job.again else _known(index, digest)
     if known is not None:
@@ -158,9 +158,9 @@ def stage(job: Staging) -> Staged:
         digest=digest,
         kind=kind,
         tables=tuple(tables),
-        warnings=tuple(dict.fromkeys(says))[:MOST],
+        warnings=tuple(dict.fromkeys(says))[:MAX_STAGED_WARNINGS],
     )
-    write_document(index, {"schema": SCHEMA, **asdict(staged)}, job.folder / PARTS)
+    write_document(index, {"schema": STAGED_SCHEMA, **asdict(staged)}, job.folder / PARTS_FOLDER)
     return staged
 
 
@@ -180,7 +180,7 @@ def _known(index: Path, digest: str) -> Staged | None:
         found = Staged(**{**document, "tables": tables, "warnings": tuple(document["warnings"])})
     except (InputError, TypeError, KeyError, AttributeError):
         return None
-    return found if schema == SCHEMA and found.digest == digest else None
+    return found if schema == STAGED_SCHEMA and found.digest == digest else None
 
 
 def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
@@ -195,7 +195,7 @@ def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
                 told = StagedTable(
                     person=0, path=str(path.resolve()), frames=table.rows, head=_head(path, table.head)
                 )
-                return VIEWS, [told]
+                return VIEWS_FOLDER, [told]
             pieces = read_rows(path, 0, table.rows, source.rate)
             return f"key points: {path.suffix.lower()[1:]}", [_of_rows(job, base, pieces)]
     elif is_view_arrays(path):
@@ -203,13 +203,13 @@ def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
         _check_numbers(path, rows.frame, None)
         if head:
             _refuse_told(path, source)
-            return VIEWS, [_laid_down(job, base, 0, _head(path, head), [rows])]
+            return VIEWS_FOLDER, [_laid_down(job, base, 0, _head(path, head), [rows])]
         return "key points: npz", [_of_rows(job, base, iter([rows]))]
     what = recognise(path, source.format)
     if what.holds is Content.VIEW:
         _refuse_told(path, source)
         view = read_view(path)
-        return VIEWS, [_laid_down(job, base, 0, head_text(view), [ImageRows.of_view(view)])]
+        return VIEWS_FOLDER, [_laid_down(job, base, 0, head_text(view), [ImageRows.of_view(view)])]
     if what.holds is not Content.KEY_POINTS:
         given_views(path, source)  # refuses it in its own words
     return _of_detections(job, base)
@@ -272,14 +272,14 @@ def _as_views(job: Staging, pieces: Iterator[ImageRows], seen: list[View]) -> It
 def _shows_somebody(found: KeyPoints, camera: CameraModel, minimum_confidence: float) -> bool:
     """Tell whether any picture can be recovered: it shows a neck or both shoulders; uncalibrated, any joint."""
     known = np.isfinite(found.landmarks[..., 0]) & ~(found.landmark_confidence < minimum_confidence)
-    needed = range(len(JOINTS)) if isinstance(camera, ScaledOrthographicModel) else NECK
+    needed = range(len(JOINTS)) if isinstance(camera, ScaledOrthographicModel) else NECK_POINTS
     return bool(known[:, list(needed)].any())
 
 
 def _keypoints(path: Path, rows: ImageRows) -> KeyPoints:
     """Take rows for what a detector saw; points that are nowhere in them are no points of its layout."""
     there = {name: (name,) for k, name in enumerate(POINTS) if np.isfinite(rows.points[:, k, 0]).any()}
-    middles = {name: sides for name, sides in MIDDLES.items() if there.keys() >= set(sides)}
+    middles = {name: sides for name, sides in MIDDLE_POINTS.items() if there.keys() >= set(sides)}
     return KeyPoints(
         format=path.suffix.lower()[1:],
         source=str(path),
@@ -305,7 +305,7 @@ def _laid_down(job: Staging, base: Path, who: int, head: str, pieces: Any) -> St
             yield rows
 
     path.parent.mkdir(exist_ok=True)
-    with whole(path, job.folder / PARTS) as file:
+    with whole(path, job.folder / PARTS_FOLDER) as file:
         write_rows(file, head, counted(), group=min(job.recipe.shard_frames, AT_ONCE))
     return StagedTable(person=who, path=str(path.resolve()), frames=count, head=head)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.batch.digests import LARGEST
+from posekit.batch.digests import MAX_INPUT_BYTES
 from posekit.batch.image_rows import ImageRows
 from posekit.safe_io import open_npz, refusal
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
@@ -22,7 +22,7 @@ def is_view_arrays(path: Path) -> bool:
     """Tell whether a file is an NPZ of image points."""
     if path.suffix.lower() != ".npz" or not zipfile.is_zipfile(path):
         return False
-    with open_npz(path, limit=LARGEST) as archive:
+    with open_npz(path, limit=MAX_INPUT_BYTES) as archive:
         return "image" in archive.names
 
 
@@ -34,7 +34,7 @@ def read_view_arrays(path: Path, rate: float | None = None) -> tuple[ImageRows, 
     InputError
         Where an array has another shape or type than it should, or a number is infinite.
     """
-    with open_npz(path, limit=LARGEST) as archive:
+    with open_npz(path, limit=MAX_INPUT_BYTES) as archive:
         image = archive.array("image", "f", (None, len(JOINTS), 2)).astype(np.float64)
         count = len(image)
         if not count:

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.batch.digests import LARGEST
+from posekit.batch.digests import MAX_INPUT_BYTES
 from posekit.batch.image_rows import ImageRows, head_text
 from posekit.errors import InputError
 from posekit.formats.own import View
@@ -28,15 +28,15 @@ from posekit.skeleton import POINTS
 from posekit.views.person_view import RATE
 
 HEAD_KEY: Final = b"posekit.view"
-UV: Final = tuple(f"{point}_{axis}" for point in POINTS for axis in "uv")
-SURE: Final = tuple(f"{point}_confidence" for point in POINTS)
-ROOT: Final = ("root_x", "root_y", "root_z")
+UV_COLUMNS: Final = tuple(f"{point}_{axis}" for point in POINTS for axis in "uv")
+CONFIDENCE_COLUMNS: Final = tuple(f"{point}_confidence" for point in POINTS)
+ROOT_COLUMNS: Final = ("root_x", "root_y", "root_z")
 AT_ONCE: Final = 4096
 """Rows that are decoded together."""
-BUFFER: Final = 1 << 18
+BUFFER_BYTES: Final = 1 << 18
 """Bytes read at once of a column: row groups may be larger than memory."""
 MAX_ROWS: Final = 1 << 40
-FEWEST: Final = 4
+FEWEST_POINTS: Final = 4
 """Points below which a table is none of image points."""
 
 
@@ -63,7 +63,7 @@ class ViewTable:
 def is_view_table(names: Iterable[str]) -> bool:
     """Tell whether columns are those of image points."""
     there = set(names)
-    return sum(f"{point}_u" in there and f"{point}_v" in there for point in POINTS) >= FEWEST
+    return sum(f"{point}_u" in there and f"{point}_v" in there for point in POINTS) >= FEWEST_POINTS
 
 
 def open_view_table(path: Path) -> ViewTable:
@@ -77,7 +77,7 @@ def open_view_table(path: Path) -> ViewTable:
     pa = extra("pyarrow", "parquet", "reading Parquet")
     with _opened(path) as file:
         schema, rows = file.schema_arrow, file.metadata.num_rows
-        for name in {*UV, *SURE, *ROOT, "frame", "time"} & set(schema.names):
+        for name in {*UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time"} & set(schema.names):
             kind = schema.field(name).type
             if not (pa.types.is_integer(kind) or pa.types.is_floating(kind)):
                 raise refusal(path, name, str(kind)[:60], "numbers", "write the column as numbers")
@@ -104,7 +104,11 @@ def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> I
     """
     with _opened(path) as file:
         there = set(file.schema_arrow.names)
-        wanted = [name for name in (*UV, *SURE, *ROOT, "frame", "time") if name in there]
+        wanted = [
+            name
+            for name in (*UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time")
+            if name in there
+        ]
         found = start
         for columns, first in _pieces(path, file, wanted, start, stop):
             rows = _rows(columns, first, rate)
@@ -164,7 +168,10 @@ def write_rows(file: BinaryIO, head: str, pieces: Iterable[ImageRows], *, group:
     """Write rows into an open file, with camera and person."""
     pa = extra("pyarrow", "parquet", "writing Parquet")
     pq = extra("pyarrow.parquet", "parquet", "writing Parquet")
-    kinds = {"frame": pa.int64(), **dict.fromkeys(("time", *UV, *SURE, *ROOT), pa.float64())}
+    kinds = {
+        "frame": pa.int64(),
+        **dict.fromkeys(("time", *UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS), pa.float64()),
+    }
     schema = pa.schema(list(kinds.items()), metadata={HEAD_KEY: head.encode()})
     with pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=False) as writer:
         for rows in pieces:
@@ -172,9 +179,9 @@ def write_rows(file: BinaryIO, head: str, pieces: Iterable[ImageRows], *, group:
             flat = {
                 "frame": rows.frame,
                 "time": rows.time,
-                **dict(zip(UV, rows.points.reshape(count, -1).T, strict=True)),
-                **dict(zip(SURE, rows.confidence.T, strict=True)),
-                **dict(zip(ROOT, rows.root.T, strict=True)),
+                **dict(zip(UV_COLUMNS, rows.points.reshape(count, -1).T, strict=True)),
+                **dict(zip(CONFIDENCE_COLUMNS, rows.confidence.T, strict=True)),
+                **dict(zip(ROOT_COLUMNS, rows.root.T, strict=True)),
             }
             arrays = [pa.array(flat[name], kind, from_pandas=True) for name, kind in kinds.items()]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema), row_group_size=group)
@@ -190,9 +197,9 @@ def _opened(path: Path) -> Iterator[Any]:
     """Open a file that is read piece by piece; what pyarrow says about a damaged one is one line."""
     pa = extra("pyarrow", "parquet", "reading Parquet")
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
-    with open_file(path, limit=LARGEST) as file:
+    with open_file(path, limit=MAX_INPUT_BYTES) as file:
         try:
-            yield pq.ParquetFile(file, pre_buffer=False, buffer_size=BUFFER)
+            yield pq.ParquetFile(file, pre_buffer=False, buffer_size=BUFFER_BYTES)
         except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
             reason = cut(one_line(str(error)) or type(error).__name__)
             raise refusal(
@@ -243,13 +250,15 @@ def _rows(columns: dict[str, Array], first: int, rate: float | None) -> ImageRow
     frame = columns.get("frame", np.arange(first, first + count, dtype=np.float64))
     numbers: NDArray[np.int64] = frame.astype(np.int64)
     timed = "time" in columns and rate is None
-    points = np.stack([columns.get(name, unknown) for name in UV], axis=-1).reshape(count, len(POINTS), 2)
-    sure = np.stack([columns.get(name, unknown) for name in SURE], axis=-1)
+    points = np.stack([columns.get(name, unknown) for name in UV_COLUMNS], axis=-1).reshape(
+        count, len(POINTS), 2
+    )
+    sure = np.stack([columns.get(name, unknown) for name in CONFIDENCE_COLUMNS], axis=-1)
     points = np.where(np.isnan(points).any(axis=-1, keepdims=True), np.nan, points)
     return ImageRows(
         frame=numbers,
         time=columns["time"] if timed else numbers / (rate or RATE),
         points=points,
         confidence=np.where(np.isnan(points[..., 0]), np.nan, sure),
-        root=np.stack([columns.get(name, unknown) for name in ROOT], axis=-1),
+        root=np.stack([columns.get(name, unknown) for name in ROOT_COLUMNS], axis=-1),
     )

@@ -24,7 +24,7 @@ from posekit.errors import InputError
 if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.formats.own import Postures, Result
-    from posekit.formats.own.postures_q import Configurations
+    from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
 LOOSE = 0.1
@@ -50,7 +50,7 @@ EXAMPLES = examples(
 class _Input(NamedTuple):
     """What a file holds: postures or configurations, frames in time, the direction up, the result they are of."""
 
-    postures: Postures | Configurations
+    postures: Postures | NamedConfigurations
     clip: Any = None
     up: Array | None = None
     result: Result | None = None
@@ -294,7 +294,7 @@ def _read(path: Path) -> _Input:
     return _Input(held.postures, held.clip, DIRECTIONS[held.up] if held.up else None)
 
 
-def _count(postures: Postures | Configurations) -> int:
+def _count(postures: Postures | NamedConfigurations) -> int:
     from posekit.formats.own import Postures
 
     return len(postures.joints) if isinstance(postures, Postures) else len(postures)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.batch.reading import FRAME_COLUMNS, shard_paths
-from posekit.batch.run_folder import ASKED, MANIFEST, MANIFEST_SCHEMA, RunFolder
-from posekit.batch.shard import KEY, SHARDS
+from posekit.batch.run_folder import ASKED_FILE, MANIFEST_FILE, MANIFEST_SCHEMA, RunFolder
+from posekit.batch.shard import METADATA_KEY, SHARDS_FOLDER
 from posekit.errors import InputError
 from posekit.formats.given_file import first_bytes
 from posekit.formats.motion.parquet import opened
@@ -30,9 +30,9 @@ MOST: Final = 100_000_000
 def run_of(path: Path) -> Path | None:
     """Return the folder of a run, where a path is one, or a part of one that says it; else None."""
     folder = path
-    if path.name in (ASKED, MANIFEST, SHARDS) and not (path / ASKED).is_file():
+    if path.name in (ASKED_FILE, MANIFEST_FILE, SHARDS_FOLDER) and not (path / ASKED_FILE).is_file():
         folder = path.absolute().parent
-    return folder if folder.is_dir() and (folder / ASKED).is_file() else None
+    return folder if folder.is_dir() and (folder / ASKED_FILE).is_file() else None
 
 
 def run_lines(folder: Path) -> list[str]:
@@ -45,9 +45,11 @@ def run_lines(folder: Path) -> list[str]:
     """
     asked = RunFolder(path=folder).asked()
     if asked is None:
-        raise InputError(f"{folder}: got no {ASKED}; expected the output of posekit batch; check the name")
-    manifest = _manifest(folder / MANIFEST)
-    shards = shard_paths(folder) if (folder / SHARDS).is_dir() else []
+        raise InputError(
+            f"{folder}: got no {ASKED_FILE}; expected the output of posekit batch; check the name"
+        )
+    manifest = _manifest(folder / MANIFEST_FILE)
+    shards = shard_paths(folder) if (folder / SHARDS_FOLDER).is_dir() else []
     found = Tally()
     for shard in shards:
         found.add(shard)
@@ -66,7 +68,7 @@ def run_lines(folder: Path) -> list[str]:
             f"failed: {cut_long(str(one.get('shard') or one.get('input')))}: {cut_long(str(one.get('error')))}"
         )
     if len(failed) > FAILURES:
-        lines.append(f"and {len(failed) - FAILURES} more failures, in {folder / MANIFEST}")
+        lines.append(f"and {len(failed) - FAILURES} more failures, in {folder / MANIFEST_FILE}")
     return [*lines, _settings(asked.hash, asked.settings)]
 
 
@@ -75,7 +77,9 @@ def is_shard(path: Path) -> bool:
     if path.suffix.lower() != ".parquet" or not path.is_file() or not first_bytes(path).startswith(b"PAR1"):
         return False
     with opened(path) as file:
-        return KEY in (file.schema_arrow.metadata or {}) or KEY in (file.metadata.metadata or {})
+        return METADATA_KEY in (file.schema_arrow.metadata or {}) or METADATA_KEY in (
+            file.metadata.metadata or {}
+        )
 
 
 def shard_lines(path: Path) -> list[str]:
@@ -88,7 +92,7 @@ def shard_lines(path: Path) -> list[str]:
     """
     with opened(path) as file:
         names = set(file.schema_arrow.names)
-        said = _said(path, (file.metadata.metadata or {}).get(KEY, b""))
+        said = _said(path, (file.metadata.metadata or {}).get(METADATA_KEY, b""))
     found = Tally()
     found.add(path)
     rows = said.get("rows")

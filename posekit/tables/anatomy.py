@@ -9,24 +9,24 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from posekit.safe_io.refusal import cut, shown
-from posekit.tables.angles import ANGLES, DERIVED_ANGLES
+from posekit.tables.angles import DERIVED_ANGLES, SIDELESS_ANGLES
 from posekit.tables.fields import listed
 from posekit.tables.file_model import FileModel, refuse
 from posekit.tables.ranges import by_joint, check_angles
 
-ELEVATION, PLANE, TURN = DERIVED_ANGLES
+ELEVATION_ANGLE, PLANE_ANGLE, TURN_ANGLE = DERIVED_ANGLES
 
 COUPLED_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
-    ELEVATION: (PLANE,),
-    TURN: (ELEVATION,),
+    ELEVATION_ANGLE: (PLANE_ANGLE,),
+    TURN_ANGLE: (ELEVATION_ANGLE,),
     **{
         angle: tuple(
             other
-            for other in ANGLES
+            for other in SIDELESS_ANGLES
             if other != angle and {angle.split(".")[0], other.split(".")[0]} <= set(pair)
         )
         for pair in (("shoulder", "elbow"), ("hip", "knee"))
-        for angle in ANGLES
+        for angle in SIDELESS_ANGLES
         if angle.split(".")[0] in pair
     },
 }
@@ -143,7 +143,7 @@ class AnatomyTable(FileModel):
     def _by_joint(cls, document: Any) -> Any:
         tables = by_joint(cls, document)
         if isinstance(tables, dict):
-            check_angles(tables["joints"], ANGLES, every=True)
+            check_angles(tables["joints"], SIDELESS_ANGLES, every=True)
         return tables
 
     @model_validator(mode="after")

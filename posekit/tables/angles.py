@@ -17,7 +17,9 @@ PROJECTED_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """The angles of Lee & Chen (1985, section 3.2.A) by joint; of both sides."""
 
-ANGLES: Final = tuple(dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS))
+SIDELESS_ANGLES: Final = tuple(
+    dict.fromkeys(dof.removeprefix("right_").removeprefix("left_") for dof in DOFS)
+)
 """The 12 angles that differ by more than their side: ``"hip.flexion"``."""
 
 DERIVED_ANGLES: Final = ("shoulder.elevation", "shoulder.plane", "shoulder.turn")

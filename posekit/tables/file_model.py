@@ -87,7 +87,7 @@ def _few(value: Any) -> Any:
     return value
 
 
-FEW: Final = BeforeValidator(_few)
+FEW_ENTRIES: Final = BeforeValidator(_few)
 """Annotate an object with free keys: not more of them than anyone needs."""
 
 

@@ -101,7 +101,7 @@ class ViewFigure(FigureTable):
     model_config = ConfigDict(extra="ignore")
 
 
-class ViewTable(FileModel):
+class ViewLengthsTable(FileModel):
     """What a view says of a person's lengths; the rest of it is passed over."""
 
     model_config = ConfigDict(extra="ignore")

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure
 from posekit.formats.own import Postures, Report, Result
-from posekit.formats.own.postures_q import Configurations
+from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.formats.own.report import PostureReport
-from posekit.formats.own.report_columns import Columns, Place, joined
+from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
 from posekit.recovery.judged import tolerances_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
@@ -54,7 +54,7 @@ class _Given:
 
 def validate(
     validator: Validator,
-    postures: Postures | Configurations,
+    postures: Postures | NamedConfigurations,
     *,
     settings: dict[str, Any] | None = None,
     every: bool = False,
@@ -85,14 +85,14 @@ def validate(
     -------
     posekit.formats.own.Report
     """
-    if isinstance(postures, Configurations):
+    if isinstance(postures, NamedConfigurations):
         given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
     else:
         given = _Given(joints=postures.joints, head=postures.head, q=None, sequence=sequence)
     applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
     checks = [name.replace("-", "_") for name in applied]
-    places: dict[Place, int] = {}
-    parts: list[Columns] = []
+    places: dict[ReportPlace, int] = {}
+    parts: list[VerdictColumns] = []
     listed: list[PostureReport] = []
     all_listed = len(given) <= LISTED
     for first, verdicts in _batches(validator, given):
@@ -221,7 +221,7 @@ def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdict
             )
 
 
-def _ordered(validator: Validator, given: Configurations) -> NDArray[np.float64]:
+def _ordered(validator: Validator, given: NamedConfigurations) -> NDArray[np.float64]:
     """Return q in the validator's order; as it is where that is the file's."""
     names = validator.configuration_names
     if given.q.shape[1] == len(names) and given.names in (None, tuple(names)):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.report_columns import PER_DEGREE, Columns, Place
+from posekit.formats.own.report_columns import PER_DEGREE, ReportPlace, VerdictColumns
 from posekit.validators import Judgement
 from posekit.validators import Report as Verdicts
 from posekit.validators.robot import Contacts, Deferred
@@ -17,11 +17,11 @@ from posekit.validators.robot import Contacts, Deferred
 def columns_of(
     verdicts: Verdicts,
     contacts: Contacts | None,
-    places: dict[Place, int],
+    places: dict[ReportPlace, int],
     checks: Sequence[str],
     *,
     margins: bool = True,
-) -> Columns:
+) -> VerdictColumns:
     """Put the findings of a batch in columns.
 
     Parameters
@@ -52,7 +52,7 @@ def columns_of(
         silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
         if judgement.check == "collision" and contacts is not None:
             rows, margin = contacts.posture, contacts.distance - lower_margin(judgement)
-            index = _indices(places, [Place("collision", name, "m") for name in contacts.names])[
+            index = _indices(places, [ReportPlace("collision", name, "m") for name in contacts.names])[
                 contacts.pair
             ]
             bad = contacts.violated
@@ -62,7 +62,7 @@ def columns_of(
         index = _indices(
             places,
             [
-                Place(judgement.check, where, unit)
+                ReportPlace(judgement.check, where, unit)
                 for where, unit in zip(judgement.where, judgement.unit, strict=True)
             ],
         )
@@ -83,7 +83,7 @@ def columns_of(
     rows = np.concatenate([part[0] for part in found] or [np.zeros(0, dtype=np.int64)])
     order = np.argsort(rows, kind="stable")
     verdict = np.where(verdicts.invalid, 1, np.where(verdicts.valid, 0, 2)).astype(np.int8)
-    return Columns(
+    return VerdictColumns(
         places=tuple(places),
         verdict=verdict,
         fk_distance=verdicts.fk_distance,
@@ -113,7 +113,7 @@ def _take_least(
     worst_place[at], worst_margin[at], least[at] = place[order], margin[order], scaled[order]
 
 
-def _indices(places: dict[Place, int], new: list[Place]) -> NDArray[np.int32]:
+def _indices(places: dict[ReportPlace, int], new: list[ReportPlace]) -> NDArray[np.int32]:
     return np.array([places.setdefault(place, len(places)) for place in new], dtype=np.int32)
 
 

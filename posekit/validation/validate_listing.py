@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own import Judged
+from posekit.formats.own import JudgedCheck
 from posekit.formats.own.report import Finding, PostureReport, Worst, make_report
-from posekit.formats.own.report_columns import Columns, Place
-from posekit.formats.own.report_schema import VERDICTS
+from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
+from posekit.formats.own.report_schema import VERDICT_NAMES
 from posekit.tree import Findings
 from posekit.validation.validate_columns import lower_margin
 from posekit.validators import Judgement
@@ -21,8 +21,8 @@ from posekit.validators.robot import Contacts
 def list_postures(
     verdicts: Verdicts,
     contacts: Contacts | None,
-    columns: Columns,
-    places: list[Place],
+    columns: VerdictColumns,
+    places: list[ReportPlace],
     rows: NDArray[Any],
     *,
     every: bool,
@@ -54,7 +54,7 @@ def list_postures(
     ]
     made = make_report(
         settings={},
-        verdicts=[VERDICTS[verdict] for verdict in columns.verdict[rows]],
+        verdicts=[VERDICT_NAMES[verdict] for verdict in columns.verdict[rows]],
         fk_distance=verdicts.fk_distance[rows],
         judged=judged,
         all_findings=every,
@@ -118,14 +118,14 @@ def _touching(verdicts: Verdicts, contacts: Contacts | None, rows: NDArray[Any])
     return findings
 
 
-def _judged(judgement: Judgement, rows: NDArray[Any]) -> list[Judged]:
+def _judged(judgement: Judgement, rows: NDArray[Any]) -> list[JudgedCheck]:
     """Split a validator's findings by unit."""
     parts = []
     for unit in dict.fromkeys(judgement.unit):
         columns = [k for k, own in enumerate(judgement.unit) if own == unit]
         at = rows[:, None], np.array(columns)
         parts.append(
-            Judged(
+            JudgedCheck(
                 check=judgement.check,
                 unit=unit,
                 where=[judgement.where[k] for k in columns],

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from posekit.batch import Recipe, digests, read_frames, run_batch, run_shard, shard_paths, write_view_table
-from posekit.batch.durable import PARTS
+from posekit.batch.durable import PARTS_FOLDER
 from posekit.batch.shard import shards_of
 from posekit.batch.staging import Staging, stage
 from posekit.body import load_figure
@@ -77,7 +77,7 @@ def assert_whole(archive: Path, folder: Path, name: str, count: int) -> None:
         found.update(table.column("frame").to_pylist())
     assert found == dict.fromkeys(range(count), 1)
     reference = folder.parent / "reference"
-    for part in ("shards", ".staged", PARTS):
+    for part in ("shards", ".staged", PARTS_FOLDER):
         (reference / part).mkdir(parents=True, exist_ok=True)
     settings = digests.of_values(RECIPE.document())
     staged = stage(Staging(name=name, path=archive / name, folder=reference, recipe=RECIPE, reading=""))
@@ -98,7 +98,7 @@ def test_what_crashes_is_named_and_the_rest_is_done(
     assert (failure.start, failure.stop, failure.attempts, failure.died) == (POISON, POISON + 2, 2, True)
     assert failure.error == "its process was ended by signal 11 (SIGSEGV)"
     assert summary.frames == 10 and len(shard_paths(out)) == 5
-    assert list((out / PARTS).iterdir()) == []
+    assert list((out / PARTS_FOLDER).iterdir()) == []
     (named,) = json.loads((out / "manifest.json").read_text())["failed"]
     assert named["shard"].startswith("short.p0.0000000004-0000000006.") and named["killed_its_process"]
 
@@ -130,7 +130,7 @@ def test_interrupted_and_killed_and_run_to_the_end(archive: Path, tmp_path: Path
         first.communicate(timeout=30)[1] == f"posekit: error: interrupted; run it again to go on in {out}\n"
     )
     assert first.returncode == 130
-    assert list((out / PARTS).iterdir()) == []
+    assert list((out / PARTS_FOLDER).iterdir()) == []
     there = len(shard_paths(out))
     assert 1 <= there < FRAMES // 2
     second = start(archive, out)

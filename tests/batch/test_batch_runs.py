@@ -28,10 +28,10 @@ from posekit.batch import (
     write_view_table,
 )
 from posekit.batch import run as run_module
-from posekit.batch.durable import PARTS
+from posekit.batch.durable import PARTS_FOLDER
 from posekit.batch.pool import Outcome, attempt
 from posekit.batch.run_folder import run_folder
-from posekit.batch.staging import STAGED
+from posekit.batch.staging import STAGED_FOLDER
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.formats.own import View, write_view
@@ -109,7 +109,7 @@ def test_every_frame_comes_once_and_only_what_is_missing_is_done(archive: Path, 
         for table in read_shards(tmp_path / "out")
     )
     assert told[-1] == Progress(stage="recovering", done=16, total=16)
-    assert not list((tmp_path / "out" / STAGED).glob("*.parquet"))
+    assert not list((tmp_path / "out" / STAGED_FOLDER).glob("*.parquet"))
     before = contents(tmp_path / "out")
     times = {path: path.stat().st_mtime_ns for path in shard_paths(tmp_path / "out")}
     again = run_batch([archive], tmp_path / "out", RECIPE, work=_never)
@@ -297,7 +297,7 @@ def test_a_full_disk_is_an_error_and_nothing_half_written_counts(archive: Path, 
             run_batch([archive / "a.parquet"], out, large)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert shard_paths(out) == [] and list((out / PARTS).iterdir()) == []
+    assert shard_paths(out) == [] and list((out / PARTS_FOLDER).iterdir()) == []
     assert run_batch([archive / "a.parquet"], out, large).frames == 9
 
 
@@ -316,7 +316,7 @@ def test_a_disk_that_fails_at_the_end_leaves_nothing(
         patch.setattr(os if call == "fsync" else Path, call, refuse)
         with pytest.raises(InputError, match="No space left on device"):
             run_batch([archive], out, RECIPE)
-    assert len(shard_paths(out)) == 1 and list((out / PARTS).iterdir()) == []
+    assert len(shard_paths(out)) == 1 and list((out / PARTS_FOLDER).iterdir()) == []
     assert run_batch([archive], out, RECIPE).frames == 16
 
 

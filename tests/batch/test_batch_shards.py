@@ -13,10 +13,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from posekit.batch import Recipe, Shard, run_shard, write_view_table
-from posekit.batch.durable import PARTS
+from posekit.batch.durable import PARTS_FOLDER
 from posekit.batch.image_rows import ImageRows, head_text, nothing_seen, read_head
-from posekit.batch.shard import SHARDS, finished, portions, shards_of
-from posekit.batch.staging import STAGED, Staged, Staging, stage
+from posekit.batch.shard import SHARDS_FOLDER, finished, portions, shards_of
+from posekit.batch.staging import STAGED_FOLDER, Staged, Staging, stage
 from posekit.batch.view_table import open_view_table, read_rows, write_rows
 from posekit.body import load_figure
 from posekit.errors import InputError
@@ -42,7 +42,7 @@ def seen(count: int, seed: int = 0) -> View:
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     place = tmp_path / "run"
-    for name in (SHARDS, STAGED, PARTS):
+    for name in (SHARDS_FOLDER, STAGED_FOLDER, PARTS_FOLDER):
         (place / name).mkdir(parents=True)
     return place
 
@@ -153,7 +153,7 @@ def test_the_same_frames_give_the_same_bytes(tmp_path: Path, folder: Path) -> No
     first = shard.path.read_bytes()
     run_shard(shard)
     assert shard.path.read_bytes() == first
-    assert list((folder / PARTS).iterdir()) == []
+    assert list((folder / PARTS_FOLDER).iterdir()) == []
     said = finished(shard)
     assert said is not None and said.frames == 5
     shard.path.write_bytes(first[:-9])

@@ -14,7 +14,7 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.formats.own import read_report, schema
-from posekit.formats.own.postures_q import Configurations, read_configurations, write_configurations
+from posekit.formats.own.postures_q import NamedConfigurations, read_configurations, write_configurations
 from posekit.robots import load_robot
 from posekit.robots.find import find
 from posekit.skeleton import JOINTS
@@ -122,13 +122,13 @@ def test_configurations_are_taken_as_they_are(run, suffix: str) -> None:
 def test_names_bring_them_into_the_robots_order() -> None:
     order = np.random.default_rng(0).permutation(HUMAN.model.nq)
     names = tuple(HUMAN.configuration_names[k] for k in order)
-    mixed = Configurations(q=some_q()[:, order], names=names)
+    mixed = NamedConfigurations(q=some_q()[:, order], names=names)
     np.testing.assert_array_equal(mixed.in_order_of(HUMAN.configuration_names), some_q())
 
 
 def test_a_root_that_is_left_out_stands_at_the_origin() -> None:
     for names in (None, HUMAN.configuration_names[7:]):
-        short = Configurations(q=some_q()[:, 7:], names=names)
+        short = NamedConfigurations(q=some_q()[:, 7:], names=names)
         np.testing.assert_array_equal(short.in_order_of(HUMAN.configuration_names), some_q())
 
 

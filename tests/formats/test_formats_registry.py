@@ -18,7 +18,7 @@ from posekit.formats.format import Content, Format
 from posekit.formats.keypoints import KeyPoints, key_point_formats, read_keypoints
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.motion import Motion, SurvivorTable, write_motion, write_survivors
-from posekit.formats.own import Configurations, Postures, View, write_configurations, write_view
+from posekit.formats.own import NamedConfigurations, Postures, View, write_configurations, write_view
 from posekit.formats.own_files import OWN_FORMATS, OwnFormat
 from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import load_skeleton_map
@@ -97,9 +97,9 @@ def test_what_is_opened_is_what_the_file_holds(tmp_path: Path) -> None:
     for name, kind in (
         ("view.json", View),
         ("walk.trc", Motion),
-        ("q.npz", Configurations),
+        ("q.npz", NamedConfigurations),
         ("lifted.npz", Postures),
-        ("bare.npz", Configurations),
+        ("bare.npz", NamedConfigurations),
         ("survivors.csv", SurvivorTable),
         ("survivors.npz", SurvivorTable),
         ("people.json", KeyPoints),

@@ -7,18 +7,26 @@ import numpy as np
 import pytest
 
 from posekit.errors import InputError
-from posekit.formats.own import Finding, Judged, PostureReport, Report, make_report, read_report, write_report
+from posekit.formats.own import (
+    Finding,
+    JudgedCheck,
+    PostureReport,
+    Report,
+    make_report,
+    read_report,
+    write_report,
+)
 from posekit.formats.own.report import Worst, columns_of
-from posekit.formats.own.report_columns import Columns, Place, joined
+from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_table import summary_table
 from posekit.tree.check import Findings
 
 VALUE = np.array([[0.5, 2.0, -1.0], [0.5, 0.4, 0.9], [np.nan, np.nan, np.nan]])
 
 
-def judged(name="joint_range") -> Judged:
+def judged(name="joint_range") -> JudgedCheck:
     findings = Findings(value=VALUE, lower=np.zeros(3), upper=np.array([1.0, 1.0, np.inf]))
-    return Judged(check=name, unit="rad", where=("a", "b", "c"), findings=findings)
+    return JudgedCheck(check=name, unit="rad", where=("a", "b", "c"), findings=findings)
 
 
 def a_report(**options) -> Report:
@@ -87,14 +95,14 @@ def test_no_posture_and_no_place_are_reports(tmp_path):
     write_report(tmp_path / "r.json", empty)
     assert read_report(tmp_path / "r.json").summary == {"valid": 0, "invalid": 0, "undecided": 0}
     nowhere = Findings(value=np.zeros((1, 0)), lower=np.zeros(0), upper=np.zeros(0))
-    check = Judged(check="c", unit="m", where=(), findings=nowhere)
+    check = JudgedCheck(check="c", unit="m", where=(), findings=nowhere)
     report = make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[check])
     assert report.postures[0].findings == ()
 
 
 def test_thousands_of_postures_are_reported_in_seconds(tmp_path, rng):
     findings = Findings(value=rng.normal(size=(10_000, 22)), lower=np.full(22, -2.0), upper=np.full(22, 2.0))
-    check = Judged(check="c", unit="rad", where=[str(i) for i in range(22)], findings=findings)
+    check = JudgedCheck(check="c", unit="rad", where=[str(i) for i in range(22)], findings=findings)
     verdicts = np.where(findings.violated.any(axis=1), "invalid", "valid").tolist()
     report = make_report(settings={}, verdicts=verdicts, fk_distance=np.zeros(10_000), judged=[check])
     write_report(tmp_path / "r.json", report)
@@ -223,11 +231,11 @@ def test_a_name_cannot_break_out_of_its_cell(tmp_path):
 
 
 def test_batches_are_counted_through():
-    places = [Place("joint_range", "knee", "deg"), Place("collision", "a-b", "m")]
+    places = [ReportPlace("joint_range", "knee", "deg"), ReportPlace("collision", "a-b", "m")]
 
     def part(verdict, posture, place, margin):
         n = len(verdict)
-        return Columns(
+        return VerdictColumns(
             places=places,
             verdict=np.array(verdict, dtype=np.int8),
             fk_distance=np.zeros(n),

@@ -15,7 +15,7 @@ from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.evaluate import Evaluation, FrameSampling, Method, Sweep, by_path, evaluate, write_evaluation
 from posekit.formats.own import (
-    SCHEMAS,
+    SCHEMA_NAMES,
     Family,
     LeeChenModel,
     ObjectFrame,
@@ -36,7 +36,7 @@ from posekit.formats.own import (
     write_result,
     write_view,
 )
-from posekit.formats.own.batch_schema import ManifestFile, SettingsFields, SourceFields
+from posekit.formats.own.batch_schema import BatchSettingsFields, ManifestFile, SourceFields
 from posekit.settings import MEASURED_TOLERANCE, PartialTolerance, RecoverSettings
 from posekit.skeleton import JOINTS, SEGMENT_NAMES
 from posekit.synthesis import Capture
@@ -184,7 +184,7 @@ def write_all(folder, rng) -> dict[str, list]:
     write_evaluation(folder / "evaluation.json", evaluation())
     write_evaluation(folder / "followed.json", evaluation(choose=by_path, tolerance=MEASURED_TOLERANCE))
     write_batch(folder / "batch")
-    documents: dict[str, list] = {name: [] for name in SCHEMAS}
+    documents: dict[str, list] = {name: [] for name in SCHEMA_NAMES}
     for path in folder.rglob("*.json"):
         document = json.loads(path.read_text())
         documents[document["schema"]].append(document)
@@ -192,8 +192,8 @@ def write_all(folder, rng) -> dict[str, list]:
 
 
 def test_each_is_versioned_and_closed():
-    assert SCHEMAS == tuple(f"posekit.{kind}/1" for kind in KINDS)
-    for name in SCHEMAS:
+    assert SCHEMA_NAMES == tuple(f"posekit.{kind}/1" for kind in KINDS)
+    for name in SCHEMA_NAMES:
         found = schema(name)
         assert found["title"] == name
         assert found["$id"] == "urn:" + name.replace(".", ":").replace("/", ":")
@@ -244,7 +244,7 @@ def test_an_unknown_schema_is_refused():
 
 def test_all_that_decides_a_batch_is_in_its_schema():
     settings = Recipe().document()
-    assert list(settings) == list(SettingsFields.model_fields)
+    assert list(settings) == list(BatchSettingsFields.model_fields)
     assert list(settings["source"]) == list(SourceFields.model_fields)
     assert set(TOTALS) | {"schema_", "failed"} == set(ManifestFile.model_fields)
 

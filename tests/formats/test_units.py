@@ -7,20 +7,20 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.own import parse_length
-from posekit.formats.own.units import METRES, UNITS, from_metres, to_metres
+from posekit.formats.own.units import UNIT_METRES, UNIT_NAMES, from_metres, to_metres
 
 
-@given(st.decimals(0, 1000, places=3), st.sampled_from(UNITS))
+@given(st.decimals(0, 1000, places=3), st.sampled_from(UNIT_NAMES))
 def test_a_decimal_becomes_the_nearest_float(number, unit):
     metres = number.scaleb({"m": 0, "cm": -2, "mm": -3}[unit])
     assert parse_length(f"{number}{unit}") == float(metres)
     assert to_metres(float(number), unit) == pytest.approx(float(metres), rel=3e-16)
 
 
-@given(st.floats(-1e6, 1e6), st.sampled_from(UNITS))
+@given(st.floats(-1e6, 1e6), st.sampled_from(UNIT_NAMES))
 def test_there_and_back(value, unit):
     assert to_metres(from_metres(value, unit), unit) == pytest.approx(value, rel=3e-16, abs=1e-300)
-    assert to_metres(value, unit) == pytest.approx(value * METRES[unit], rel=3e-16, abs=1e-300)
+    assert to_metres(value, unit) == pytest.approx(value * UNIT_METRES[unit], rel=3e-16, abs=1e-300)
 
 
 def test_metres_are_exact(rng):

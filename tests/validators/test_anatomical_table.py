@@ -11,7 +11,7 @@ import pytest
 from posekit.errors import InputError
 from posekit.skeleton import DOFS
 from posekit.tables.anatomy import MAX_COUPLINGS
-from posekit.tables.angles import ANGLES
+from posekit.tables.angles import SIDELESS_ANGLES
 from posekit.validators import Ranges, load_ranges
 from posekit.validators.anatomical import Anatomy
 
@@ -233,7 +233,7 @@ def test_a_file_with(tmp_path: Path, name: str) -> None:
 def test_a_table_without_couplings_or_sources_is_a_table(tmp_path: Path) -> None:
     bare = 'schema = "posekit.ranges/1"\nkind = "anatomical"\nspreads = 2\n' + "".join(
         f"[{angle}]\nlower = {{ mean = -30, spread = 5 }}\nupper = {{ mean = 40, spread = 10 }}\n"
-        for angle in ANGLES
+        for angle in SIDELESS_ANGLES
     )
     table = load(tmp_path, bare)
     assert set(table.limits.values()) == {(-40.0, 60.0)}

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from posekit.formats.own import write_report
-from posekit.formats.own.postures_q import Configurations
+from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.robots import Robot, load_robot
 from posekit.validation import validate
 from posekit.validators import Validator
@@ -144,7 +144,7 @@ def test_contacts_are_all_pairs_one_by_one_and_the_nearest_of_the_rest(name: str
 
 
 def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
-    given = Configurations(q=some_q("human"))
+    given = NamedConfigurations(q=some_q("human"))
     reports = {
         detail: validate(validator("human"), given, detail=detail)
         for detail in ("findings", "margins", "verdicts")
@@ -165,7 +165,7 @@ def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
 
 
 def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    given = Configurations(q=some_q("human"))
+    given = NamedConfigurations(q=some_q("human"))
     module = importlib.import_module("posekit.validation.validate")
     whole = validate(validator("human"), given, detail="verdicts").columns
     monkeypatch.setattr(module, "BATCH", 17)
@@ -183,8 +183,8 @@ def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_an_order_of_ones_own_is_brought_into_the_robots() -> None:
     q, robot = some_q("human")[:40], load_robot("human")
     names = robot.configuration_names
-    turned = Configurations(q=q[:, ::-1], names=names[::-1])
-    plain = validate(validator("human"), Configurations(q=q, names=names), detail="verdicts")
+    turned = NamedConfigurations(q=q[:, ::-1], names=names[::-1])
+    plain = validate(validator("human"), NamedConfigurations(q=q, names=names), detail="verdicts")
     assert validate(validator("human"), turned, detail="verdicts").verdicts == plain.verdicts
 
 
@@ -194,7 +194,7 @@ def test_a_robot_without_limits_is_inside_them() -> None:
     q = pin.neutral(robot.model)[None]
     assert judge.check(q=q).verdicts == ["valid"]
     assert judge.check(q=q).judgements[0].where == ()
-    report = validate(judge, Configurations(q=q))
+    report = validate(judge, NamedConfigurations(q=q))
     assert [posture.verdict for posture in report.postures] == ["valid"]
 
 

@@ -40,7 +40,7 @@ def read_lengths(path: str | Path) -> SegmentLengths:
         Where the file cannot be read, or is not what its schema says.
     """
     from posekit.tables.file_model import validated
-    from posekit.tables.lengths import LengthsTable, ViewTable
+    from posekit.tables.lengths import LengthsTable, ViewLengthsTable
 
     path = Path(path)
     suffix = path.suffix.lower()
@@ -49,7 +49,7 @@ def read_lengths(path: str | Path) -> SegmentLengths:
     document = read_toml(path) if suffix == ".toml" else read_json(path)
     schema = document.get("schema") if isinstance(document, dict) else None
     if isinstance(schema, str) and schema.startswith("posekit.view/"):
-        view = validated(ViewTable, document, path)
+        view = validated(ViewLengthsTable, document, path)
         return _lengths(view.figure, view.unit, f"the figure of {path.name}", path)
     table = validated(LengthsTable, document, path)
     source = str(path) if table.source is None else table.source

@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures import Postures as Postures
     from posekit.formats.own.postures import read_postures as read_postures
     from posekit.formats.own.postures import write_postures as write_postures
-    from posekit.formats.own.postures_q import Configurations as Configurations
+    from posekit.formats.own.postures_q import NamedConfigurations as NamedConfigurations
     from posekit.formats.own.postures_q import holds_configurations as holds_configurations
     from posekit.formats.own.postures_q import read_configurations as read_configurations
     from posekit.formats.own.postures_q import write_configurations as write_configurations
     from posekit.formats.own.reading import read_json as read_json
     from posekit.formats.own.report import Finding as Finding
-    from posekit.formats.own.report import Judged as Judged
+    from posekit.formats.own.report import JudgedCheck as JudgedCheck
     from posekit.formats.own.report import PostureReport as PostureReport
     from posekit.formats.own.report import Report as Report
     from posekit.formats.own.report import check_report_path as check_report_path
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from posekit.formats.own.result_file import read_result as read_result
     from posekit.formats.own.result_file import write_result as write_result
     from posekit.formats.own.root import Root as Root
-    from posekit.formats.own.schemas import SCHEMAS as SCHEMAS
+    from posekit.formats.own.schemas import SCHEMA_NAMES as SCHEMA_NAMES
     from posekit.formats.own.schemas import schema as schema
     from posekit.formats.own.schemas import schema_text as schema_text
     from posekit.formats.own.units import PER_METRE as PER_METRE
@@ -82,7 +82,7 @@ else:
                 "write_postures",
             ),
             "postures_q": (
-                "Configurations",
+                "NamedConfigurations",
                 "holds_configurations",
                 "read_configurations",
                 "write_configurations",
@@ -90,7 +90,7 @@ else:
             "reading": ("read_json",),
             "report": (
                 "Finding",
-                "Judged",
+                "JudgedCheck",
                 "PostureReport",
                 "Report",
                 "check_report_path",
@@ -109,7 +109,7 @@ else:
             ),
             "root": ("Root",),
             "schemas": (
-                "SCHEMAS",
+                "SCHEMA_NAMES",
                 "schema",
                 "schema_text",
             ),

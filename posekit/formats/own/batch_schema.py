@@ -8,7 +8,7 @@ from pydantic import Field
 
 from posekit.tables.file_model import FileModel
 
-SCHEMA = "posekit.batch/1"
+BATCH_SCHEMA = "posekit.batch/1"
 MANIFEST_SCHEMA = "posekit.batch_manifest/1"
 
 Count = Annotated[int, Field(ge=0)]
@@ -39,7 +39,7 @@ class SourceFields(FileModel):
     proportions: str
 
 
-class SettingsFields(FileModel):
+class BatchSettingsFields(FileModel):
     """Everything that decides the results but the inputs; tolerances that are null were the usual ones."""
 
     checks: list[str]
@@ -72,7 +72,7 @@ class BatchFile(FileModel):
 
     schema_: Literal["posekit.batch/1"] = Field(alias="schema")
     hash: Annotated[str, Field(pattern="^[0-9a-f]{16}$")] = Field(description="Of the settings.")
-    settings: SettingsFields
+    settings: BatchSettingsFields
     inputs: dict[str, Digest] = Field(description="Contents by name, below `root`.")
     root: str
 

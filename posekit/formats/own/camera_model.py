@@ -13,7 +13,7 @@ from posekit.errors import CameraError
 
 Array = NDArray[np.float64]
 
-ORTHONORMAL = 1e-6
+ORTHONORMAL_TOLERANCE = 1e-6
 """How far R R^T may be from the identity, entry by entry: files round R to six digits or more."""
 
 
@@ -120,7 +120,7 @@ def check_rotation(R: Array | list[list[float]]) -> None:
         raise CameraError("R must be a finite 3x3 matrix")
     with np.errstate(over="ignore", invalid="ignore"):
         error = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
-    if not error <= ORTHONORMAL:
+    if not error <= ORTHONORMAL_TOLERANCE:
         raise CameraError(f"R must be a rotation; R R^T is off the identity by {error:.2g}")
     if np.linalg.det(matrix) < 0:
         raise CameraError("R must be a rotation; its determinant is -1, so it mirrors")

@@ -8,7 +8,7 @@ from pydantic import FailFast, Field
 
 from posekit.tables.file_model import FileModel
 
-SCHEMA = "posekit.evaluation/1"
+EVALUATION_SCHEMA = "posekit.evaluation/1"
 
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
@@ -31,7 +31,7 @@ class ToleranceFields(FileModel):
     hips: Share = Field(description="What part of `rigid` the hips' distance may be off.")
 
 
-class SettingsFields(FileModel):
+class EvaluationSettingsFields(FileModel):
     """What decided the results; those of virtual cameras are there where motion was seen through them."""
 
     source: str = Field(description="The motion or the view.")
@@ -196,7 +196,7 @@ class EvaluationFile(FileModel):
     """What `posekit evaluate` writes."""
 
     schema_: Literal["posekit.evaluation/1"] = Field(alias="schema")
-    settings: SettingsFields
+    settings: EvaluationSettingsFields
     frames: Annotated[int, Field(ge=1)] = Field(
         description="Views that were recovered: frames, cameras, noises."
     )

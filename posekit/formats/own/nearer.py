@@ -9,9 +9,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import FailFast, Field
 
 from posekit.formats.own.reading import read_json
-from posekit.tables.file_model import FEW, FileModel, validated
+from posekit.tables.file_model import FEW_ENTRIES, FileModel, validated
 
-SCHEMA = "posekit.nearer/1"
+NEARER_SCHEMA = "posekit.nearer/1"
 
 
 class NearerFile(FileModel):
@@ -22,7 +22,7 @@ class NearerFile(FileModel):
     }
 
     schema_: Literal["posekit.nearer/1"] = Field(alias="schema")
-    frames: Annotated[list[Annotated[dict[str, str], FEW]], Field(min_length=1), FailFast()] = Field(
+    frames: Annotated[list[Annotated[dict[str, str], FEW_ENTRIES]], Field(min_length=1), FailFast()] = Field(
         description="Segment, named a-b, to the name of its nearer end; one that is level or not known is left out."
     )
 

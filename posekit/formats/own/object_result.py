@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.own.family import Family
 from posekit.formats.own.npz import suffix
-from posekit.formats.own.object_result_schema import SCHEMA, ObjectFile, ObjectFrameRecord
+from posekit.formats.own.object_result_schema import OBJECT_SCHEMA, ObjectFile, ObjectFrameRecord
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.safe_io.refusal import refusal
@@ -147,7 +147,7 @@ def write_object(path: str | Path, result: ObjectResult) -> None:
     check_object_path(path)
     per = _per(result.unit)
     head = {
-        "schema": SCHEMA,
+        "schema": OBJECT_SCHEMA,
         "unit": result.unit,
         "linkage": result.linkage,
         "points": list(result.points),

@@ -10,9 +10,9 @@ from pydantic import FailFast, Field
 from posekit.formats.own.result_schema import Maybe, MaybePoint, Names, ResultFamily
 from posekit.formats.own.survivor_models import Count
 from posekit.formats.own.units import Unit
-from posekit.tables.file_model import FEW, FileModel
+from posekit.tables.file_model import FEW_ENTRIES, FileModel
 
-SCHEMA = "posekit.object/1"
+OBJECT_SCHEMA = "posekit.object/1"
 
 Branches = Annotated[str, Field(max_length=64, pattern="^[01]*$")]
 Segments = Annotated[list[Annotated[list[str], Field(min_length=2, max_length=2)]], Field(max_length=5000)]
@@ -32,11 +32,11 @@ class ObjectPosture(FileModel):
         description="Camera frame, the tree's root at depth 0, in `unit` or relative; null where not seen."
     )
     branches: Branches = Field(description="Near (0) or far (1), level by level of the tree.")
-    flips: Annotated[dict[str, str | None], FEW] = Field(
+    flips: Annotated[dict[str, str | None], FEW_ENTRIES] = Field(
         description="The nearer end of each segment; null where both are level, or one is not seen."
     )
     scale: float = Field(description="Pixels a `unit`, or a relative unit, that it was recovered at.")
-    margins: Annotated[dict[str, Maybe], FEW] = Field(
+    margins: Annotated[dict[str, Maybe], FEW_ENTRIES] = Field(
         description="By check: the distance to the nearest bound, in metres or the relative unit."
     )
     q: Annotated[list[Maybe], Field(max_length=1000)] | None = Field(
@@ -64,7 +64,7 @@ class ObjectFrameRecord(FileModel):
     reason: str = Field(default="", description="Why there is nothing.")
     levels: ObjectLevels
     postures: Annotated[list[ObjectPosture], FailFast()]
-    rejected: Annotated[dict[str, Count], FEW] = Field(
+    rejected: Annotated[dict[str, Count], FEW_ENTRIES] = Field(
         description="Flips lost to each reason; with the postures, all of them at all scales taken."
     )
     family: ResultFamily | None = Field(default=None, description="The scales that it can have.")

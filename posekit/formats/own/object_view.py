@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.camera_model import ScaledOrthographicModel
-from posekit.formats.own.object_view_schema import SCHEMA, ObjectViewFile
+from posekit.formats.own.object_view_schema import OBJECT_VIEW_SCHEMA, ObjectViewFile
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.linkages import Linkage
@@ -148,7 +148,7 @@ def write_object_view(path: str | Path, view: ObjectView) -> None:
         if truth := _known(view.points, view.truth[k] * per):
             frame["truth"] = truth
         frames.append(frame)
-    head: dict[str, Any] = {"schema": SCHEMA, "unit": view.unit, "camera": camera}
+    head: dict[str, Any] = {"schema": OBJECT_VIEW_SCHEMA, "unit": view.unit, "camera": camera}
     validated(ObjectViewFile, {**head, "frames": frames}, path)
     write_text(path, json_pieces(head, "frames", frames))
 

@@ -8,20 +8,20 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import FailFast, Field
 
 from posekit.formats.own.units import Unit
-from posekit.formats.own.view_schema import Point2, Point3, ScaledOrthographicCamera
-from posekit.tables.file_model import FEW, FileModel
+from posekit.formats.own.view_schema import Point2, Point3, ScaledOrthographicFields
+from posekit.tables.file_model import FEW_ENTRIES, FileModel
 
-SCHEMA = "posekit.view/1"
+OBJECT_VIEW_SCHEMA = "posekit.view/1"
 
 
 class ObjectFrameFields(FileModel):
     """One picture."""
 
     time: float = Field(description="Seconds.")
-    image: Annotated[dict[str, Point2], FEW] = Field(
+    image: Annotated[dict[str, Point2], FEW_ENTRIES] = Field(
         description="Where each point of the linkage is seen; one that is not seen is left out."
     )
-    truth: Annotated[dict[str, Point3], FEW] | None = Field(
+    truth: Annotated[dict[str, Point3], FEW_ENTRIES] | None = Field(
         default=None,
         description="Points, camera frame, in `unit`, or in the linkage's own where that is null.",
     )
@@ -43,5 +43,5 @@ class ObjectViewFile(FileModel):
 
     schema_: Literal["posekit.view/1"] = Field(alias="schema")
     unit: Unit | None = Field(default=None, description="Of lengths; null where they are relative.")
-    camera: ScaledOrthographicCamera
+    camera: ScaledOrthographicFields
     frames: Annotated[list[ObjectFrameFields], Field(min_length=1), FailFast()]

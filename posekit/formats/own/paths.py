@@ -15,7 +15,7 @@ from posekit.skeleton import JOINTS
 
 Array = NDArray[np.float64]
 
-LENGTHS: Final = ("joints", "smoothed", "deviation")
+LENGTH_COLUMNS: Final = ("joints", "smoothed", "deviation")
 """What is in metres, and in files in their unit."""
 
 
@@ -107,8 +107,10 @@ class FollowedPaths:
     def in_unit(self, unit: Unit) -> dict[str, NDArray[Any]]:
         """Return the arrays as files hold them."""
         values: dict[str, NDArray[Any]] = {}
-        values |= {item.name: getattr(self, item.name) for item in fields(self) if item.name not in TOLD}
-        for name in LENGTHS:
+        values |= {
+            item.name: getattr(self, item.name) for item in fields(self) if item.name not in SINGLE_VALUES
+        }
+        for name in LENGTH_COLUMNS:
             values[name] = from_metres(values[name], unit)
         values["scale"] = values["scale"] / PER_METRE[unit]
         return values
@@ -137,7 +139,7 @@ class FollowedPaths:
             for name, given in arrays.items()
             if name not in ("survivor", "interpolated")
         }
-        for name in LENGTHS:
+        for name in LENGTH_COLUMNS:
             values[name] = to_metres(values[name], unit)
         values["scale"] = values["scale"] * PER_METRE[unit]
         return FollowedPaths(
@@ -150,7 +152,7 @@ class FollowedPaths:
         )
 
 
-TOLD: Final = ("lead", "exact", "apart")
+SINGLE_VALUES: Final = ("lead", "exact", "apart")
 """What is said once of all paths."""
 
 

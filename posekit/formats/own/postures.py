@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
-from posekit.formats.own.postures_schema import SCHEMA, PosturesFile
+from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.result import Result
 from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
-from posekit.formats.own.result_schema import SCHEMA as RESULT_SCHEMA
+from posekit.formats.own.result_schema import RESULT_SCHEMA
 from posekit.formats.own.units import Unit, from_metres, to_metres
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
@@ -116,12 +116,16 @@ def write_postures(path: str | Path, postures: Postures | Array, unit: Unit = "m
     """
     given = postures if isinstance(postures, Postures) else Postures(joints=postures)
     if suffix(path, ".json", ".npz") == ".npz":
-        arrays = {"schema": np.array(SCHEMA), "joint_names": np.array(JOINTS), "joints": given.joints}
+        arrays = {
+            "schema": np.array(POSTURES_SCHEMA),
+            "joint_names": np.array(JOINTS),
+            "joints": given.joints,
+        }
         with replacing(path) as file:
             write_npz(file, arrays if given.head is None else {**arrays, "head": given.head})
         return
     names = JOINTS if given.head is None else POINTS
-    head = {"schema": SCHEMA, "unit": unit, "joint_names": list(names)}
+    head = {"schema": POSTURES_SCHEMA, "unit": unit, "joint_names": list(names)}
     points = given.joints if given.head is None else np.concatenate([given.joints, given.head], axis=1)
     write_text(path, json_pieces(head, "postures", _listed(from_metres(points, unit))))
 
@@ -149,8 +153,10 @@ def _read_npz(path: str | Path) -> Postures:
             schema = str(archive.array("schema", "U", ()))
             if schema == RESULT_SCHEMA:
                 return _survivors(result_in(archive))
-            if schema != SCHEMA:
-                raise refusal(path, "schema", shown(schema), f'"{SCHEMA}"', "give a file of this schema")
+            if schema != POSTURES_SCHEMA:
+                raise refusal(
+                    path, "schema", shown(schema), f'"{POSTURES_SCHEMA}"', "give a file of this schema"
+                )
         archive.check_held(MAX_ARRAYS)
         names = _names(archive)
         joints = _coordinates(archive, "joints", len(names))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
-from posekit.formats.own.postures_q_schema import SCHEMA, ConfigurationsFile
+from posekit.formats.own.postures_q_schema import CONFIGURATIONS_SCHEMA, ConfigurationsFile
 from posekit.formats.own.reading import read_json
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
@@ -19,12 +19,12 @@ from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
 
-ROOT = ("x", "y", "z", "qx", "qy", "qz", "qw")
+ROOT_NAMES = ("x", "y", "z", "qx", "qy", "qz", "qw")
 """The variables of a root that moves freely; where a file has none of them it stands at the origin."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Configurations:
+class NamedConfigurations:
     """Configurations as a file has them.
 
     Parameters
@@ -61,11 +61,11 @@ class Configurations:
         InputError
             Where a name is unknown, missing or there twice, or without names the number of variables is another.
         """
-        rooted = tuple(names[: len(ROOT)]) == ROOT
+        rooted = tuple(names[: len(ROOT_NAMES)]) == ROOT_NAMES
         own = self.names
         if own is None:
-            short = rooted and self.q.shape[1] == len(names) - len(ROOT)
-            own = tuple(names[len(ROOT) :]) if short else tuple(names)
+            short = rooted and self.q.shape[1] == len(names) - len(ROOT_NAMES)
+            own = tuple(names[len(ROOT_NAMES) :]) if short else tuple(names)
             if self.q.shape[1] != len(own):
                 remedy = "check which robot it is; configuration_names says what is in which place"
                 raise refusal(self.source, "q", f"{self.q.shape[1]} variables", f"{len(names)}", remedy)
@@ -75,7 +75,7 @@ class Configurations:
                 raise refusal(
                     self.source, "configuration_names", shown(name), expected, nearest(name, names)[:200]
                 )
-        wanted = names[len(ROOT) :] if rooted and not set(own) & set(ROOT) else names
+        wanted = names[len(ROOT_NAMES) :] if rooted and not set(own) & set(ROOT_NAMES) else names
         missing = [name for name in wanted if name not in own]
         if missing:
             got = f"no {', no '.join(missing[:3])}{' …' if len(missing) > 3 else ''}"
@@ -84,7 +84,7 @@ class Configurations:
             )
         q = np.zeros((len(self.q), len(names)))
         if rooted:
-            q[:, len(ROOT) - 1] = 1.0
+            q[:, len(ROOT_NAMES) - 1] = 1.0
         q[:, [list(names).index(name) for name in own]] = self.q
         return q
 
@@ -94,13 +94,13 @@ def holds_configurations(path: str | Path) -> bool:
     if suffix(path, ".json", ".npz") == ".npz":
         with open_npz(path) as archive:
             if "schema" in archive.names:
-                return str(archive.array("schema", "U", ())) == SCHEMA
+                return str(archive.array("schema", "U", ())) == CONFIGURATIONS_SCHEMA
             return "q" in archive.names and "joints" not in archive.names
     document = read_json(path)
-    return isinstance(document, dict) and document.get("schema") == SCHEMA
+    return isinstance(document, dict) and document.get("schema") == CONFIGURATIONS_SCHEMA
 
 
-def read_configurations(path: str | Path) -> Configurations:
+def read_configurations(path: str | Path) -> NamedConfigurations:
     """Read configurations.
 
     Parameters
@@ -134,10 +134,18 @@ def write_configurations(path: str | Path, q: Array, names: Sequence[str]) -> No
     if suffix(path, ".json", ".npz") == ".npz":
         with replacing(path) as file:
             write_npz(
-                file, {"schema": np.array(SCHEMA), "configuration_names": np.array(list(names)), "q": q}
+                file,
+                {
+                    "schema": np.array(CONFIGURATIONS_SCHEMA),
+                    "configuration_names": np.array(list(names)),
+                    "q": q,
+                },
             )
         return
-    write_text(path, json_pieces({"schema": SCHEMA, "configuration_names": list(names)}, "q", _listed(q)))
+    write_text(
+        path,
+        json_pieces({"schema": CONFIGURATIONS_SCHEMA, "configuration_names": list(names)}, "q", _listed(q)),
+    )
 
 
 def _listed(q: Array) -> Iterator[list[Any]]:
@@ -145,7 +153,7 @@ def _listed(q: Array) -> Iterator[list[Any]]:
         yield row.tolist()
 
 
-def _from_archive(archive: Archive) -> Configurations:
+def _from_archive(archive: Archive) -> NamedConfigurations:
     q = archive.array("q", "f", (None, None)).astype(np.float64)
     names: tuple[str, ...] | None = None
     if "configuration_names" in archive.names:
@@ -153,7 +161,7 @@ def _from_archive(archive: Archive) -> Configurations:
     return _checked(archive.path, q, names)
 
 
-def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> Configurations:
+def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> NamedConfigurations:
     if np.isinf(q).any():
         raise not_finite(path, "q", q)
     if names is not None and len(names) != q.shape[1]:
@@ -163,4 +171,4 @@ def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> Confi
         raise refusal(
             path, "configuration_names", "a name twice", "each variable once", "remove one of the two"
         )
-    return Configurations(q=q, names=names, source=str(path))
+    return NamedConfigurations(q=q, names=names, source=str(path))

@@ -9,7 +9,7 @@ from pydantic import FailFast, Field
 
 from posekit.tables.file_model import FileModel
 
-SCHEMA = "posekit.configurations/1"
+CONFIGURATIONS_SCHEMA = "posekit.configurations/1"
 MOST_VARIABLES = 1000
 """Variables of one configuration: a robot has at most 1000 links."""
 

@@ -12,7 +12,7 @@ from posekit.safe_io.refusal import nearest, shown
 from posekit.skeleton import POINTS
 from posekit.tables.file_model import FileModel, refuse
 
-SCHEMA = "posekit.postures/1"
+POSTURES_SCHEMA = "posekit.postures/1"
 
 
 def check_joint_names(names: list[str]) -> list[str]:

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.reading import read_json
-from posekit.formats.own.report_columns import CheckCount, Columns, Place, joined
+from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_csv import csv_lines
 from posekit.formats.own.report_schema import (
-    SCHEMA,
-    VERDICTS,
+    REPORT_SCHEMA,
+    VERDICT_NAMES,
     CheckFields,
     PostureFields,
     ReportFile,
@@ -30,11 +30,11 @@ from posekit.safe_io.writing import check_target, json_pieces, write_lines, writ
 from posekit.tables.file_model import validated
 from posekit.tree.check import Findings
 
-NUMBERS = ("value", "lower", "upper", "margin")
+FINDING_NUMBERS = ("value", "lower", "upper", "margin")
 MOST_PLACES = 500
 """Places of one check that the summary of a JSON file counts, the most frequent first."""
 
-SUFFIXES = (".json", ".md", ".csv")
+REPORT_SUFFIXES = (".json", ".md", ".csv")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class Report:
     checks: Mapping[str, CheckCount] | None = field(default=None, compare=False)
     listed: str | None = None
     verdicts: str | None = None
-    columns: Columns | None = field(default=None, compare=False, repr=False)
+    columns: VerdictColumns | None = field(default=None, compare=False, repr=False)
 
     def __len__(self) -> int:
         """Count the postures that were judged."""
@@ -137,13 +137,13 @@ class Report:
     def summary(self) -> dict[str, int]:
         """How many postures have each verdict."""
         if self.verdicts is not None:
-            return {verdict: self.verdicts.count(verdict[0]) for verdict in VERDICTS}
+            return {verdict: self.verdicts.count(verdict[0]) for verdict in VERDICT_NAMES}
         counts = Counter(posture.verdict for posture in self.postures)
-        return {verdict: counts[verdict] for verdict in VERDICTS}
+        return {verdict: counts[verdict] for verdict in VERDICT_NAMES}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Judged:
+class JudgedCheck:
     """What one check found in N postures at its K places.
 
     Parameters
@@ -170,7 +170,7 @@ def make_report(
     settings: Mapping[str, Any],
     verdicts: Sequence[str],
     fk_distance: NDArray[np.float64],
-    judged: Sequence[Judged],
+    judged: Sequence[JudgedCheck],
     all_findings: bool = False,
 ) -> Report:
     """Make a report of what the checks found.
@@ -200,8 +200,8 @@ def make_report(
     """
     rows: list[list[Finding]] = [[] for _ in verdicts]
     for verdict in verdicts:
-        if verdict not in VERDICTS:
-            raise refusal("report", "verdicts", shown(verdict), " or ".join(VERDICTS), "correct it")
+        if verdict not in VERDICT_NAMES:
+            raise refusal("report", "verdicts", shown(verdict), " or ".join(VERDICT_NAMES), "correct it")
     for check in judged:
         if len(check.findings.value) != len(rows):
             counts = f"{len(check.findings.value)} postures"
@@ -219,7 +219,7 @@ def make_report(
 
 def check_report_path(path: str | Path) -> None:
     """Refuse a report's name before the work that it is for is done."""
-    suffix(path, *SUFFIXES)
+    suffix(path, *REPORT_SUFFIXES)
     check_target(path)
 
 
@@ -231,7 +231,7 @@ def write_report(path: str | Path, report: Report) -> None:
     InputError
         Where the name ends otherwise or the file cannot be written.
     """
-    kind = suffix(path, *SUFFIXES)
+    kind = suffix(path, *REPORT_SUFFIXES)
     if kind == ".json":
         write_text(path, json_pieces(_head(report), "postures", _fields(report)))
         return
@@ -258,29 +258,31 @@ def read_report(path: str | Path) -> Report:
     )
 
 
-def columns_of(report: Report) -> Columns:
+def columns_of(report: Report) -> VerdictColumns:
     """Return a report's columns; of one without, what its listed postures tell."""
     if report.columns is not None:
         return report.columns
-    places: dict[Place, int] = {}
+    places: dict[ReportPlace, int] = {}
     violations: list[tuple[int, int, float]] = []
     worst: list[tuple[int, float]] = []
     for k, posture in enumerate(report.postures):
         for finding in posture.findings:
-            place = places.setdefault(Place(finding.check, finding.where, finding.unit), len(places))
+            place = places.setdefault(ReportPlace(finding.check, finding.where, finding.unit), len(places))
             if finding.verdict == "invalid":
                 violations.append((k, place, math.nan if finding.margin is None else finding.margin))
         least = posture.worst
-        at = None if least is None else Place(least.check, least.where, least.unit)
+        at = None if least is None else ReportPlace(least.check, least.where, least.unit)
         worst.append(
             (-1, math.nan)
             if at is None or least is None
             else (places.setdefault(at, len(places)), least.margin)
         )
     checks = list(dict.fromkeys(place.check for place in places))
-    part = Columns(
+    part = VerdictColumns(
         places=tuple(places),
-        verdict=np.array([VERDICTS.index(posture.verdict) for posture in report.postures], dtype=np.int8),
+        verdict=np.array(
+            [VERDICT_NAMES.index(posture.verdict) for posture in report.postures], dtype=np.int8
+        ),
         fk_distance=np.array(
             [math.nan if posture.fk_distance is None else posture.fk_distance for posture in report.postures]
         ),
@@ -296,13 +298,17 @@ def columns_of(report: Report) -> Columns:
 
 
 def _silent(posture: PostureReport, checks: Sequence[str]) -> int:
-    """Spell what is undecided about a posture as `Columns` has it."""
+    """Spell what is undecided about a posture as `VerdictColumns` has it."""
     names = ("joints", *checks)
     return sum(1 << names.index(name) for name in posture.undecided_by or () if name in names)
 
 
 def _head(report: Report) -> dict[str, Any]:
-    head: dict[str, Any] = {"schema": SCHEMA, "settings": dict(report.settings), "summary": report.summary}
+    head: dict[str, Any] = {
+        "schema": REPORT_SCHEMA,
+        "settings": dict(report.settings),
+        "summary": report.summary,
+    }
     if report.checks is not None:
         head["checks"] = {
             name: {
@@ -341,7 +347,7 @@ def _count(check: CheckFields) -> CheckCount:
     return CheckCount(rejected=check.rejected, undecided=check.undecided, places=check.places, worst=None)
 
 
-def _list_findings(rows: list[list[Finding]], check: Judged, every: bool) -> None:
+def _list_findings(rows: list[list[Finding]], check: JudgedCheck, every: bool) -> None:
     """Add a check's findings to the postures that they were found in."""
     found = check.findings
     value = np.asarray(found.value)
@@ -377,7 +383,9 @@ def _number(value: float | None) -> float | None:
 
 
 def _finding(finding: Finding) -> dict[str, Any]:
-    return {name: _number(value) if name in NUMBERS else value for name, value in vars(finding).items()}
+    return {
+        name: _number(value) if name in FINDING_NUMBERS else value for name, value in vars(finding).items()
+    }
 
 
 def _fields(report: Report) -> Iterator[dict[str, Any]]:

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.report_schema import VERDICTS, Verdict
+from posekit.formats.own.report_schema import VERDICT_NAMES, Verdict
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ PER_DEGREE: Final[Mapping[str, float]] = {"deg": 1.0, "m": 0.01}
 """What counts as one degree where margins of different units are compared: a centimetre, as at the end of a limb."""
 
 
-class Place(NamedTuple):
+class ReportPlace(NamedTuple):
     """Where a check judges, and the unit of its numbers."""
 
     check: str
@@ -31,14 +31,14 @@ class Place(NamedTuple):
         return f"{self.check}/{self.where}"
 
 
-class Row(NamedTuple):
+class VerdictRow(NamedTuple):
     """One posture: its verdict, its worst margin and where that is, its violations and their margins, the undecided."""
 
     posture: int
     verdict: Verdict
     fk_distance: float
-    worst: tuple[Place, float] | None
-    violations: list[tuple[Place, float]]
+    worst: tuple[ReportPlace, float] | None
+    violations: list[tuple[ReportPlace, float]]
     undecided_by: list[str]
 
 
@@ -48,18 +48,18 @@ class CheckCount(NamedTuple):
     rejected: int
     undecided: int
     places: dict[str, int]
-    worst: tuple[int, Place, float] | None
+    worst: tuple[int, ReportPlace, float] | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Columns:
+class VerdictColumns:
     """Verdicts on N postures with M violations.
 
     Parameters
     ----------
     places : sequence of Place
     verdict : int array (N,)
-        Index into `VERDICTS`.
+        Index into `VERDICT_NAMES`.
     fk_distance : array (N,)
         Metres.
     worst_place, worst_margin : int array (N,), array (N,)
@@ -73,7 +73,7 @@ class Columns:
         The checks that were applied.
     """
 
-    places: Sequence[Place]
+    places: Sequence[ReportPlace]
     verdict: NDArray[np.int8]
     fk_distance: Array
     worst_place: NDArray[np.int32]
@@ -91,16 +91,16 @@ class Columns:
     @property
     def summary(self) -> dict[str, int]:
         """How many postures have each verdict."""
-        counts = np.bincount(self.verdict, minlength=len(VERDICTS)).tolist()
-        return dict(zip(VERDICTS, counts, strict=True))
+        counts = np.bincount(self.verdict, minlength=len(VERDICT_NAMES)).tolist()
+        return dict(zip(VERDICT_NAMES, counts, strict=True))
 
     @property
     def letters(self) -> str:
         """The first letter of every verdict: ``vviu``."""
-        letters = np.array([verdict[0] for verdict in VERDICTS])
+        letters = np.array([verdict[0] for verdict in VERDICT_NAMES])
         return "".join(letters[self.verdict].tolist())
 
-    def rows(self) -> Iterator[Row]:
+    def rows(self) -> Iterator[VerdictRow]:
         """Go through the postures."""
         starts = np.searchsorted(self.posture, np.arange(len(self) + 1)).tolist()
         verdicts, distances = self.verdict.tolist(), self.fk_distance.tolist()
@@ -109,9 +109,9 @@ class Columns:
         silent = (self.silent != 0).tolist()
         for k, verdict in enumerate(verdicts):
             some = range(starts[k], starts[k + 1])
-            yield Row(
+            yield VerdictRow(
                 posture=k,
-                verdict=VERDICTS[verdict],
+                verdict=VERDICT_NAMES[verdict],
                 fk_distance=distances[k],
                 worst=None if places[k] < 0 else (self.places[places[k]], margins[k]),
                 violations=[(self.places[where[i]], by[i]) for i in some],
@@ -144,7 +144,9 @@ class Columns:
         return counts
 
 
-def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[str]) -> Columns:
+def joined(
+    parts: Sequence[VerdictColumns], places: Sequence[ReportPlace], checks: Sequence[str]
+) -> VerdictColumns:
     """Put the columns of a file's batches together; postures are counted through."""
     firsts = np.cumsum([0, *(len(part) for part in parts)])
     empty: dict[str, NDArray[np.generic]] = {
@@ -160,7 +162,7 @@ def joined(parts: Sequence[Columns], places: Sequence[Place], checks: Sequence[s
         name: np.concatenate([none, *(getattr(part, name) for part in parts)]) for name, none in empty.items()
     }
     shifted = [part.posture + first for part, first in zip(parts, firsts[:-1].tolist(), strict=True)]
-    return Columns(
+    return VerdictColumns(
         places=tuple(places),
         posture=np.concatenate([np.zeros(0, dtype=np.int64), *shifted]),
         checks=tuple(checks),

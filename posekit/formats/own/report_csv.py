@@ -8,9 +8,9 @@ import math
 from collections.abc import Iterator
 from typing import Final
 
-from posekit.formats.own.report_columns import Columns
+from posekit.formats.own.report_columns import VerdictColumns
 
-HEAD: Final = (
+CSV_HEAD: Final = (
     "posture",
     "verdict",
     "worst_margin",
@@ -24,14 +24,14 @@ HEAD: Final = (
 """The columns: `violations` are ``check/where=margin unit``, by semicolons."""
 
 
-def csv_lines(columns: Columns) -> Iterator[str]:
+def csv_lines(columns: VerdictColumns) -> Iterator[str]:
     """Yield the lines (RFC 4180): a head, then every posture, counted from 0; what is not known is empty.
 
     Parameters
     ----------
     columns : Columns
     """
-    yield ",".join(HEAD)
+    yield ",".join(CSV_HEAD)
     for row in columns.rows():
         place, margin = (None, math.nan) if row.worst is None else row.worst
         violations = "; ".join(f"{at.name}={by:.6g} {at.unit}" for at, by in row.violations)

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Final, Literal, get_args
 
 from pydantic import FailFast, Field
 
-from posekit.tables.file_model import FEW, FileModel
+from posekit.tables.file_model import FEW_ENTRIES, FileModel
 
-SCHEMA = "posekit.report/1"
+REPORT_SCHEMA = "posekit.report/1"
 
 Verdict = Literal["valid", "invalid", "undecided"]
-VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
+VERDICT_NAMES: Final[tuple[Verdict, ...]] = get_args(Verdict)
 
 
 class FindingFields(FileModel):
@@ -73,7 +73,7 @@ class CheckFields(FileModel):
 
     rejected: Annotated[int, Field(ge=0)] = Field(description="Postures that it rejects.")
     undecided: Annotated[int, Field(ge=0)] = Field(description="Postures about which it says nothing.")
-    places: Annotated[dict[str, int], FEW] = Field(
+    places: Annotated[dict[str, int], FEW_ENTRIES] = Field(
         description="Violations by place, the most frequent first."
     )
 
@@ -84,7 +84,7 @@ class ReportFile(FileModel):
     schema_: Literal["posekit.report/1"] = Field(alias="schema")
     settings: dict[str, Any]
     summary: SummaryFields
-    checks: Annotated[dict[str, CheckFields], FEW] | None = None
+    checks: Annotated[dict[str, CheckFields], FEW_ENTRIES] | None = None
     listed: str | None = Field(default=None, description="Which postures are listed, where not all are.")
     verdicts: Annotated[str, Field(pattern="^[viu]*$")] | None = Field(
         default=None, description="One letter for every posture of the file, where not all are listed."

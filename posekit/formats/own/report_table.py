@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from posekit.formats.own.report_columns import CheckCount, Columns, Place
+from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns
 
-MOST: Final = 3
+MAX_NAMED_PLACES: Final = 3
 """Places of a check that the table names."""
 
-SHOWN: Final = 100
+MAX_SHOWN_POSTURES: Final = 100
 """Postures that are not valid, in a Markdown file."""
 
-LONGEST: Final = 200
+MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
 
 
-def summary_table(columns: Columns) -> list[str]:
+def summary_table(columns: VerdictColumns) -> list[str]:
     """Count the verdicts, and for each check what it rejects, where most, and the worst posture (from 0).
 
     Parameters
@@ -41,7 +41,7 @@ def summary_table(columns: Columns) -> list[str]:
     return lines + _table(head, rows)
 
 
-def markdown_lines(columns: Columns, settings: Mapping[str, Any]) -> list[str]:
+def markdown_lines(columns: VerdictColumns, settings: Mapping[str, Any]) -> list[str]:
     """Write a report as Markdown: the summary, the settings, and the first postures that are not valid."""
     lines = ["# Validation", "", *summary_table(columns), "", "## Settings", ""]
     lines += [f"- {_cell(name)}: {_cell(_shown(value))}" for name, value in settings.items()]
@@ -49,8 +49,8 @@ def markdown_lines(columns: Columns, settings: Mapping[str, Any]) -> list[str]:
     lines += ["", "## Postures that are not valid", ""]
     if not bad:
         return [*lines, "None."]
-    if len(bad) > SHOWN:
-        lines += [f"The first {SHOWN} of {len(bad)}.", ""]
+    if len(bad) > MAX_SHOWN_POSTURES:
+        lines += [f"The first {MAX_SHOWN_POSTURES} of {len(bad)}.", ""]
     rows = [
         (
             row.posture,
@@ -59,15 +59,15 @@ def markdown_lines(columns: Columns, settings: Mapping[str, Any]) -> list[str]:
             "; ".join(_at(place, margin) for place, margin in row.violations)
             or f"undecided: {', '.join(row.undecided_by)}",
         )
-        for row in bad[:SHOWN]
+        for row in bad[:MAX_SHOWN_POSTURES]
     ]
     return lines + _table(("posture", "verdict", "least margin", "why"), rows)
 
 
 def _most(check: str, count: CheckCount) -> str:
     places = list(count.places.items())
-    named = ", ".join(f"{check}/{where} {number}" for where, number in places[:MOST])
-    return named + (f", and {len(places) - MOST} more" if len(places) > MOST else "")
+    named = ", ".join(f"{check}/{where} {number}" for where, number in places[:MAX_NAMED_PLACES])
+    return named + (f", and {len(places) - MAX_NAMED_PLACES} more" if len(places) > MAX_NAMED_PLACES else "")
 
 
 def _worst(count: CheckCount) -> str:
@@ -77,13 +77,13 @@ def _worst(count: CheckCount) -> str:
     return f"posture {index}: {place.where} {margin:.3g} {place.unit}"
 
 
-def _at(place: Place, margin: float) -> str:
+def _at(place: ReportPlace, margin: float) -> str:
     return f"{place.name} {margin:.3g} {place.unit}"
 
 
 def _shown(value: object) -> str:
     text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+    return text if len(text) <= MAX_SETTING_CHARACTERS else f"{text[: MAX_SETTING_CHARACTERS - 1]}…"
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:

@@ -18,8 +18,8 @@ from posekit.safe_io.refusal import refusal
 from posekit.skeleton import JOINTS
 
 CAMERA_FIELDS: Final = ("f", "rotation", "position", "residual")
-LEVELS: Final = ("joint", "physical", "motion")
-EVERYWHERE: Final = tuple(name for name, column in SURVIVOR_COLUMNS.items() if column.everywhere)
+LEVEL_FIELDS: Final = ("joint", "physical", "motion")
+EVERYWHERE_COLUMNS: Final = tuple(name for name, column in SURVIVOR_COLUMNS.items() if column.everywhere)
 """Columns that all frames of a result have, or none."""
 
 
@@ -58,7 +58,10 @@ class ResultFrame(SurvivorColumns):
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "camera", _camera(self.camera))
-        if set(self.levels) != set(LEVELS) or len({len(self.levels[name]) for name in LEVELS}) != 1:
+        if (
+            set(self.levels) != set(LEVEL_FIELDS)
+            or len({len(self.levels[name]) for name in LEVEL_FIELDS}) != 1
+        ):
             raise _refused("levels", ", ".join(self.levels), "joint, physical and motion, of one length")
         levels = {
             "joint": tuple(str(name) for name in self.levels["joint"]),
@@ -122,7 +125,7 @@ class Result:
                     ", ".join(frame.margins) or "none",
                     f"those of frames[0]: {', '.join(first.margins)}",
                 )
-            for name in EVERYWHERE:
+            for name in EVERYWHERE_COLUMNS:
                 if (getattr(frame, name) is None) != (getattr(first, name) is None):
                     raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
 

@@ -14,7 +14,7 @@ from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.reading import read_json
 from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.result_schema import (
-    SCHEMA,
+    RESULT_SCHEMA,
     ResultFile,
     ResultFrameFields,
     ResultPaths,
@@ -78,7 +78,7 @@ def _paths(path: str | Path, given: ResultPaths, unit: Unit) -> FollowedPaths:
 def write_result_json(path: str | Path, result: Result) -> None:
     """Write a result as JSON; see `posekit.formats.own.write_result`."""
     head = {
-        "schema": SCHEMA,
+        "schema": RESULT_SCHEMA,
         "unit": result.unit,
         "joint_names": list(result.joint_names),
         "configuration_names": list(result.configuration_names),

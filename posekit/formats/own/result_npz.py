@@ -29,12 +29,12 @@ from posekit.formats.own.inferred import Inferred
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.reading import parse_json
-from posekit.formats.own.result import CAMERA_FIELDS, LEVELS, Result, ResultFrame
-from posekit.formats.own.result_schema import SCHEMA, ResultDetails, ResultPathsTold
+from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, Result, ResultFrame
+from posekit.formats.own.result_schema import RESULT_SCHEMA, ResultDetails, ResultPathsTold
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
-from posekit.formats.own.survivor_npz import PADDED, survivor_arrays, survivors_in
-from posekit.formats.own.units import UNITS, Unit, from_metres, to_metres
+from posekit.formats.own.survivor_npz import PADDED_PREFIXES, survivor_arrays, survivors_in
+from posekit.formats.own.units import UNIT_NAMES, Unit, from_metres, to_metres
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import replacing
 from posekit.skeleton import JOINTS
@@ -51,7 +51,7 @@ def write_result_npz(path: str | Path, result: Result) -> None:
     """Write a result as NPZ; see `posekit.formats.own.write_result`."""
     frames, unit = result.frames, result.unit
     arrays: dict[str, Array | Ragged] = {
-        "schema": np.array(SCHEMA),
+        "schema": np.array(RESULT_SCHEMA),
         "unit": np.array(unit),
         "settings": np.array(json.dumps(dict(result.settings), allow_nan=False)),
         "joint_names": np.array(result.joint_names),
@@ -90,9 +90,9 @@ def read_result_npz(path: str | Path) -> Result:
 def result_in(archive: Archive) -> Result:
     """Make a result of an open archive."""
     path = archive.path
-    archive.check_held(MAX_ARRAYS, but=PADDED)
-    _expect(archive, "schema", (SCHEMA,))
-    unit: Unit = _expect(archive, "unit", UNITS)  # type: ignore[assignment]
+    archive.check_held(MAX_ARRAYS, but=PADDED_PREFIXES)
+    _expect(archive, "schema", (RESULT_SCHEMA,))
+    unit: Unit = _expect(archive, "unit", UNIT_NAMES)  # type: ignore[assignment]
     names = tuple(archive.array("joint_names", "U", (None,)).tolist())
     if names != JOINTS:
         raise refusal(
@@ -286,7 +286,7 @@ def _level_arrays(frames: Sequence[ResultFrame]) -> dict[str, Array]:
     fills = {"joint": "", "physical": -1, "motion": -1}
     longest = max(len(frame.levels["joint"]) for frame in frames)
     arrays = {}
-    for name in LEVELS:
+    for name in LEVEL_FIELDS:
         rows = [
             [*frame.levels[name], *[fills[name]] * (longest - len(frame.levels[name]))] for frame in frames
         ]
@@ -301,7 +301,7 @@ def _levels(archive: Archive, frames: int) -> list[dict[str, Any]]:
     return [
         {
             name: values[index][joint[index] != ""].tolist()
-            for name, values in zip(LEVELS, (joint, physical, motion), strict=True)
+            for name, values in zip(LEVEL_FIELDS, (joint, physical, motion), strict=True)
         }
         for index in range(frames)
     ]

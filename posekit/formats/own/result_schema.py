@@ -13,9 +13,9 @@ from posekit.formats.own.survivor_models import Count, model_of
 from posekit.formats.own.units import Unit
 from posekit.safe_io.refusal import shown
 from posekit.skeleton import JOINTS
-from posekit.tables.file_model import FEW, FileModel, refuse
+from posekit.tables.file_model import FEW_ENTRIES, FileModel, refuse
 
-SCHEMA = "posekit.result/1"
+RESULT_SCHEMA = "posekit.result/1"
 
 Maybe = float | None
 MaybePoint = Annotated[list[Maybe], Field(min_length=3, max_length=3)]
@@ -143,7 +143,9 @@ class ResultFrameFields(FileModel):
     camera: ResultCamera
     levels: ResultLevels
     postures: Annotated[list[ResultPosture], FailFast()]
-    rejected: Annotated[dict[str, Count], FEW] = Field(description="Pruned branches, by what killed them.")
+    rejected: Annotated[dict[str, Count], FEW_ENTRIES] = Field(
+        description="Pruned branches, by what killed them."
+    )
     family: ResultFamily | None = Field(default=None, description="Uncalibrated: the scales it can have.")
     root: ResultRoot | None = Field(
         default=None, description="Calibrated, neck not given: how its depth was found."

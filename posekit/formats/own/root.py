@@ -14,7 +14,7 @@ from posekit.safe_io.refusal import refusal
 
 Array = NDArray[np.float64]
 
-ARRAYS = ("intervals", "chosen", "minima_depth", "minima_residual", "curve_depth", "curve_residual")
+ROOT_ARRAYS = ("intervals", "chosen", "minima_depth", "minima_residual", "curve_depth", "curve_residual")
 
 
 def _nothing() -> Array:
@@ -71,7 +71,7 @@ class Root:
     note: str = ""
 
     def __post_init__(self) -> None:
-        for name in ARRAYS:
+        for name in ROOT_ARRAYS:
             values = np.array(getattr(self, name), dtype=np.float64)
             values = values.reshape(-1, 2) if name == "intervals" else values.reshape(-1)
             if not np.isfinite(values).all():

@@ -20,18 +20,18 @@ from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.tables.file_model import FileModel
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
-    view_schema.SCHEMA: view_schema.ViewFile,
-    result_schema.SCHEMA: result_schema.ResultFile,
-    postures_schema.SCHEMA: postures_schema.PosturesFile,
-    report_schema.SCHEMA: report_schema.ReportFile,
-    nearer_schema.SCHEMA: nearer_schema.NearerFile,
-    object_result_schema.SCHEMA: object_result_schema.ObjectFile,
-    postures_q_schema.SCHEMA: postures_q_schema.ConfigurationsFile,
-    evaluation_schema.SCHEMA: evaluation_schema.EvaluationFile,
-    batch_schema.SCHEMA: batch_schema.BatchFile,
+    view_schema.VIEW_SCHEMA: view_schema.ViewFile,
+    result_schema.RESULT_SCHEMA: result_schema.ResultFile,
+    postures_schema.POSTURES_SCHEMA: postures_schema.PosturesFile,
+    report_schema.REPORT_SCHEMA: report_schema.ReportFile,
+    nearer_schema.NEARER_SCHEMA: nearer_schema.NearerFile,
+    object_result_schema.OBJECT_SCHEMA: object_result_schema.ObjectFile,
+    postures_q_schema.CONFIGURATIONS_SCHEMA: postures_q_schema.ConfigurationsFile,
+    evaluation_schema.EVALUATION_SCHEMA: evaluation_schema.EvaluationFile,
+    batch_schema.BATCH_SCHEMA: batch_schema.BatchFile,
     batch_schema.MANIFEST_SCHEMA: batch_schema.ManifestFile,
 }
-SCHEMAS: Final = tuple(_MODELS)
+SCHEMA_NAMES: Final = tuple(_MODELS)
 """The names of the schemas, each with its version: ``posekit.view/1``."""
 
 
@@ -41,7 +41,7 @@ def schema(name: str) -> dict[str, Any]:
     Parameters
     ----------
     name : str
-        One of `SCHEMAS`, or its middle: ``"posekit.view/1"``, ``"view"``.
+        One of `SCHEMA_NAMES`, or its middle: ``"posekit.view/1"``, ``"view"``.
 
     Returns
     -------
@@ -53,7 +53,7 @@ def schema(name: str) -> dict[str, Any]:
     InputError
         Where there is no schema of this name.
     """
-    known = {**{full: full for full in SCHEMAS}, **{_short(full): full for full in SCHEMAS}}
+    known = {**{full: full for full in SCHEMA_NAMES}, **{_short(full): full for full in SCHEMA_NAMES}}
     if name not in known:
         raise refusal("", "schema", shown(name), "the name of a schema", nearest(name, known))
     full = known[name]

@@ -9,7 +9,7 @@ from pydantic import FailFast, Field, create_model
 
 from posekit.formats.own.column import Column, columns_in
 from posekit.skeleton import JOINTS
-from posekit.tables.file_model import FEW, FileModel, named
+from posekit.tables.file_model import FEW_ENTRIES, FileModel, named
 
 Count = Annotated[int, Field(ge=0, le=2**53)]
 MAX_EXTENT: Final = 1000
@@ -51,7 +51,7 @@ def _annotation(column: Column) -> Any:
         number = Annotated[number, Field(ge=column.lower, le=column.upper)]
     kind: Any = number | None if column.null == "number" else number
     if column.by_check:
-        return Annotated[dict[str, kind], FEW]
+        return Annotated[dict[str, kind], FEW_ENTRIES]
     for depth, extent in enumerate(reversed(column.shape)):
         inner: Any = kind | None if depth == 1 and column.null == "row" else kind
         kind = (

@@ -15,7 +15,7 @@ from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 
-PADDED: Final = tuple(
+PADDED_PREFIXES: Final = tuple(
     f"{name}/" if column.by_check or column.kind == "table" else name
     for name, column in SURVIVOR_COLUMNS.items()
     if column.kind != "objects"

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.safe_io.refusal import refusal, shown
 
 Unit = Literal["m", "cm", "mm"]
-UNITS: Final = get_args(Unit)
+UNIT_NAMES: Final = get_args(Unit)
 
-METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+UNIT_METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one unit."""
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units in one metre. Whole numbers: dividing by them errs by half a unit in the last place, no more."""

@@ -16,10 +16,10 @@ from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.formats.own.view import View
 from posekit.formats.own.view_schema import (
-    SCHEMA,
+    VIEW_SCHEMA,
     LeeChenCamera,
     OpenCVCamera,
-    ScaledOrthographicCamera,
+    ScaledOrthographicFields,
     ViewFile,
 )
 from posekit.safe_io.refusal import refusal
@@ -114,7 +114,7 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
             frame["truth"] = joints
         frames.append(frame)
     head_of_file: dict[str, Any] = {
-        "schema": SCHEMA,
+        "schema": VIEW_SCHEMA,
         "unit": unit,
         "camera": _camera_fields(view.camera, unit),
     }
@@ -160,7 +160,7 @@ def _camera(file: ViewFile, path: str | Path) -> CameraModel:
         raise refusal(path, "camera", str(error), "a camera that can be", "correct it") from None
 
 
-def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera, unit: Unit) -> CameraModel:
+def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicFields, unit: Unit) -> CameraModel:
     if isinstance(camera, LeeChenCamera):
         return LeeChenModel(f=None if camera.f is None else float(to_metres(camera.f, unit)))
     if isinstance(camera, OpenCVCamera):

@@ -12,7 +12,7 @@ from posekit.formats.own.units import Unit
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.tables.file_model import FileModel, checked, named, refuse
 
-SCHEMA = "posekit.view/1"
+VIEW_SCHEMA = "posekit.view/1"
 HEAD_NAMES = ("neck", *HEAD_POINTS)
 
 
@@ -63,7 +63,7 @@ class OpenCVCamera(FileModel):
     )
 
 
-class ScaledOrthographicCamera(FileModel):
+class ScaledOrthographicFields(FileModel):
     """The uncalibrated camera of Taylor 2000: image points in pixels, y down."""
 
     model: Literal["scaled-orthographic"]
@@ -138,7 +138,7 @@ class ViewFile(FileModel):
 
     schema_: Literal["posekit.view/1"] = Field(alias="schema")
     unit: Unit
-    camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicCamera = Field(discriminator="model")
+    camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicFields = Field(discriminator="model")
     figure: FigureFields | None = None
     deviation: Positive | None = Field(
         default=None, description="Standard deviation of each coordinate of the image points, pixels."
@@ -151,7 +151,7 @@ class ViewFile(FileModel):
 
     @model_validator(mode="after")
     def _neck_is_seen(self) -> ViewFile:
-        calibrated = not isinstance(self.camera, ScaledOrthographicCamera)
+        calibrated = not isinstance(self.camera, ScaledOrthographicFields)
         if calibrated and not any("neck" in frame.image for frame in self.frames):
             refuse(
                 "the neck in one frame at least: the tree grows from it",
