@@ -15,7 +15,7 @@ from posekit.formats.format import Content
 from posekit.formats.motion import SurvivorTable, guess_up, postures_of, read_motion, read_survivors
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.own import (
-    Configurations,
+    NamedConfigurations,
     Postures,
     Result,
     View,
@@ -129,7 +129,7 @@ def postures_of_result(result: Result) -> HeldPostures:
     return _held(Postures(joints=joints), np.repeat(np.arange(len(counts)), counts), time)
 
 
-def _of_configurations(configurations: Configurations) -> HeldPostures:
+def _of_configurations(configurations: NamedConfigurations) -> HeldPostures:
     """Place the joints of the built-in figure, whose z points up: angles alone do not say lengths."""
     figure = load_figure()
     points = figure.forward_kinematics(configurations.in_order_of(tuple(figure.configuration_names)))

@@ -37,7 +37,7 @@ def open(
     a view            `posekit.View`
     a result          `posekit.formats.own.Result`
     postures          `posekit.formats.own.Postures`
-    configurations    `posekit.formats.own.Configurations`
+    configurations    `posekit.formats.own.NamedConfigurations`
     survivors         `posekit.formats.motion.SurvivorTable`
     key points        `posekit.formats.keypoints.KeyPoints`
     motion            `posekit.formats.motion.Motion`
