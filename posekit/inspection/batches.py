@@ -18,7 +18,7 @@ from posekit.batch.shard import METADATA_KEY, SHARDS_FOLDER
 from posekit.errors import InputError
 from posekit.formats.given_file import first_bytes
 from posekit.formats.motion.parquet import opened
-from posekit.inspection.telling import cut_long, histogram_line, plural, reason_lines, tally
+from posekit.inspection.telling import cut_long, histogram_line, judged_line, plural, reason_lines
 from posekit.safe_io import cut, extra, read_json, refusal
 
 FAILURES: Final = 3
@@ -157,7 +157,7 @@ class Tally:
         lines += reason_lines({word: count for word, count in self.reasons.items() if word})
         judged = {word: count for word, count in self.judged.items() if word}
         if judged:
-            lines.append(f"judged as {tally(Counter(judged).elements())}")
+            lines.append(judged_line(Counter(judged).elements()))
         if self.inferred:
             lines.append(f"joints inferred in {self.inferred:,} frames")
         return lines

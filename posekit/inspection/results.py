@@ -10,7 +10,15 @@ import numpy as np
 
 from posekit.formats.own import Result
 from posekit.formats.own.paths import FollowedPaths
-from posekit.inspection.telling import counts_line, cut_long, plural, reason_lines, settings_line, tally
+from posekit.inspection.telling import (
+    counts_line,
+    cut_long,
+    judged_line,
+    plural,
+    reason_lines,
+    settings_line,
+    tally,
+)
 
 
 def result_lines(result: Result) -> list[str]:
@@ -20,7 +28,7 @@ def result_lines(result: Result) -> list[str]:
     judged = settings.get("judged")
     kinds = [one for one in judged if isinstance(one, str)] if isinstance(judged, list) else []
     if kinds:
-        lines.append(f"judged as {tally(map(cut_long, kinds))}")
+        lines.append(judged_line(map(cut_long, kinds)))
     roots = [frame.root.method for frame in frames if frame.root is not None and frame.root.method != "none"]
     if roots:
         lines.append(f"neck placed by {tally(roots)}")

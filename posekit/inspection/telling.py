@@ -51,6 +51,11 @@ def tally(words: Iterable[str]) -> str:
     return ", ".join(f"{word} in {count:,}" for word, count in counted) + f" {last}"
 
 
+def judged_line(words: Iterable[str]) -> str:
+    """Say how frames were judged, by the words that results have for it."""
+    return f"judged as {tally('the given tolerances allow' if word == 'given' else word for word in words)}"
+
+
 def reason_lines(reasons: Mapping[str, int]) -> list[str]:
     """Say why nothing was grown in frames, the most frequent reasons first."""
     ranked = sorted(reasons.items(), key=lambda pair: -pair[1])

@@ -12,7 +12,7 @@ NAMED: Final = 3
 
 
 def advice_lines(recovery: Recovery) -> list[str]:
-    """Say of frames without a posture what would admit one, and which lengths the picture does not bear out.
+    """Say of frames without a posture how near one comes to the limits, and which lengths contradict the pictures.
 
     Of the first few frames the least violation (`posekit.recovery.least_violation`); where most of them have none,
     the lengths that would have to be others (`posekit.refinement.diagnose`).
@@ -29,7 +29,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
         allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, frame.number, allowed)
         if found is not None and found.excesses:
-            lines.append(f"frame {k + 1}: the least that would admit a posture: {found}")
+            lines.append(f"frame {k + 1}: no posture; the one nearest to the limits breaks {found}")
         elif found is not None and frame.refined is not None:
             lines.append(
                 f"frame {k + 1}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"

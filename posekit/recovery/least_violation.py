@@ -1,4 +1,4 @@
-"""What the least violation is that would admit a posture, where a frame has none."""
+"""How near any posture comes to passing the checks, in a frame where none does."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ from posekit.refinement.trunk_terms import start_jacobian, trunk_terms
 
 
 class TrunkTables(NamedTuple):
-    """Of each trunk.
+    """What the joint step needs of each trunk, laid out before limbs are added.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class TrunkTables(NamedTuple):
 
 
 class LimbTables(NamedTuple):
-    """Of the limbs of each column.
+    """What the joint step needs of the limbs of each column.
 
     Attributes
     ----------
