@@ -51,7 +51,9 @@ class ShardFrames:
     Parameters
     ----------
     frame : int array (F,)
+        The number of each in its recording.
     time : array (F,)
+        Seconds.
     count : int array (F,)
         Survivors of each.
     judged, reason, inferred, rejected : tuple of str (F,)
@@ -60,6 +62,7 @@ class ShardFrames:
     branches : byte array (N, B)
         Survivors' branches: a letter a joint from the second, 0 or 1.
     joints : array (N, 14, 3)
+        The survivors, camera frame, metres.
     values : mapping of str to array (N,)
         Every other number of a survivor, by the name of its column.
     """

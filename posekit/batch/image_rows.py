@@ -31,6 +31,7 @@ class ImageRows:
     points : array (F, 19, 2)
         Joints and head points as `View` has them; NaN where one is not seen.
     confidence : array (F, 19)
+        How sure the detector is of each point; NaN where it does not say.
     root : array (F, 3)
         The neck in space where it is known, metres.
     """

@@ -27,6 +27,7 @@ class Input:
     name : str
         What results call it: its path from the run's root.
     path : Path
+        The file or folder.
     """
 
     name: str
@@ -55,6 +56,7 @@ def list_inputs(given: Sequence[Path], output: Path, root: Path | None = None) -
     Parameters
     ----------
     given : sequence of Path
+        Files and folders, as they were named.
     output : Path
         The run's folder.
     root : Path, optional

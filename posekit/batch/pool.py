@@ -46,6 +46,7 @@ class Outcome(Generic[T, R]):
     Parameters
     ----------
     item : T
+        What was worked on.
     value : R or None
         None where it failed.
     error : str

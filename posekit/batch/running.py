@@ -29,6 +29,7 @@ class Progress:
     Parameters
     ----------
     stage : {"opening", "recovering"}
+        What the run is at.
     done, total : int
         Inputs that are opened; frames that are recovered, those of earlier runs included.
     before : int
@@ -57,9 +58,11 @@ class Summary:
     planned : int
         Frames of all inputs that were opened.
     failures : tuple of Failure
+        Shards, and inputs, of which nothing came.
     peak : int
         The most memory of a process, bytes.
     seconds : float
+        How long the run took.
     """
 
     inputs: int

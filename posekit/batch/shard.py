@@ -59,11 +59,13 @@ class Shard:
     digest : str
         SHA-256 of its content.
     table : StagedTable
+        The rows of image points that it is cut from.
     start, stop : int
         Rows of the table: from `start` to before `stop`.
     settings : str
         Hash of the recipe.
     recipe : Recipe
+        What is asked of every frame.
     folder : Path
         Of the run.
     """
@@ -114,6 +116,7 @@ class Finished:
     frames, survivors, empty : int
         Frames, survivors, and frames without any.
     warnings : tuple of str
+        What was warned of, each once.
     """
 
     frames: int

@@ -47,7 +47,7 @@ from posekit.views.source import Source
 STAGED_FOLDER: Final = ".staged"
 """The folder beside the results that holds the tables."""
 STAGED_SCHEMA: Final = "posekit.batch_input/1"
-VIEWS_FOLDER: Final = "views"
+VIEWS_FORMAT: Final = "views"
 """What inputs are called that say camera and person themselves."""
 MIDDLE_POINTS: Final = {f"mid_{part}s": (f"right_{part}", f"left_{part}") for part in ("shoulder", "hip")}
 NECK_POINTS: Final = (LANDMARK["neck"], LANDMARK["mid_shoulders"])
@@ -64,9 +64,11 @@ class Staging:
     name : str
         What results call it.
     path : Path
+        Where it is.
     folder : Path
         Of the run.
     recipe : Recipe
+        How inputs are read.
     reading : str
         Hash of `Recipe.reading`.
     again : bool
@@ -92,6 +94,7 @@ class StagedTable:
     path : str
         The table.
     frames : int
+        Its rows.
     head : str
         Camera and person: a ``posekit.view/1`` document of one frame.
     """
@@ -109,12 +112,15 @@ class Staged:
     Parameters
     ----------
     name : str
+        The input's name.
     digest : str
         SHA-256 of its content.
     kind : str
-        What it is: `VIEWS_FOLDER`, or the format and layout of its key points.
+        What it is: `VIEWS_FORMAT`, or the format and layout of its key points.
     tables : tuple of StagedTable
+        One for each person.
     warnings : tuple of str
+        What was warned of while it was read.
     """
 
     name: str
@@ -195,7 +201,7 @@ def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
                 told = StagedTable(
                     person=0, path=str(path.resolve()), frames=table.rows, head=_head(path, table.head)
                 )
-                return VIEWS_FOLDER, [told]
+                return VIEWS_FORMAT, [told]
             pieces = read_rows(path, 0, table.rows, source.rate)
             return f"key points: {path.suffix.lower()[1:]}", [_of_rows(job, base, pieces)]
     elif is_view_arrays(path):
@@ -203,13 +209,13 @@ def _opened(job: Staging, base: Path) -> tuple[str, list[StagedTable]]:
         _check_numbers(path, rows.frame, None)
         if head:
             _refuse_told(path, source)
-            return VIEWS_FOLDER, [_laid_down(job, base, 0, _head(path, head), [rows])]
+            return VIEWS_FORMAT, [_laid_down(job, base, 0, _head(path, head), [rows])]
         return "key points: npz", [_of_rows(job, base, iter([rows]))]
     what = recognise(path, source.format)
     if what.holds is Content.VIEW:
         _refuse_told(path, source)
         view = read_view(path)
-        return VIEWS_FOLDER, [_laid_down(job, base, 0, head_text(view), [ImageRows.of_view(view)])]
+        return VIEWS_FORMAT, [_laid_down(job, base, 0, head_text(view), [ImageRows.of_view(view)])]
     if what.holds is not Content.KEY_POINTS:
         given_views(path, source)  # refuses it in its own words
     return _of_detections(job, base)

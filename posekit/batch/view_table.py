@@ -47,7 +47,9 @@ class ViewTable:
     Parameters
     ----------
     path : Path
+        The file.
     rows : int
+        How many frames it has.
     head : str
         Camera and person, a ``posekit.view/1`` document; empty where the file has none.
     names : tuple of str
@@ -131,6 +133,7 @@ def write_view_table(path: str | Path, views: View | Iterable[View], *, group: i
     Parameters
     ----------
     path : path
+        The file to write.
     views : View or iterable of View
         The first one's camera and person hold for all.
     group : int

@@ -35,9 +35,9 @@ def list_postures(
     verdicts : posekit.validators.Report
     contacts : Contacts, optional
         The pairs of bodies, where the check of collisions names none.
-    columns : Columns
+    columns : VerdictColumns
         The batch's.
-    places : list of Place
+    places : list of ReportPlace
         What the columns' places are.
     rows : int array
         Which postures of the batch.

@@ -39,6 +39,7 @@ class ObjectFrame:
     points : array (N, P, 3)
         Camera frame; NaN where a point was not seen.
     branches : tuple of N str
+        The near (0) or far (1) choice at each of the tree's points.
     flips : int array (N, S)
         1 where the first end of a segment is nearer, -1 where its second is, 0 where they are level or not seen.
     scales : array (N,)
@@ -50,10 +51,13 @@ class ObjectFrame:
     fk_distance : array (N,), optional
         Metres.
     certified : tuple of N (bool or None)
+        Whether the robot of the URDF reaches the posture within its limits; None without a URDF.
     reasons : tuple of N str
         Why each is not certified.
     rejected : mapping of str to int
+        Pruned branches by what killed them.
     family : Family, optional
+        The scales that the frame can have.
     """
 
     time: float
@@ -110,7 +114,9 @@ class ObjectResult:
     linkage : str
         Its name.
     points : tuple of str (P,)
+        The object's points.
     segments : tuple of (str, str) (S,)
+        Its rigid segments, each by the names of its ends.
     lengths : array (S,)
         Metres, or relative.
     configuration_names : tuple of str
@@ -118,6 +124,7 @@ class ObjectResult:
     settings : mapping
         Everything that decided the result.
     frames : sequence of ObjectFrame
+        What was recovered, frame by frame.
     """
 
     unit: Unit | None

@@ -37,6 +37,7 @@ class ObjectView:
     points : tuple of str (P,)
         The linkage's points.
     camera : ScaledOrthographicModel
+        Which says where y points, and what is known of the scale.
     time : array (F,)
         Seconds.
     image : array (F, P, 2)

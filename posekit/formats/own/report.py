@@ -118,7 +118,7 @@ class Report:
         Which postures are listed, where not all are.
     verdicts : str, optional
         The first letter of every posture's verdict, where not all are listed.
-    columns : Columns, optional
+    columns : VerdictColumns, optional
         All verdicts and violations, for tables and CSV; not in the JSON file.
     """
 
@@ -183,7 +183,7 @@ def make_report(
         ``valid``, ``invalid`` or ``undecided``.
     fk_distance : array (N,)
         Metres; NaN where there is no configuration.
-    judged : sequence of Judged
+    judged : sequence of JudgedCheck
         The checks that were applied.
     all_findings : bool
         List every finding; else those that are violated, and for each check the one with the least margin

@@ -57,7 +57,8 @@ class VerdictColumns:
 
     Parameters
     ----------
-    places : sequence of Place
+    places : sequence of ReportPlace
+        Where checks judge.
     verdict : int array (N,)
         Index into `VERDICT_NAMES`.
     fk_distance : array (N,)
@@ -67,6 +68,7 @@ class VerdictColumns:
     posture, place : int array (M,)
         Of each violation; postures in rising order.
     margin : array (M,)
+        How far each violation is outside, in the place's unit; negative.
     silent : int array (N,)
         Bit 0: some joint is unknown; bit k + 1: the k-th check says nothing.
     checks : sequence of str

@@ -29,7 +29,8 @@ def csv_lines(columns: VerdictColumns) -> Iterator[str]:
 
     Parameters
     ----------
-    columns : Columns
+    columns : VerdictColumns
+        The verdicts, one a posture.
     """
     yield ",".join(CSV_HEAD)
     for row in columns.rows():

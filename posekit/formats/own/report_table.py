@@ -22,7 +22,8 @@ def summary_table(columns: VerdictColumns) -> list[str]:
 
     Parameters
     ----------
-    columns : Columns
+    columns : VerdictColumns
+        The verdicts, one a posture.
     """
     counts = ", ".join(f"{count} {verdict}" for verdict, count in columns.summary.items())
     lines = [f"{len(columns)} postures: {counts}", ""]

@@ -36,6 +36,7 @@ class Root:
         Of the method: root mean square reprojection error in pixels, or for a search the least misfit of the rigid
         parts in metres; NaN where there is none.
     residual_unit : {"px", "m"}
+        What the residual is in.
     estimate : float
         The single most likely depth, metres; NaN where there is none.
     deviation : float

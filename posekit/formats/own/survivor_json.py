@@ -22,6 +22,7 @@ def survivor_rows(table: SurvivorColumns | Likelihoods, unit: Unit) -> list[dict
     table : SurvivorColumns or Likelihoods
         A dataclass of columns; those that are None are left out.
     unit : {"m", "cm", "mm"}
+        The unit of lengths in the file.
     """
     lists: dict[str, list[Any]] = {}
     kind: Any = type(table)

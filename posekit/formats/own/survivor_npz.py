@@ -33,7 +33,9 @@ def survivor_arrays(
     table : type
         Which columns: a dataclass of them.
     frames : sequence of such tables
+        One a frame.
     unit : {"m", "cm", "mm"}
+        The unit of lengths in the file.
     carried : frozenset of str
         Optional columns that are written: where a frame lacks one, as not known.
     within : str
@@ -81,6 +83,7 @@ def survivors_in(
     Parameters
     ----------
     archive : Archive
+        The open NPZ.
     table : type
         Which columns: a dataclass of them.
     count : int array (F,)
