@@ -21,13 +21,13 @@ from posekit.views.source import Source
 SHARD_FRAMES: Final = 2000
 """Frames of a shard: about a second's work, and a file of a megabyte."""
 
-PACKAGES: Final = ("posekit", "pin", "coal", "numpy", "pyarrow")
+RECORDED_PACKAGES: Final = ("posekit", "pin", "coal", "numpy", "pyarrow")
 """Whose versions decide results, or the bytes that they are written in."""
 
 
 def versions() -> dict[str, str]:
     """Return the versions of what computes and writes the results."""
-    return {name: version(name) for name in PACKAGES}
+    return {name: version(name) for name in RECORDED_PACKAGES}
 
 
 @dataclass(frozen=True, kw_only=True)

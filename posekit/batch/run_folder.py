@@ -18,7 +18,7 @@ from posekit.errors import InputError
 from posekit.safe_io import read_json, refusal
 from posekit.safe_io.writing import make_folder
 
-SCHEMA: Final = "posekit.batch/1"
+RUN_SCHEMA: Final = "posekit.batch/1"
 MANIFEST_SCHEMA: Final = "posekit.batch_manifest/1"
 ASKED_FILE: Final = "batch.json"
 MANIFEST_FILE: Final = "manifest.json"
@@ -105,7 +105,7 @@ class RunFolder:
 
     def write_asked(self, asked: Asked) -> None:
         """Note what is asked, of which contents."""
-        document = {"schema": SCHEMA, **asdict(asked), "root": str(asked.root)}
+        document = {"schema": RUN_SCHEMA, **asdict(asked), "root": str(asked.root)}
         write_document(self.path / ASKED_FILE, document, self.parts)
 
     def asked(self) -> Asked | None:
@@ -121,13 +121,15 @@ class RunFolder:
             return None
         document = read_json(file)
         try:
-            if document["schema"] == SCHEMA:
+            if document["schema"] == RUN_SCHEMA:
                 inputs = {str(name): str(digest) for name, digest in document["inputs"].items()}
                 root, settings = Path(document["root"]), dict(document["settings"])
                 return Asked(hash=str(document["hash"]), settings=settings, inputs=inputs, root=root)
         except (KeyError, TypeError, ValueError, AttributeError):
             pass
-        raise refusal(file, "", "a damaged note", f'"{SCHEMA}"', "choose another folder, or give --overwrite")
+        raise refusal(
+            file, "", "a damaged note", f'"{RUN_SCHEMA}"', "choose another folder, or give --overwrite"
+        )
 
     def write_manifest(self, totals: Mapping[str, Any], failures: Sequence[Failure]) -> None:
         """Note how far the run is, and what failed."""

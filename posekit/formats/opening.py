@@ -44,7 +44,7 @@ def open(
     cameras           a mapping of names to `posekit.cameras.calibrated.CalibratedCamera`
     a robot           `posekit.robots.Robot`
     objects           `posekit.formats.own.ObjectResult`
-    a report          `posekit.formats.own.Report`
+    a report          `posekit.formats.own.ValidationReport`
     an evaluation     a mapping, as ``posekit.evaluation/1`` has it
     ================  ==================================================================================
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
-from posekit.formats.own.report import Report, columns_of
+from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_table import summary_table
 from posekit.inspection.telling import cut_long, settings_line
 from posekit.safe_io import refusal
@@ -14,7 +14,7 @@ MOST: Final = 2**53
 """Views are fewer."""
 
 
-def report_lines(report: Report) -> list[str]:
+def report_lines(report: ValidationReport) -> list[str]:
     """Describe verdicts, what checks reject, and settings."""
     if report.checks is None or report.listed is None:
         return [*summary_table(columns_of(report)), settings_line(report.settings)]

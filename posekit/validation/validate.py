@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure
-from posekit.formats.own import Postures, Report, Result
+from posekit.formats.own import Postures, Result, ValidationReport
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.formats.own.report import PostureReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
@@ -61,7 +61,7 @@ def validate(
     sequence: NDArray[np.intp] | None = None,
     distances: bool | None = None,
     detail: Detail = "findings",
-) -> Report:
+) -> ValidationReport:
     """Judge a file of postures.
 
     Parameters
@@ -83,7 +83,7 @@ def validate(
 
     Returns
     -------
-    posekit.formats.own.Report
+    posekit.formats.own.ValidationReport
     """
     if isinstance(postures, NamedConfigurations):
         given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
@@ -109,7 +109,7 @@ def validate(
         )
     columns = joined(parts, list(places), checks)
     not_valid = len(columns) - columns.summary["valid"]
-    return Report(
+    return ValidationReport(
         settings={
             **validator.describe(),
             "checks": applied,

@@ -11,7 +11,7 @@ from posekit.formats.own import (
     Finding,
     JudgedCheck,
     PostureReport,
-    Report,
+    ValidationReport,
     make_report,
     read_report,
     write_report,
@@ -29,7 +29,7 @@ def judged(name="joint_range") -> JudgedCheck:
     return JudgedCheck(check=name, unit="rad", where=("a", "b", "c"), findings=findings)
 
 
-def a_report(**options) -> Report:
+def a_report(**options) -> ValidationReport:
     return make_report(
         settings={"checks": ["joint_range"]},
         verdicts=["invalid", "valid", "undecided"],
@@ -85,7 +85,7 @@ def test_numbers_that_json_has_not_become_null(tmp_path):
         verdict="undecided",
     )
     posture = PostureReport(verdict="undecided", fk_distance=np.nan, findings=[finding])
-    write_report(tmp_path / "r.json", Report(settings={}, postures=[posture]))
+    write_report(tmp_path / "r.json", ValidationReport(settings={}, postures=[posture]))
     back = read_report(tmp_path / "r.json").postures[0]
     assert (back.fk_distance, back.findings[0].value, back.findings[0].lower) == (None, None, None)
 
@@ -166,7 +166,9 @@ def test_a_report_of_a_part_is_read_back(tmp_path):
     silent = PostureReport(
         verdict="undecided", fk_distance=None, findings=(), index=8, undecided_by=("joints", "reach")
     )
-    report = Report(settings={}, postures=(posture, silent), listed="the first 2 of 2", verdicts="vvvvvvviuv")
+    report = ValidationReport(
+        settings={}, postures=(posture, silent), listed="the first 2 of 2", verdicts="vvvvvvviuv"
+    )
     write_report(tmp_path / "r.json", report)
     back = read_report(tmp_path / "r.json")
     assert back == report
@@ -196,7 +198,7 @@ def test_tables_are_written_of_any_report(tmp_path, name):
     text = (tmp_path / name).read_text(encoding="utf-8")
     assert "invalid" in text
     assert "undecided" in text
-    write_report(tmp_path / name, Report(settings={}, postures=()))
+    write_report(tmp_path / name, ValidationReport(settings={}, postures=()))
     assert (tmp_path / name).stat().st_size > 0
 
 
@@ -211,7 +213,7 @@ def test_a_name_cannot_break_out_of_its_cell(tmp_path):
         unit="m",
         verdict="invalid",
     )
-    report = Report(
+    report = ValidationReport(
         settings={"a\nb": "x\n# y"},
         postures=[PostureReport(verdict="invalid", fk_distance=0.0, findings=[finding])],
     )

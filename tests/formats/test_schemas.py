@@ -21,10 +21,10 @@ from posekit.formats.own import (
     ObjectFrame,
     ObjectResult,
     OpenCVModel,
-    Report,
     Result,
     ResultFrame,
     ScaledOrthographicModel,
+    ValidationReport,
     View,
     read_nearer,
     schema,
@@ -149,7 +149,7 @@ def write_all(folder, rng) -> dict[str, list]:
     joints = rng.normal(size=(2, 14, 3))
     joints[0, 1] = np.nan
     write_postures(folder / "postures.json", joints)
-    write_report(folder / "report.json", Report(settings={}, postures=[]))
+    write_report(folder / "report.json", ValidationReport(settings={}, postures=[]))
     rod = ObjectFrame(
         time=0.0,
         judged="exact",

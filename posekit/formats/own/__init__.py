@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from posekit.formats.own.report import Finding as Finding
     from posekit.formats.own.report import JudgedCheck as JudgedCheck
     from posekit.formats.own.report import PostureReport as PostureReport
-    from posekit.formats.own.report import Report as Report
+    from posekit.formats.own.report import ValidationReport as ValidationReport
     from posekit.formats.own.report import check_report_path as check_report_path
     from posekit.formats.own.report import make_report as make_report
     from posekit.formats.own.report import read_report as read_report
@@ -92,7 +92,7 @@ else:
                 "Finding",
                 "JudgedCheck",
                 "PostureReport",
-                "Report",
+                "ValidationReport",
                 "check_report_path",
                 "make_report",
                 "read_report",

@@ -103,7 +103,7 @@ class PostureReport:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Report:
+class ValidationReport:
     """The verdicts on a file of postures.
 
     Parameters
@@ -172,7 +172,7 @@ def make_report(
     fk_distance: NDArray[np.float64],
     judged: Sequence[JudgedCheck],
     all_findings: bool = False,
-) -> Report:
+) -> ValidationReport:
     """Make a report of what the checks found.
 
     Parameters
@@ -208,7 +208,7 @@ def make_report(
             raise refusal("report", check.check, counts, f"{len(rows)}, one a verdict", "judge all postures")
         _list_findings(rows, check, all_findings)
     distances = np.broadcast_to(fk_distance, len(rows)).tolist()
-    return Report(
+    return ValidationReport(
         settings=settings,
         postures=tuple(
             PostureReport(verdict=verdict, fk_distance=_number(distance), findings=tuple(findings))  # type: ignore[arg-type]
@@ -223,7 +223,7 @@ def check_report_path(path: str | Path) -> None:
     check_target(path)
 
 
-def write_report(path: str | Path, report: Report) -> None:
+def write_report(path: str | Path, report: ValidationReport) -> None:
     """Write a report, whole or not at all: ``.json``, ``.md`` (tables) or ``.csv`` (one row a posture).
 
     Raises
@@ -239,7 +239,7 @@ def write_report(path: str | Path, report: Report) -> None:
     write_lines(path, csv_lines(columns) if kind == ".csv" else markdown_lines(columns, report.settings))
 
 
-def read_report(path: str | Path) -> Report:
+def read_report(path: str | Path) -> ValidationReport:
     """Read a report's JSON.
 
     Raises
@@ -249,7 +249,7 @@ def read_report(path: str | Path) -> Report:
     """
     suffix(path, ".json")
     file = validated(ReportFile, read_json(path), path)
-    return Report(
+    return ValidationReport(
         settings=file.settings,
         postures=tuple(_posture(posture) for posture in file.postures),
         checks=None if file.checks is None else {name: _count(check) for name, check in file.checks.items()},
@@ -258,7 +258,7 @@ def read_report(path: str | Path) -> Report:
     )
 
 
-def columns_of(report: Report) -> VerdictColumns:
+def columns_of(report: ValidationReport) -> VerdictColumns:
     """Return a report's columns; of one without, what its listed postures tell."""
     if report.columns is not None:
         return report.columns
@@ -303,7 +303,7 @@ def _silent(posture: PostureReport, checks: Sequence[str]) -> int:
     return sum(1 << names.index(name) for name in posture.undecided_by or () if name in names)
 
 
-def _head(report: Report) -> dict[str, Any]:
+def _head(report: ValidationReport) -> dict[str, Any]:
     head: dict[str, Any] = {
         "schema": REPORT_SCHEMA,
         "settings": dict(report.settings),
@@ -388,7 +388,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _fields(report: Report) -> Iterator[dict[str, Any]]:
+def _fields(report: ValidationReport) -> Iterator[dict[str, Any]]:
     for posture in report.postures:
         entry: dict[str, Any] = {} if posture.index is None else {"index": posture.index}
         entry |= {"verdict": posture.verdict, "fk_distance": _number(posture.fk_distance)}
