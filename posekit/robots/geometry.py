@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Literal
+from typing import Final, Literal
 from xml.etree import ElementTree
 
+import coal
+import numpy as np
 import pinocchio as pin
 
 from posekit.robots.declared import declared_bodies
 from posekit.safe_io import cut, refusal
+
+MAX_TRIANGLES: Final = 500_000
+"""Faces of one mesh: a tree of boxes over so many takes seconds; published robots have at most 350,000."""
+FARTHEST_VERTEX: Final = 1e6
+"""Coordinates beyond this, in whatever unit, describe no body part; coal takes NaN without a word."""
 
 
 def build_geometry(
@@ -33,9 +40,30 @@ def build_geometry(
     except (ValueError, RuntimeError) as error:
         got = f"a {kind} body that coal cannot load: {_reason(error)}"
         raise refusal(source, "", got, "a mesh with triangles", "export the mesh again") from error
+    _check_meshes(model, geometry, source)
     if kind == "collision":
         _check_loaded(model, geometry, robot, source)
     return geometry
+
+
+def _check_meshes(model: pin.Model, geometry: pin.GeometryModel, source: str) -> None:
+    """Refuse what the native reader took: too many triangles, or vertices that are no place on a body."""
+    seen: set[int] = set()
+    for body in geometry.geometryObjects:
+        mesh = body.geometry
+        if not isinstance(mesh, coal.BVHModelBase) or mesh.id() in seen:
+            continue
+        seen.add(mesh.id())
+        where = f"link {link_of(model, body)!r}"
+        if mesh.num_tris > MAX_TRIANGLES:
+            got = f"{mesh.num_tris:,} faces"
+            raise refusal(source, where, got, f"at most {MAX_TRIANGLES:,}", "simplify the mesh")
+        vertices = np.asarray(mesh.vertices())
+        wrong = ~(np.abs(vertices) <= FARTHEST_VERTEX)
+        if wrong.any():
+            got = f"a vertex at {vertices[wrong][0]:g}"
+            expected = f"finite coordinates, at most {FARTHEST_VERTEX:,.0f} in size"
+            raise refusal(source, where, got, expected, "export the mesh again")
 
 
 def link_of(model: pin.Model, body: pin.GeometryObject) -> str:

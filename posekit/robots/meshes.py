@@ -12,8 +12,8 @@ from posekit.robots.declared import declared_bodies
 from posekit.robots.mesh_path import resolve_mesh
 from posekit.safe_io import check_mesh, refusal
 
-MAX_FACES: Final = 2_000_000
-"""Faces of all meshes of one robot together."""
+MAX_MESHES_BYTES: Final = 100_000_000
+"""Of all meshes of one robot together: about two million triangles of STL."""
 
 
 def with_resolved_meshes(
@@ -29,18 +29,18 @@ def with_resolved_meshes(
     Raises
     ------
     InputError
-        Where a mesh lies outside of `package_dirs`, is not there, is malformed, or all together are too large.
+        Where a mesh lies outside of `package_dirs`, is not there, is too large, or is not what its suffix says.
     """
     robot = copy.deepcopy(robot)
-    faces: dict[Path, int] = {}
+    sizes: dict[Path, int] = {}
     for body in declared_bodies(robot, kind):
         if body.shape == "mesh":
             name = body.element.get("filename", "")
             path = resolve_mesh(name, package_dirs, source, f"link {body.link!r}")
-            if path not in faces:
-                faces[path] = check_mesh(path)
+            if path not in sizes:
+                sizes[path] = check_mesh(path)
             body.element.set("filename", str(path))
-    if sum(faces.values()) > MAX_FACES:
-        got = f"meshes of {sum(faces.values()):,} faces"
-        raise refusal(source, "", got, f"at most {MAX_FACES:,}", "simplify the meshes")
+    if sum(sizes.values()) > MAX_MESHES_BYTES:
+        got = f"meshes of {sum(sizes.values()) / 1e6:,.1f} MB"
+        raise refusal(source, "", got, f"at most {MAX_MESHES_BYTES / 1e6:,.0f} MB", "simplify the meshes")
     return robot

@@ -332,20 +332,43 @@ def dae(indices: str = "0 1 2", library: str = "", node: str = '<instance_geomet
 
 
 ITSELF = '<library_nodes><node id="m"><instance_node url="#m"/></node></library_nodes>'
+NESTED = (
+    "<library_nodes>"
+    + "".join(f'<node id="n{k}">' + f'<instance_node url="#n{k + 1}"/>' * 3 + "</node>" for k in range(30))
+    + '<node id="n30"><instance_geometry url="#g"/></node></library_nodes>'
+)
 MESHES: dict[str, tuple[str, bytes, str]] = {
     "a huge count": ("m.stl", stl(2**32 - 1, triangle()), "4,294,967,295 triangles"),
-    "a NaN vertex": ("m.stl", stl(1, triangle(0, 0, np.nan, 1, 0, 0, 0, 1, 0)), "got nan"),
+    "a NaN vertex": ("m.stl", stl(1, triangle(0, 0, np.nan, 1, 0, 0, 0, 1, 0)), "a vertex at nan"),
     "no surface": ("m.stl", stl(1, triangle(*[0.0] * 9)), "a collision body that coal cannot load"),
     "another format": ("m.stl", b"BLENDER-v279" + bytes(500), "triangles in"),
-    "a vertex beyond the list": ("m.obj", OBJ + b"f 1 2 9\n", "the vertex 9"),
+    "a vertex beyond the list": ("m.obj", OBJ + b"f 1 2 9\n", "vertex index out of range"),
     "a normal that is none": ("m.obj", OBJ + b"f 1//x 2//2 3//3\n", ""),
     "a line beyond the list": ("m.obj", OBJ + b"f 1 2 3\nl 1 99999\n", "coal cannot load"),
-    "a face of many corners": ("m.obj", OBJ + b"f " + b"1 2 3 " * 100_000, "300,000 corners"),
+    "a face of many corners": ("m.obj", OBJ + b"f " + b"1 2 3 " * 100_000, "a line that is longer"),
     "materials elsewhere": ("m.obj", b"mtllib /dev/stdin\n" + OBJ + b"f 1 2 3\n", "mtllib"),
     "entities": ("m.dae", b"<!DOCTYPE x [<!ENTITY a 'b'>]>" + dae(), "DOCTYPE"),
     "an index beyond the list": ("m.dae", dae("0 1 99"), "coal cannot load"),
     "a negative index": ("m.dae", dae("0 1 -2"), "coal cannot load"),
     "no scene": ("m.dae", b'<COLLADA version="1.4.1"/>', "coal cannot load"),
+    "an infinite vertex": ("m.stl", stl(1, triangle(0, 0, np.inf, 1, 0, 0, 0, 1, 0)), ""),
+    "a vertex that is no number": ("m.obj", OBJ.replace(b"1 0 0", b"1 nan 0") + b"f 1 2 3\n", ""),
+    "a vertex beyond any body": (
+        "m.obj",
+        OBJ.replace(b"1 0 0", b"1 1e30 0") + b"f 1 2 3\n",
+        "a vertex at 1e+30",
+    ),
+    "more numbers declared than there are": (
+        "m.dae",
+        dae().replace(b'count="9"', b'count="4000000000"'),
+        "",
+    ),
+    "more faces declared than there are": ("m.dae", dae().replace(b's count="1"', b's count="4000000"'), ""),
+    "nodes that place nodes, three each": (
+        "m.dae",
+        dae("0 1 2", NESTED, '<instance_node url="#n0"/>'),
+        "a process that",
+    ),
     "a node that places itself": (
         "m.dae",
         dae("0 1 2", ITSELF, '<instance_node url="#m"/>'),
@@ -384,7 +407,7 @@ def test_meshes_that_are_too_large_together(folder: Path) -> None:
     for k in range(5):
         (folder / f"{k}.stl").write_bytes(stl(450_000, triangle() * 450_000))
     (folder / "x.urdf").write_text(VALID.replace("</link>", many + "</link>", 1))
-    assert "meshes of 2,250,000 faces" in refused(folder / "x.urdf", untrusted=False)
+    assert "meshes of 112.5 MB; expected at most 100 MB" in refused(folder / "x.urdf", untrusted=False)
 
 
 def test_a_mesh_that_takes_the_memory_ends_the_child_alone(folder: Path) -> None:
