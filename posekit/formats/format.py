@@ -50,9 +50,10 @@ class Format:
     folder : bool
         Whether a folder can be of this format.
     looks_like : callable
-        Tells whether a file or folder can be of this format, by its structure: ``looks_like(given)``. It is called for
-        files whose suffix is one of `suffixes`, and for every folder where `folder` is set; it reads as little as it
-        can, imports no heavy library, and returns False for files of other formats instead of raising.
+        Tells whether a file or folder can be of this format, by its structure: ``looks_like(given)``. It is asked of
+        files whose suffix is one of `suffixes`, of folders where `folder` is set, and of files whose name tells
+        nothing; it reads as little as it can, imports no heavy library, and returns False for files of other formats
+        instead of raising.
     """
 
     name: str

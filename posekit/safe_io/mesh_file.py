@@ -21,6 +21,8 @@ MAX_MATERIAL_BYTES: Final = 10_000_000
 """The largest library of materials beside an OBJ file."""
 MAX_LINE_BYTES: Final = 65_536
 """Of an OBJ file: a face of so many corners that its line is longer takes the square of their number to triangulate."""
+MAX_PLACED_NODES: Final = 64
+"""Words ``instance_node`` in a COLLADA file, two an element: of 32 nodes that place nodes at most 3**(32/3) copies come."""
 MESH_SUFFIXES: Final = (".stl", ".obj", ".dae")
 STL_HEADER_BYTES: Final = 84
 STL_TRIANGLE_BYTES: Final = 50
@@ -60,6 +62,9 @@ def check_mesh(path: str | Path, *, limit: int = MAX_BYTES) -> int:
     elif suffix == ".dae" and (b"<COLLADA" not in data or b"<!DOCTYPE" in data):
         got = "DOCTYPE" if b"<!DOCTYPE" in data else "no COLLADA"
         raise refusal(path, "", got, "<COLLADA> without DOCTYPE", "export it again")
+    elif suffix == ".dae" and data.count(b"instance_node") > MAX_PLACED_NODES:
+        got, expected = "many nodes that place nodes", f"at most {MAX_PLACED_NODES // 2}"
+        raise refusal(path, "", got, expected, "export it with its nodes resolved")
     elif suffix == ".obj" and max(map(len, _LINE_ENDS.split(data))) > MAX_LINE_BYTES:
         expected = f"at most {MAX_LINE_BYTES:,} bytes"
         raise refusal(path, "", "a line that is longer", expected, "triangulate its faces")

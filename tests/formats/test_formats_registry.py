@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -15,6 +16,7 @@ import posekit
 from posekit.errors import InputError
 from posekit.formats import registry
 from posekit.formats.format import Content, Format
+from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints import KeyPoints, key_point_formats, read_keypoints
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.motion import Motion, SurvivorTable, write_motion, write_survivors
@@ -159,7 +161,7 @@ DOTS = KeyPointFormat(
     name="dots",
     title="a row a point",
     suffixes=(".dots",),
-    looks_like=lambda given: given.start[:1].isdigit(),
+    looks_like=lambda given: given.suffix == ".dots",
     read=_read_dots,
 )
 
@@ -209,3 +211,16 @@ def test_what_another_package_gives_and_is_no_format_costs_itself_and_a_warning(
 
 def test_own_formats_are_formats() -> None:
     assert all(isinstance(one, Format) and isinstance(one, OwnFormat) for one in OWN_FORMATS)
+
+
+def test_the_format_of_the_page_that_says_how_to_add_one(tmp_path: Path) -> None:
+    page = Path(__file__).parents[2] / "docs" / "formats" / "add-a-format.md"
+    code = textwrap.dedent(page.read_text(encoding="utf-8").partition("```python\n")[2].partition("```")[0])
+    said: dict = {}
+    exec(compile(code, str(page), "exec"), said)
+    rows = np.arange(68.0).reshape(2, 34)
+    np.savetxt(tmp_path / "a.dots", rows, delimiter=",")
+    given = GivenFile(tmp_path / "a.dots")
+    assert said["DOTS_FORMAT"].looks_like(given)
+    found = said["DOTS_FORMAT"].read(given, None)
+    np.testing.assert_array_equal(found.points.reshape(2, -1), rows)

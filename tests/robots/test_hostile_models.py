@@ -367,7 +367,7 @@ MESHES: dict[str, tuple[str, bytes, str]] = {
     "nodes that place nodes, three each": (
         "m.dae",
         dae("0 1 2", NESTED, '<instance_node url="#n0"/>'),
-        "a process that",
+        "many nodes that place nodes",
     ),
     "a node that places itself": (
         "m.dae",

@@ -9,7 +9,7 @@ from posekit.formats.format import Content
 from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
-from posekit.formats.registry import formats
+from posekit.formats.registry import FOLDER_SUFFIX, formats, suffixes_of
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import cut, nearest, refusal, shown
 
@@ -65,7 +65,10 @@ def read_keypoints(
 
 def _candidates(given: GivenFile) -> list[KeyPointFormat]:
     """List the formats that a file looks like; the file is parsed here, so that damage is told first."""
-    return [one for one in key_point_formats().values() if one.looks_like(given)]
+    known = list(key_point_formats().values())
+    suffix = FOLDER_SUFFIX if given.is_folder else given.suffix
+    named = [one for one in known if suffix in suffixes_of(one)]
+    return [one for one in named or known if one.looks_like(given)]
 
 
 def _described(given: GivenFile) -> str:
