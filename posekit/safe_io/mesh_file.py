@@ -22,7 +22,7 @@ MAX_MATERIAL_BYTES: Final = 10_000_000
 MAX_LINE_BYTES: Final = 65_536
 """Of an OBJ file: a face of so many corners that its line is longer takes the square of their number to triangulate."""
 MAX_PLACED_NODES: Final = 64
-"""Words ``instance_node`` in a COLLADA file, two an element: of 32 nodes that place nodes at most 3**(32/3) copies come."""
+"""Words ``instance_node`` in a COLLADA file, two an element: of 32 nodes that place others come 3**(32/3) at most."""
 MESH_SUFFIXES: Final = (".stl", ".obj", ".dae")
 STL_HEADER_BYTES: Final = 84
 STL_TRIANGLE_BYTES: Final = 50
