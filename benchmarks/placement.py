@@ -28,7 +28,7 @@ from posekit.body import Figure, load_figure
 from posekit.body.lengths import hips_points, torso_points
 from posekit.body.stature import stature_from_lengths
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck import Placement, place
+from posekit.cameras.neck import NeckPlacement, place
 from posekit.geometry import rotation_from_vector
 from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
@@ -45,13 +45,13 @@ TOLD = (*((px, 0.0) for px in PIXELS), (2.0, 0.01), (5.0, 0.01), (5.0, 0.02))
 """Deviations (px) and offsets (m) that the methods are told of real postures and detections."""
 
 
-def inside(found: Placement, depth: float) -> bool:
+def inside(found: NeckPlacement, depth: float) -> bool:
     low, high = found.intervals.T
     return bool(((low <= depth + 1e-6) & (high >= depth - 1e-6)).any())
 
 
 def row(
-    name: str, error: tuple[float, float], found: list[Placement], depths: np.ndarray, seconds: float
+    name: str, error: tuple[float, float], found: list[NeckPlacement], depths: np.ndarray, seconds: float
 ) -> None:
     """Print a line; `error` is the deviation and the offset."""
     pairs = list(zip(found, depths, strict=True))
@@ -104,7 +104,7 @@ def captured(path: Path, rng: np.random.Generator) -> None:
     scenes = mocap_scenes(read_capture(path), 480, rng)
     depths = np.concatenate([scene.joints_cam[:, 0, 2] for scene in scenes])
     for deviation, offset in TOLD:
-        found: list[Placement] = []
+        found: list[NeckPlacement] = []
         start = time.perf_counter()
         for scene in scenes:
             found += place(

@@ -17,6 +17,7 @@ SECTIONS: Final = (
     ("Names loaded on demand", "posekit.on_demand"),
     ("Names of joints", "posekit.skeleton"),
     ("Vectors and rotations", "posekit.geometry"),
+    ("Damped least squares", "posekit.least_squares"),
     ("Settings", "posekit.settings"),
     ("Reading and writing files safely", "posekit.safe_io"),
     ("Tables", "posekit.tables"),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.objects.draw import draw_configurations
 from posekit.robots import Robot
-from posekit.robots.descent import Problem, descend
+from posekit.robots.descent import KinematicProblem, descend
 from posekit.robots.ik import PULL, InverseKinematics, Reach, Solution
 from posekit.robots.kinematics import Kinematics, body_points
 from posekit.robots.starts import lay
@@ -103,7 +103,7 @@ class Certifier:
         space = self.kinematics.space
         found = starts.reshape(n * k, nq)
         for _ in range(2):  # the second time what the points do not determine is drawn to where it is
-            problem = Problem(
+            problem = KinematicProblem(
                 targets=goals,
                 weights=np.ones(goals.shape[:2]),
                 lower=space.lower,

@@ -22,7 +22,7 @@ from posekit.skeleton import HEAD, HEAD_POINTS
 
 if TYPE_CHECKING:
     from posekit.cameras.head import HeadPose
-    from posekit.cameras.neck import Placement
+    from posekit.cameras.neck import NeckPlacement
 
 ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 """Metres that a given root may lie beside the neck's ray before it is warned of, and refused."""
@@ -51,7 +51,7 @@ class CameraFit:
         For each frame why its root is not known, or an empty text.
     families : list of Family, optional
         For each uncalibrated frame the scales that it can have; None where the reason says why.
-    placements : list of Placement or None, optional
+    placements : list of NeckPlacement or None, optional
         For each calibrated frame how its neck was placed; None where it was given or six head points told.
     closed : bool
         Whether scales were fitted to close the rigid parts.
@@ -64,7 +64,7 @@ class CameraFit:
     pose: HeadPose | None
     reasons: list[str]
     families: list[Family | None] | None = None
-    placements: list[Placement | None] | None = None
+    placements: list[NeckPlacement | None] | None = None
     closed: bool = False
 
     def cameras(self, part: NDArray[np.intp]) -> Camera:
@@ -174,7 +174,7 @@ def _head_pose(
     return lee_chen.pinhole(_recovered_f(pose) if model.f is None else model.f), pose
 
 
-def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Placement | None]:
+def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[NeckPlacement | None]:
     """Say of frames without a neck why: where the head that would tell f is not seen, nothing can be placed."""
     asked = [k for k, reason in enumerate(reasons) if not reason]
     for k in asked:
@@ -196,9 +196,9 @@ def _placed(
     rooting: Rooting,
     tolerance: Tolerance | None,
     reasons: list[str],
-) -> list[Placement | None]:
+) -> list[NeckPlacement | None]:
     """Place the necks that are not known by now, and say of the others that they need not be."""
-    placements: list[Placement | None] = [None] * len(reasons)
+    placements: list[NeckPlacement | None] = [None] * len(reasons)
     without = np.asarray(np.isnan(root).any(axis=1))
     unknown = np.flatnonzero(without & np.array([not reason for reason in reasons]))
     found = place_roots(view, camera, figure, unknown, rooting, tolerance) if len(unknown) else []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera
-from posekit.cameras.neck import Placement
+from posekit.cameras.neck import NeckPlacement
 from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
@@ -113,7 +113,7 @@ def neck_priors(
     return RootPrior.along_ray(camera, root, depth=step, lateral=lateral), float(step.max(initial=0.0))
 
 
-def _step(placement: Placement | None) -> float:
+def _step(placement: NeckPlacement | None) -> float:
     """Return how far the depth may be from the nearest of the necks that were placed, metres."""
     if placement is None:
         return 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck import Placement, place
+from posekit.cameras.neck import NeckPlacement, place
 from posekit.errors import PosekitError
 from posekit.formats.own import OpenCVModel
 from posekit.geometry import Array
@@ -150,7 +150,7 @@ def _placed_by_trunk(recovery: Recovery, grower: Grower, frames: NDArray[np.intp
         deviation=noise.deviation,
         offset=noise.offset,
     )
-    placements: list[Placement | None] = [None] * len(view)
+    placements: list[NeckPlacement | None] = [None] * len(view)
     root = np.full((len(frames), 3), np.nan)
     for row, (k, one) in enumerate(zip(frames.tolist(), found, strict=True)):
         if len(one.necks):
@@ -168,7 +168,7 @@ def _placed_by_trunk(recovery: Recovery, grower: Grower, frames: NDArray[np.intp
     )
 
 
-def _likeliest(placement: Placement) -> int:
+def _likeliest(placement: NeckPlacement) -> int:
     """Choose the neck whose depth is nearest to the estimate, or at which the rigid parts close best."""
     if np.isfinite(placement.estimate):
         return int(np.argmin(np.abs(placement.depths - placement.estimate)))

@@ -25,7 +25,7 @@ from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 
 if TYPE_CHECKING:
-    from posekit.cameras.neck import Placement
+    from posekit.cameras.neck import NeckPlacement
     from posekit.hidden import CompletedSurvivors
     from posekit.recovery.fit_camera import CameraFit
     from posekit.recovery.grower import Grower
@@ -88,7 +88,7 @@ class FrameRecovery:
         under noise as trunks, which may be none.
     family : Family, optional
         The scales that an uncalibrated frame can have.
-    placement : Placement, optional
+    placement : NeckPlacement, optional
         How the neck of a calibrated frame was placed, where it was not given.
     reason : str
         Why nothing was grown.
@@ -107,7 +107,7 @@ class FrameRecovery:
     index: int
     hypotheses: int = 1
     family: Family | None = None
-    placement: Placement | None = None
+    placement: NeckPlacement | None = None
     reason: str = ""
     lost_to: str = "root/not_known"
     group_within: float | None = None

@@ -15,7 +15,7 @@ from posekit.settings import Rooting, Tolerance
 from posekit.settings.rooting import DETECTED_DEVIATION, DETECTED_OFFSET
 
 if TYPE_CHECKING:
-    from posekit.cameras.neck import Placement
+    from posekit.cameras.neck import NeckPlacement
 
 DEVIATION: Final = 2.0
 """Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
@@ -37,7 +37,7 @@ def place_roots(
     frames: NDArray[np.intp],
     rooting: Rooting,
     tolerance: Tolerance | None,
-) -> list[Placement]:
+) -> list[NeckPlacement]:
     """Place the neck in some frames of a view (`posekit.cameras.neck.place`).
 
     A view with derived joints is a detector's, whose points are farther off, of a body that gives.
@@ -62,14 +62,14 @@ def place_roots(
     )
 
 
-def tolerance_of(placement: Placement) -> Tolerance:
+def tolerance_of(placement: NeckPlacement) -> Tolerance:
     """Return what a tree that grows from a placed neck is judged with: as far off as its image points let it be."""
     rigid, tangent = (STEP * math.ceil(value / STEP) for value in (placement.tolerance, placement.tangent))
     angle = math.degrees(math.atan2(tangent, SHORTEST))
     return Tolerance(rigid=rigid, tangent=tangent, placement=False, angle=angle)
 
 
-def root_of(placement: Placement) -> Root:
+def root_of(placement: NeckPlacement) -> Root:
     """Say in a result how the neck was found."""
     curve = placement.curve[np.isfinite(placement.curve[:, 1])]
     return Root(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.least_squares import Damping
 from posekit.refinement.equations import LimitSigns, evaluate, linearise, solve
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, moved
@@ -15,20 +16,7 @@ from posekit.refinement.state import PostureState, moved
 MAX_STEPS = 20
 """Steps after which a posture is left where it is."""
 
-INITIAL_DAMPING = 1e-4
-"""Fraction of the diagonal that is added to it, at first."""
-
-MIN_DAMPING, MAX_DAMPING = 1e-12, 1e6
-"""Below the least, damping is lost in the diagonal's rounding; beyond the most, steps are too short to change chi2."""
-
-LIGHT_DAMPING = 0.1
-"""Damping up to which a small promise means that there is nothing left to gain."""
-
-DAMPING_GROWTH, DAMPING_DECAY = 8.0, 0.1
-"""What damping is multiplied with after a step that was no better, and at least after one that was."""
-
-MIN_GAIN = 1e-300
-"""Stands for a promised gain of zero, by which the actual one is divided."""
+REFINEMENT_DAMPING = Damping(initial=1e-4, smallest=1e-12, largest=1e6, growth=8.0, decay=0.1, light=0.1)
 
 BLOCK_POSTURES = 2048
 """Postures worked on at once: enough to spread the overhead of each operation."""
@@ -92,7 +80,11 @@ def descend(
 ) -> DescentResult:
     """Minimise chi2 from postures; it never increases.
 
-    Levenberg 1944, Marquardt 1963, damping after Nielsen 1999. A posture is settled where a step promises less
+    The damping of `posekit.least_squares`, not its loop: the equations are arrows of blocks that are eliminated, batch
+    last; a limit that a step ran into is watched in the next, which is no reason for more damping; and what is hopeless
+    is given up before its step is tried.
+
+    A posture is settled where a step promises less
     than `precision` of chi2, be it for a limit in its way, or no step decreases it. It is given up where chi2 is
     beyond `hopeless` and the next step does not promise to halve it.
     """
@@ -116,7 +108,7 @@ class _BatchDescent:
     def __init__(self, problem: RefinementProblem, start: PostureState) -> None:
         n = start.root.shape[1]
         self.problem, self.state = problem, start.copy()
-        self.damping, self.watch = np.full(n, INITIAL_DAMPING), LimitSigns.none(n)
+        self.damping, self.watch = np.full(n, REFINEMENT_DAMPING.initial), LimitSigns.none(n)
         self.watching = np.zeros(n, dtype=np.bool_)
         self.passed = np.zeros(n, dtype=np.intp)
         chi2, active = np.empty(n), np.empty(n, dtype=np.intp)
@@ -141,7 +133,8 @@ class _BatchDescent:
         change, gain = solve(here, self.damping[rows])
         chi2, damping, watching = found.chi2[rows], self.damping[rows], self.watching[rows]
         found.folds[rows] = here.folds()
-        done = (damping > MAX_DAMPING) | ((gain <= precision) & ((damping <= LIGHT_DAMPING) | watching))
+        light = damping <= REFINEMENT_DAMPING.light
+        done = (damping > REFINEMENT_DAMPING.largest) | ((gain <= precision) & (light | watching))
         found.settled[rows] = done
         done |= ~np.isfinite(chi2) | ((chi2 > hopeless) & (gain < 0.5 * chi2) & ~watching)
         if last:
@@ -163,12 +156,8 @@ class _BatchDescent:
         better = value <= chi2
         # A step that ran into a limit is taken anew, with that limit in its equations.
         ran = self._run_into(rows, passed, better)
-        # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
-        with np.errstate(invalid="ignore"):
-            ratio = np.clip((chi2 - value) / np.maximum(gain, MIN_GAIN), 0.0, 1.0)
-        slower = np.where(ran, 1.0, DAMPING_GROWTH)
-        change_by = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, DAMPING_DECAY), slower)
-        self.damping[rows] = np.maximum(damping * change_by, MIN_DAMPING)
+        growth = np.where(ran, 1.0, REFINEMENT_DAMPING.growth)
+        self.damping[rows] = REFINEMENT_DAMPING.updated(damping, better, chi2 - value, gain, growth)
         good = np.flatnonzero(better)
         self.state.put(rows[good], trial.take(good))
         found.chi2[rows[good]] = value[good]

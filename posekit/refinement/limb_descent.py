@@ -9,16 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.geometry.batch_last import backward
-from posekit.refinement.descent import (
-    BLOCK_POSTURES,
-    DAMPING_DECAY,
-    DAMPING_GROWTH,
-    INITIAL_DAMPING,
-    LIGHT_DAMPING,
-    MAX_DAMPING,
-    MIN_DAMPING,
-    MIN_GAIN,
-)
+from posekit.refinement.descent import BLOCK_POSTURES, REFINEMENT_DAMPING
 from posekit.refinement.equations import DIAGONAL_FLOOR, eliminate
 from posekit.refinement.limb_terms import Chains, limb_chi2, limb_terms
 from posekit.refinement.problem import RefinementProblem
@@ -37,8 +28,10 @@ def fit_limbs(
 ) -> None:
     """Minimise each limb's chi2 (4, M) over its own directions and lengths, in place; it never increases.
 
-    A limb is left where it is when its next step promises less than `precision`, or when its chi2 is beyond `hopeless`
-    and the next step does not promise to halve it. Only those that are `used` (4, M) are looked at.
+    The damping is that of `posekit.refinement.descent`, whose docstring says why the loop is its own; here four
+    searches stand beside each other in a column. A limb is left where it is when its next step promises less than
+    `precision`, or when its chi2 is beyond `hopeless` and the next step does not promise to halve it. Only those that
+    are `used` (4, M) are looked at.
     """
     n = chains.start.shape[2]
     search = _LimbSearch(
@@ -46,7 +39,7 @@ def fit_limbs(
         chains=chains,
         chi2=chi2,
         used=used,
-        damping=np.full((4, n), INITIAL_DAMPING),
+        damping=np.full((4, n), REFINEMENT_DAMPING.initial),
         watch=np.zeros((4, 4, n), dtype=np.int8),
         precision=precision,
         hopeless=hopeless,
@@ -86,7 +79,8 @@ def _advance(search: _LimbSearch, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     step = -backward(block.factor, block.right[:, -1].copy())
     gain = (block.right[:, -1] ** 2).sum(axis=0) + (block.damped * step * step).sum(axis=0) - terms.slack
     watching = (watched != 0).any(axis=0)
-    done = (damped > MAX_DAMPING) | ((gain <= search.precision) & ((damped <= LIGHT_DAMPING) | watching))
+    light = damped <= REFINEMENT_DAMPING.light
+    done = (damped > REFINEMENT_DAMPING.largest) | ((gain <= search.precision) & (light | watching))
     done |= (value > search.hopeless) & (gain < 0.5 * value) & ~watching
     done |= ~used[:, rows]
     if done.all():
@@ -97,14 +91,8 @@ def _advance(search: _LimbSearch, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     better = (trial <= value) & ~done
     new = np.where((watched == 0) & ~better & ~done, passed, 0)
     ran = new.any(axis=0)
-    with np.errstate(invalid="ignore"):
-        ratio = np.clip((value - trial) / np.maximum(gain, MIN_GAIN), 0.0, 1.0)
-    change = np.where(
-        better,
-        np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, DAMPING_DECAY),
-        np.where(ran | done, 1.0, DAMPING_GROWTH),
-    )
-    damping[:, rows] = np.maximum(damped * change, MIN_DAMPING)
+    growth = np.where(ran | done, 1.0, REFINEMENT_DAMPING.growth)
+    damping[:, rows] = REFINEMENT_DAMPING.updated(damped, better, value - trial, gain, growth)
     watch[..., rows] = np.where(better | done, 0, watched + new)
     chi2[:, rows] = np.where(better, trial, value)
     chains.directions[..., rows] = np.where(better[:, None, None], directions, now.directions)

@@ -8,27 +8,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.least_squares import Damping, Rows, State, Stopping, minimise, normal_equations
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.normal_equations import limited_step, normal_equations
+from posekit.robots.limited_step import limited_step
 
-STEPS = 60
-DAMPING = 1e-3
-LEAST, MOST = 1e-12, 1e6
-SLOWER, FASTER = 8.0, 0.05
-FLOOR = 1e-6
+MAX_STEPS = 60
+
+IK_DAMPING = Damping(initial=1e-3, smallest=1e-12, largest=1e6, growth=8.0, decay=0.05, light=1e-3)
+
+DIAGONAL_FLOOR = 1e-6
 """Added to the normal equations' diagonal before it scales the damping (m^2/rad^2): for what moves no point."""
 
-SETTLED = 1e-6
+IK_PRECISION = 1e-6
 """Predicted decrease of the cost, as a fraction of it, that ends the search."""
 
-NOTHING = 1e-19
+NEGLIGIBLE_COST = 1e-19
 """Predicted decrease (m^2) that ends it in any case: residuals are then below a nanometre."""
 
-BLOCK = 256
+BLOCK_POSTURES = 256
 """Postures worked on at once."""
 
 
-class Problem(NamedTuple):
+class KinematicProblem(NamedTuple):
     """What is minimised, for N postures.
 
     Attributes
@@ -52,14 +53,14 @@ class Problem(NamedTuple):
     reference: Array
     pull: float
 
-    def take(self, rows: NDArray[np.intp] | slice) -> Problem:
+    def take(self, rows: NDArray[np.intp] | slice) -> KinematicProblem:
         """Select postures."""
         return self._replace(
             targets=self.targets[rows], weights=self.weights[rows], reference=self.reference[rows]
         )
 
 
-class Descent(NamedTuple):
+class KinematicDescent(NamedTuple):
     """Where the search ended.
 
     Attributes
@@ -80,12 +81,12 @@ class Descent(NamedTuple):
 
 def descend(
     kinematics: Kinematics,
-    problem: Problem,
+    problem: KinematicProblem,
     start: Array,
-    steps: int = STEPS,
+    steps: int = MAX_STEPS,
     columns: NDArray[np.intp] | None = None,
-    precision: float = SETTLED,
-) -> Descent:
+    precision: float = IK_PRECISION,
+) -> KinematicDescent:
     r"""Minimise :math:`\frac12 \sum_p w_p |p(q) - y_p|^2 + \frac{\epsilon}{2} |q \ominus q_0|^2` within limits.
 
     Levenberg 1944, Marquardt 1963, damping after Nielsen 1999; limits by `limited_step`. A start outside the
@@ -96,23 +97,15 @@ def descend(
         columns = np.flatnonzero(kinematics.moved_by.any(axis=0))
     parts = [
         _Block(kinematics, problem.take(rows), columns).descend(start[rows], steps, precision)
-        for rows in (slice(at, at + BLOCK) for at in range(0, max(len(start), 1), BLOCK))
+        for rows in (slice(at, at + BLOCK_POSTURES) for at in range(0, max(len(start), 1), BLOCK_POSTURES))
     ]
-    return Descent(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
-
-
-class _Equations(NamedTuple):
-    """The problem at a configuration, linearised: its cost, J'J and the gradient."""
-
-    cost: Array
-    normal: Array
-    gradient: Array
+    return KinematicDescent(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
 
 
 class _Block:
     """A block of postures and the entries of v that are moved."""
 
-    def __init__(self, kinematics: Kinematics, problem: Problem, moving: NDArray[np.intp]) -> None:
+    def __init__(self, kinematics: Kinematics, problem: KinematicProblem, moving: NDArray[np.intp]) -> None:
         self.kinematics, self.problem, self.moving = kinematics, problem, moving
         known = np.isfinite(problem.targets).all(axis=2)
         self.weight = np.sqrt(np.where(known, problem.weights, 0.0))[..., None]
@@ -127,39 +120,16 @@ class _Block:
         self.bounded = np.flatnonzero(position[moving] >= 0)
         self.at = position[moving][self.bounded]
 
-    def descend(self, start: Array, steps: int, precision: float) -> Descent:
+    def descend(self, start: Array, steps: int, precision: float) -> KinematicDescent:
         """Take steps until every posture is settled, or so many are taken."""
         q = np.clip(start, self.problem.lower, self.problem.upper)
-        n = len(q)
-        active = np.arange(n)
-        here = self._linearise(active, q)
-        cost = here.cost.copy()
-        damping = np.full(n, DAMPING)
-        taken, settled = np.zeros(n, dtype=np.intp), np.zeros(n, dtype=np.bool_)
-        for _ in range(steps):
-            if not active.size:
-                break
-            step, gain = self._step(here, q[active], damping[active])
-            trial = self._moved(q[active], step)
-            there = self._linearise(active, trial)
-            # Nielsen 1999: less damping where the decrease is what was predicted, more where it is not.
-            better = there.cost <= cost[active]
-            ratio = np.clip((cost[active] - there.cost) / np.maximum(gain, 1e-300), 0.0, 1.0)
-            factor = np.where(better, np.maximum(1.0 - (2.0 * ratio - 1.0) ** 3, FASTER), SLOWER)
-            small = gain <= np.maximum(precision * cost[active], NOTHING)
-            settled[active] = small & (damping[active] <= DAMPING)
-            damping[active] = np.maximum(damping[active] * factor, LEAST)
-            settled[active] |= damping[active] > MOST
-            taken[active] += 1
-            q[active[better]], cost[active[better]] = trial[better], there.cost[better]
-            for mine, theirs in zip(here, there, strict=True):
-                mine[better] = theirs[better]
-            left = ~settled[active]
-            if not left.all():
-                active, here = active[left], _Equations(*(array[left] for array in here))
-        return Descent(q, cost, taken, settled)
+        stopping = Stopping(steps=steps, precision=precision, smallest=NEGLIGIBLE_COST)
+        found = minimise(self, (q,), IK_DAMPING, stopping)
+        return KinematicDescent(found.state[0], found.cost, found.steps, found.settled)
 
-    def _linearise(self, rows: NDArray[np.intp], q: Array) -> _Equations:
+    def linearise(self, rows: Rows, state: State) -> State:
+        """Return half the weighted sum of squared distances with the pull's share, and its normal equations."""
+        (q,) = state
         placed = self.kinematics.place(q, self.moving)
         residual = ((placed.positions - self.target[rows]) * self.weight[rows]).reshape(
             len(rows), 3 * placed.positions.shape[1]
@@ -169,24 +139,27 @@ class _Block:
         away = self.kinematics.space.difference(self.problem.reference[rows], q)[:, self.moving]
         cost = 0.5 * (np.einsum("ni,ni->n", residual, residual) + (away * away) @ self.pull)
         normal, gradient = normal_equations(residual, jacobian.reshape(*residual.shape, len(self.moving)))
-        return _Equations(cost, normal, gradient + self.pull * away)
+        return cost, normal, gradient + self.pull * away
 
-    def _step(self, here: _Equations, q: Array, damping: Array) -> tuple[Array, Array]:
+    def step(self, rows: Rows, state: State, here: State, damping: Array) -> tuple[Array, Array]:
         """Return a damped step (N, m) inside the limits, and the decrease that it promises (N,)."""
+        (q,) = state
+        _, normal, gradient = here
         diagonal = np.arange(len(self.moving))
-        damped = here.normal.copy()
+        damped = normal.copy()
         damped[:, diagonal, diagonal] += self.pull + damping[:, None] * (
-            here.normal[:, diagonal, diagonal] + FLOOR
+            normal[:, diagonal, diagonal] + DIAGONAL_FLOOR
         )
-        lowest, highest = np.full(here.gradient.shape, -np.inf), np.full(here.gradient.shape, np.inf)
+        lowest, highest = np.full(gradient.shape, -np.inf), np.full(gradient.shape, np.inf)
         lowest[:, self.bounded] = self.problem.lower[self.at] - q[:, self.at]
         highest[:, self.bounded] = self.problem.upper[self.at] - q[:, self.at]
-        step = limited_step(damped, here.gradient, lowest, highest)
-        bend = (here.normal @ step[..., None])[..., 0] + self.pull * step
-        return step, -np.einsum("ni,ni->n", step, here.gradient + 0.5 * bend)
+        step = limited_step(damped, gradient, lowest, highest)
+        bend = (normal @ step[..., None])[..., 0] + self.pull * step
+        return step, -np.einsum("ni,ni->n", step, gradient + 0.5 * bend)
 
-    def _moved(self, q: Array, step: Array) -> Array:
+    def moved(self, rows: Rows, state: State, step: Array) -> State:
         """Take steps; rounding does not pass a limit."""
+        (q,) = state
         space = self.kinematics.space
         dv = np.zeros((len(q), space.nv))
         dv[:, self.moving] = step
@@ -196,4 +169,4 @@ class _Block:
             self.problem.lower[space.bounded_q],
             self.problem.upper[space.bounded_q],
         )
-        return moved
+        return (moved,)

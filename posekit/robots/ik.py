@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.robots.descent import Problem
+from posekit.robots.descent import KinematicProblem
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.search import Found, Search, unlimited
 from posekit.robots.start_tables import make_tables
@@ -271,7 +271,7 @@ class InverseKinematics:
         starts = Starts(kinematics=self.kinematics, tables=tables)
         return Search(starts=starts, tolerance=min(self.precision, self.tolerance))
 
-    def _problem(self, targets: ArrayLike, weights: ArrayLike | None) -> Problem:
+    def _problem(self, targets: ArrayLike, weights: ArrayLike | None) -> KinematicProblem:
         """Check what is asked for."""
         goal = np.asarray(targets, dtype=np.float64)
         count = len(self.kinematics.points)
@@ -292,7 +292,7 @@ class InverseKinematics:
             raise InputError("weights must be finite and not negative")
         lower, upper = self._limits
         rest = np.clip(self.kinematics.neutral, lower, upper)
-        return Problem(
+        return KinematicProblem(
             targets=goal,
             weights=np.broadcast_to(each / max(float(each.max(initial=0.0)), SMALLEST), goal.shape[:2]),
             lower=lower,
@@ -301,7 +301,7 @@ class InverseKinematics:
             pull=PULL,
         )
 
-    def _explain(self, problem: Problem, found: Found) -> Solution:
+    def _explain(self, problem: KinematicProblem, found: Found) -> Solution:
         """Tell whether limits or lengths are the reason where a posture is not met."""
         q, space = found.q, self.kinematics.space
         reach = np.full(len(q), Reach.MET, dtype=np.intp)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.robots.body_point import frame_index
-from posekit.robots.descent import Descent, Problem, descend
+from posekit.robots.descent import KinematicDescent, KinematicProblem, descend
 from posekit.robots.joint_chain import beyond
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.start_tables import Table
@@ -94,11 +94,11 @@ class Search:
         """The model and its points."""
         return self.starts.kinematics
 
-    def descend(self, problem: Problem, start: Array) -> Found:
+    def descend(self, problem: KinematicProblem, start: Array) -> Found:
         """Search from one start, all joints together."""
         return self._found(descend(self.kinematics, problem, start), problem)
 
-    def everywhere(self, problem: Problem) -> Found:
+    def everywhere(self, problem: KinematicProblem) -> Found:
         """Search from the tables of starts: trunk, limbs, then all joints; other trunks where that did not do."""
         trunk = self._trunk(problem)
         found = self.descend(problem, self._with_limbs(trunk, problem))
@@ -107,7 +107,9 @@ class Search:
             self._try_other_trunks(found, problem.take(rows), rows, trunk[rows])
         return found
 
-    def _try_other_trunks(self, found: Found, problem: Problem, rows: NDArray[np.intp], trunk: Array) -> None:
+    def _try_other_trunks(
+        self, found: Found, problem: KinematicProblem, rows: NDArray[np.intp], trunk: Array
+    ) -> None:
         """Start from trunks that lie on their points as well, but otherwise: as a flat trunk does back to front.
 
         All points together cost no less than the trunk's alone: a trunk that costs more than the best posture found
@@ -131,13 +133,13 @@ class Search:
                 few = problem.take(some)
                 found.improve(rows[some], self.descend(few, self._with_limbs(other[some], few)))
 
-    def _found(self, descent: Descent, problem: Problem) -> Found:
+    def _found(self, descent: KinematicDescent, problem: KinematicProblem) -> Found:
         gap = np.linalg.norm(self.kinematics.positions(descent.q) - problem.targets, axis=2)
         counts = np.isfinite(gap) & (problem.weights > 0)
         worst = np.where(counts, gap, 0.0).max(axis=1, initial=0.0)
         return Found(descent.q, descent.cost, worst, descent.steps, descent.settled)
 
-    def _trunk(self, problem: Problem) -> Array:
+    def _trunk(self, problem: KinematicProblem) -> Array:
         """Lay the trunk: the first candidate, and the best of the others where it does not meet its points."""
         first = self.starts.trunks(problem.targets, 1)
         if not self._trunk_part.columns.size:
@@ -150,7 +152,7 @@ class Search:
             self._improve_part(self._trunk_part, few, others, TRUNK_STEPS, rows, q, cost)
         return q
 
-    def _with_limbs(self, q: Array, problem: Problem) -> Array:
+    def _with_limbs(self, q: Array, problem: KinematicProblem) -> Array:
         """Lay the limbs on a trunk that stands: each by itself, other shapes where the first does not meet its points.
 
         Before all joints together are moved: a limb in the wrong shape would pull the trunk along.
@@ -173,7 +175,7 @@ class Search:
     def _improve_part(
         self,
         part: _Part,
-        problem: Problem,
+        problem: KinematicProblem,
         starts: Array,
         steps: int,
         rows: NDArray[np.intp],
@@ -184,13 +186,17 @@ class Search:
         better = other_cost < cost[rows]
         q[rows[better]], cost[rows[better]] = others[better], other_cost[better]
 
-    def _descend_part(self, part: _Part, problem: Problem, starts: Array, steps: int) -> tuple[Array, Array]:
+    def _descend_part(
+        self, part: _Part, problem: KinematicProblem, starts: Array, steps: int
+    ) -> tuple[Array, Array]:
         """Descend on a part's points from several starts (S, N, nq): the best q (N, nq) and its cost (N,)."""
         q, cost = self._descend_each(part, problem, starts, steps)
         best, rows = np.argmin(cost, axis=0), np.arange(cost.shape[1])
         return q[best, rows], cost[best, rows]
 
-    def _descend_each(self, part: _Part, problem: Problem, starts: Array, steps: int) -> tuple[Array, Array]:
+    def _descend_each(
+        self, part: _Part, problem: KinematicProblem, starts: Array, steps: int
+    ) -> tuple[Array, Array]:
         """Descend on a part's points from several starts (S, N, nq): every q (S, N, nq) and its cost (S, N)."""
         count, n = starts.shape[:2]
         targets = problem.targets[:, part.points]
@@ -198,7 +204,7 @@ class Search:
             # The carrier stands still meanwhile, and it stands alike in all starts.
             rotation, origin = self.kinematics.joint_placements(starts[0], part.kinematics.carrier)
             targets = np.einsum("nji,npj->npi", rotation, targets - origin[:, None])
-        small = Problem(
+        small = KinematicProblem(
             targets=np.tile(targets, (count, 1, 1)),
             weights=np.tile(problem.weights[:, part.points], (count, 1)),
             lower=problem.lower,
@@ -236,7 +242,7 @@ class Search:
         return _Part(part, columns, table.points)
 
 
-def unlimited(problem: Problem, reference: Array) -> Problem:
+def unlimited(problem: KinematicProblem, reference: Array) -> KinematicProblem:
     """Return the same problem without limits, what the points do not determine near a reference (N, nq)."""
     return problem._replace(
         lower=np.full_like(problem.lower, -np.inf),

@@ -15,7 +15,7 @@ from posekit.cameras.head import (
     head_points_cam,
     solve_pose,
 )
-from posekit.cameras.head.perspective import Heads, Placement, look
+from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.errors import CameraError, HeadError
 from posekit.geometry import rotation_from_vector
 from posekit.skeleton import HEAD_POINTS
@@ -311,7 +311,7 @@ def test_jacobian_against_finite_differences(camera, side, rng):
     scale = rng.uniform(0.02, 0.1, count)
     slope = side * scale if camera is not None else rng.normal(0, 0.05, count)
     R = rotation_from_vector(rng.normal(size=(count, 3)))
-    here = Placement(R, rng.normal(0, 0.3, (count, 2)), scale, slope)
+    here = HeadPlacement(R, rng.normal(0, 0.3, (count, 2)), scale, slope)
     residual, jacobian, possible = look(heads, here)
     assert possible.all()
     assert (residual.reshape(count, 2, 7)[0, :, 3] == 0).all()

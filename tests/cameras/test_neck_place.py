@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck import Placement, place
+from posekit.cameras.neck import NeckPlacement, place
 from posekit.cameras.neck.cover import cover, meet
 from posekit.cameras.neck.place import MOST, REACH
 from posekit.cameras.neck.suggestion import SUFFICES
@@ -24,16 +24,16 @@ VIEWS = random_views(FIGURE, 120, np.random.default_rng(20))
 NEAR = random_views(FIGURE, 30, np.random.default_rng(21), CameraSphere(distance=(1.8, 2.2), f=700.0))
 
 
-def placed(scene: SyntheticScene, **options: Any) -> list[Placement]:
+def placed(scene: SyntheticScene, **options: Any) -> list[NeckPlacement]:
     return place(scene.camera, scene.figure, scene.image, scene.head_image, **options)
 
 
-def inside(found: Placement, depth: float, slack: float = 1e-7) -> bool:
+def inside(found: NeckPlacement, depth: float, slack: float = 1e-7) -> bool:
     low, high = found.intervals.T
     return bool(((low <= depth + slack) & (high >= depth - slack)).any())
 
 
-def chosen_near(found: Placement, depth: float) -> bool:
+def chosen_near(found: NeckPlacement, depth: float) -> bool:
     return bool(np.abs(found.depths - depth).min(initial=np.inf) <= found.step + 1e-6)
 
 

@@ -16,7 +16,7 @@ from posekit.robots import load_robot
 from posekit.robots.ik import InverseKinematics, Reach, Solution, solve, solve_sequence
 from posekit.robots.joint_map import load_joint_map
 from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points
-from posekit.robots.normal_equations import limited_step
+from posekit.robots.limited_step import limited_step
 from posekit.robots.start_tables import find_branches
 
 MM = 1e-3

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.robots.descent import STEPS, Problem, descend
+from posekit.robots.descent import MAX_STEPS, KinematicProblem, descend
 from posekit.robots.ik import PULL, InverseKinematics
 from posekit.robots.kinematics import Kinematics
 from posekit.validators.robot.branches import Branches
@@ -208,7 +208,7 @@ class Fitter:
         best = np.argmin(self._cost(found, goals).reshape(len(q), SHAKES), axis=1)
         return np.asarray(found.reshape(len(q), SHAKES, -1)[np.arange(len(q)), best])
 
-    def _inside(self, targets: Array, start: Array, steps: int = STEPS) -> Array:
+    def _inside(self, targets: Array, start: Array, steps: int = MAX_STEPS) -> Array:
         """Descend inside the limits."""
         space = self.kinematics.space
         lower, upper = np.full(space.nq, -np.inf), np.full(space.nq, np.inf)
@@ -217,8 +217,8 @@ class Fitter:
         start = np.clip(start, lower, upper)
         return descend(self.kinematics, self._problem(targets, start, lower, upper), start, steps).q
 
-    def _problem(self, targets: Array, reference: Array, lower: Array, upper: Array) -> Problem:
-        return Problem(
+    def _problem(self, targets: Array, reference: Array, lower: Array, upper: Array) -> KinematicProblem:
+        return KinematicProblem(
             targets=targets,
             weights=np.ones(targets.shape[:2]),
             lower=lower,

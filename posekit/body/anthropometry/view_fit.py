@@ -21,7 +21,7 @@ CONVERGED: Final = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Fit:
+class DimensionFit:
     """The logarithms of the dimensions, the scales' middle and width (M + 2,); their covariance; independent frames."""
 
     y: Array
@@ -29,7 +29,7 @@ class Fit:
     independent: Array
 
 
-def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> Fit:
+def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> DimensionFit:
     """Find where the slopes vanish, each dimension's weighted by how many independent frames it has shown.
 
     Newton's method with the sum of the slopes' squares for the information (Berndt, Hall, Hall & Hausman 1974).
@@ -64,7 +64,7 @@ def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> Fi
             if left < CONVERGED:
                 break
             y = y + SHARE * np.clip(step, -0.2, 0.2)
-    return Fit(
+    return DimensionFit(
         y=y,
         covariance=np.asarray(np.linalg.inv(information), dtype=np.float64),
         independent=independent,

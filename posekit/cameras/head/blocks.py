@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from posekit.cameras import PinholeCamera
-from posekit.cameras.head.estimate import Estimate, estimate
+from posekit.cameras.head.estimate import HeadEstimate, estimate
 from posekit.cameras.head.points import HeadPoints
 from posekit.cameras.head.sighting import Sighting
 from posekit.geometry import Array
@@ -23,13 +23,13 @@ BLOCK = 1000
 
 def estimate_blocks(
     head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None, threads: int = 1
-) -> Estimate:
+) -> HeadEstimate:
     """Place the head in every frame, as `posekit.cameras.head.estimate.estimate` does, on some threads."""
     frames = [slice(k, k + BLOCK) for k in range(0, len(sighting.reasons), BLOCK)]
     if len(frames) < 2:
         return estimate(head, sighting, known)
 
-    def one(part: slice) -> Estimate:
+    def one(part: slice) -> HeadEstimate:
         seen = Sighting(sighting.image[part], sighting.seen[part], sighting.reasons[part])
         return estimate(head, seen, None if known is None else _known(*known, part))
 
@@ -42,7 +42,7 @@ def estimate_blocks(
         estimates = [one(part) for part in frames]
     columns: Any = zip(*estimates, strict=True)
     reasons, *arrays = columns
-    return Estimate(
+    return HeadEstimate(
         [reason for part in reasons for reason in part], *(np.concatenate(parts) for parts in arrays)
     )
 

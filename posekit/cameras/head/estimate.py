@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head.dlt import BEHIND
-from posekit.cameras.head.fit import Fit, equations, fit
+from posekit.cameras.head.fit import HeadFit, fit
 from posekit.cameras.head.misfit import misfits, spread
-from posekit.cameras.head.perspective import Heads, Placement, look
+from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.cameras.head.points import HeadPoints
 from posekit.cameras.head.sighting import Sighting
 from posekit.cameras.head.starts import affine_start, direct_start, reversed_start
 from posekit.geometry import Array
+from posekit.least_squares import scaled_equations
 
 CLEARLY = 5.0
 """Standard deviations by which the perspective must be reversed to be called so, not merely unseen."""
@@ -34,7 +35,7 @@ DETERMINED = 1e-12
 """Smallest eigenvalue of the normal equations, scaled to a unit diagonal, that determines all unknowns."""
 
 
-class Estimate(NamedTuple):
+class HeadEstimate(NamedTuple):
     """The poses of F heads: what `posekit.cameras.head.HeadPose` is made of; NaN where there is a reason."""
 
     reasons: list[str]
@@ -49,7 +50,7 @@ class Estimate(NamedTuple):
     chance: Array
 
 
-def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None) -> Estimate:
+def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None) -> HeadEstimate:
     """Place the head in every frame.
 
     Parameters
@@ -61,7 +62,7 @@ def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, A
     """
     reasons = list(sighting.reasons)
     total, count = sighting.seen.shape
-    result = Estimate(
+    result = HeadEstimate(
         reasons,
         R=np.full((total, 3, 3), np.nan),
         t=np.full((total, 3), np.nan),
@@ -118,8 +119,8 @@ def _centred(points: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array, Arra
     return centre, size, offset / size[:, None, None]
 
 
-def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
-    """Fit from both starts, take the better, and say where a head behind the camera fits better still.
+def _best(heads: Heads, plane: Array) -> tuple[HeadFit, list[str]]:
+    """HeadFit from both starts, take the better, and say where a head behind the camera fits better still.
 
     Coarse image points have a second minimum, the head with its depths reversed: there it is tried as well.
     """
@@ -131,7 +132,7 @@ def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
     number = np.arange(len(plane))
     both = fit(
         heads.take(np.concatenate([number, number])),
-        Placement(*(np.concatenate(pair) for pair in zip(direct, affine, strict=True))),
+        HeadPlacement(*(np.concatenate(pair) for pair in zip(direct, affine, strict=True))),
     )
     second = both.cost[len(plane) :] < both.cost[: len(plane)]
     choice = np.where(second, number + len(plane), number)
@@ -159,13 +160,13 @@ def _best(heads: Heads, plane: Array) -> tuple[Fit, list[str]]:
     return best, reasons
 
 
-def _focal_length(heads: Heads, fitted: Fit) -> tuple[Array, Array, list[str]]:
+def _focal_length(heads: Heads, fitted: HeadFit) -> tuple[Array, Array, list[str]]:
     """Return f, its standard deviation, and why it is not determined; K's own where K is known."""
     count = len(fitted.cost)
     if heads.K is not None:
         return heads.K[:, 0, 0], np.zeros(count), [""] * count
     residual, jacobian, _ = look(heads, fitted.placement)
-    normal, _, unit = equations(residual, jacobian)
+    normal, _, unit = scaled_equations(residual, jacobian)
     normal[~fitted.settled] = np.eye(heads.unknowns)
     values, vectors = np.linalg.eigh(normal)
     freedom = 2 * heads.seen.sum(axis=-1) - heads.unknowns

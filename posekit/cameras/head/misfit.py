@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.head.fit import Fit, fit
-from posekit.cameras.head.perspective import Heads, Placement, look
+from posekit.cameras.head.fit import HeadFit, fit
+from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.cameras.head.starts import affine_start
 from posekit.geometry import Array
 
@@ -31,7 +31,7 @@ PRECISION = 1e-3
 """Fraction to which the squared error without a point is found: enough to judge it."""
 
 
-def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], Array, Array]:
+def misfits(heads: Heads, plane: Array, fitted: HeadFit) -> tuple[NDArray[np.intp], Array, Array]:
     """Name the point that does not fit.
 
     Parameters
@@ -39,7 +39,7 @@ def misfits(heads: Heads, plane: Array, fitted: Fit) -> tuple[NDArray[np.intp], 
     heads : Heads
     plane : array (F, P, 2)
         The image points, normalised where K is known.
-    fitted : Fit
+    fitted : HeadFit
         Of all points.
 
     Returns
@@ -86,7 +86,7 @@ def beyond_chance(chance: Array) -> NDArray[np.bool_]:
     return beyond
 
 
-def _start(heads: Heads, plane: Array, placement: Placement) -> Placement:
+def _start(heads: Heads, plane: Array, placement: HeadPlacement) -> HeadPlacement:
     """Start from the placement of all points or, where that is led far astray, the orthographic view."""
     start = affine_start(heads.points, plane, heads.seen > 0, heads.K is not None)
     costs = []

@@ -60,7 +60,7 @@ class Heads(NamedTuple):
         return 7 if self.K is None else 6
 
 
-class Placement(NamedTuple):
+class HeadPlacement(NamedTuple):
     """The unknowns: R (F, 3, 3), shift a (F, 2), scale s (F,) and slope d (F,)."""
 
     R: Array
@@ -68,23 +68,25 @@ class Placement(NamedTuple):
     scale: Array
     slope: Array
 
-    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> Placement:
+    def take(self, index: NDArray[np.intp] | NDArray[np.bool_]) -> HeadPlacement:
         """Select placements."""
-        return Placement(*(array[index] for array in self))
+        return HeadPlacement(*(array[index] for array in self))
 
-    def put(self, index: NDArray[np.intp] | NDArray[np.bool_], other: Placement) -> None:
+    def put(self, index: NDArray[np.intp] | NDArray[np.bool_], other: HeadPlacement) -> None:
         """Overwrite placements."""
         for array, values in zip(self, other, strict=True):
             array[index] = values
 
-    def moved(self, step: Array, heads: Heads) -> Placement:
+    def moved(self, step: Array, heads: Heads) -> HeadPlacement:
         """Add steps (F, 6 or 7): a rotation vector in the camera's frame, shift, scale, and slope if free."""
         scale = self.scale + step[:, 5]
         slope = self.slope + step[:, 6] if heads.K is None else heads.side * scale
-        return Placement(rotation_from_vector(step[:, :3]) @ self.R, self.shift + step[:, 3:5], scale, slope)
+        return HeadPlacement(
+            rotation_from_vector(step[:, :3]) @ self.R, self.shift + step[:, 3:5], scale, slope
+        )
 
 
-def look(heads: Heads, placement: Placement) -> tuple[Array, Array, NDArray[np.bool_]]:
+def look(heads: Heads, placement: HeadPlacement) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Compare a placement with the image.
 
     Returns
@@ -92,7 +94,7 @@ def look(heads: Heads, placement: Placement) -> tuple[Array, Array, NDArray[np.b
     residual : array (F, 2P)
         Projection less image point, 0 where a point does not count: u of every point, then v.
     jacobian : array (F, 2P, 6 or 7)
-        Its derivative by `Placement.moved`'s step.
+        Its derivative by `HeadPlacement.moved`'s step.
     possible : bool array (F,)
         Whether every point is on its side of the camera.
     """

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras.head.dlt import solve
-from posekit.cameras.head.perspective import Placement
+from posekit.cameras.head.perspective import HeadPlacement
 from posekit.geometry import Array, cross
 
 FLAT = 1e-12
 """Added to the squared extent of points of size 1, so that the rest of a head, if flat, has a start too."""
 
 
-def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bool) -> Placement:
+def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bool) -> HeadPlacement:
     """Fit a scaled orthographic view: the limit of a distant camera (DeMenthon & Davis 1995).
 
     Parameters
@@ -39,10 +39,10 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     R = np.concatenate([axes, cross(axes[:, 0], axes[:, 1])[:, None]], axis=1)
     scale = values.mean(axis=-1)
     shift = middle - scale[:, None] * np.einsum("fij,fj->fi", axes, centre)
-    return Placement(R, shift, scale, scale.copy() if known else np.zeros(len(R)))
+    return HeadPlacement(R, shift, scale, scale.copy() if known else np.zeros(len(R)))
 
 
-def reversed_start(points: Array, placement: Placement) -> Placement:
+def reversed_start(points: Array, placement: HeadPlacement) -> HeadPlacement:
     """Turn heads (F, P, 3) so that they look nearly the same with their depths reversed (Necker 1832).
 
     The head is mirrored in the plane across its thinnest direction, then along the optical axis: together a
@@ -53,7 +53,9 @@ def reversed_start(points: Array, placement: Placement) -> Placement:
     return placement._replace(R=np.diag([1.0, 1.0, -1.0]) @ placement.R @ mirror)
 
 
-def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[Placement, NDArray[np.bool_]]:
+def direct_start(
+    points: Array, image: Array, seen: NDArray[np.bool_]
+) -> tuple[HeadPlacement, NDArray[np.bool_]]:
     """Take the placement from the direct linear transformation, and say whether it lies behind the camera.
 
     NaN where the linear equations do not determine it or it has points on both sides of the camera.
@@ -68,4 +70,4 @@ def direct_start(points: Array, image: Array, seen: NDArray[np.bool_]) -> tuple[
     R = direct.R * np.stack([side, side, np.ones_like(side)], axis=-1)[..., None]
     R = np.where(usable[:, None, None], R, np.nan)
     shift = direct.f[:, None] * direct.t[:, :2] / depth[:, None]
-    return Placement(R, shift, direct.f / np.abs(depth), 1 / depth), behind
+    return HeadPlacement(R, shift, direct.f / np.abs(depth), 1 / depth), behind

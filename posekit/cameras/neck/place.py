@@ -16,7 +16,7 @@ from posekit.cameras.neck.closure import Closure
 from posekit.cameras.neck.cover import cover, meet
 from posekit.cameras.neck.given import Given
 from posekit.cameras.neck.head import head_suggestion
-from posekit.cameras.neck.placement import Placement
+from posekit.cameras.neck.placement import NeckPlacement
 from posekit.cameras.neck.search import Depths, search
 from posekit.cameras.neck.suggestion import SIGMAS, Suggestion
 from posekit.cameras.neck.torso import torso_suggestion
@@ -49,7 +49,7 @@ def place(
     tangent: float | None = None,
     reach: float = REACH,
     most: int = MOST,
-) -> list[Placement]:
+) -> list[NeckPlacement]:
     """Find where the neck is in F frames.
 
     ``auto`` takes the head where it tells the depth well enough, else the torso, else the search; always within the
@@ -82,11 +82,11 @@ def place(
     reach : float
         Metres within which some neck shall be of any depth that is possible.
     most : int
-        The most necks a frame; where they do not suffice, they are wider apart (`Placement.step`).
+        The most necks a frame; where they do not suffice, they are wider apart (`NeckPlacement.step`).
 
     Returns
     -------
-    list of Placement
+    list of NeckPlacement
         One a frame.
 
     Raises
@@ -113,7 +113,7 @@ def place(
         elif frame in depths:
             placements.append(_choose(given, seen, closure, depths[frame], parts, method, frame, allowed))
         else:
-            placements.append(Placement(method="none", reason=_why(seen, frame)))
+            placements.append(NeckPlacement(method="none", reason=_why(seen, frame)))
     return placements
 
 
@@ -140,7 +140,7 @@ def _choose(
     method: RootMethod,
     frame: int,
     allowed: Allowance,
-) -> Placement:
+) -> NeckPlacement:
     """Take the first part that suffices, or else the search, and choose depths from what it leaves."""
     z = float(seen.rays[frame, 0, 2])
     searched = _searched(depths, z, allowed, frame)
@@ -204,11 +204,13 @@ def _necks(
 
 def _as_given(
     given: Given, seen: Sight, closure: Closure, depths: Depths | None, frame: int, allowed: Allowance
-) -> Placement:
+) -> NeckPlacement:
     """Keep a root that is given, and say where it stands to the search's depths."""
     root = given.root[frame]
     if depths is None:
-        return Placement(method="given", necks=root[None], misfit=np.array([np.nan]), estimate=float(root[2]))
+        return NeckPlacement(
+            method="given", necks=root[None], misfit=np.array([np.nan]), estimate=float(root[2])
+        )
     z = float(seen.rays[frame, 0, 2])
     at = float(seen.rays[frame, 0] @ root)
     misfit = closure.least(np.array([frame]), np.array([at])) if depths.known else np.array([np.nan])
@@ -225,9 +227,9 @@ def _as_given(
     )
 
 
-def _searched(depths: Depths, z: float, allowed: Allowance, frame: int) -> Placement:
+def _searched(depths: Depths, z: float, allowed: Allowance, frame: int) -> NeckPlacement:
     """Say what the search found of a frame, as depths; z is the ray's."""
-    return Placement(
+    return NeckPlacement(
         method="none",
         lower=(float(depths.intervals[0, 0]) if len(depths.intervals) else depths.lower) * z,
         upper=depths.upper * z,

@@ -17,7 +17,7 @@ def _nothing() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Placement:
+class NeckPlacement:
     """Where one frame's neck can be, and the places to grow the tree from. Depths are camera z, metres.
 
     Parameters

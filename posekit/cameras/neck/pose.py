@@ -8,19 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
-from posekit.cameras.head.perspective import Heads, Placement, look
+from posekit.cameras.head.fit import fit_reprojection
+from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.cameras.head.starts import affine_start, reversed_start
 from posekit.geometry import Array, coordinate_rotation, cross
+from posekit.least_squares import Damping, Stopping, scaled_equations
 
 LEAST = 4
 """Points below which a pose is not determined: three leave up to four, none of which can be told from the others."""
 
-STEPS = 50
-DAMPING = 1e-3
-SLOWER, FASTER = 8.0, 0.2
-STUCK = 1e10
-SETTLED = 1e-10
-"""Predicted decrease of the squared error, in squared deviations and as a fraction of it, that ends the search."""
+POSE_DAMPING = Damping(initial=1e-3, largest=1e10, growth=8.0, decay=0.2, light=np.inf, gradual=False)
+
+POSE_STOPPING = Stopping(steps=50, precision=1e-10, full_cost=1.0)
+"""The search ends by the promised decrease of the squared error, in squared deviations or as a fraction of it."""
 
 FLOOR = 1e-12
 """Pixels: a deviation of zero is taken as this where residuals are weighed."""
@@ -131,10 +131,10 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     # Seen nearly face on, a flat part has its minima side by side, and all of these may lead to the same one.
     best = np.argmin([cost for _, cost, _, _ in fits], axis=0)
     picked = [np.stack([fit[0][k] for fit in fits])[best, np.arange(len(number))] for k in range(4)]
-    fits += [_fit(heads, weights, start) for start in _tilted(Placement(*picked))]
+    fits += [_fit(heads, weights, start) for start in _tilted(HeadPlacement(*picked))]
     n = len(fits)
     every = np.tile(np.arange(len(number)), n)
-    end = Placement(*(np.concatenate(parts) for parts in zip(*(fit[0] for fit in fits), strict=True)))
+    end = HeadPlacement(*(np.concatenate(parts) for parts in zip(*(fit[0] for fit in fits), strict=True)))
     cost, jacobian, residual = (np.concatenate([fit[k] for fit in fits]) for k in (1, 2, 3))
     R, origin, covariance = _origin(end, jacobian, centre[every], size[every])
     rms = np.sqrt((residual**2).sum(axis=1) / np.maximum(seen.sum(axis=1), 1)[every])
@@ -179,7 +179,7 @@ def _usable(normalized: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     return np.flatnonzero(usable), seen[usable]
 
 
-def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
+def _starts(points: Array, image: Array, first: HeadPlacement) -> list[HeadPlacement]:
     """Return where the search starts: the solid seen from afar, and its flat part, each with depths reversed too.
 
     Of a body that is nearly flat the first knows its thinnest direction by noise alone. The second leaves it out: the
@@ -202,64 +202,24 @@ def _starts(points: Array, image: Array, first: Placement) -> list[Placement]:
         plane = tilted @ W
         normal = cross(plane[..., 0], plane[..., 1])
         R = np.concatenate([plane, normal[..., None]], axis=-1) @ np.swapaxes(v, -1, -2)
-        starts.append(Placement(R, first.shift, scale, scale.copy()))
+        starts.append(HeadPlacement(R, first.shift, scale, scale.copy()))
     return starts
 
 
-def _tilted(placement: Placement) -> list[Placement]:
+def _tilted(placement: HeadPlacement) -> list[HeadPlacement]:
     """Tilt bodies by `TILT` to four sides, about axes across the line of sight."""
     turns = (coordinate_rotation(axis, np.asarray(tilt)) for tilt in (TILT, -TILT) for axis in (0, 1))
     return [placement._replace(R=turn @ placement.R) for turn in turns]
 
 
-def _fit(heads: Heads, weights: Array, start: Placement) -> tuple[Placement, Array, Array, Array]:
+def _fit(heads: Heads, weights: Array, start: HeadPlacement) -> tuple[HeadPlacement, Array, Array, Array]:
     """Minimise; return the poses, the cost (infinite without one), the weighted jacobian and the plain residual."""
-    here = Placement(*(array.copy() for array in start))
-    both = np.concatenate([weights, weights], axis=1)
-    residual, jacobian, possible = look(heads, here)
-    with np.errstate(over="ignore"):
-        cost = np.where(possible, ((both * residual) ** 2).sum(axis=1), np.inf)
-    cost[~np.isfinite(cost)] = np.inf
-    damping = np.full(len(cost), DAMPING)
-    active = np.flatnonzero(np.isfinite(cost))
-    for _ in range(STEPS):
-        if not active.size:
-            break
-        W = both[active]
-        normal, gradient, unit = _equations(W * residual[active], W[..., None] * jacobian[active])
-        damped = normal + damping[active, None, None] * np.eye(6)
-        step = -np.linalg.solve(damped, gradient[..., None])[..., 0]
-        gain = -np.einsum("fi,fi->f", step, 2 * gradient + np.einsum("fij,fj->fi", normal, step))
-        few = heads.take(active)
-        trial = here.take(active).moved(step / unit, few)
-        new_residual, new_jacobian, possible = look(few, trial)
-        with np.errstate(over="ignore"):
-            new_cost = np.where(possible, ((W * new_residual) ** 2).sum(axis=1), np.inf)
-        better = new_cost < cost[active]
-        done = (gain <= SETTLED * np.minimum(cost[active], 1.0)) | (damping[active] > STUCK)
-        rows = active[better]
-        here.put(rows, trial.take(better))
-        cost[rows], residual[rows], jacobian[rows] = (
-            new_cost[better],
-            new_residual[better],
-            new_jacobian[better],
-        )
-        damping[active] *= np.where(better, FASTER, SLOWER)
-        active = active[~done]
-    here.R[:] = 1.5 * here.R - 0.5 * here.R @ np.swapaxes(here.R, -1, -2) @ here.R
-    return here, cost, both[..., None] * jacobian, residual
+    end, found = fit_reprojection(heads, start, POSE_DAMPING, POSE_STOPPING, weights=weights)
+    residual, jacobian, _ = look(heads, end)
+    return end, found.cost, np.concatenate([weights, weights], axis=1)[..., None] * jacobian, residual
 
 
-def _equations(residual: Array, jacobian: Array) -> tuple[Array, Array, Array]:
-    """Return the normal equations of unknowns scaled to a unit diagonal, and the scales (F, 6)."""
-    squares = np.einsum("fpi,fpi->fi", jacobian, jacobian)
-    unit = np.sqrt(np.where(squares > 0, squares, 1.0))
-    scaled = jacobian / unit[:, None]
-    transposed = np.swapaxes(scaled, -1, -2)
-    return transposed @ scaled, (transposed @ residual[..., None])[..., 0], unit
-
-
-def _origin(end: Placement, jacobian: Array, centre: Array, size: Array) -> tuple[Array, Array, Array]:
+def _origin(end: HeadPlacement, jacobian: Array, centre: Array, size: Array) -> tuple[Array, Array, Array]:
     """Return rotations, the origins (M, 3) and their covariance: first order, by the derivative of each unknown."""
     depth = size / end.scale
     arm = -np.einsum("fij,fj->fi", end.R, centre)
@@ -272,7 +232,7 @@ def _origin(end: Placement, jacobian: Array, centre: Array, size: Array) -> tupl
     by[:, 2, 0], by[:, 2, 1] = y, -x
     by[:, 0, 3] = by[:, 1, 4] = depth
     by[:, :, 5] = -(depth / end.scale)[:, None] * towards
-    normal, _, unit = _equations(np.zeros(jacobian.shape[:2]), jacobian)
+    normal, _, unit = scaled_equations(np.zeros(jacobian.shape[:2]), jacobian)
     with np.errstate(all="ignore"):
         inverse = np.linalg.pinv(np.where(np.isfinite(normal), normal, 0.0), hermitian=True)
         by = by / unit[:, None]

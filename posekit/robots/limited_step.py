@@ -1,4 +1,4 @@
-"""Damped normal equations with limits on the step, for a batch."""
+"""Steps of a search that stay within limits, for a batch."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.least_squares import solve_each
 
-ROUNDS = 4
+CLAMPING_ROUNDS = 4
 """How often a step that passes a limit is cut there and the rest solved anew."""
-
-
-def normal_equations(residual: Array, jacobian: Array) -> tuple[Array, Array]:
-    """Return J'J (N, m, m) and J'r (N, m) of residuals (N, k) and their Jacobian (N, k, m)."""
-    transposed = np.swapaxes(jacobian, 1, 2)
-    return transposed @ jacobian, (transposed @ residual[..., None])[..., 0]
 
 
 def limited_step(normal: Array, gradient: Array, lowest: Array, highest: Array) -> Array:
@@ -40,7 +35,7 @@ def limited_step(normal: Array, gradient: Array, lowest: Array, highest: Array) 
     """
     held = ((lowest >= 0) & (gradient > 0)) | ((highest <= 0) & (gradient < 0))
     step = _solve(normal, gradient, held, np.zeros_like(gradient))
-    for _ in range(ROUNDS - 1):
+    for _ in range(CLAMPING_ROUNDS - 1):
         past = ~held & ((step < lowest) | (step > highest))
         rows = np.flatnonzero(past.any(axis=1))
         if not rows.size:
@@ -54,15 +49,11 @@ def limited_step(normal: Array, gradient: Array, lowest: Array, highest: Array) 
 def _solve(normal: Array, gradient: Array, held: NDArray[np.bool_], value: Array) -> Array:
     """Solve H d = -g for the entries that are not held; the held ones have their value."""
     if not held.any():
-        return -_linear(normal, gradient)
+        return -solve_each(normal, gradient)
     free = (~held).astype(np.float64)
     fixed = np.where(held, value, 0.0)
     right = free * (gradient + (normal @ fixed[..., None])[..., 0])
     matrix = normal * free[:, :, None] * free[:, None, :]
     diagonal = np.arange(normal.shape[1])
     matrix[:, diagonal, diagonal] += 1.0 - free
-    return fixed - _linear(matrix, right)
-
-
-def _linear(matrix: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
+    return fixed - solve_each(matrix, right)
