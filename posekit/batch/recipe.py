@@ -95,11 +95,11 @@ class Recipe:
         table = Path(ranges)
         taylor = asked.proportions == "taylor"
         return {
-            **vars(asked.tolerance or PartialTolerance()),
             "checks": list(map(str, asked.checks)),
             "ranges": [ranges, digests.of_file(table)] if table.is_file() else [ranges],
             "rules": list(asked.rules),
             "walkers": asked.walkers,
+            **vars(asked.tolerance or PartialTolerance()),
             "contact_margin": asked.contact_margin,
             "scale": asked.scale or "",
             "proportions": asked.proportions if taylor else self.source.proportions,

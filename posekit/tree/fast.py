@@ -9,7 +9,6 @@ somebody wants to know.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import TypeVar
 
@@ -83,6 +82,8 @@ def _spread(do: Callable[[Task], Result], tasks: Sequence[Task]) -> list[Result]
     threads = min(n_threads(), len(tasks))
     if threads < 2:
         return [do(task) for task in tasks]
+    from concurrent.futures import ThreadPoolExecutor
+
     with ThreadPoolExecutor(threads) as pool:
         # Each in a copy of this context: what NumPy shall not warn of holds there too.
         waiting = [pool.submit(copy_context().run, do, task) for task in tasks]

@@ -7,11 +7,13 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Final
 
-from posekit.body.anthropometry import proportion_names
 from posekit.errors import InputError
 
 OPTIONS: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
 """The options that are called otherwise than what they set."""
+
+OWN_PROPORTIONS: Final = ("figure", "taylor")
+"""Those that come with the figure, and with Taylor's; others are tables of anthropometry."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,9 +78,12 @@ class Source:
             "--focal35": self.focal35,
         }
         _one_of(cameras, "one camera")
-        names = ("figure", "taylor", *proportion_names())
-        if self.proportions not in names:
-            raise InputError(f"--proportions: {self.proportions!r}; expected one of {', '.join(names)}")
+        if self.proportions not in OWN_PROPORTIONS:
+            from posekit.body.anthropometry import proportion_names
+
+            names = (*OWN_PROPORTIONS, *proportion_names())
+            if self.proportions not in names:
+                raise InputError(f"--proportions: {self.proportions!r}; expected one of {', '.join(names)}")
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
         inf = float("inf")
         bounds = (

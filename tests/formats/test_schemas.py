@@ -182,7 +182,10 @@ def write_all(folder, rng) -> dict[str, list]:
     (folder / "nearer.json").write_text(json.dumps(near), encoding="utf-8")
     assert read_nearer(folder / "nearer.json") == [{"neck-pelvis": "neck"}]
     write_evaluation(folder / "evaluation.json", evaluation())
-    write_evaluation(folder / "followed.json", evaluation(choose=by_path, tolerance=MEASURED_TOLERANCE))
+    write_evaluation(
+        folder / "followed.json",
+        evaluation(choose=by_path, settings=RecoverSettings(tolerance=MEASURED_TOLERANCE)),
+    )
     write_batch(folder / "batch")
     documents: dict[str, list] = {name: [] for name in SCHEMA_NAMES}
     for path in folder.rglob("*.json"):

@@ -5,7 +5,6 @@ The numbers do not depend on how many threads there are.
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from contextvars import copy_context
 from typing import Any
 
@@ -34,6 +33,8 @@ def estimate_blocks(
         return estimate(head, seen, None if known is None else _known(*known, part))
 
     if threads > 1:
+        from concurrent.futures import ThreadPoolExecutor
+
         with ThreadPoolExecutor(min(threads, len(frames))) as pool:
             # Each in a copy of this context: what NumPy shall not warn of holds there too.
             waiting = [pool.submit(copy_context().run, one, part) for part in frames]

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
 from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
 from posekit.formats.own.reading import read_json
-from posekit.formats.own.result import Result
+from posekit.formats.own.result import RESULT_SCHEMA, Result
 from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
-from posekit.formats.own.result_schema import RESULT_SCHEMA
 from posekit.formats.own.units import Unit, from_metres, to_metres
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text

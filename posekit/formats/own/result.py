@@ -22,6 +22,9 @@ LEVEL_FIELDS: Final = ("joint", "physical", "motion")
 EVERYWHERE_COLUMNS: Final = tuple(name for name, column in SURVIVOR_COLUMNS.items() if column.everywhere)
 """Columns that all frames of a result have, or none."""
 
+RESULT_SCHEMA: Final = "posekit.result/1"
+"""What a result's file says it is."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ResultFrame(SurvivorColumns):

@@ -6,8 +6,6 @@ from pathlib import Path
 
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.result import Result
-from posekit.formats.own.result_json import read_result_json, write_result_json
-from posekit.formats.own.result_npz import read_result_npz, write_result_npz
 from posekit.safe_io.writing import check_target
 
 
@@ -32,7 +30,13 @@ def read_result(path: str | Path) -> Result:
     -----
     In JSON margins and groups are written with each posture; where no frame has a survivor, none are read.
     """
-    return read_result_json(path) if suffix(path, ".json", ".npz") == ".json" else read_result_npz(path)
+    if suffix(path, ".json", ".npz") == ".json":
+        from posekit.formats.own.result_json import read_result_json
+
+        return read_result_json(path)
+    from posekit.formats.own.result_npz import read_result_npz
+
+    return read_result_npz(path)
 
 
 def check_result_path(path: str | Path) -> None:
@@ -57,6 +61,10 @@ def write_result(path: str | Path, result: Result) -> None:
         Where the file cannot be written, or would be larger than can be read again.
     """
     if suffix(path, ".json", ".npz") == ".json":
+        from posekit.formats.own.result_json import write_result_json
+
         write_result_json(path, result)
     else:
+        from posekit.formats.own.result_npz import write_result_npz
+
         write_result_npz(path, result)

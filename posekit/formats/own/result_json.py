@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +12,16 @@ from numpy.typing import NDArray
 from posekit.formats.own.family import Family
 from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.reading import read_json
-from posekit.formats.own.result import Result, ResultFrame
-from posekit.formats.own.result_schema import (
-    RESULT_SCHEMA,
-    ResultFile,
-    ResultFrameFields,
-    ResultPaths,
-)
+from posekit.formats.own.result import RESULT_SCHEMA, Result, ResultFrame
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
 from posekit.formats.own.units import Unit, from_metres, to_metres
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
-from posekit.tables.file_model import validated
+
+if TYPE_CHECKING:
+    from posekit.formats.own.result_schema import ResultFrameFields, ResultPaths
 
 _KINDS: Final = {"survivor": int, "interpolated": bool}
 
@@ -37,6 +33,10 @@ def read_result_json(path: str | Path) -> Result:
 
 def result_of(document: object, path: str | Path) -> Result:
     """Make a result of a parsed document that came from `path`."""
+    # What checks a file takes as long to load as a result to write: who only writes one does without.
+    from posekit.formats.own.result_schema import ResultFile
+    from posekit.tables.file_model import validated
+
     file = validated(ResultFile, document, path)
     nq = len(file.configuration_names)
     for index, frame in enumerate(file.frames):

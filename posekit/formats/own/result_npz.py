@@ -29,8 +29,8 @@ from posekit.formats.own.inferred import Inferred
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
 from posekit.formats.own.paths import FollowedPaths
 from posekit.formats.own.reading import parse_json
-from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, Result, ResultFrame
-from posekit.formats.own.result_schema import RESULT_SCHEMA, ResultDetails, ResultPathsTold
+from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, RESULT_SCHEMA, Result, ResultFrame
+from posekit.formats.own.result_schema import ResultDetails, ResultPathsTold
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_npz import PADDED_PREFIXES, survivor_arrays, survivors_in

@@ -15,8 +15,6 @@ from posekit.safe_io.refusal import shown
 from posekit.skeleton import JOINTS
 from posekit.tables.file_model import FEW_ENTRIES, FileModel, refuse
 
-RESULT_SCHEMA = "posekit.result/1"
-
 Maybe = float | None
 MaybePoint = Annotated[list[Maybe], Field(min_length=3, max_length=3)]
 Row = Annotated[list[float], Field(min_length=3, max_length=3)]

@@ -16,12 +16,13 @@ from posekit.formats.own import (
     view_schema,
 )
 from posekit.formats.own import nearer as nearer_schema
+from posekit.formats.own.result import RESULT_SCHEMA
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.tables.file_model import FileModel
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
     view_schema.VIEW_SCHEMA: view_schema.ViewFile,
-    result_schema.RESULT_SCHEMA: result_schema.ResultFile,
+    RESULT_SCHEMA: result_schema.ResultFile,
     postures_schema.POSTURES_SCHEMA: postures_schema.PosturesFile,
     report_schema.REPORT_SCHEMA: report_schema.ReportFile,
     nearer_schema.NEARER_SCHEMA: nearer_schema.NearerFile,
