@@ -22,13 +22,12 @@ from posekit.robots import (
     QuaternionWarning,
     Robot,
     check_configurations,
-    find,
     load_robot,
     robot_names,
     untrusted,
 )
 from posekit.robots.declared import declared_bodies
-from posekit.robots.find import robots_folder
+from posekit.robots.find import find, robots_folder
 from posekit.robots.pairs import neutral_inside_limits
 from posekit.robots.second_reader import compare_readers
 from posekit.robots.srdf import check_srdf
