@@ -24,7 +24,7 @@ ACCELERATION_CORRELATION_SECONDS: Final = 0.05
 """Seconds over which an acceleration lasts: q is its square times this."""
 
 MIN_DEVIATION_METRES: Final = 1e-4
-"""The least deviation that a joint is given: a distance known exactly would make the filter's gain a division by zero."""
+"""The least standard deviation that a joint is given, metres: no distance is known better."""
 
 
 def smooth(
