@@ -15,8 +15,8 @@ import posekit
 from posekit.viewer.browser.studio import Studio
 from posekit.viewer.pictures import Shot, write_picture
 from posekit.viewer.scene.compose import Style, compose
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.framing import fitted_eye
-from posekit.viewer.scene.subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.world import upright_world
 
 SIZE = (640, 480)

@@ -35,7 +35,7 @@ from posekit.ranking import (
     rank,
     write_prior,
 )
-from posekit.ranking.prior import TERM_NAMES, WEIGHT_NAMES
+from posekit.ranking.posture_prior import TERM_NAMES, WEIGHT_NAMES
 from posekit.ranking.ranking import softmax
 from posekit.recovery import recover
 from posekit.skeleton import RIGID_SEGMENTS, segment_name

@@ -36,7 +36,14 @@ from posekit.settings import MEASURED_TOLERANCE, RecoverSettings, Tolerance
 from posekit.skeleton import JOINTS, RIGID_SEGMENTS, SEGMENTS, segment_name
 from posekit.synthesis import Capture, SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.validators import load_ranges
-from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR, drawing, save
+from posekit.viewer.plots.plot_file import (
+    LEFT_COLOUR,
+    MUTED_COLOUR,
+    RIGHT_COLOUR,
+    TRUNK_COLOUR,
+    drawing,
+    save,
+)
 from posekit.views.builtin import view_of
 
 Floats = NDArray[np.float64]

@@ -15,14 +15,14 @@ from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.safe_io.writing import replacing, write_text
 from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS
-from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
 from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
 from posekit.viewer.scene.compose import Composition, Style, compose, row_count
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, check_one_scale
 from posekit.viewer.scene.eye import CameraEye, Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.subject import DrawnSubject, Shown, check_one_scale
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
 

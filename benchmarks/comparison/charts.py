@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.comparison.measure import Chart
 from posekit.viewer.plots import save
-from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
+from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 
 COLOURS = (LEFT_COLOUR, RIGHT_COLOUR, MUTED_COLOUR)
 MARKS = ("o", "s", "^")

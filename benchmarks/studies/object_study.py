@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.objects.articulated import ArticulatedObject
-from posekit.objects.draw import draw_view
-from posekit.objects.recover import recover_object
+from posekit.objects.drawn_views import draw_view
+from posekit.objects.object_recovery import recover_object
 from posekit.settings.scale import Scale
 
 FOUND = 1e-5

@@ -131,10 +131,10 @@ def evaluate(
 ) -> None:
     """Recover views whose truth is known, and say how good the survivors are: retained, how many, how far off."""
     from posekit import evaluate as evaluation
-    from posekit.evaluate.draw import plot_paths, write_plots
-    from posekit.evaluate.report import check_evaluation_path, summary
+    from posekit.evaluate.evaluation_charts import plot_paths, write_plots
+    from posekit.evaluate.evaluation_report import check_evaluation_path, summary
     from posekit.formats.own import View
-    from posekit.viewer.plots.figure import drawing
+    from posekit.viewer.plots.plot_file import drawing
 
     charts = plot_paths(output[0]) if plots else {}
     distinct(file, *output, *charts.values())

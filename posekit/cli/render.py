@@ -16,7 +16,7 @@ from posekit.errors import InputError, ViewerError
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
     from posekit.formats.own import Postures, Result, View
-    from posekit.viewer.scene.subject import DrawnSubject, Shown
+    from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
@@ -209,7 +209,7 @@ def _shown(
     """Choose what is drawn of a file."""
     from posekit.formats.own import Result
     from posekit.viewer.scene.branch import one_a_reason, rejected_of
-    from posekit.viewer.scene.subject import subject_of
+    from posekit.viewer.scene.drawn_subject import subject_of
 
     subject = subject_of(content, view)
     numbers_of_frames = _frames(frame, len(subject.frames))

@@ -9,15 +9,15 @@ if TYPE_CHECKING:
     from posekit.evaluate.comparison import compare as compare
     from posekit.evaluate.evaluation import Evaluation as Evaluation
     from posekit.evaluate.evaluation import evaluate as evaluate
+    from posekit.evaluate.evaluation_report import write_evaluation as write_evaluation
+    from posekit.evaluate.followed_sequences import Choice as Choice
+    from posekit.evaluate.followed_sequences import Chooser as Chooser
+    from posekit.evaluate.followed_sequences import by_path as by_path
+    from posekit.evaluate.frame_sampling import FrameSampling as FrameSampling
     from posekit.evaluate.method import Method as Method
-    from posekit.evaluate.ranking import Ranker as Ranker
-    from posekit.evaluate.ranking import SurvivorOrder as SurvivorOrder
-    from posekit.evaluate.ranking import by_probability as by_probability
-    from posekit.evaluate.report import write_evaluation as write_evaluation
-    from posekit.evaluate.sampling import FrameSampling as FrameSampling
-    from posekit.evaluate.sequences import Choice as Choice
-    from posekit.evaluate.sequences import Chooser as Chooser
-    from posekit.evaluate.sequences import by_path as by_path
+    from posekit.evaluate.survivor_order import Ranker as Ranker
+    from posekit.evaluate.survivor_order import SurvivorOrder as SurvivorOrder
+    from posekit.evaluate.survivor_order import by_probability as by_probability
     from posekit.evaluate.sweep import Sweep as Sweep
 else:
     __getattr__ = on_demand(
@@ -32,14 +32,14 @@ else:
                 "evaluate",
             ),
             "method": ("Method",),
-            "ranking": (
+            "survivor_order": (
                 "Ranker",
                 "SurvivorOrder",
                 "by_probability",
             ),
-            "report": ("write_evaluation",),
-            "sampling": ("FrameSampling",),
-            "sequences": (
+            "evaluation_report": ("write_evaluation",),
+            "frame_sampling": ("FrameSampling",),
+            "followed_sequences": (
                 "Choice",
                 "Chooser",
                 "by_path",

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.evaluate.frames import EvaluatedFrames
+from posekit.evaluate.evaluated_frames import EvaluatedFrames
 from posekit.evaluate.scores import correct_poses, correct_poses_score, reliability
 from posekit.evaluate.work import ROLES
 from posekit.geometry import Array

@@ -13,10 +13,10 @@ from multiprocessing import get_context
 from typing import Any
 
 from posekit.errors import InputError
-from posekit.evaluate.frames import EvaluatedFrames
+from posekit.evaluate.evaluated_frames import EvaluatedFrames
+from posekit.evaluate.frame_sampling import FrameSampling
 from posekit.evaluate.material import Material, of_capture, of_view
 from posekit.evaluate.method import Method
-from posekit.evaluate.sampling import FrameSampling
 from posekit.evaluate.sweep import Sweep
 from posekit.evaluate.work import Measured, Work, measure
 from posekit.formats.own import View

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import FigureError, InputError
+from posekit.evaluate.frame_sampling import FrameSampling, action_names
 from posekit.evaluate.method import Method, of_frames, scaled
-from posekit.evaluate.sampling import FrameSampling, action_names
 from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.work import Work
 from posekit.formats.own import LeeChenModel, OpenCVModel, View

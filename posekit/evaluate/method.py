@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError, PosekitError
-from posekit.evaluate.ranking import Ranker, by_probability
-from posekit.evaluate.sequences import Chooser
+from posekit.evaluate.followed_sequences import Chooser
+from posekit.evaluate.survivor_order import Ranker, by_probability
 from posekit.formats.own import View
 from posekit.recovery.body import loaded, ranges_of
 from posekit.recovery.conductor import recover

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure
-from posekit.evaluate.certificate import SurvivorCertificate, certify
-from posekit.evaluate.errors import best_of_frames, best_rows, of_chosen, survivor_errors
+from posekit.evaluate.followed_sequences import chosen_by
+from posekit.evaluate.joint_errors import best_of_frames, best_rows, of_chosen, survivor_errors
 from posekit.evaluate.method import Method, figure_of
-from posekit.evaluate.ranking import SurvivorOrder, first_ranked
-from posekit.evaluate.sequences import chosen_by
+from posekit.evaluate.survivor_certificate import SurvivorCertificate, certify
+from posekit.evaluate.survivor_order import SurvivorOrder, first_ranked
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.formats.own import ScaledOrthographicModel, View
 from posekit.geometry import Array
@@ -75,7 +75,7 @@ class Measured:
     ----------
     survivors : int array (F,)
     errors : mapping of str to array (F, 5)
-        By `ROLES`: `posekit.evaluate.errors.ERROR_NAMES`, metres.
+        By `ROLES`: `posekit.evaluate.joint_errors.ERROR_NAMES`, metres.
     branch : array (F,)
         1 where a survivor has the truth's branch code, 0 where none has, NaN where the truth has none to be known.
     limbs : mapping of str to array (F,)

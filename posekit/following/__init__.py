@@ -11,11 +11,11 @@ from posekit.following.bridging import bridge as bridge
 from posekit.following.follower import Follower as Follower
 from posekit.following.follower import LiveEstimate as LiveEstimate
 from posekit.following.following import Following as Following
-from posekit.following.frame import SurvivorFrame as SurvivorFrame
+from posekit.following.length_scales import ScaleChoice as ScaleChoice
+from posekit.following.length_scales import choose_scale as choose_scale
 from posekit.following.motion_model import MotionModel as MotionModel
-from posekit.following.paths import Paths as Paths
-from posekit.following.scales import ScaleChoice as ScaleChoice
-from posekit.following.scales import choose_scale as choose_scale
 from posekit.following.smoothing import smooth as smooth
+from posekit.following.survivor_frame import SurvivorFrame as SurvivorFrame
+from posekit.following.survivor_paths import Paths as Paths
 from posekit.following.switches import Switch as Switch
 from posekit.following.switches import elevations as elevations

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from posekit.compiled.compiling import is_fast
-from posekit.following import fast, plain
+from posekit.following import compiled_arrivals, reference_arrivals
 from posekit.following.beam import Beam
 from posekit.following.channels import NextSurvivors
 from posekit.following.floors import Arrivals, Floors
@@ -43,7 +43,11 @@ def arrivals(
     floors = Floors.of(states, to, model)
     # As long as no end has a velocity, all survivors are followed: the first steps say too little to choose.
     least = 0 if floors.moving else len(to)
-    find = fast.find if is_fast(len(states) * len(to) // PAIRS_PER_TREE_GROWN) else plain.find
+    find = (
+        compiled_arrivals.find
+        if is_fast(len(states) * len(to) // PAIRS_PER_TREE_GROWN)
+        else reference_arrivals.find
+    )
     width = max(beam.width, least)
     came, went, cost, dropped = find(states, to, floors, model=model, beam=beam, width=width)
     order = np.lexsort((went, came))

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.following.beam import Beam
-from posekit.following.frame import SurvivorFrame, check_frames
 from posekit.following.motion_model import MotionModel
-from posekit.following.paths import Paths, joints_of
-from posekit.following.search import PathStep, advance, trace
 from posekit.following.states import States
+from posekit.following.survivor_frame import SurvivorFrame, check_frames
+from posekit.following.survivor_paths import Paths, joints_of
+from posekit.following.viterbi import PathStep, advance, trace
 from posekit.geometry import Array
 
 PATH_SEPARATION_METRES = 0.25

@@ -1,7 +1,7 @@
 r"""What steps and turns cost at least, whichever survivor they go to: what noise alone makes of them.
 
-They cost :math:`\sum_c a \log (G_c / H_c) + \tfrac12 \log H_c` (`posekit.following.student`), the first part never
-negative. Of the second, with :math:`H = 1 + w (B_r + B_c)`, the logarithm being concave,
+They cost :math:`\sum_c a \log (G_c / H_c) + \tfrac12 \log H_c` (`posekit.following.pairwise_student`), the first
+part never negative. Of the second, with :math:`H = 1 + w (B_r + B_c)`, the logarithm being concave,
 
 .. math:: \tfrac12 \log H \ge \tfrac14 \log (1 + 2 w B_r) + \tfrac14 \log (1 + 2 w B_c)
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.following.beam import Beam
 from posekit.following.bridging import COASTING_SECONDS, bridge
-from posekit.following.frame import SurvivorFrame, check_order
 from posekit.following.motion_model import MotionModel
-from posekit.following.search import PathStep, advance
 from posekit.following.states import States
+from posekit.following.survivor_frame import SurvivorFrame, check_order
+from posekit.following.viterbi import PathStep, advance
 from posekit.geometry import Array
 
 LIVE_BEAM = Beam(width=128, survivors=1024)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from posekit.following.channels import Channels
 from posekit.following.motion_model import MotionModel
+from posekit.following.pairwise_student import columns, rows, unlikelihood
 from posekit.following.states import States
-from posekit.following.student import columns, rows, unlikelihood
 from posekit.geometry import Array
 
 RESTING_NU: Final = 1.0
@@ -31,7 +31,7 @@ class Target:
     centre : array (27, 3)
         Taken off all values, so that no digits are lost far from the origin.
     columns : array (27, 7, N)
-        The channels as `posekit.following.student.columns` lays them out.
+        The channels as `posekit.following.pairwise_student.columns` lays them out.
     """
 
     channels: Channels

@@ -16,8 +16,8 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages.bound_angle import BoundAngle
 from posekit.linkages.consistency import components
-from posekit.linkages.family import AT_BOUND, LinkageFamily, read_nearer
 from posekit.linkages.flips import FlipCodes, number_flips
+from posekit.linkages.linkage_family import AT_BOUND, LinkageFamily, read_nearer
 from posekit.linkages.residuals import Flatness, LoopClosure, Perpendicularity, Residual, Slice
 
 CONSTRAINT_KINDS: Final = ("closure", "coplanar", "perpendicular", "collinear")

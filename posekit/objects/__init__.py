@@ -10,10 +10,10 @@ if TYPE_CHECKING:
     from posekit.objects.articulated import ArticulatedObject as ArticulatedObject
     from posekit.objects.articulated import load_object as load_object
     from posekit.objects.articulated import tolerance_of as tolerance_of
-    from posekit.objects.draw import draw_view as draw_view
-    from posekit.objects.recover import recover_object as recover_object
-    from posekit.objects.summary import object_lines as object_lines
-    from posekit.objects.tolerance import ObjectTolerance as ObjectTolerance
+    from posekit.objects.drawn_views import draw_view as draw_view
+    from posekit.objects.object_recovery import recover_object as recover_object
+    from posekit.objects.object_summary import object_lines as object_lines
+    from posekit.objects.object_tolerance import ObjectTolerance as ObjectTolerance
 else:
     __getattr__ = on_demand(
         __name__,
@@ -23,9 +23,9 @@ else:
                 "load_object",
                 "tolerance_of",
             ),
-            "draw": ("draw_view",),
-            "recover": ("recover_object",),
-            "summary": ("object_lines",),
-            "tolerance": ("ObjectTolerance",),
+            "drawn_views": ("draw_view",),
+            "object_recovery": ("recover_object",),
+            "object_summary": ("object_lines",),
+            "object_tolerance": ("ObjectTolerance",),
         },
     )

@@ -11,7 +11,7 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.linkages import Linkage, linkage_names, load_linkage
 from posekit.linkages.robot_linkage import Carried, linkage_of
-from posekit.objects.tolerance import ObjectTolerance
+from posekit.objects.object_tolerance import ObjectTolerance
 from posekit.robots import Robot, load_robot, robot_names
 from posekit.safe_io import nearest, refusal, shown
 from posekit.validators.robot_limits import RobotLimits

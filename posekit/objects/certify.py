@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.geometry import Array, quaternion_from_rotation
-from posekit.objects.draw import draw_configurations
+from posekit.objects.drawn_views import draw_configurations
 from posekit.robots import Robot
 from posekit.robots.descent import KinematicProblem, descend
 from posekit.robots.ik import PULL, InverseKinematics, Reach, Solution

@@ -14,9 +14,9 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.objects.mirror import mirrored
-from posekit.objects.plan import ObjectPlan
+from posekit.objects.object_plan import ObjectPlan
+from posekit.objects.object_tolerance import ObjectTolerance
 from posekit.objects.spread import ImageSpread
-from posekit.objects.tolerance import ObjectTolerance
 from posekit.tree import Check, Leaves
 
 AT_ONCE = 1 << 20

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.linkages import Linkage
-from posekit.linkages.family import LinkageFamily
+from posekit.linkages.linkage_family import LinkageFamily
 
 NEAREST_TO_RIGHT_ANGLE = 1e-3
 """How near (rad) the search goes to the right angle: a thousand times the bound."""

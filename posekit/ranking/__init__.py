@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
     from posekit.ranking.evidence import RankingEvidence as RankingEvidence
     from posekit.ranking.fitting import fit_prior as fit_prior
-    from posekit.ranking.prior import TERM_NAMES as TERM_NAMES
-    from posekit.ranking.prior import Prior as Prior
+    from posekit.ranking.posture_prior import TERM_NAMES as TERM_NAMES
+    from posekit.ranking.posture_prior import Prior as Prior
     from posekit.ranking.prior_file import load_prior as load_prior
     from posekit.ranking.prior_file import write_prior as write_prior
     from posekit.ranking.rank import Term as Term
@@ -35,7 +35,7 @@ else:
             ),
             "evidence": ("RankingEvidence",),
             "fitting": ("fit_prior",),
-            "prior": (
+            "posture_prior": (
                 "TERM_NAMES",
                 "Prior",
             ),

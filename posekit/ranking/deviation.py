@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.image import MIN_DEVIATION_METRES
+from posekit.ranking.image_term import MIN_DEVIATION_METRES
 
 PER_TOLERANCE: Final = 2.2
 """Deviations in the tolerance of rigid distances: as fitted weights have it (docs, "Ranking")."""

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.depth import Depth
-from posekit.ranking.image import rigid_lengths
-from posekit.ranking.prior import TERM_NAMES
+from posekit.ranking.image_term import rigid_lengths
+from posekit.ranking.posture_prior import TERM_NAMES
 from posekit.ranking.upright import Up
 from posekit.skeleton import JOINTS
 

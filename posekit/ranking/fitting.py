@@ -11,7 +11,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.directions import DIRECTION_NAMES, directions, mirrored, rows_of
 from posekit.ranking.ground import standing
-from posekit.ranking.prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
+from posekit.ranking.posture_prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
 from posekit.ranking.student import Student
 from posekit.skeleton import JOINTS
 
@@ -28,10 +28,10 @@ PRIOR_DEGREES_OF_FREEDOM: Final = 4.0
 """Degrees of freedom of the t distributions: postures far from those that were recorded are rare, not impossible."""
 
 DEFAULT_TEMPERATURE: Final = 0.008
-"""Metres: see `posekit.ranking.prior.Prior`."""
+"""Metres: see `posekit.ranking.posture_prior.Prior`."""
 
 BALANCE_SCALE_METRES, CONTACT_SCALE_METRES = 0.10, 0.06
-"""Metres: see `posekit.ranking.prior.SmallDistancePrior`."""
+"""Metres: see `posekit.ranking.posture_prior.SmallDistancePrior`."""
 
 
 def fit_prior(

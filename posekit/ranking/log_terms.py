@@ -11,8 +11,8 @@ from posekit.geometry import Array
 from posekit.ranking.directions import directions
 from posekit.ranking.evidence import RankingEvidence
 from posekit.ranking.ground import standing
-from posekit.ranking.image import misfit
-from posekit.ranking.prior import Prior
+from posekit.ranking.image_term import misfit
+from posekit.ranking.posture_prior import Prior
 from posekit.skeleton import JOINT
 
 BLOCK_SURVIVORS: Final = 4096

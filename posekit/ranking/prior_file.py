@@ -11,7 +11,7 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking.prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
+from posekit.ranking.posture_prior import WEIGHT_NAMES, DirectionBlock, Prior, SmallDistancePrior
 from posekit.ranking.student import Student
 from posekit.safe_io import nearest, refusal, shown, write_lines
 

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.evidence import RankingEvidence, numbers
 from posekit.ranking.log_terms import log_terms
-from posekit.ranking.prior import TERM_NAMES, Prior
+from posekit.ranking.posture_prior import TERM_NAMES, Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.ranking import Ranking, softmax
 from posekit.safe_io import nearest

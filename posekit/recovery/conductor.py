@@ -34,7 +34,7 @@ from posekit.settings import (
 )
 
 if TYPE_CHECKING:
-    from posekit.objects.nearer import NearerEnds
+    from posekit.objects.nearer_ends import NearerEnds
     from posekit.recovery.refiner import Refiner
 
 FRAMES_AT_ONCE = 2000
@@ -184,7 +184,7 @@ def _nearer(asked: RecoverSettings, body: Body, count: int) -> NearerEnds | None
     """Read the flips that were given by hand for a number of frames."""
     if asked.nearer is None:
         return None
-    from posekit.objects.nearer import NearerEnds
+    from posekit.objects.nearer_ends import NearerEnds
 
     return NearerEnds.of(asked.nearer, body.linkage, count)
 

@@ -23,7 +23,7 @@ from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
 if TYPE_CHECKING:
     from posekit.hidden import CompletedSurvivors
-    from posekit.objects.nearer import NearerEnds
+    from posekit.objects.nearer_ends import NearerEnds
 
 MOST_HIDDEN = 1000
 """Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""

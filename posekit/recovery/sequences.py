@@ -20,7 +20,7 @@ from posekit.following import (
     SurvivorFrame,
     best_paths,
 )
-from posekit.following.paths import joints_of
+from posekit.following.survivor_paths import joints_of
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.skeleton import JOINT, JOINTS

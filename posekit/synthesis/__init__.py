@@ -13,7 +13,7 @@ from posekit.synthesis.mocap import mocap_scene as mocap_scene
 from posekit.synthesis.mocap import mocap_scenes as mocap_scenes
 from posekit.synthesis.random_postures import random_postures as random_postures
 from posekit.synthesis.random_postures import random_views as random_views
-from posekit.synthesis.scene import SyntheticScene as SyntheticScene
+from posekit.synthesis.synthetic_scene import SyntheticScene as SyntheticScene
 from posekit.synthesis.walker import Walker as Walker
 from posekit.synthesis.walker_scene import seq1 as seq1
 from posekit.synthesis.walker_scene import seq2 as seq2

@@ -14,7 +14,7 @@ from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
 from posekit.synthesis.camera_sphere import CameraPlacements, CameraSphere
 from posekit.synthesis.capture import Capture
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import SyntheticScene
+from posekit.synthesis.synthetic_scene import SyntheticScene
 from posekit.synthesis.viewpoints import look_at, to_camera
 
 

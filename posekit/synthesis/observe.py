@@ -10,7 +10,7 @@ from posekit.cameras import PinholeCamera
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.skeleton import JOINTS, TORSO
 from posekit.synthesis.camera_sphere import CameraPlacements
-from posekit.synthesis.scene import SyntheticScene
+from posekit.synthesis.synthetic_scene import SyntheticScene
 from posekit.synthesis.viewpoints import to_camera
 
 

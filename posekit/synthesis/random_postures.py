@@ -10,7 +10,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import SyntheticScene
+from posekit.synthesis.synthetic_scene import SyntheticScene
 
 UP_TORSO = np.array([0.0, 0.0, 1.0])
 """Up in the torso's frame at which the postures stand."""

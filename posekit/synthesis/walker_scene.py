@@ -12,7 +12,7 @@ from posekit.cameras import lee_chen
 from posekit.errors import InputError
 from posekit.synthesis.camera_sphere import CameraPlacements
 from posekit.synthesis.observe import observe
-from posekit.synthesis.scene import SyntheticScene
+from posekit.synthesis.synthetic_scene import SyntheticScene
 from posekit.synthesis.viewpoints import look_at
 from posekit.synthesis.walker import Walker
 

@@ -23,9 +23,9 @@ from posekit.evaluate import (
     write_evaluation,
 )
 from posekit.evaluate.condition import lost_to, numbers
-from posekit.evaluate.frames import CONDITION_KEYS
+from posekit.evaluate.evaluated_frames import CONDITION_KEYS
+from posekit.evaluate.evaluation_report import csv_lines, document, summary
 from posekit.evaluate.material import of_capture, of_view
-from posekit.evaluate.report import csv_lines, document, summary
 from posekit.formats.own import OpenCVModel, View
 from posekit.measures import mpjpe
 from posekit.recovery.recovery import FrameRecovery

@@ -7,9 +7,9 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.errors import ViewerError
-from posekit.evaluate.certificate import certify
-from posekit.evaluate.errors import best_of_frames, of_chosen, survivor_errors
+from posekit.evaluate.joint_errors import best_of_frames, of_chosen, survivor_errors
 from posekit.evaluate.scores import THRESHOLDS_METRES, correct_poses, correct_poses_score, reliability
+from posekit.evaluate.survivor_certificate import certify
 from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.true_branch import killers, limbs_right, true_branch
 from posekit.measures import mpjpe, pa_mpjpe
@@ -20,7 +20,7 @@ from posekit.synthesis import Walker, random_postures, random_views
 from posekit.synthesis.viewpoints import to_camera
 from posekit.tree import enumerate_leaves
 from posekit.validators import load_ranges
-from posekit.viewer.plots import evaluation as plots
+from posekit.viewer.plots import evaluation_plot as plots
 from posekit.views.builtin import view_of
 
 FIGURE = load_figure()

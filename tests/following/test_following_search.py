@@ -14,9 +14,9 @@ from posekit.errors import InputError
 from posekit.following import Beam, MotionModel, SurvivorFrame, best_paths, bridge
 from posekit.following.channels import N_JOINTS, N_SEGMENTS, NextSurvivors, channels_of
 from posekit.following.floors import Floors
-from posekit.following.search import advance
 from posekit.following.states import States
 from posekit.following.transitions import Target, step_costs, turn_costs
+from posekit.following.viterbi import advance
 from posekit.skeleton import TREE_SEGMENTS
 
 ALL = Beam(width=10**6, slack=1e9)
@@ -249,7 +249,7 @@ def test_a_path_that_a_beam_claims_to_be_exact_is():
 def test_blocks_of_memory_do_not_show(monkeypatch):
     frames = sequence(1, (12, 15, 9, 14), noise=0.01)
     whole = best_paths(frames, k=2)
-    monkeypatch.setattr("posekit.following.plain.MAX_BLOCK_NUMBERS", 27 * 20)
+    monkeypatch.setattr("posekit.following.reference_arrivals.MAX_BLOCK_NUMBERS", 27 * 20)
     parts = best_paths(frames, k=2)
     np.testing.assert_allclose(whole.cost, parts.cost, atol=1e-9)
     assert whole.survivor.tolist() == parts.survivor.tolist()
@@ -266,7 +266,7 @@ def test_a_dear_detour_is_charged_its_turns_in_any_block(monkeypatch, detour):
             joints = np.concatenate([joints, joints[:1] + np.array([0, 0, detour])])
         frames.append(SurvivorFrame(time=k / 30, joints=joints))
     whole = best_paths(frames, k=2, apart=detour - 0.02)
-    monkeypatch.setattr("posekit.following.plain.MAX_BLOCK_NUMBERS", 27 * 5)
+    monkeypatch.setattr("posekit.following.reference_arrivals.MAX_BLOCK_NUMBERS", 27 * 5)
     parts = best_paths(frames, k=2, apart=detour - 0.02)
     model = MotionModel()
     assert whole.cost[1] > whole.cost[0] + 60

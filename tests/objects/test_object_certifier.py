@@ -11,7 +11,7 @@ from posekit.objects import (
     load_object,
 )
 from posekit.objects.certify import Certifier
-from posekit.objects.draw import draw_configurations
+from posekit.objects.drawn_views import draw_configurations
 
 
 def robot_of(thing):

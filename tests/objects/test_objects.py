@@ -17,7 +17,7 @@ from posekit.objects import (
     recover_object,
     tolerance_of,
 )
-from posekit.objects.draw import draw_configurations
+from posekit.objects.drawn_views import draw_configurations
 from posekit.objects.spread import ImageSpread
 from posekit.objects.triangles import Triangles, triangles
 from posekit.robots.kinematics import Kinematics, body_points

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posekit.body import load_figure
 from posekit.geometry import Array
 from posekit.ranking import TERM_NAMES, Depth, Ranking, RankingEvidence, Up, load_prior, rank
-from posekit.ranking.prior import WEIGHT_NAMES
+from posekit.ranking.posture_prior import WEIGHT_NAMES
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
 

@@ -25,7 +25,7 @@ from posekit.ranking import (
     write_prior,
 )
 from posekit.ranking.directions import DIRECTION_NAMES, directions, mirrored
-from posekit.ranking.prior import WEIGHT_NAMES
+from posekit.ranking.posture_prior import WEIGHT_NAMES
 from posekit.ranking.prior_file import prior_lines
 from posekit.ranking.ranking import softmax
 from posekit.skeleton import JOINT, JOINTS

@@ -24,8 +24,8 @@ from posekit.ranking import (
 )
 from posekit.ranking.directions import DIRECTION_NAMES, directions
 from posekit.ranking.ground import standing
-from posekit.ranking.image import MIN_DEVIATION_METRES
-from posekit.ranking.prior import WEIGHT_NAMES
+from posekit.ranking.image_term import MIN_DEVIATION_METRES
+from posekit.ranking.posture_prior import WEIGHT_NAMES
 from posekit.ranking.student import Student, digamma
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures

@@ -19,7 +19,7 @@ from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_postures
 from posekit.viewer.browser.studio import Studio
 from posekit.viewer.scene.branch import lift_branch
-from posekit.viewer.scene.subject import DrawnSubject, subject_of
+from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
 
 
 @pytest.fixture(scope="session")

@@ -15,7 +15,7 @@ from posekit.formats.own import Postures
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
-from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.page import page_html, write_page
 from posekit.viewer.scene.world import upright_world

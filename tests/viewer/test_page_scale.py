@@ -11,12 +11,12 @@ import posekit
 from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
 from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.page.data import page_data
-from posekit.viewer.page.family import walk
+from posekit.viewer.page.family_page import walk
 from posekit.viewer.page.page import write_page
 from posekit.viewer.scene.branch import lift_branch
-from posekit.viewer.scene.subject import subject_of
+from posekit.viewer.scene.drawn_subject import subject_of
 from posekit.viewer.scene.world import upright_world
 
 FLAGS = [

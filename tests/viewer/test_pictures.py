@@ -19,7 +19,7 @@ from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
-from posekit.viewer.scene.subject import DrawnSubject, subject_of
+from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
 
 SMALL = Shot(size=(200, 150), supersample=1)
 FAKE_FFMPEG = """#!{python}

@@ -16,13 +16,13 @@ from posekit.papers.lee_chen_printed import PRINTED_MOTION, PRINTED_PHYSICAL
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, SEGMENTS
-from posekit.viewer.plots.figure import PLOT_STYLE, save
-from posekit.viewer.plots.image import plot_image
+from posekit.viewer.plots.image_plot import plot_image
 from posekit.viewer.plots.levels import plot_levels
+from posekit.viewer.plots.plot_file import PLOT_STYLE, save
 from posekit.viewer.plots.projections import letter, plot_projections, side_view
 from posekit.viewer.plots.stick import side, wave
-from posekit.viewer.plots.tree import place, plot_tree
 from posekit.viewer.plots.tree_nodes import pruned_branches, tips
+from posekit.viewer.plots.tree_plot import place, plot_tree
 from posekit.views.builtin import builtin_view
 
 mpl = pytest.importorskip("matplotlib")

@@ -14,15 +14,15 @@ from posekit.errors import ViewerError
 from posekit.formats.own import Postures, Result, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.branch import lift_branch, one_a_reason, rejected_of
 from posekit.viewer.scene.compose import Style, compose, row_count
 from posekit.viewer.scene.culprit import culprit
+from posekit.viewer.scene.drawn_posture import DrawnPosture, Look, add_posture
+from posekit.viewer.scene.drawn_subject import DrawnSubject, check_one_scale, subject_of
 from posekit.viewer.scene.eye import Eye
 from posekit.viewer.scene.framing import fitted_eye, orbit
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.stage import background_colour
-from posekit.viewer.scene.subject import DrawnSubject, check_one_scale, subject_of
 from posekit.viewer.scene.superposed import superposed_looks
 from posekit.viewer.scene.world import upright_world
 

@@ -16,16 +16,16 @@ from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.viewer.browser.browser import Browser
-from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_drawn
-from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.compose import Style, compose
+from posekit.viewer.scene.drawn_posture import DrawnPosture, Look, add_posture
+from posekit.viewer.scene.drawn_subject import DrawnSubject
 from posekit.viewer.scene.eye import Eye, ParallelEye, ViewEye
 from posekit.viewer.scene.framing import fitted_eye, view_eye
+from posekit.viewer.scene.image_sight import ImageSight
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.sight import ImageSight
 from posekit.viewer.scene.stage import add_stage
-from posekit.viewer.scene.subject import DrawnSubject
 from posekit.viewer.scene.world import World, upright_world
 from posekit.viewer.standalone import standalone_page
 

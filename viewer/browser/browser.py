@@ -8,7 +8,7 @@ from typing import Any
 
 from posekit.errors import ViewerError
 from posekit.viewer.browser.devtools import DevTools
-from posekit.viewer.browser.find import find_browser
+from posekit.viewer.browser.find_browser import find_browser
 
 STEP_TIMEOUT_SECONDS = 60.0
 """Seconds that one step of the browser may take."""
@@ -20,7 +20,7 @@ class Browser:
     Parameters
     ----------
     program : str, optional
-        Its path; default see `posekit.viewer.browser.find`.
+        Its path; default see `posekit.viewer.browser.find_browser`.
     timeout : float
         Seconds that any step may take; after them the browser is ended.
     size : (int, int)

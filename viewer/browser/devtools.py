@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from posekit.errors import ViewerError
-from posekit.viewer.browser.find import BROWSER_REMEDY
+from posekit.viewer.browser.find_browser import BROWSER_REMEDY
 
 Message = dict[str, Any]
 

@@ -40,7 +40,7 @@ class Studio:
     Parameters
     ----------
     browser : str, optional
-        The program; default see `posekit.viewer.browser.find`.
+        The program; default see `posekit.viewer.browser.find_browser`.
     timeout : float
         Seconds that one picture may take.
 

@@ -18,9 +18,9 @@ from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.view import View
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
-from posekit.viewer.page.family import family_data, inferred_data, tree_of, walk
+from posekit.viewer.page.family_page import family_data, inferred_data, tree_of, walk
 from posekit.viewer.scene.colours import GROUP_RGB, SIDE_RGB, number, side
-from posekit.viewer.scene.subject import DrawnSubject, Shown, subject_of
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.world import World, upright_world
 
 Array = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """The paper's figures as matplotlib plots."""
 
 from posekit.viewer.plots.curve import plot_curve as plot_curve
-from posekit.viewer.plots.figure import save as save
-from posekit.viewer.plots.image import plot_image as plot_image
+from posekit.viewer.plots.image_plot import plot_image as plot_image
 from posekit.viewer.plots.levels import plot_levels as plot_levels
+from posekit.viewer.plots.plot_file import save as save
 from posekit.viewer.plots.projections import plot_projections as plot_projections
-from posekit.viewer.plots.tree import plot_tree as plot_tree
+from posekit.viewer.plots.tree_plot import plot_tree as plot_tree

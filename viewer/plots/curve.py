@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.geometry import Array
-from posekit.viewer.plots.figure import LEFT_COLOUR, RIGHT_COLOUR, drawing
+from posekit.viewer.plots.plot_file import LEFT_COLOUR, RIGHT_COLOUR, drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -9,8 +9,8 @@ import numpy as np
 
 from posekit.errors import ViewerError
 from posekit.formats.own.result import ResultFrame
-from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 from posekit.viewer.plots.panels import panels
+from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 from posekit.viewer.plots.tree_nodes import scale_count
 
 if TYPE_CHECKING:

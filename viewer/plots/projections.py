@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
 from posekit.skeleton import JOINTS
-from posekit.viewer.plots.figure import drawing
 from posekit.viewer.plots.panels import panels, same_scale
+from posekit.viewer.plots.plot_file import drawing
 from posekit.viewer.plots.stick import add_key, draw_stick
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.skeleton import HIPS, JOINTS, SEGMENTS, SIDES, TORSO, segment_name
-from posekit.viewer.plots.figure import LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR
+from posekit.viewer.plots.plot_file import LEFT_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -12,7 +12,7 @@ from posekit.errors import ViewerError
 from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.scene.subject import DrawnSubject, Shown
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 TANGENT_METRES = 0.01
 """Metres by which a segment may be too short for its image, where the result does not tell."""

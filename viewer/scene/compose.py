@@ -12,15 +12,15 @@ from posekit.body import Figure
 from posekit.errors import ViewerError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, PARENTS, POINTS
-from posekit.viewer.scene.body import DrawnPosture, Look, add_posture
 from posekit.viewer.scene.colours import GROUP_RGB
 from posekit.viewer.scene.culprit import Culprit, culprit
+from posekit.viewer.scene.drawn_posture import DrawnPosture, Look, add_posture
+from posekit.viewer.scene.drawn_subject import Shown
 from posekit.viewer.scene.framing import sight_axes
+from posekit.viewer.scene.image_sight import add_sight
 from posekit.viewer.scene.region import corners_of
 from posekit.viewer.scene.scene import Scene
-from posekit.viewer.scene.sight import add_sight
 from posekit.viewer.scene.stage import add_mat, add_stage
-from posekit.viewer.scene.subject import Shown
 from posekit.viewer.scene.superposed import superposed_looks
 from posekit.viewer.scene.world import World
 

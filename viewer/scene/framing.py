@@ -8,7 +8,7 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import ViewerError
 from posekit.geometry import Array, cross
 from posekit.viewer.scene.eye import CameraEye, Eye, ParallelEye, ViewEye
-from posekit.viewer.scene.sight import ImageSight
+from posekit.viewer.scene.image_sight import ImageSight
 from posekit.viewer.scene.world import World
 
 FLESH_METRES = 0.13

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.skeleton import POINTS, TREE_SEGMENTS
-from posekit.viewer.scene.body import Look
 from posekit.viewer.scene.colours import GROUP_RGB, MIDDLE_RGB, Rgb
-from posekit.viewer.scene.subject import Shown
+from posekit.viewer.scene.drawn_posture import Look
+from posekit.viewer.scene.drawn_subject import Shown
 
 SAME_POINT_METRES = 1e-3
 """Metres: what is nearer than this in every point is drawn once."""

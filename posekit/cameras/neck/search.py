@@ -1,7 +1,8 @@
 """The one-dimensional search over the neck's depth: where the rigid parts come to close, and how far they may not.
 
-The twin, for a camera that is known, of the search over the scale of one that is not (Taylor 2000, section 2.1;
-`posekit.linkages.search`): there the pictures of one family differ in the scale s, here in how far the body is away.
+The twin, for a camera that is known, of the search over the scale of one that is not (Taylor 2000,
+section 2.1; `posekit.linkages.scale_search`): there the pictures of one family differ in the
+scale s, here in how far the body is away.
 """
 
 from __future__ import annotations

@@ -14,9 +14,9 @@ from posekit.geometry import Array
 from posekit.linkages import Linkage, Midpoint, SpanningTree, span
 from posekit.linkages.consistency import components
 from posekit.objects.articulated import ArticulatedObject
+from posekit.objects.object_tolerance import ObjectTolerance
 from posekit.objects.shape import shape_checks
 from posekit.objects.spread import ImageSpread, Loose
-from posekit.objects.tolerance import ObjectTolerance
 from posekit.tree import Check
 from posekit.validators import linkage as validators
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from posekit.following.arrivals import arrivals
 from posekit.following.beam import Beam
 from posekit.following.channels import N_JOINTS, Channels, NextSurvivors, channels_of
-from posekit.following.frame import SurvivorFrame
 from posekit.following.motion_model import MotionModel
 from posekit.following.states import States
+from posekit.following.survivor_frame import SurvivorFrame
 from posekit.geometry import Array
 
 MISSING_JOINT_COST: Final = 5.0

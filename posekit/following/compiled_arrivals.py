@@ -1,4 +1,4 @@
-"""The cheapest ways from the ends of paths to survivors, by compiled loops: as `posekit.following.plain` finds them."""
+"""The cheapest ways from the ends of paths to survivors, by compiled loops: the same as `reference_arrivals` finds."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def find(
     beam: Beam,
     width: int,
 ) -> Arrivals:
-    """Find the cheapest way from each last survivor to each new one; see `posekit.following.plain.find`."""
+    """Find the cheapest way from each last survivor to each new one: see `reference_arrivals.find`."""
     loops: Any = compiled(kernels)
     channels = to.channels
     order = np.lexsort((states.cost + floors.turns, states.group))

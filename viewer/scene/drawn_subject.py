@@ -15,8 +15,8 @@ from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultFrame, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
-from posekit.viewer.scene.seen import check_camera, scale_of, sight_of, view_sight
-from posekit.viewer.scene.sight import ImageSight
+from posekit.viewer.scene.image_sight import ImageSight
+from posekit.viewer.scene.sight_of_view import check_camera, scale_of, sight_of, view_sight
 
 UNIT_QUATERNION_TOLERANCE = 1e-6
 """How far a quaternion's length may be off for forward kinematics to be asked."""

@@ -11,10 +11,10 @@ from posekit.formats.own.camera_model import LeeChenModel, ScaledOrthographicMod
 from posekit.formats.own.result import Result
 from posekit.formats.own.view import View
 from posekit.skeleton import JOINTS
-from posekit.viewer.plots.figure import RIGHT_COLOUR, TRUNK_COLOUR, drawing
 from posekit.viewer.plots.panels import panels, same_scale
+from posekit.viewer.plots.plot_file import RIGHT_COLOUR, TRUNK_COLOUR, drawing
 from posekit.viewer.plots.stick import add_key, draw_stick
-from posekit.viewer.scene.subject import subject_of
+from posekit.viewer.scene.drawn_subject import subject_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,10 +11,10 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages.bound_angle import grid
 from posekit.linkages.constraints import Constraints, put_together
-from posekit.linkages.family import LinkageFamily
 from posekit.linkages.flips import Codes
-from posekit.linkages.minima import Minima
+from posekit.linkages.linkage_family import LinkageFamily
 from posekit.linkages.roots import find_roots
+from posekit.linkages.scale_minima import Minima
 from posekit.linkages.scan import Brackets, scan
 
 MAX_LOOP_FLIPS = 1 << 20

@@ -11,9 +11,9 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.following.beam import Beam
 from posekit.following.best_paths import best_paths
-from posekit.following.frame import SurvivorFrame
 from posekit.following.motion_model import MotionModel
-from posekit.following.paths import Paths
+from posekit.following.survivor_frame import SurvivorFrame
+from posekit.following.survivor_paths import Paths
 from posekit.geometry import Array
 
 

@@ -15,10 +15,10 @@ from posekit.formats.own.object_view import ObjectView
 from posekit.objects.articulated import ArticulatedObject
 from posekit.objects.certify import Certifier
 from posekit.objects.growth import GrownObject, grow
-from posekit.objects.nearer import NearerEnds
-from posekit.objects.plan import ObjectPlan
-from posekit.objects.scales import CLOSED_RESIDUAL, family_of
-from posekit.objects.tolerance import ObjectTolerance
+from posekit.objects.nearer_ends import NearerEnds
+from posekit.objects.object_plan import ObjectPlan
+from posekit.objects.object_scales import CLOSED_RESIDUAL, family_of
+from posekit.objects.object_tolerance import ObjectTolerance
 from posekit.settings.scale import Scale
 
 NOT_ASKED = "undecided: no configuration was asked for"

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.evaluate.condition import curves, lost_to, numbers
+from posekit.evaluate.evaluated_frames import CONDITION_KEYS
 from posekit.evaluate.evaluation import Evaluation
-from posekit.evaluate.frames import CONDITION_KEYS
 from posekit.formats.markdown import table_lines
 from posekit.formats.own.npz import suffix
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.following.bridging import bridge
-from posekit.following.frame import SurvivorFrame
+from posekit.following.survivor_frame import SurvivorFrame
 from posekit.following.switches import Switch, switches_of
 from posekit.geometry import Array
 

@@ -9,7 +9,7 @@ from posekit.errors import ViewerError
 from posekit.formats.own import LeeChenModel, OpenCVModel, Result, ResultFrame, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS
-from posekit.viewer.scene.sight import ImageSight
+from posekit.viewer.scene.image_sight import ImageSight
 
 ON_RAY = 1e-6
 """Metres across the image within which all positions of a joint are one image point."""

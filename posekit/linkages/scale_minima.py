@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.linkages.bound_angle import grid
 from posekit.linkages.constraints import Constraints
-from posekit.linkages.family import Flips
+from posekit.linkages.linkage_family import Flips
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

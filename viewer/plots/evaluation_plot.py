@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import ViewerError
 from posekit.geometry import Array
-from posekit.viewer.plots.figure import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
+from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

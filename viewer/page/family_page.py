@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from posekit.formats.own.family import Family
 from posekit.formats.own.result import ResultFrame
 from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS
-from posekit.viewer.scene.seen import hidden
-from posekit.viewer.scene.subject import Shown
+from posekit.viewer.scene.drawn_subject import Shown
+from posekit.viewer.scene.sight_of_view import hidden
 from posekit.viewer.scene.world import World
 
 Array = NDArray[np.float64]

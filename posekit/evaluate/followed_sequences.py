@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.evaluate.ranking import SurvivorOrder
+from posekit.evaluate.survivor_order import SurvivorOrder
 from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery
 from posekit.recovery.sequences import follow_frames

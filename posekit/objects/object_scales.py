@@ -10,8 +10,8 @@ from posekit.errors import InputError
 from posekit.formats.own import PER_METRE, Family, ScaledOrthographicModel, Unit
 from posekit.geometry import Array
 from posekit.linkages import search
-from posekit.linkages.family import LinkageFamily as Solutions
-from posekit.objects.plan import ObjectPlan
+from posekit.linkages.linkage_family import LinkageFamily as Solutions
+from posekit.objects.object_plan import ObjectPlan
 from posekit.objects.triangles import Triangles
 from posekit.settings.scale import Scale, way_of
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from posekit.evaluate.condition import numbers, roles_of
+from posekit.evaluate.evaluated_frames import EvaluatedFrames
 from posekit.evaluate.evaluation import Evaluation
-from posekit.evaluate.frames import EvaluatedFrames
 from posekit.evaluate.scores import THRESHOLDS_METRES, correct_poses, reliability
 from posekit.geometry import Array
 
@@ -31,7 +31,7 @@ def write_plots(report: Path, evaluation: Evaluation) -> list[Path]:
     InputError
         Where a file cannot be written.
     """
-    from posekit.viewer.plots import evaluation as plots
+    from posekit.viewer.plots import evaluation_plot as plots
     from posekit.viewer.plots import save
 
     frames, paths = evaluation.frames, plot_paths(report)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 from posekit.errors import ViewerError
 from posekit.formats.own.result import ResultFrame
-from posekit.viewer.plots.figure import MUTED_COLOUR, TRUNK_COLOUR, drawing
+from posekit.viewer.plots.plot_file import MUTED_COLOUR, TRUNK_COLOUR, drawing
 from posekit.viewer.plots.tree_nodes import Tip, pruned_branches, readable_levels, scale_count, tips
 
 if TYPE_CHECKING:

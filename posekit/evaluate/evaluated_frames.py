@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.evaluate.errors import ERROR_NAMES
+from posekit.evaluate.joint_errors import ERROR_NAMES
 from posekit.evaluate.work import Measured, Work
 from posekit.geometry import Array
 
