@@ -138,6 +138,8 @@ class GivenFile:
         if self.suffix == ".toml":
             return str(read_toml(self.path, limit=MAX_TOML_BYTES).get("schema", ""))
         if self.suffix == ".json":
+            if said := _SCHEMA_FIRST.match(self.start):  # as posekit writes it: its reader parses it, once
+                return said[1].decode()
             return str(self.document.get("schema", "")) if isinstance(self.document, dict) else ""
         return ""
 
@@ -170,6 +172,10 @@ MAX_TOML_BYTES = 10_000_000
 """The largest TOML file whose schema is looked for."""
 _JSON = re.compile(rb'\s*(\{\s*["}]|\[\s*(\{|\]|\[\s*[\[{\d-]))')
 """How JSON begins, and TOML, whose tables have names in brackets, does not."""
+
+
+_SCHEMA_FIRST = re.compile(rb'(?:\xef\xbb\xbf)?\s*\{\s*"schema"\s*:\s*"(posekit\.[a-z_]+/\d+)"\s*[,}]')
+"""How JSON begins that names its schema first."""
 
 
 def _parsed(path: Path) -> Any:
