@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from posekit.recovery import recover as recover
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
+    from posekit.recovery.sequences import follow as follow
     from posekit.settings import RecoverSettings as RecoverSettings
     from posekit.settings import Tolerance as Tolerance
     from posekit.settings import ValidateSettings as ValidateSettings
@@ -54,7 +55,7 @@ _HOMES = {
     "posekit.formats.keypoints": ("read_keypoints",),
     "posekit.formats.motion": ("read_motion",),
     "posekit.formats.opening": ("open",),
-    "posekit.recovery": ("Recovery", "recover", "result_of"),
+    "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),
     "posekit.validators": ("Validator",),
