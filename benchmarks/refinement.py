@@ -45,7 +45,7 @@ from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segmen
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
 from posekit.validation.validate import recovered_with
-from posekit.validators import PHYSICAL, Validator, load_ranges, make_checks
+from posekit.validators import PHYSICAL_CHECKS, Validator, load_ranges, make_checks
 from posekit.views.builtin import view_of
 
 NEAR = 0.035
@@ -72,7 +72,7 @@ def lengths_of(figure: Figure) -> np.ndarray:
 def checks_of(figure: Figure, tolerance: Tolerance, contact: float) -> list[Check]:
     return make_checks(
         figure,
-        PHYSICAL,
+        PHYSICAL_CHECKS,
         ranges=load_ranges("urdf"),
         rigid_tolerance=tolerance.rigid,
         rigid_mode="distances",

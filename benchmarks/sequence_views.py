@@ -29,7 +29,7 @@ from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.viewpoints import look_at
 from posekit.tree import InterpretationTree
-from posekit.validators import PHYSICAL, load_ranges, make_checks
+from posekit.validators import PHYSICAL_CHECKS, load_ranges, make_checks
 
 HEIGHT = 1.4
 RATE = 30.0
@@ -197,7 +197,7 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     rigid = 0.5 * TRUNK_LENGTHS if real else allowed.rigid
     checks = make_checks(
         figure,
-        PHYSICAL,
+        PHYSICAL_CHECKS,
         ranges=load_ranges("urdf"),
         rigid_tolerance=rigid,
         rigid_mode="distances",

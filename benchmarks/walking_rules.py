@@ -27,12 +27,12 @@ from posekit.settings import MEASURED_TOLERANCE
 from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
 from posekit.tree import Findings
 from posekit.validators import load_ranges, walking
-from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds
+from posekit.validators.walking import DEFAULT_RULES, PEOPLE_THRESHOLDS, RULE_NUMBERS, WalkingThresholds
 from posekit.views.builtin import view_of
 
 ACTION = "walking"
-THRESHOLDS = {"default": WalkingThresholds(), "people": PEOPLE}
-SETS = ((), *((rule,) for rule in RULES), DEFAULT_RULES, (1, 2, 3), RULES)
+THRESHOLDS = {"default": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
+SETS = ((), *((rule,) for rule in RULE_NUMBERS), DEFAULT_RULES, (1, 2, 3), RULE_NUMBERS)
 
 
 def judged(clip: Clip, rule: int, thresholds: WalkingThresholds) -> dict[str, Findings]:
@@ -56,14 +56,14 @@ def on_true_joints(clips: Sequence[Clip]) -> None:
                 f"{np.concatenate([lost(c, rule, thresholds) for c in clips if c.action == action]).mean():.1%}"
                 for action in actions
             ]
-            for rule in RULES
+            for rule in RULE_NUMBERS
         ]
         print(f"Frames whose true posture a rule kills, {name} thresholds\n")
         print("\n".join(table_lines(["rule", *actions], rows)))
     walkers = [clip for clip in clips if clip.action == ACTION]
     for name, thresholds in THRESHOLDS.items():
         rows = []
-        for rule in RULES:
+        for rule in RULE_NUMBERS:
             each = ", ".join(f"{lost(clip, rule, thresholds).mean():.1%}" for clip in walkers)
             findings = [judged(clip, rule, thresholds) for clip in walkers]
             silent = [
@@ -102,10 +102,12 @@ def cross_validation(walkers: Sequence[Clip]) -> None:
             for name, need in needs.items()
         }
         thresholds = WalkingThresholds(**chosen)
-        killed = [f"{lost(clip, rule, thresholds).mean():.1%}" for rule in RULES]
+        killed = [f"{lost(clip, rule, thresholds).mean():.1%}" for rule in RULE_NUMBERS]
         rows.append([str(k + 1), ", ".join(f"{value:.2g}" for value in chosen.values()), *killed])
     print("Thresholds chosen on the other walkers\n")
-    print("\n".join(table_lines(["walker", ", ".join(needs), *(f"rule {rule}" for rule in RULES)], rows)))
+    print(
+        "\n".join(table_lines(["walker", ", ".join(needs), *(f"rule {rule}" for rule in RULE_NUMBERS)], rows))
+    )
 
 
 def on_views(scenes: Sequence[SyntheticScene]) -> None:
@@ -126,7 +128,7 @@ def on_views(scenes: Sequence[SyntheticScene]) -> None:
                             for check in walking(recovery.figure, (rule,), thresholds)
                         ]
                     )
-                    for rule in RULES
+                    for rule in RULE_NUMBERS
                 }
                 for rules in SETS:
                     kept = ~np.logical_or.reduce(

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from posekit.validators.options import CheckOptions as CheckOptions
     from posekit.validators.ranges import Ranges as Ranges
     from posekit.validators.ranges import load_ranges as load_ranges
-    from posekit.validators.registry import CHECKS as CHECKS
-    from posekit.validators.registry import PHYSICAL as PHYSICAL
+    from posekit.validators.registry import ALL_CHECKS as ALL_CHECKS
+    from posekit.validators.registry import PHYSICAL_CHECKS as PHYSICAL_CHECKS
     from posekit.validators.registry import AnyCheck as AnyCheck
     from posekit.validators.registry import check_names as check_names
     from posekit.validators.registry import chosen_checks as chosen_checks

@@ -20,7 +20,7 @@ from posekit.skeleton import DOFS
 
 Side = Literal["lower", "upper"]
 
-OUTWARD: Mapping[str, int] = {"lower": -1, "upper": 1}
+OUTWARD_SIGNS: Mapping[str, int] = {"lower": -1, "upper": 1}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,7 +41,7 @@ class End:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class AngleRange:
     """The range of one angle, in the clinic's degrees, and where the clinic's zero is on the figure."""
 
     lower: End
@@ -117,7 +117,7 @@ class Anatomy:
         What each key of a source stands for.
     """
 
-    motions: Mapping[str, Motion]
+    motions: Mapping[str, AngleRange]
     couplings: tuple[Coupling, ...]
     spreads: float
     sources: Mapping[str, str]
@@ -142,13 +142,13 @@ class Anatomy:
         mean = np.interp(of - other.mean, knots[:, 0], knots[:, 1]) + angle.mean
         return mean, math.hypot(coupling.spread, angle.spread)
 
-    def motion(self, dof: str) -> Motion:
+    def motion(self, dof: str) -> AngleRange:
         """Return the motion of an angle, with or without its side."""
         return self.motions[dof.removeprefix("right_").removeprefix("left_")]
 
     def _limit(self, dof: str, side: Side) -> float:
         mean, spread = self.motion(dof).end(side)
-        return mean + OUTWARD[side] * self.spreads * spread
+        return mean + OUTWARD_SIGNS[side] * self.spreads * spread
 
     def _zero(self, angle: str) -> End:
         return self.motions[angle].zero if angle in self.motions else End(mean=0.0, spread=0.0)

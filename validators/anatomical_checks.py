@@ -17,7 +17,7 @@ from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
 from posekit.validators.anatomical_screen import limb_numbers
 
-UNSEEN = 45.0
+UNSEEN_DEGREES = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
@@ -33,7 +33,7 @@ class AnatomicalLimb(Check):
     tolerance. That one is reported, else the one that is least outside. An arm's direction is judged by its elevation,
     how far it is raised in its plane, instead of by flexion and abduction, where the table bounds that. As in
     `posekit.validators.joint_range.Limb` the axial rotation of a limb that is almost straight has its tolerance
-    divided by the sine of the bend, and is undecided beyond `UNSEEN`.
+    divided by the sine of the bend, and is undecided beyond `UNSEEN_DEGREES`.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ class AnatomicalLimb(Check):
             bend = np.abs(np.sin(np.radians(angles[:, 3])))
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
-            value[tolerance[:, 2] > UNSEEN, :, 2] = np.nan
+            value[tolerance[:, 2] > UNSEEN_DEGREES, :, 2] = np.nan
         beyond = np.maximum(lower - value, value - upper) - tolerance[:, None]
         worst = np.fmax.reduce(beyond, axis=2)
         best = np.argmin(np.where(np.isnan(worst), np.inf, worst), axis=1)[:, None, None]
@@ -110,6 +110,6 @@ class AnatomicalLimb(Check):
             self.figure.ik.limits.sign[first : first + (2 if len(self.limb) == 2 else 4)],
             rigid=len(self._parent),
             tolerance=self.tolerance,
-            unseen=UNSEEN,
+            unseen=UNSEEN_DEGREES,
         )
-        return Rule(kind=kernels.ANATOMICAL, numbers=numbers)
+        return Rule(kind=kernels.OF_ANATOMICAL_LIMB, numbers=numbers)

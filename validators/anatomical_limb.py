@@ -14,14 +14,14 @@ import numpy as np
 
 from posekit.geometry import Array
 from posekit.tables.angles import DERIVED_ANGLES
-from posekit.validators.anatomical import OUTWARD, Anatomy, Side
+from posekit.validators.anatomical import OUTWARD_SIGNS, Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
 
-BALL = ("flexion", "abduction", "rotation")
-HINGES: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
-ROTATION = BALL.index("rotation")
-ENDS: tuple[Side, Side] = ("lower", "upper")
-ELEVATION, PLANE, TURN = DERIVED_ANGLES
+BALL_ANGLES = ("flexion", "abduction", "rotation")
+HINGE_OF_BALL: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
+ROTATION_INDEX = BALL_ANGLES.index("rotation")
+LIMIT_SIDES: tuple[Side, Side] = ("lower", "upper")
+ELEVATION_ANGLE, PLANE_ANGLE, TURN_ANGLE = DERIVED_ANGLES
 
 LEAST_LEFT = 0.1
 """The fraction of a range that a sinus leaves at the very end of another angle: below it spreads lose their meaning."""
@@ -75,11 +75,11 @@ class Wall:
 
     def limit(self, spreads: float) -> Array | float:
         """Return the mean moved outward by so many spreads."""
-        return self.mean + OUTWARD[self.side] * spreads * self.spread
+        return self.mean + OUTWARD_SIGNS[self.side] * spreads * self.spread
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LimbWalls:
+class LimbReadings:
     """A limb's angles in all writings, and the walls around them.
 
     Parameters
@@ -117,7 +117,7 @@ class LimbWalls:
         worst = np.zeros(self.values.shape)
         for wall in self.walls:
             column = (..., wall.place)
-            beyond = OUTWARD[wall.side] * (self.values[column] - wall.mean) / wall.spread
+            beyond = OUTWARD_SIGNS[wall.side] * (self.values[column] - wall.mean) / wall.spread
             worst[column] = np.fmax(worst[column], beyond)
         return worst
 
@@ -127,13 +127,13 @@ def judged_names(anatomy: Anatomy, joint: str, count: int) -> tuple[str, ...]:
 
     An arm's direction is judged by its elevation where the table bounds that, instead of by flexion and abduction.
     """
-    names = (*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion")[:count]
+    names = (*(f"{joint}.{angle}" for angle in BALL_ANGLES), f"{HINGE_OF_BALL[joint]}.flexion")[:count]
     if not _by_elevation(anatomy, joint):
         return names
-    return (*names[2:], ELEVATION)
+    return (*names[2:], ELEVATION_ANGLE)
 
 
-def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0.0) -> LimbWalls:
+def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0.0) -> LimbReadings:
     """Set up the walls of a limb.
 
     Parameters
@@ -152,24 +152,26 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
     """
     by_elevation = _by_elevation(anatomy, joint)
     written = writings(angles)
-    turn_sides = {c.side for c in anatomy.couplings_of(TURN)}
-    if by_elevation and (turn_sides == set(ENDS) or angles.shape[1] == 2):
+    turn_sides = {c.side for c in anatomy.couplings_of(TURN_ANGLE)}
+    if by_elevation and (turn_sides == set(LIMIT_SIDES) or angles.shape[1] == 2):
         written = written[:, : written.shape[1] // 2]  # elevation and turn are the same in both branches
-    names = [*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion"][: angles.shape[1]]
-    ends = {(name, side): anatomy.motions[name].end(side) for name in names for side in ENDS}
+    names = [*(f"{joint}.{angle}" for angle in BALL_ANGLES), f"{HINGE_OF_BALL[joint]}.flexion"][
+        : angles.shape[1]
+    ]
+    ends = {(name, side): anatomy.motions[name].end(side) for name in names for side in LIMIT_SIDES}
     columns = [
         turned_near(written[..., k], (ends[name, "lower"][0] + ends[name, "upper"][0]) / 2)
         for k, name in enumerate(names)
     ]
     readings = dict(zip(names, columns, strict=True))
-    replaced = {(name, side) for name in names[:2] for side in ENDS} if by_elevation else set()
+    replaced = {(name, side) for name in names[:2] for side in LIMIT_SIDES} if by_elevation else set()
     if joint == "shoulder":
         elevation, plane = elevation_and_plane(angles[:, 0], angles[:, 1])
-        readings[PLANE] = np.broadcast_to(plane[:, None], columns[0].shape)
-        readings[ELEVATION] = np.broadcast_to(elevation[:, None], columns[0].shape)
-        columns.append(readings[ELEVATION])
-        names.append(ELEVATION)
-        replaced |= {("shoulder.rotation", c.side) for c in anatomy.couplings_of(TURN)}
+        readings[PLANE_ANGLE] = np.broadcast_to(plane[:, None], columns[0].shape)
+        readings[ELEVATION_ANGLE] = np.broadcast_to(elevation[:, None], columns[0].shape)
+        columns.append(readings[ELEVATION_ANGLE])
+        names.append(ELEVATION_ANGLE)
+        replaced |= {("shoulder.rotation", c.side) for c in anatomy.couplings_of(TURN_ANGLE)}
     walls = [
         Wall(place=names.index(name), side=side, mean=mean, spread=spread)
         for (name, side), (mean, spread) in ends.items()
@@ -186,7 +188,7 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
     sinus = anatomy.sinus_of(joint)
     if sinus is not None:
         walls = _round_off(walls, columns, anatomy.spreads, sinus.power, tolerance)
-    return LimbWalls(names=tuple(names), values=np.stack(columns, axis=-1), walls=tuple(walls))
+    return LimbReadings(names=tuple(names), values=np.stack(columns, axis=-1), walls=tuple(walls))
 
 
 def _round_off(
@@ -201,12 +203,12 @@ def _round_off(
     """
     used: Array = np.zeros(columns[0].shape)
     rounded = list(walls)
-    for place in range(min(len(columns), len(BALL))):
+    for place in range(min(len(columns), len(BALL_ANGLES))):
         own = [k for k, wall in enumerate(walls) if wall.place == place]
         # Of rotation all walls count; it is not among what is judged early.
         below, above = (
-            [walls[k] for k in own if walls[k].side == side][: None if place == ROTATION else 1]
-            for side in ENDS
+            [walls[k] for k in own if walls[k].side == side][: None if place == ROTATION_INDEX else 1]
+            for side in LIMIT_SIDES
         )
         lower = reduce(np.maximum, (wall.mean for wall in below))
         upper = reduce(np.minimum, (wall.mean for wall in above))
@@ -216,7 +218,7 @@ def _round_off(
             for k in own:
                 mean = middle + (walls[k].mean - middle) * left
                 rounded[k] = replace(walls[k], mean=mean, spread=walls[k].spread * left)
-        if place < ROTATION:
+        if place < ROTATION_INDEX:
             off = columns[place] - middle
             half = np.where(off < 0, middle - below[0].limit(spreads), above[0].limit(spreads) - middle)
             used = used + (np.abs(off) / (half + tolerance)) ** power
@@ -224,13 +226,13 @@ def _round_off(
 
 
 def _by_elevation(anatomy: Anatomy, joint: str) -> bool:
-    return joint == "shoulder" and bool(anatomy.couplings_of(ELEVATION, "upper"))
+    return joint == "shoulder" and bool(anatomy.couplings_of(ELEVATION_ANGLE, "upper"))
 
 
 def _turn_walls(anatomy: Anatomy, angles: Array, readings: Mapping[str, Array]) -> list[Wall]:
     """Bound the rotation by the turn: with flexion and abduction given, the two differ by an offset."""
-    couplings = anatomy.couplings_of(TURN)
-    bounds = [anatomy.coupled(coupling, readings[ELEVATION]) for coupling in couplings]
+    couplings = anatomy.couplings_of(TURN_ANGLE)
+    bounds = [anatomy.coupled(coupling, readings[ELEVATION_ANGLE]) for coupling in couplings]
     rotation = readings["shoulder.rotation"]
     # The other branch has half a turn more of rotation, and half a turn less of offset: the turn is the same.
     branch = np.array([0.0, 0.0, 180.0, 180.0])[: rotation.shape[1]]

@@ -21,7 +21,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, SIDES
 from posekit.validators.anatomical import Anatomy
-from posekit.validators.anatomical_limb import HINGES, limb_walls, turned_near
+from posekit.validators.anatomical_limb import HINGE_OF_BALL, limb_walls, turned_near
 
 
 def plausibility(angles: Array, anatomy: Anatomy) -> Array:
@@ -66,7 +66,7 @@ def plausibility(angles: Array, anatomy: Anatomy) -> Array:
     for joint in ("neck", "pelvis"):
         first = DOFS.index(f"{joint}.flexion")
         excess[:, first : first + 3] = _ball_excess(anatomy, joint, degrees[:, first : first + 3])
-    for joint in HINGES:
+    for joint in HINGE_OF_BALL:
         for side in SIDES:
             first = DOFS.index(f"{side}_{joint}.flexion")
             excess[:, first : first + 4] = _limb_excess(anatomy, joint, degrees[:, first : first + 4])

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from posekit.compiled.anatomical_kernels import AT_TURN, BEYOND_ALL, COUPLED, JUDGED
+from posekit.compiled.anatomical_kernels import AT_COUPLED, AT_JUDGED, AT_TURN, BEYOND_ALL
 from posekit.geometry import Array
-from posekit.validators.anatomical import OUTWARD, Anatomy
+from posekit.validators.anatomical import OUTWARD_SIGNS, Anatomy
 from posekit.validators.anatomical_limb import (
-    BALL,
-    ELEVATION,
-    ENDS,
-    HINGES,
+    BALL_ANGLES,
+    ELEVATION_ANGLE,
+    HINGE_OF_BALL,
     LEAST_LEFT,
-    PLANE,
-    ROTATION,
-    TURN,
+    LIMIT_SIDES,
+    PLANE_ANGLE,
+    ROTATION_INDEX,
+    TURN_ANGLE,
     judged_names,
 )
-from posekit.validators.anatomical_shoulder import SEAM
+from posekit.validators.anatomical_shoulder import SEAM_DEGREES
 
 
 def limb_numbers(
@@ -43,25 +43,29 @@ def limb_numbers(
         As `posekit.compiled.anatomical_kernels` says; ends are beyond all where the table bounds an angle otherwise.
     """
     count, arm = len(signs), joint == "shoulder"
-    names = (*(f"{joint}.{angle}" for angle in BALL), f"{HINGES[joint]}.flexion")
-    readings = (*names[:count], *([""] * (4 - count)), *((ELEVATION, PLANE) if arm else ()))
+    names = (*(f"{joint}.{angle}" for angle in BALL_ANGLES), f"{HINGE_OF_BALL[joint]}.flexion")
+    readings = (*names[:count], *([""] * (4 - count)), *((ELEVATION_ANGLE, PLANE_ANGLE) if arm else ()))
     judged = judged_names(anatomy, joint, count)
-    ends = _ends(anatomy, names, count, by_elevation=ELEVATION in judged)
-    couplings = _couplings(anatomy, (*readings, TURN if arm and count == 4 else ""))
+    ends = _ends(anatomy, names, count, by_elevation=ELEVATION_ANGLE in judged)
+    couplings = _couplings(anatomy, (*readings, TURN_ANGLE if arm and count == 4 else ""))
     branches = 2
-    if ELEVATION in judged and ends[ROTATION, 1] <= -BEYOND_ALL and ends[ROTATION, 3] >= BEYOND_ALL:
+    if (
+        ELEVATION_ANGLE in judged
+        and ends[ROTATION_INDEX, 1] <= -BEYOND_ALL
+        and ends[ROTATION_INDEX, 3] >= BEYOND_ALL
+    ):
         # Elevation and turn are the same in both branches of the ball joint: the judge has but one, either.
-        ball = names[: ROTATION + 1]
+        ball = names[: ROTATION_INDEX + 1]
         branches = 0 if any(c.of in ball or c.angle in ball for c in anatomy.couplings) else 1
     sinus = anatomy.sinus_of(joint)
     power = sinus.power if sinus else 0.0
-    places = np.zeros(COUPLED - JUDGED)
+    places = np.zeros(AT_COUPLED - AT_JUDGED)
     places[0] = len(judged)
     places[1 : len(judged) + 1] = [readings.index(name) for name in judged]
     return np.concatenate(
         [
             [rigid, count == 4, arm, branches],
-            [power, LEAST_LEFT**power, SEAM, tolerance, unseen],
+            [power, LEAST_LEFT**power, SEAM_DEGREES, tolerance, unseen],
             np.pad(signs, (0, 4 - count)),
             np.ravel(ends),
             places,
@@ -74,13 +78,13 @@ def _ends(anatomy: Anatomy, names: tuple[str, ...], count: int, *, by_elevation:
     """Return the own ends of four angles: middle; lower mean and limit; upper mean and limit (4, 5)."""
     ends = np.empty((4, 5))
     for k, name in enumerate(names):
-        (lower, below), (upper, above) = (anatomy.motions[name].end(side) for side in ENDS)
+        (lower, below), (upper, above) = (anatomy.motions[name].end(side) for side in LIMIT_SIDES)
         low, high = lower - anatomy.spreads * below, upper + anatomy.spreads * above
         ends[k] = (lower + upper) / 2, lower, low, upper, high
-        if k >= count or (by_elevation and k < ROTATION):
+        if k >= count or (by_elevation and k < ROTATION_INDEX):
             ends[k, 1:] = -BEYOND_ALL, -BEYOND_ALL, BEYOND_ALL, BEYOND_ALL
-        for side, outward in OUTWARD.items():
-            if name == "shoulder.rotation" and any(c.side == side for c in anatomy.couplings_of(TURN)):
+        for side, outward in OUTWARD_SIGNS.items():
+            if name == "shoulder.rotation" and any(c.side == side for c in anatomy.couplings_of(TURN_ANGLE)):
                 first = 1 if outward < 0 else 3
                 ends[k, first : first + 2] = outward * BEYOND_ALL
     return ends
@@ -95,11 +99,11 @@ def _couplings(anatomy: Anatomy, readings: tuple[str, ...]) -> Array:
         zero = anatomy.motions[coupling.of].zero.mean if coupling.of in anatomy.motions else 0.0
         at = np.array(coupling.points)[:, 0] + zero
         mean, spread = anatomy.coupled(coupling, at)
-        bounded = AT_TURN if coupling.angle == TURN else readings.index(coupling.angle)
+        bounded = AT_TURN if coupling.angle == TURN_ANGLE else readings.index(coupling.angle)
         row = [
             bounded,
             readings.index(coupling.of),
-            OUTWARD[coupling.side],
+            OUTWARD_SIGNS[coupling.side],
             anatomy.spreads * spread,
             len(at),
         ]

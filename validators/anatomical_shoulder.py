@@ -14,7 +14,7 @@ stated elevations, so they are judged by elevation:
 
 The turn has no pole: at :math:`e = 180^\circ`, where plane and twist mean nothing alone, their combination does. It has
 a seam, as any such angle must, since an arm carried all the way around gathers a rotation: the seam is behind the
-back, on the other arm's side (`SEAM`), where an arm hardly gets.
+back, on the other arm's side (`SEAM_DEGREES`), where an arm hardly gets.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from posekit.geometry import Array
 
-SEAM = -115.0
+SEAM_DEGREES = -115.0
 """Degrees of the plane at which the turn is cut."""
 
 
@@ -44,5 +44,5 @@ def turn_offset(flexion: Array, abduction: Array) -> Array:
     a, b = np.radians(flexion) / 2, np.radians(abduction) / 2
     twist = -2 * np.degrees(np.arctan2(np.sin(a) * np.sin(b), np.cos(a) * np.cos(b)))
     elevation, plane = elevation_and_plane(flexion, abduction)
-    from_side = 90.0 - np.where(plane < SEAM, plane + 360.0, plane)
+    from_side = 90.0 - np.where(plane < SEAM_DEGREES, plane + 360.0, plane)
     return np.asarray(twist - (1 - np.cos(np.radians(elevation))) * from_side)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from posekit.validators.anatomical import Anatomy, Coupling, End, Motion, Sinus
+from posekit.validators.anatomical import Anatomy, AngleRange, Coupling, End, Sinus
 
 if TYPE_CHECKING:
     from posekit.tables.anatomy import AnatomyTable, EndTable, ZeroTable
@@ -20,7 +20,7 @@ def anatomy_of(table: AnatomyTable) -> Anatomy:
     """
     return Anatomy(
         motions={
-            angle: Motion(lower=_end(motion.lower), upper=_end(motion.upper), zero=_end(motion.zero))
+            angle: AngleRange(lower=_end(motion.lower), upper=_end(motion.upper), zero=_end(motion.zero))
             for angle, motion in table.joints.items()
         },
         couplings=tuple(

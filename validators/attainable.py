@@ -20,16 +20,16 @@ Groups = NDArray[np.intp]
 Invariant = Callable[[Array, Groups], Array]
 Second = Callable[[float, float], float]
 
-MOST = 3
+MAX_JOINTS = 3
 """The most joints between two points whose distance is bounded; there are grids over all but one of them."""
 
-GRID = {1: 1, 2: 512, 3: 64}
+GRID_POINTS = {1: 1, 2: 512, 3: 64}
 """Points of the grid for each joint but the last, by how many joints there are."""
 
-THIRDS = np.array([-2.0, 0.0, 2.0]) * np.pi / 3
+THIRDS_OF_TURN = np.array([-2.0, 0.0, 2.0]) * np.pi / 3
 """Three angles that determine A + B cos q + C sin q."""
 
-ROUNDING = 1e-12
+ROUNDING_PART = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +79,7 @@ class Attainable:
         low, high = self._bounds(
             joints, pairs, _squared_distances, lambda i, j: 2 * i * j + 2 * E * max(i, j), E
         )
-        low, high = np.maximum(low * (1 - ROUNDING), 0.0), np.maximum(high * (1 + ROUNDING), 0.0)
+        low, high = np.maximum(low * (1 - ROUNDING_PART), 0.0), np.maximum(high * (1 + ROUNDING_PART), 0.0)
         return np.sqrt(low), np.sqrt(high)
 
     def volumes(self, joints: tuple[int, ...], quads: Groups) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ class Attainable:
         low, high = self._bounds(
             joints, quads, six_volumes, lambda i, j: 6 * i * j * E + 3 * max(i, j) * E * E, E
         )
-        rounding = ROUNDING * E**3
+        rounding = ROUNDING_PART * E**3
         return low - rounding, high + rounding
 
     def free(self, joints: tuple[int, ...], quads: Groups) -> Array:
@@ -166,11 +166,11 @@ class Attainable:
             unbounded = np.full(len(groups), np.inf)
             return -unbounded, unbounded
         *others, last = joints
-        count = GRID[len(joints)]
+        count = GRID_POINTS[len(joints)]
         axes = [np.linspace(*self.ranges[joint], count) for joint in others]
         grid = np.array(list(product(*axes)), dtype=np.float64).reshape(count ** len(others), len(others))
         slides = last in self.carried.space.slides
-        knots = np.linspace(*self.ranges[last], 3) if slides else THIRDS
+        knots = np.linspace(*self.ranges[last], 3) if slides else THIRDS_OF_TURN
         values = np.stack(
             [
                 invariant(
@@ -208,7 +208,7 @@ def _circle(values: Array, limits: tuple[float, float]) -> tuple[Array, Array]:
     """Return the range (G, T) of A + B cos q + C sin q within limits, given at three angles (3, G, T)."""
     lower, upper = limits
     A = values.mean(axis=0)
-    B, C = (2 / 3 * np.tensordot(wave(THIRDS), values, axes=1) for wave in (np.cos, np.sin))
+    B, C = (2 / 3 * np.tensordot(wave(THIRDS_OF_TURN), values, axes=1) for wave in (np.cos, np.sin))
     amplitude, phase = np.hypot(B, C), np.arctan2(C, B)
     at_ends = [A + B * np.cos(q) + C * np.sin(q) for q in limits]
     low, high = np.minimum(*at_ends), np.maximum(*at_ends)

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.linkages.robot_linkage import Carried
 
-SINE = 0.05
+MIN_SINE = 0.05
 """Of the least angle that three points make: below it their plane is too uncertain to place anything."""
 
-SAME = 0.02
+SAME_PART = 0.02
 """Of the extent: two points of an axis that are nearer to each other do not show its direction."""
 
-REACH = 0.25
+AXIS_PART = 0.25
 """Of the extent: how far along the axis a point is put."""
 
 
@@ -90,7 +90,7 @@ def find_axis_points(carried: Carried) -> tuple[AxisPoint, ...]:
                 if corners is None:
                     continue
                 along = _along(carried, joint, axis)
-                at = (along[0] + REACH * extent if len(along) else 0.0) * axis
+                at = (along[0] + AXIS_PART * extent if len(along) else 0.0) * axis
                 place = at if body == joint else model.jointPlacements[joint].act(at)
                 point = _axis_point(carried, body, place, corners, looseness)
                 found.append(point)
@@ -116,12 +116,12 @@ def _along(carried: Carried, joint: int, axis: Array) -> Array:
 def _shown(carried: Carried, joint: int, axis: Array, extent: float) -> bool:
     """Tell whether an axis has two points that are well apart."""
     along = _along(carried, joint, axis)
-    return len(along) > 1 and bool(along[-1] - along[0] > SAME * extent)
+    return len(along) > 1 and bool(along[-1] - along[0] > SAME_PART * extent)
 
 
 def _corners(carried: Carried, body: int) -> tuple[int, int, int] | None:
     """Return the three points of a body that place it best, None where none do."""
-    best, corners = SINE, None
+    best, corners = MIN_SINE, None
     on: NDArray[np.intp] = np.flatnonzero(carried.on[body])
     for triple in combinations(on.tolist(), 3):
         a, b, c = carried.place[body, list(triple)]

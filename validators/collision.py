@@ -116,11 +116,11 @@ class PairCollision(Check):
         reach = a.radius + b.radius + self.contact_margin
         sizes = len(a.start), len(a.end), len(b.start), len(b.end)
         return Rule(
-            kind=kernels.CAPSULES,
+            kind=kernels.OF_CAPSULES,
             numbers=np.array(
                 [a.center, a.half_length, b.center, b.half_length, reach, *sizes], dtype=np.float64
             ),
-            presumed=kernels.PLACED,
+            presumed=kernels.CAPSULE_NUMBERS,
         )
 
     def _coal(self, middle_a: Array, axis_a: Array, middle_b: Array, axis_b: Array) -> NDArray[np.bool_]:

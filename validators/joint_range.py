@@ -23,10 +23,10 @@ from posekit.validators.anatomical_checks import AnatomicalLimb
 from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges
 
-TOLERANCE = 1e-3
+ANGLE_TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
 
-UNSEEN = 45.0
+UNSEEN_DEGREES = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
@@ -34,7 +34,11 @@ HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
 def joint_range(
-    figure: Figure, ranges: Ranges = URDF_RANGES, *, tolerance: float = TOLERANCE, directions: bool = False
+    figure: Figure,
+    ranges: Ranges = URDF_RANGES,
+    *,
+    tolerance: float = ANGLE_TOLERANCE,
+    directions: bool = False,
 ) -> list[Check]:
     """Make the checks of the joint ranges.
 
@@ -131,7 +135,10 @@ class Neck(Check):
     def rule(self) -> Rule:
         """The screen as numbers: limits, tolerance, and where the head's points are."""
         return _rule(
-            self.ik, self.where, kernels.NECK, [np.radians(self.tolerance), *np.ravel(self.ik.head_offsets)]
+            self.ik,
+            self.where,
+            kernels.OF_NECK,
+            [np.radians(self.tolerance), *np.ravel(self.ik.head_offsets)],
         )
 
 
@@ -158,7 +165,7 @@ class Pelvis(Check):
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: limits and tolerance."""
-        return _rule(self.ik, self.where, kernels.PELVIS, [np.radians(self.tolerance)])
+        return _rule(self.ik, self.where, kernels.OF_PELVIS, [np.radians(self.tolerance)])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,7 +174,7 @@ class LimbRange(Check):
 
     A limb that is almost straight hardly shows its axial rotation: turning the lower segment's direction by
     the tolerance turns the rotation by the tolerance over the sine of the bend. That much the rotation may be
-    off; beyond `UNSEEN` it is undecided.
+    off; beyond `UNSEEN_DEGREES` it is undecided.
 
     Parameters
     ----------
@@ -219,13 +226,13 @@ class LimbRange(Check):
             bend = np.abs(np.sin(angles[:, 3]))
             least = max(np.radians(self.tolerance) / np.pi, np.finfo(np.float64).tiny)
             tolerance[:, 2] /= np.maximum(np.where(np.isnan(bend), 1.0, bend), least)
-            angles[tolerance[:, 2] > UNSEEN, 2] = np.nan
+            angles[tolerance[:, 2] > UNSEEN_DEGREES, 2] = np.nan
         if self.directions:
             level = np.abs(np.cos(angles[:, 1]))
             tolerance[:, 0] = self._turn(np.where(np.isnan(level), 1.0, level))
             if end is not None:
                 tolerance[:, 2] = self._turn(np.where(np.isnan(bend), 1.0, bend))
-            angles[tolerance > UNSEEN] = np.nan
+            angles[tolerance > UNSEEN_DEGREES] = np.nan
         return _findings(self.figure.ik, self._angles[: angles.shape[1]], angles, tolerance)
 
     def _turn(self, sine: Array) -> Array:
@@ -239,5 +246,5 @@ class LimbRange(Check):
         if self.directions:
             return None  # tolerances of their own for each angle, which the screen does not know
         sizes = len(self._parent), len(self.limb) == 3
-        more = [np.radians(self.tolerance), np.radians(UNSEEN), *sizes]
-        return _rule(self.figure.ik, self._angles, kernels.LIMB, more)
+        more = [np.radians(self.tolerance), np.radians(UNSEEN_DEGREES), *sizes]
+        return _rule(self.figure.ik, self._angles, kernels.OF_LIMB, more)

@@ -10,7 +10,7 @@ from typing import Any, Final
 from posekit.errors import InputError
 from posekit.settings import RigidTolerance
 from posekit.settings.recover import checked_rules
-from posekit.validators.joint_range import TOLERANCE
+from posekit.validators.joint_range import ANGLE_TOLERANCE
 from posekit.validators.ranges import URDF_RANGES, Ranges, load_ranges
 from posekit.validators.rigid_parts import Mode
 from posekit.validators.walking import DEFAULT_RULES, WalkingThresholds
@@ -60,7 +60,7 @@ class CheckOptions:
     rigid_tolerance: float | RigidTolerance = 0.0
     rigid_mode: Mode = "placement"
     limbs: bool = False
-    angle_tolerance: float = TOLERANCE
+    angle_tolerance: float = ANGLE_TOLERANCE
     directions: bool = False
     rules: tuple[int, ...] = DEFAULT_RULES
     thresholds: WalkingThresholds = field(default_factory=WalkingThresholds)

@@ -21,7 +21,7 @@ from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.ranges import Ranges
 
-ROUNDING = 1e-3
+ROUNDING_DEGREES = 1e-3
 """Degrees within which -180 is taken for 180."""
 
 HIP_SIGNS: Final = (1.0, -1.0, 1.0)
@@ -48,7 +48,7 @@ def projected_angles(figure: Figure, ranges: Ranges, *, tolerance: float) -> lis
 
 def _rule(kind: int, ranges: Ranges, tolerance: float, *more: object, wrap: float | None = None) -> Rule:
     """Write a screen as numbers: tolerance, shortest projection, where a turn is added, and what else there is."""
-    turn = max(tolerance if wrap is None else wrap, ROUNDING) - 180
+    turn = max(tolerance if wrap is None else wrap, ROUNDING_DEGREES) - 180
     return Rule(
         kind=kind,
         numbers=np.concatenate(
@@ -66,14 +66,14 @@ def paper_axes(points: Array) -> Array:
     return np.stack([R[..., 0], -R[..., 2], R[..., 1]], axis=-2)
 
 
-def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING) -> Array:
+def angle_in_plane(x: Array, y: Array, shortest: Array | float, tolerance: float = ROUNDING_DEGREES) -> Array:
     """Return the angle (deg) from the y axis towards x, NaN where the projection (x, y) is too short.
 
     In (-180, 180], and up to the tolerance (deg) beyond: an arm straight up is flexed by 180, on whichever side
     of it rounding or noise leaves the arm.
     """
     angle = np.degrees(np.arctan2(x, y))
-    angle = np.where(angle < max(tolerance, ROUNDING) - 180, angle + 360, angle)
+    angle = np.where(angle < max(tolerance, ROUNDING_DEGREES) - 180, angle + 360, angle)
     return np.where(np.hypot(x, y) < shortest, np.nan, angle)
 
 
@@ -126,7 +126,7 @@ class ProjectedBall(Check):
     def rule(self) -> Rule:
         """The screen as numbers: which way is outward, and the bounds."""
         outward = 1.0 if self.side == "left" else -1.0
-        return _rule(kernels.PROJECTED_BALL, self.ranges, self.tolerance, outward, self._bounds)
+        return _rule(kernels.OF_PROJECTED_BALL, self.ranges, self.tolerance, outward, self._bounds)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -197,9 +197,9 @@ class ProjectedHinge(Check):
         limits = self.ranges.limits
         own = limits[f"{self.limb[1]}.flexion"]
         if self.limb[1] == "elbow":
-            return _rule(kernels.PROJECTED_HINGE, self.ranges, self.tolerance, 1.0, own)
+            return _rule(kernels.OF_PROJECTED_HINGE, self.ranges, self.tolerance, 1.0, own)
         hip = (self.ranges.knee_flexed, *limits["hip.flexion"], *limits["hip.flexion_with_straight_knee"])
-        return _rule(kernels.PROJECTED_HINGE, self.ranges, self.tolerance, -1.0, own, hip)
+        return _rule(kernels.OF_PROJECTED_HINGE, self.ranges, self.tolerance, -1.0, own, hip)
 
 
 def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
@@ -249,7 +249,9 @@ class HipPlane(Check):
     def rule(self) -> Rule:
         """The screen as numbers: signs and bounds."""
         bounds = _plane_bounds("pelvis", self.ranges)
-        return _rule(kernels.HIP_PLANE, self.ranges, self.tolerance, HIP_SIGNS, bounds, wrap=ROUNDING)
+        return _rule(
+            kernels.OF_HIP_PLANE, self.ranges, self.tolerance, HIP_SIGNS, bounds, wrap=ROUNDING_DEGREES
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -281,7 +283,7 @@ class HeadPlane(Check):
     def rule(self) -> Rule:
         """The screen as numbers: signs and bounds, and where the head's points are."""
         more = HEAD_SIGNS, _plane_bounds("neck", self.ranges), self.figure.ik.head_offsets
-        return _rule(kernels.HEAD_PLANE, self.ranges, self.tolerance, *more, wrap=ROUNDING)
+        return _rule(kernels.OF_HEAD_PLANE, self.ranges, self.tolerance, *more, wrap=ROUNDING_DEGREES)
 
 
 def _plane_findings(joint: str, angles: Array, ranges: Ranges, tolerance: float) -> Findings:

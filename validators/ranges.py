@@ -13,7 +13,7 @@ from posekit.tables.built_in import built_in_document
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_table import anatomy_of
 
-SCHEMA = "posekit.ranges/1"
+RANGES_SCHEMA = "posekit.ranges/1"
 MAX_BYTES = 1_000_000
 
 Range = tuple[float, float]
@@ -50,7 +50,7 @@ class Ranges:
 
 URDF_RANGES = Ranges(name="urdf", kind="configuration")
 
-NAMED = ("table1", "anatomical")
+NAMED_TABLES = ("table1", "anatomical")
 """Tables that come with the package."""
 
 
@@ -64,7 +64,7 @@ def load_ranges(name: str) -> Ranges:
     """
     if name == "urdf":
         return URDF_RANGES
-    if name in NAMED:
+    if name in NAMED_TABLES:
         return _ranges(built_in_document("ranges", name), name)
     try:
         exists = Path(name).exists()
@@ -73,7 +73,7 @@ def load_ranges(name: str) -> Ranges:
     if not name or not exists:
         raise InputError(
             one_line(
-                f"--ranges {cut(name)}: no such table or file; expected urdf, {', '.join(NAMED)} or the path "
+                f"--ranges {cut(name)}: no such table or file; expected urdf, {', '.join(NAMED_TABLES)} or the path "
                 "of a TOML file"
             )
         )

@@ -1,7 +1,7 @@
 """The registry of checks: what ``--checks`` may name, and how checks are made from names, settings and objects.
 
-Those that come with posekit are in `KINDS`. Others are found by name: in the entry-point group ``posekit.checks``, or
-as ``package.module:Class``; or they are given as objects (docs, "Write your own check").
+Those that come with posekit are in `CHECK_KINDS`. Others are found by name: in the entry-point group
+``posekit.checks``, or as ``package.module:Class``; or they are given as objects (docs, "Write your own check").
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class CheckKind:
     scope: Scope = Scope.POSTURE
 
 
-KINDS: Final[Mapping[str, CheckKind]] = {
+CHECK_KINDS: Final[Mapping[str, CheckKind]] = {
     "rigid-parts": CheckKind(
         make=lambda figure, options: rigid_parts(
             figure, tolerance=options.rigid_tolerance, mode=options.rigid_mode, limbs=options.limbs
@@ -75,8 +75,8 @@ KINDS: Final[Mapping[str, CheckKind]] = {
 }
 """By the name that ``--checks`` takes, in the order in which they are applied; other checks come after them."""
 
-CHECKS: Final = tuple(KINDS)
-PHYSICAL: Final = tuple(name for name, kind in KINDS.items() if kind.scope is not Scope.MOTION)
+ALL_CHECKS: Final = tuple(CHECK_KINDS)
+PHYSICAL_CHECKS: Final = tuple(name for name, kind in CHECK_KINDS.items() if kind.scope is not Scope.MOTION)
 
 AnyCheck = str | Check | CheckSettings
 """A check by its name, itself, or as settings record it."""
@@ -92,9 +92,10 @@ def chosen_checks(checks: Iterable[AnyCheck]) -> tuple[CheckSettings, ...]:
     """
     chosen = list(dict.fromkeys(map(check_settings, checks)))
     for one in chosen:
-        if one.name not in KINDS and given_check(one) is None:
+        if one.name not in CHECK_KINDS and given_check(one) is None:
             _found(one.name)
-    return tuple(sorted(chosen, key=lambda one: CHECKS.index(one.name) if one.name in KINDS else len(CHECKS)))
+    rank = {name: place for place, name in enumerate(ALL_CHECKS)}
+    return tuple(sorted(chosen, key=lambda one: rank.get(one.name, len(rank))))
 
 
 def check_names(checks: Iterable[AnyCheck]) -> tuple[str, ...]:
@@ -125,7 +126,7 @@ def make_checks(
     options = replace(options or CheckOptions(), **changes)
     made: list[Check] = []
     for settings in chosen_checks(checks):
-        kind = KINDS.get(settings.name)
+        kind = CHECK_KINDS.get(settings.name)
         if kind is not None:
             made += kind.make(figure, options.with_parameters(settings.name, settings.parameters))
         else:
@@ -161,7 +162,7 @@ def _found(name: str) -> Callable[..., Any]:
     module, _, inside = name.partition(":")
     if name not in known and not (module and inside):
         raise InputError(
-            f"--checks: {cut(name)!r} is not a check; expected some of {', '.join((*CHECKS, *sorted(known)))}"
+            f"--checks: {cut(name)!r} is not a check; expected some of {', '.join((*ALL_CHECKS, *sorted(known)))}"
         )
     try:
         if name in known:

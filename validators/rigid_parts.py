@@ -85,7 +85,7 @@ class SegmentLength(Check):
     def rule(self) -> Rule:
         """The screen as numbers: the bounds."""
         bounds = np.array([self.length - self.tolerance, self.length + self.tolerance])
-        return Rule(kind=kernels.DISTANCE, numbers=bounds)
+        return Rule(kind=kernels.OF_DISTANCE, numbers=bounds)
 
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
@@ -115,4 +115,4 @@ class TorsoPlacement(Check):
     def rule(self) -> Rule:
         """The screen as numbers: the tolerance, and the figure's torso."""
         numbers = np.concatenate([[self.tolerance], np.ravel(self.torso)])
-        return Rule(kind=kernels.PLACEMENT, numbers=numbers)
+        return Rule(kind=kernels.OF_PLACEMENT, numbers=numbers)

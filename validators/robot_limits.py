@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.linkages.robot_linkage import Carried
 from posekit.robots import Robot
-from posekit.tree import Check, Findings
-from posekit.validators.attainable import MOST, Attainable, six_volumes
+from posekit.tree import Check, Findings, Place
+from posekit.validators.attainable import MAX_JOINTS, Attainable, six_volumes
 from posekit.validators.axis_points import AxisPoint, find_axis_points, place_axis_point
 
 AT_ONCE = 8
 """Volumes that one check asks, those with the narrowest intervals: more of one joint say the same again."""
 
-NARROWER = 0.999
+MAX_RANGE_PART = 0.999
 """Of the whole range: an interval that is wider says nothing."""
 
-FLAT = 1e-6
+FLAT_PART = 1e-6
 """Of the extent squared: three points with less area between them are on one line."""
 
 Looseness = Callable[[Sequence[int]], float]
@@ -105,14 +105,14 @@ class RobotLimits:
         Between points on axes, inside a rigid body too.
         """
         attainable, found = self._attainable, []
-        for joints, pairs in self._by_joints(2, range(MOST + 1), self._count).items():
+        for joints, pairs in self._by_joints(2, range(MAX_JOINTS + 1), self._count).items():
             low, high = attainable.distances(joints, pairs)
             for pair, lower, upper in zip(pairs.tolist(), low.tolist(), high.tolist(), strict=True):
                 if not joints and max(pair) < len(self.names):
                     continue  # a segment, or a chord, of the linkage itself
                 least, most = self._implied(*pair)
                 share = (min(upper, most) - max(lower, least)) / max(most - least, 1e-12)
-                if share < NARROWER:
+                if share < MAX_RANGE_PART:
                     found.append(self._interval(joints, pair, lower, upper, 1.0, share))
         return tuple(found)
 
@@ -133,7 +133,7 @@ class RobotLimits:
                 # Volumes that are always nothing (planar fingers) say as much as those with one sign.
                 widest = max(size, 1e-3 * length**3)
                 share = (min(upper, widest) - max(lower, -widest)) / (2 * widest)
-                if share < NARROWER:
+                if share < MAX_RANGE_PART:
                     found.append(
                         self._interval(joints, quad, lower / length**2, upper / length**2, length, share)
                     )
@@ -174,7 +174,7 @@ class RobotLimits:
         joints: tuple[str, ...],
         place: Mapping[int, int],
         tolerance: float | Looseness,
-    ) -> Within:
+    ) -> WithinIntervals:
         """Put intervals of one level and the same joints into one check."""
         needed = self._needed([point for interval in intervals for point in interval.points])
         column = {point: k for k, point in enumerate(needed)}
@@ -189,9 +189,11 @@ class RobotLimits:
             off = tolerance(joints) if callable(tolerance) else tolerance
             return off * sum(looseness[column[point]] for point in interval.points)
 
-        return Within(
+        return WithinIntervals(
             name="robot_limits" if joints else "rigid_body",
-            where=tuple("+".join(joints) or self._body(interval.points) for interval in intervals),
+            places=tuple(
+                Place(name="+".join(joints) or self._body(interval.points)) for interval in intervals
+            ),
             points=tuple(place[point] for point in shown),
             axis_points=tuple(
                 point.among(column)
@@ -264,7 +266,7 @@ class RobotLimits:
     def _flat(self, quads: NDArray[np.intp]) -> NDArray[np.bool_]:
         """Return which quadruples (T,) have three points that are always on one line."""
         flat = np.zeros(len(quads), dtype=np.bool_)
-        bound = FLAT * self._attainable.extent(quads) ** 2
+        bound = FLAT_PART * self._attainable.extent(quads) ** 2
         for three in combinations(range(4), 3):
             a, b, c = (self._samples[:, quads[:, k]] for k in three)
             area = np.linalg.norm(np.cross(b - a, c - a), axis=-1).max(axis=0)
@@ -294,7 +296,7 @@ class RobotLimits:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Within:
+class WithinIntervals(Check):
     """Distances and signed volumes against their attainable intervals.
 
     A point that is off by the tolerance changes a distance by as much, a volume by no more than the area of the
@@ -302,7 +304,7 @@ class Within:
     """
 
     name: str
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
     points: tuple[int, ...]
     axis_points: tuple[AxisPoint, ...]
     intervals: tuple[Interval, ...]

@@ -19,16 +19,16 @@ from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
 from posekit.validators.ranges import load_ranges
-from posekit.validators.registry import PHYSICAL, chosen_checks, make_checks
+from posekit.validators.registry import PHYSICAL_CHECKS, chosen_checks, make_checks
 from posekit.validators.robot.figure import FigureConfigurations
 from posekit.validators.robot.load import STICK_FIGURE, load_subject
 from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
-from posekit.validators.robot.settings import LENGTHS, ROBOT_DEFAULT, RobotSettings
+from posekit.validators.robot.settings import LENGTHS_CHOICES, ROBOT_DEFAULT, RobotSettings
 from posekit.validators.suite import judge
 from posekit.validators.walking import thresholds_of
 
-FARTHEST = 1e9
+MAX_METRES = 1e9
 """Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
 
 
@@ -92,7 +92,7 @@ class Validator:
             return
         self.lengths = asked.lengths or "model"
         for option, given, known in (
-            ("--lengths", self.lengths, LENGTHS[:2]),
+            ("--lengths", self.lengths, LENGTHS_CHOICES[:2]),
             ("--bodies", asked.bodies, ("auto", "urdf")),
             ("--joint-map", asked.joint_map, (None,)),
         ):
@@ -100,7 +100,7 @@ class Validator:
                 raise InputError(
                     f"{option} {given}: the stick figure has its own; expected a robot, as --urdf human"
                 )
-        self._chosen = chosen_checks(PHYSICAL if asked.checks is None else asked.checks)
+        self._chosen = chosen_checks(PHYSICAL_CHECKS if asked.checks is None else asked.checks)
         self.checks = tuple(one.name for one in self._chosen)
         if not self.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
@@ -274,10 +274,10 @@ def _points(name: str, given: ArrayLike | None, count: int, postures: int | None
         raise InputError(f"{name}: not an array of numbers; expected {expected}, metres") from error
     if points.ndim != 3 or points.shape[1:] != (count, 3) or postures not in (None, len(points)):
         raise InputError(f"{name}: the shape is {points.shape}; expected {expected}, metres")
-    far = np.abs(points) > FARTHEST
+    far = np.abs(points) > MAX_METRES
     if far.any():
         raise InputError(
-            f"{name}: a coordinate is {points[far][0]:g} m; expected finite ones within {FARTHEST:g} m, "
+            f"{name}: a coordinate is {points[far][0]:g} m; expected finite ones within {MAX_METRES:g} m, "
             "NaN where unknown"
         )
     return points

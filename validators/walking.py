@@ -23,9 +23,9 @@ from posekit.settings.recover import checked_rules
 from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
 from posekit.tree import Check, Findings, Place, Scope
 
-RULES = (1, 2, 3, 4, 5)
+RULE_NUMBERS = (1, 2, 3, 4, 5)
 DEFAULT_RULES = (1, 2)
-LIMBS = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
+LIMB_PARTS = (("arms", "shoulder", "elbow", "wrist"), ("legs", "hip", "knee", "ankle"))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +33,8 @@ class WalkingThresholds:
     """When a swing is evidence, and what counts as parallel, flexed and vertical.
 
     The paper gives no numbers; these are posekit's. The defaults take the rules by their word, for figures that walk
-    like Lee & Chen's; real walkers keep them as `PEOPLE` says. Options choose either by its name (`thresholds_of`).
+    like Lee & Chen's; real walkers keep them as `PEOPLE_THRESHOLDS` says. Options choose either by its name
+    (`thresholds_of`).
 
     Parameters
     ----------
@@ -57,14 +58,14 @@ class WalkingThresholds:
     vertical: float = 30.0
 
 
-PEOPLE = WalkingThresholds(
+PEOPLE_THRESHOLDS = WalkingThresholds(
     elbow_swing=0.10, knee_swing=0.25, girdle_swing=0.06, out_of_plane=35.0, flexed_knee=40.0, vertical=35.0
 )
 """For real walkers (docs, "Rules of walking"): their shoulders lie behind, their hips before the figure's, arms turned
 outward leave the moving plane, and while one leg passes the other both knees are in front, and bent."""
 
-WALKERS: Final[Mapping[str, WalkingThresholds]] = MappingProxyType(
-    {"paper": WalkingThresholds(), "people": PEOPLE}
+THRESHOLDS_BY_WALKERS: Final[Mapping[str, WalkingThresholds]] = MappingProxyType(
+    {"paper": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
 )
 """Thresholds by the name that `--walkers` takes."""
 
@@ -75,11 +76,11 @@ def thresholds_of(walkers: str) -> WalkingThresholds:
     Raises
     ------
     InputError
-        Where the name is none of `WALKERS`.
+        Where the name is none of `THRESHOLDS_BY_WALKERS`.
     """
-    if walkers not in WALKERS:
-        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(WALKERS)}")
-    return WALKERS[walkers]
+    if walkers not in THRESHOLDS_BY_WALKERS:
+        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(THRESHOLDS_BY_WALKERS)}")
+    return THRESHOLDS_BY_WALKERS[walkers]
 
 
 def walking(
@@ -95,7 +96,7 @@ def walking(
     chosen = checked_rules(rules)
     makers = {1: _rule_1, 2: _rule_2, 3: _rule_3, 4: _rule_4, 5: _rule_5}
     body = thresholds or WalkingThresholds()
-    return [check for rule in RULES if rule in chosen for check in makers[rule](figure, body)]
+    return [check for rule in RULE_NUMBERS if rule in chosen for check in makers[rule](figure, body)]
 
 
 class WalkingAxes(NamedTuple):
@@ -238,7 +239,7 @@ def _rule_1(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
             joints=_indices(f"right_{middle}", f"left_{middle}"),
             wanted=False,
         )
-        for limb, _, middle, _ in LIMBS
+        for limb, _, middle, _ in LIMB_PARTS
     ]
 
 
@@ -266,7 +267,7 @@ def _rule_3(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
             joints=_indices(f"{side}_{girdle}", f"{side}_{middle}"),
             wanted=True,
         )
-        for limb, girdle, middle, _ in LIMBS
+        for limb, girdle, middle, _ in LIMB_PARTS
         for side in SIDES
     ]
 
@@ -281,7 +282,7 @@ def _rule_4(figure: Figure, thresholds: WalkingThresholds) -> list[Check]:
             joints=_indices(*(f"{side}_{name}" for name in joints)),
             unit="deg",
         )
-        for limb, *joints in LIMBS
+        for limb, *joints in LIMB_PARTS
         for side in SIDES
     ]
 

@@ -14,21 +14,21 @@ import math
 from typing import Any
 
 from posekit.compiled.angle_kernels import direction, worst
-from posekit.compiled.frame_kernels import ROOM
+from posekit.compiled.frame_kernels import ROOM_AT
 from posekit.compiled.rigid_kernels import hips, torso, unknown
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
-CLEAR = 1e-7
+CLEAR_DEGREES = 1e-7
 """Degrees within which nothing is clear: a million times the rounding."""
 
-SINGULAR = 1e-5
+SINGULAR_SINE = 1e-5
 """Sine below which an angle is nearly free, and rounding is not small any more."""
 
 CLEAR_SHARE = 1e-9
 """The same, as a part of one: of a range that is used up, or of a tolerance."""
 
-RIGID, WHOLE, ARM, BRANCHES, POWER, LEAST, CUT, TOLERANCE, UNSEEN = range(9)
+AT_RIGID, AT_WHOLE, AT_ARM, AT_BRANCHES, AT_POWER, AT_LEAST, AT_CUT, AT_TOLERANCE, AT_UNSEEN = range(9)
 """What the first numbers of a check are.
 
 How many points its rigid part has; 1 for a limb of three joints; 1 for an arm, whose elevation and plane are read; how
@@ -37,43 +37,43 @@ and the least of what is left of a range, to that power; the plane at which the 
 which on a rotation is not seen: degrees.
 """
 
-SIGNS, ENDS, JUDGED, COUPLED = 9, 13, 33, 40
+AT_SIGNS, AT_ENDS, AT_JUDGED, AT_COUPLED = 9, 13, 33, 40
 """Where the others begin.
 
 Signs of the four angles; five numbers of each: the middle between the means, lower mean and limit, upper mean and
 limit; how many places are judged, then the reading of each; how many couplings there are, then each with its knots.
 """
 
-COUPLING = 5
+COUPLING_NUMBERS = 5
 """Numbers of a coupling before its knots.
 
 What it bounds, by which reading; -1 for a lower and 1 for an upper end; how far the limit is beyond the mean; how many
 knots follow, reading and mean of each.
 """
 
-ROTATION, HINGE, ELEVATION, PLANE, AT_TURN = 2, 3, 4, 5, 6
+OF_ROTATION, OF_HINGE, OF_ELEVATION, OF_PLANE, AT_TURN = 2, 3, 4, 5, 6
 """Readings after flexion and abduction, which may be bounded too; then the turn, which is bounded alone."""
 
-READ, LOW, HIGH, WORST, FIRST = ROOM, ROOM + 6, ROOM + 12, ROOM + 18, ROOM + 22
+READ_AT, LOW_AT, HIGH_AT, WORST_AT, FIRST_AT = ROOM_AT, ROOM_AT + 6, ROOM_AT + 12, ROOM_AT + 18, ROOM_AT + 22
 """Where readings and their limits are written down, and of four writings what was found."""
 
 BEYOND_ALL = 1e9
 """Degrees of an end that is none."""
 
-DEGREES = 180.0 / math.pi
+PER_RADIAN = 180.0 / math.pi
 
 
 def near(angle: Any, middle: Any) -> Any:
     """Add full turns so that an angle lies within half a turn of a middle, degrees; NaN where the turn is unclear."""
     turn = (angle - middle + 180.0) % 360.0
-    if turn < CLEAR or turn > 360.0 - CLEAR:
+    if turn < CLEAR_DEGREES or turn > 360.0 - CLEAR_DEGREES:
         return math.nan
     return middle + turn - 180.0
 
 
 def coupled(w: Array, row: int, x: Any) -> Any:
     """Interpolate linearly between the knots of a coupling; constant beyond the outer ones, NaN of NaN."""
-    first, last = row + COUPLING, row + COUPLING + 2 * int(w[row + 4]) - 2
+    first, last = row + COUPLING_NUMBERS, row + COUPLING_NUMBERS + 2 * int(w[row + 4]) - 2
     if x <= w[first] or math.isnan(x):
         return w[first + 1] if x <= w[first] else math.nan
     for k in range(first + 2, last + 2, 2):
@@ -94,63 +94,65 @@ def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 
         Whether the rotation could be any, so that nothing may depend on it.
     """
     for k in range(4):
-        w[LOW + k], w[HIGH + k] = w[at + ENDS + 5 * k + 2], w[at + ENDS + 5 * k + 4]
-    for k in range(ELEVATION, PLANE + 1):
-        w[LOW + k], w[HIGH + k] = -BEYOND_ALL, BEYOND_ALL
-    rotation_low, rotation_high = w[at + ENDS + 5 * ROTATION + 1], w[at + ENDS + 5 * ROTATION + 3]
-    couplings = int(w[at + COUPLED])
-    middle, turns, row = 0.0, 0, at + COUPLED + 1
+        w[LOW_AT + k], w[HIGH_AT + k] = w[at + AT_ENDS + 5 * k + 2], w[at + AT_ENDS + 5 * k + 4]
+    for k in range(OF_ELEVATION, OF_PLANE + 1):
+        w[LOW_AT + k], w[HIGH_AT + k] = -BEYOND_ALL, BEYOND_ALL
+    rotation_low, rotation_high = w[at + AT_ENDS + 5 * OF_ROTATION + 1], w[at + AT_ENDS + 5 * OF_ROTATION + 3]
+    couplings = int(w[at + AT_COUPLED])
+    middle, turns, row = 0.0, 0, at + AT_COUPLED + 1
     for _ in range(couplings):
         if w[row] == AT_TURN:
-            middle += coupled(w, row, w[READ + int(w[row + 1])])
+            middle += coupled(w, row, w[READ_AT + int(w[row + 1])])
             turns += 1
-        row += COUPLING + 2 * int(w[row + 4])
+        row += COUPLING_NUMBERS + 2 * int(w[row + 4])
     shift = math.nan
-    if turns > 0 and not math.isnan(w[READ + ROTATION]):
-        turned = near(w[READ + ROTATION] + offset, middle / turns)
+    if turns > 0 and not math.isnan(w[READ_AT + OF_ROTATION]):
+        turned = near(w[READ_AT + OF_ROTATION] + offset, middle / turns)
         if math.isnan(turned):
             return False
-        shift = w[READ + ROTATION] - turned
-    row = at + COUPLED + 1
+        shift = w[READ_AT + OF_ROTATION] - turned
+    row = at + AT_COUPLED + 1
     for _ in range(couplings):
         k, of = int(w[row]), int(w[row + 1])
-        if free and of == ROTATION:
+        if free and of == OF_ROTATION:
             return False
-        end = coupled(w, row, w[READ + of])
+        end = coupled(w, row, w[READ_AT + of])
         if k == AT_TURN:
-            k, end = ROTATION, end + shift
+            k, end = OF_ROTATION, end + shift
         limit = end + w[row + 2] * w[row + 3]
         if w[row + 2] < 0:
-            w[LOW + k] = worst(w[LOW + k], limit)
-            if k == ROTATION:
+            w[LOW_AT + k] = worst(w[LOW_AT + k], limit)
+            if k == OF_ROTATION:
                 rotation_low = worst(rotation_low, end)
         else:
-            w[HIGH + k] = -worst(-w[HIGH + k], -limit)
-            if k == ROTATION:
+            w[HIGH_AT + k] = -worst(-w[HIGH_AT + k], -limit)
+            if k == OF_ROTATION:
                 rotation_high = -worst(-rotation_high, -end)
-        row += COUPLING + 2 * int(w[row + 4])
-    power = w[at + POWER]
+        row += COUPLING_NUMBERS + 2 * int(w[row + 4])
+    power = w[at + AT_POWER]
     if power > 0:
         used = 0.0
         for k in range(3):
-            centre = w[at + ENDS + 5 * k] if k < ROTATION else (rotation_low + rotation_high) / 2
+            centre = w[at + AT_ENDS + 5 * k] if k < OF_ROTATION else (rotation_low + rotation_high) / 2
             if k > 0:
                 if abs(1.0 - used) < CLEAR_SHARE:
                     return False
-                left = max(1.0 - used, w[at + LEAST]) ** (1.0 / power)
-                w[LOW + k] = centre + (w[LOW + k] - centre) * left
-                w[HIGH + k] = centre + (w[HIGH + k] - centre) * left
-            if k < ROTATION:
-                off = w[READ + k] - centre
-                half = w[at + ENDS + 5 * k + 4] - centre if off >= 0 else centre - w[at + ENDS + 5 * k + 2]
-                used += (abs(off) / (half + w[at + TOLERANCE])) ** power
+                left = max(1.0 - used, w[at + AT_LEAST]) ** (1.0 / power)
+                w[LOW_AT + k] = centre + (w[LOW_AT + k] - centre) * left
+                w[HIGH_AT + k] = centre + (w[HIGH_AT + k] - centre) * left
+            if k < OF_ROTATION:
+                off = w[READ_AT + k] - centre
+                half = (
+                    w[at + AT_ENDS + 5 * k + 4] - centre if off >= 0 else centre - w[at + AT_ENDS + 5 * k + 2]
+                )
+                used += (abs(off) / (half + w[at + AT_TOLERANCE])) ** power
     return True
 
 
 def writing(w: Array, at: int, loose: Any, to: int) -> None:
     """Write down of one writing, whose readings and limits are, how far its worst angle is outside, and which is first.
 
-    The first is `UNSURE` where an angle is at its limit. Angles that are not known, or whose limits are not, do not
+    The first is `NOT_CLEAR` where an angle is at its limit. Angles that are not known, or whose limits are not, do not
     count.
 
     Parameters
@@ -159,18 +161,18 @@ def writing(w: Array, at: int, loose: Any, to: int) -> None:
         The tolerance of the rotation, degrees; infinite where it is not seen.
     to : int
     """
-    most, first, edge = -math.inf, PASSED, False
-    for place in range(int(w[at + JUDGED])):
-        k = int(w[at + JUDGED + 1 + place])
-        low, value, high = w[LOW + k], w[READ + k], w[HIGH + k]
+    most, first, edge = -math.inf, NO_VIOLATION, False
+    for place in range(int(w[at + AT_JUDGED])):
+        k = int(w[at + AT_JUDGED + 1 + place])
+        low, value, high = w[LOW_AT + k], w[READ_AT + k], w[HIGH_AT + k]
         if math.isnan(low + value + high):
             continue
-        beyond = max(low - value, value - high) - (loose if k == ROTATION else w[at + TOLERANCE])
-        edge = edge or abs(beyond) <= CLEAR
-        if beyond > 0 and first == PASSED:
+        beyond = max(low - value, value - high) - (loose if k == OF_ROTATION else w[at + AT_TOLERANCE])
+        edge = edge or abs(beyond) <= CLEAR_DEGREES
+        if beyond > 0 and first == NO_VIOLATION:
             first = place
         most = max(most, beyond)
-    w[WORST + to], w[FIRST + to] = most, UNSURE if edge else first
+    w[WORST_AT + to], w[FIRST_AT + to] = most, NOT_CLEAR if edge else first
 
 
 def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call costs as much as some of its steps
@@ -178,18 +180,18 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
 
     Where the end is not known, nor are rotation and hinge, nor anything that depends on them.
     """
-    rigid, whole = int(w[at + RIGID]), w[at + WHOLE] > 0
+    rigid, whole = int(w[at + AT_RIGID]), w[at + AT_WHOLE] > 0
     if unknown(w, 0, rigid + 2):
-        return PASSED  # nothing is judged
+        return NO_VIOLATION  # nothing is judged
     R = torso(w) if rigid == 4 else hips(w, 0)
     ux, uy, uz = direction(w, rigid, rigid + 1, R)
     level = math.sqrt(ux * ux + uz * uz)
-    if not (level > SINGULAR and w[at + BRANCHES] > 0):
-        return UNSURE
-    alpha, beta = math.atan2(-ux, -uz) * w[at + SIGNS], math.atan2(uy, level) * w[at + SIGNS + 1]
-    flexion, abduction = alpha * DEGREES, beta * DEGREES
+    if not (level > SINGULAR_SINE and w[at + AT_BRANCHES] > 0):
+        return NOT_CLEAR
+    alpha, beta = math.atan2(-ux, -uz) * w[at + AT_SIGNS], math.atan2(uy, level) * w[at + AT_SIGNS + 1]
+    flexion, abduction = alpha * PER_RADIAN, beta * PER_RADIAN
     rotation, hinge, loose, free = math.nan, math.nan, math.inf, False
-    tolerance, unseen = w[at + TOLERANCE], w[at + UNSEEN]
+    tolerance, unseen = w[at + AT_TOLERANCE], w[at + AT_UNSEEN]
     seen = whole and not unknown(w, rigid + 2, rigid + 3)
     if seen:
         lx, ly, lz = direction(w, rigid + 1, rigid + 2, R)
@@ -198,34 +200,34 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
         x, y, z = cosine * lx - sine * lz, level * ly + uy * forward, -uy * ly + level * forward
         bend = math.sqrt(x * x + y * y)
         if not abs(tolerance - unseen * bend) > CLEAR_SHARE * tolerance:
-            return UNSURE
-        hinge = math.atan2(bend, -z) * w[at + SIGNS + HINGE] * DEGREES
-        free = bend <= SINGULAR
+            return NOT_CLEAR
+        hinge = math.atan2(bend, -z) * w[at + AT_SIGNS + OF_HINGE] * PER_RADIAN
+        free = bend <= SINGULAR_SINE
         if unseen * bend > tolerance:
             if free:
-                return UNSURE
+                return NOT_CLEAR
             loose = tolerance / bend
         if not free:
-            rotation = math.atan2(-y, -x) * w[at + SIGNS + ROTATION] * DEGREES
+            rotation = math.atan2(-y, -x) * w[at + AT_SIGNS + OF_ROTATION] * PER_RADIAN
     offset = 0.0
-    if w[at + ARM] > 0:
+    if w[at + AT_ARM] > 0:
         # As elevation_and_plane has it, of the direction itself.
-        ahead, aside, down = -ux * w[at + SIGNS], uy * w[at + SIGNS + 1], -uz
+        ahead, aside, down = -ux * w[at + AT_SIGNS], uy * w[at + AT_SIGNS + 1], -uz
         raised = math.sqrt(ahead * ahead + aside * aside)
-        plane = math.atan2(aside, ahead) * DEGREES
-        if not (raised > SINGULAR and abs(plane - w[at + CUT]) > CLEAR):
-            return UNSURE
-        w[READ + ELEVATION], w[READ + PLANE] = math.atan2(raised, down) * DEGREES, plane
+        plane = math.atan2(aside, ahead) * PER_RADIAN
+        if not (raised > SINGULAR_SINE and abs(plane - w[at + AT_CUT]) > CLEAR_DEGREES):
+            return NOT_CLEAR
+        w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.atan2(raised, down) * PER_RADIAN, plane
         if seen and not free:
             twist = -2.0 * math.atan2(
                 math.sin(alpha / 2) * math.sin(beta / 2), math.cos(alpha / 2) * math.cos(beta / 2)
             )
-            from_side = 90.0 - (plane + 360.0 if plane < w[at + CUT] else plane)
-            offset = twist * DEGREES - (1.0 - down) * from_side
+            from_side = 90.0 - (plane + 360.0 if plane < w[at + AT_CUT] else plane)
+            offset = twist * PER_RADIAN - (1.0 - down) * from_side
     else:
-        w[READ + ELEVATION], w[READ + PLANE] = math.nan, math.nan
+        w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.nan, math.nan
     count = 0
-    for branch in range(int(w[at + BRANCHES])):
+    for branch in range(int(w[at + AT_BRANCHES])):
         if branch == 1:
             flexion, abduction, rotation, offset = (
                 flexion + 180.0,
@@ -233,35 +235,35 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
                 rotation + 180.0,
                 offset + 180.0,
             )
-        w[READ], w[READ + 1] = near(flexion, w[at + ENDS]), near(abduction, w[at + ENDS + 5])
+        w[READ_AT], w[READ_AT + 1] = near(flexion, w[at + AT_ENDS]), near(abduction, w[at + AT_ENDS + 5])
         for side in range(2 if seen else 1):
-            w[READ + ROTATION] = near(rotation + 180.0 * side, w[at + ENDS + 5 * ROTATION])
-            w[READ + HINGE] = near(hinge if side == 0 else -hinge, w[at + ENDS + 5 * HINGE])
-            known = w[READ] + w[READ + 1]
+            w[READ_AT + OF_ROTATION] = near(rotation + 180.0 * side, w[at + AT_ENDS + 5 * OF_ROTATION])
+            w[READ_AT + OF_HINGE] = near(hinge if side == 0 else -hinge, w[at + AT_ENDS + 5 * OF_HINGE])
+            known = w[READ_AT] + w[READ_AT + 1]
             if seen:
-                known += w[READ + HINGE] + (0.0 if free else w[READ + ROTATION])
+                known += w[READ_AT + OF_HINGE] + (0.0 if free else w[READ_AT + OF_ROTATION])
             if math.isnan(known) or not bounds(w, at, offset, free):
-                return UNSURE
+                return NOT_CLEAR
             writing(w, at, loose, count)
-            if w[WORST + count] < -CLEAR:
-                return PASSED
+            if w[WORST_AT + count] < -CLEAR_DEGREES:
+                return NO_VIOLATION
             count += 1
     least = math.inf
     for i in range(count):
-        least = min(least, w[WORST + i])
-    if not least > CLEAR:
-        return UNSURE
-    first = PASSED
+        least = min(least, w[WORST_AT + i])
+    if not least > CLEAR_DEGREES:
+        return NOT_CLEAR
+    first = NO_VIOLATION
     for i in range(count):
-        if w[WORST + i] <= least + CLEAR:
+        if w[WORST_AT + i] <= least + CLEAR_DEGREES:
             # Of writings that are equally far outside the judge may choose any.
-            if first != PASSED and w[FIRST + i] != first:
-                return UNSURE
-            first = int(w[FIRST + i])
+            if first != NO_VIOLATION and w[FIRST_AT + i] != first:
+                return NOT_CLEAR
+            first = int(w[FIRST_AT + i])
     return first
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "near": "",
     "coupled": "",
     "bounds": "(f8[::1], i8, f8, b1)",

@@ -1,8 +1,8 @@
 """Joint ranges as plain loops, for `posekit.compiled.check_kernels`: the formulas are `posekit.body.angles`'s.
 
 The numbers of a check are signs, lower and upper limits of K angles (radians), then its tolerance; what follows is said
-where it is read. Of every branch is written down how far each angle is outside its limits (from `OVER` on, four a
-branch), and how far the branch is (from `COST` on).
+where it is read. Of every branch is written down how far each angle is outside its limits (from `OVER_AT` on, four a
+branch), and how far the branch is (from `COST_AT` on).
 
 The second branch of a ball joint is the first with half a turn more in every angle, the second abduction mirrored: all
 branches come from the same three or four arcus tangents.
@@ -15,22 +15,22 @@ from typing import Any
 
 import numpy as np
 
-from posekit.compiled.frame_kernels import ROOM
+from posekit.compiled.frame_kernels import ROOM_AT
 from posekit.compiled.rigid_kernels import between, hips, torso, unit, unknown
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
-CLEAR = 1e-9
+CLEAR_RADIANS = 1e-9
 """Radians, or what is compared with them, within which nothing is clear: a million times the rounding."""
 
-SINGULAR = 1e-5
+SINGULAR_SINE = 1e-5
 """Sine below which an angle is nearly free, and rounding is not small any more."""
 
 STRAIGHT_COSTS = 7.0
 """Radians that an axial rotation is outside its limits at most, more than a turn."""
 
-OVER, COST, TURN = ROOM, ROOM + 16, ROOM + 20
+OVER_AT, COST_AT, TURN_AT = ROOM_AT, ROOM_AT + 16, ROOM_AT + 20
 """Where branches and two matrices are written down."""
 
 MOST_STEPS = 30
@@ -41,7 +41,7 @@ def outside(angle: Any, lower: Any, upper: Any) -> Any:
     """Return how far an angle is outside its limits, negative inside; NaN where it is unclear by how many turns."""
     off = angle - (lower + upper) / 2
     off = abs(off - 2 * math.pi * np.floor(off / (2 * math.pi) + 0.5))
-    if off > math.pi - CLEAR:
+    if off > math.pi - CLEAR_RADIANS:
         return math.nan
     return off - (upper - lower) / 2
 
@@ -59,32 +59,32 @@ def verdict(w: Array, count: int, width: int, tolerance: Any, loose: Any) -> Any
     """
     least = math.inf
     for b in range(count):
-        if not abs(w[COST + b]) > CLEAR:  # NaN too
-            return UNSURE
-        least = min(least, w[COST + b])
+        if not abs(w[COST_AT + b]) > CLEAR_RADIANS:  # NaN too
+            return NOT_CLEAR
+        least = min(least, w[COST_AT + b])
     if least < 0:
-        return PASSED
+        return NO_VIOLATION
     chosen = -1
     for b in range(count):
-        if abs(w[COST + b] - least - TIED_ANGLES_RADIANS) <= CLEAR:
-            return UNSURE
-        if chosen < 0 and w[COST + b] < least + TIED_ANGLES_RADIANS:
+        if abs(w[COST_AT + b] - least - TIED_ANGLES_RADIANS) <= CLEAR_RADIANS:
+            return NOT_CLEAR
+        if chosen < 0 and w[COST_AT + b] < least + TIED_ANGLES_RADIANS:
             chosen = b
     for k in range(width):
-        beyond = w[OVER + 4 * chosen + k] - (loose if k == 2 else tolerance)
-        if abs(beyond) <= CLEAR:
-            return UNSURE
+        beyond = w[OVER_AT + 4 * chosen + k] - (loose if k == 2 else tolerance)
+        if abs(beyond) <= CLEAR_RADIANS:
+            return NOT_CLEAR
         if beyond > 0:
             return k
-    return PASSED
+    return NO_VIOLATION
 
 
 def ball(R: Any, w: Array, at: int) -> Any:
     """Judge the three angles of a rotation, nine numbers row by row."""
     ux, uy, uz = -R[2], -R[5], -R[8]
     level = ux * ux + uz * uz
-    if not level > SINGULAR * SINGULAR:
-        return UNSURE
+    if not level > SINGULAR_SINE * SINGULAR_SINE:
+        return NOT_CLEAR
     level = math.sqrt(level)
     cosine, sine = -uz / level, -ux / level
     forward = sine * R[0] + cosine * R[6]
@@ -96,10 +96,10 @@ def ball(R: Any, w: Array, at: int) -> Any:
         first = outside(alpha * w[at], w[at + 3], w[at + 6])
         second = outside(beta * w[at + 1], w[at + 4], w[at + 7])
         third = outside(gamma * w[at + 2], w[at + 5], w[at + 8])
-        w[OVER + 4 * b], w[OVER + 4 * b + 1], w[OVER + 4 * b + 2] = first, second, third
-        w[COST + b] = worst(worst(first, second), third)
-        if w[COST + b] < -CLEAR:
-            return PASSED if b == 0 or abs(w[COST]) > CLEAR else UNSURE
+        w[OVER_AT + 4 * b], w[OVER_AT + 4 * b + 1], w[OVER_AT + 4 * b + 2] = first, second, third
+        w[COST_AT + b] = worst(worst(first, second), third)
+        if w[COST_AT + b] < -CLEAR_RADIANS:
+            return NO_VIOLATION if b == 0 or abs(w[COST_AT]) > CLEAR_RADIANS else NOT_CLEAR
     return verdict(w, 2, 3, w[at + 9], w[at + 9])
 
 
@@ -128,12 +128,12 @@ def transposed(A: Any, B: Any) -> Any:
 def pelvis(w: Array, at: int) -> Any:
     """Screen the pelvis: the torso's four points, then both hips."""
     if unknown(w, 0, 6):
-        return PASSED
+        return NO_VIOLATION
     return ball(transposed(torso(w), hips(w, 3)), w, at)
 
 
 def polar(w: Array) -> Any:
-    """Turn the matrix at `TURN` into the rotation nearest to it, and say whether that is clear.
+    """Turn the matrix at `TURN_AT` into the rotation nearest to it, and say whether that is clear.
 
     By Newton's iteration (Higham 1986). Not where the determinant is negative or small: then the nearest orthogonal
     matrix is a reflection, or unclear.
@@ -141,64 +141,67 @@ def polar(w: Array) -> Any:
     size = 0.0
     for i in range(3):
         for j in range(3):
-            size += w[TURN + 3 * i + j] * w[TURN + 3 * i + j]
+            size += w[TURN_AT + 3 * i + j] * w[TURN_AT + 3 * i + j]
     size = math.sqrt(size)
     if not (size > 0 and size < math.inf):
         return False
     for i in range(3):
         for j in range(3):
-            w[TURN + 3 * i + j] = w[TURN + 3 * i + j] / size * math.sqrt(3.0)
+            w[TURN_AT + 3 * i + j] = w[TURN_AT + 3 * i + j] / size * math.sqrt(3.0)
     for step in range(MOST_STEPS):
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3
             for j in range(3):
                 c, d = (j + 1) % 3, (j + 2) % 3
-                w[TURN + 9 + 3 * i + j] = (
-                    w[TURN + 3 * a + c] * w[TURN + 3 * b + d] - w[TURN + 3 * a + d] * w[TURN + 3 * b + c]
+                w[TURN_AT + 9 + 3 * i + j] = (
+                    w[TURN_AT + 3 * a + c] * w[TURN_AT + 3 * b + d]
+                    - w[TURN_AT + 3 * a + d] * w[TURN_AT + 3 * b + c]
                 )
-        determinant = w[TURN] * w[TURN + 9] + w[TURN + 1] * w[TURN + 10] + w[TURN + 2] * w[TURN + 11]
+        determinant = (
+            w[TURN_AT] * w[TURN_AT + 9] + w[TURN_AT + 1] * w[TURN_AT + 10] + w[TURN_AT + 2] * w[TURN_AT + 11]
+        )
         if not determinant > (1e-5 if step == 0 else 0.0):
             return False
         change = 0.0
         for i in range(3):
             for j in range(3):
-                new = (w[TURN + 3 * i + j] + w[TURN + 9 + 3 * i + j] / determinant) / 2
-                change = max(change, abs(new - w[TURN + 3 * i + j]))
-                w[TURN + 3 * i + j] = new
+                new = (w[TURN_AT + 3 * i + j] + w[TURN_AT + 9 + 3 * i + j] / determinant) / 2
+                change = max(change, abs(new - w[TURN_AT + 3 * i + j]))
+                w[TURN_AT + 3 * i + j] = new
         if change < 1e-13:
             return True
     return False
 
 
 def laid_head(w: Array, at: int) -> Any:
-    """Lay the head onto the five points after the torso's four, and say whether that is clear: its frame is at `TURN`.
+    """Lay the head onto the five points after the torso's four: its frame is at `TURN_AT`. Return whether it is clear.
 
     From some place on are the offsets of its points from the neck.
     """
     for i in range(3):
         for j in range(3):
-            w[TURN + 3 * i + j] = 0.0
+            w[TURN_AT + 3 * i + j] = 0.0
             for k in range(5):
-                w[TURN + 3 * i + j] += (w[3 * (4 + k) + i] - w[i]) * w[at + 3 * k + j]
+                w[TURN_AT + 3 * i + j] += (w[3 * (4 + k) + i] - w[i]) * w[at + 3 * k + j]
     return polar(w)
 
 
 def neck(w: Array, at: int) -> Any:
     """Screen the neck: the torso's four points, then the head's five, whose offsets follow the tolerance."""
     if unknown(w, 0, 9):
-        return PASSED
+        return NO_VIOLATION
     if not laid_head(w, at + 10):
-        return UNSURE
+        return NOT_CLEAR
     head = (
-        w[TURN],
-        w[TURN + 1],
-        w[TURN + 2],
-        w[TURN + 3],
-        w[TURN + 4],
-        w[TURN + 5],
-        w[TURN + 6],
-        w[TURN + 7],
-        w[TURN + 8],
+        w[TURN_AT],
+        w[TURN_AT + 1],
+        w[TURN_AT + 2],
+        w[TURN_AT + 3],
+        w[TURN_AT + 4],
+        w[TURN_AT + 5],
+        w[TURN_AT + 6],
+        w[TURN_AT + 7],
+        w[TURN_AT + 8],
     )
     return ball(transposed(torso(w), head), w, at)
 
@@ -219,12 +222,12 @@ def limb(w: Array, at: int) -> Any:
     """
     rigid, whole = int(w[at + 14]), w[at + 15] > 0
     if unknown(w, 0, rigid + 2):
-        return PASSED  # nothing is judged
+        return NO_VIOLATION  # nothing is judged
     R = torso(w) if rigid == 4 else hips(w, 0)
     ux, uy, uz = direction(w, rigid, rigid + 1, R)
     level = ux * ux + uz * uz
-    if not level > SINGULAR * SINGULAR:
-        return UNSURE
+    if not level > SINGULAR_SINE * SINGULAR_SINE:
+        return NOT_CLEAR
     level = math.sqrt(level)
     tolerance, unseen = w[at + 12], w[at + 13]
     alpha, beta = math.atan2(-ux, -uz), math.atan2(uy, level)
@@ -233,8 +236,8 @@ def limb(w: Array, at: int) -> Any:
     first_turned = outside((alpha + math.pi) * w[at], w[at + 4], w[at + 8])
     second_turned = outside((math.pi - beta) * w[at + 1], w[at + 5], w[at + 9])
     if not whole or unknown(w, rigid + 2, rigid + 3):
-        w[OVER], w[OVER + 1], w[COST] = first, second, worst(first, second)
-        w[OVER + 4], w[OVER + 5], w[COST + 1] = (
+        w[OVER_AT], w[OVER_AT + 1], w[COST_AT] = first, second, worst(first, second)
+        w[OVER_AT + 4], w[OVER_AT + 5], w[COST_AT + 1] = (
             first_turned,
             second_turned,
             worst(first_turned, second_turned),
@@ -250,41 +253,43 @@ def limb(w: Array, at: int) -> Any:
     bent = outside(hinge * w[at + 3], w[at + 7], w[at + 11])
     back = outside(-hinge * w[at + 3], w[at + 7], w[at + 11])
     straight = wx * wx + wy * wy + wz * wz
-    if not straight > SINGULAR * SINGULAR:
+    if not straight > SINGULAR_SINE * SINGULAR_SINE:
         # The axial rotation is as good as free, and not judged. It costs a branch next to nothing, and so the one
         # that is chosen is hardly worse than the best without it.
-        loose = math.sqrt(straight) + CLEAR
+        loose = math.sqrt(straight) + CLEAR_RADIANS
         if math.isnan(first + second + first_turned + second_turned + bent + back):
-            return UNSURE
+            return NOT_CLEAR
         least = min(max(first, second), max(first_turned, second_turned))
         least = max(least, min(bent, back), 0.0) + STRAIGHT_COSTS * loose + 2 * TIED_ANGLES_RADIANS
-        clear = tolerance > unseen * loose * (1 + CLEAR) and least < tolerance - CLEAR
-        return PASSED if clear else UNSURE
+        clear = tolerance > unseen * loose * (1 + CLEAR_RADIANS) and least < tolerance - CLEAR_RADIANS
+        return NO_VIOLATION if clear else NOT_CLEAR
     loose = tolerance / bend
-    if abs(loose - unseen) <= CLEAR * loose:
-        return UNSURE
+    if abs(loose - unseen) <= CLEAR_RADIANS * loose:
+        return NOT_CLEAR
     if loose > unseen:
         loose = math.inf
     gamma = math.atan2(-y, -x)
     third = outside(gamma * w[at + 2], w[at + 6], w[at + 10])
     third_turned = outside((gamma + math.pi) * w[at + 2], w[at + 6], w[at + 10])
     for b in range(4):
-        w[OVER + 4 * b], w[OVER + 4 * b + 1] = (first, second) if b < 2 else (first_turned, second_turned)
-        w[OVER + 4 * b + 2] = third_turned if 0 < b < 3 else third
-        w[OVER + 4 * b + 3] = bent if b % 2 == 0 else back
-        # The axial rotation counts by how far it turns the lower segment.
-        w[COST + b] = worst(
-            worst(worst(w[OVER + 4 * b], w[OVER + 4 * b + 1]), w[OVER + 4 * b + 2] * bend),
-            w[OVER + 4 * b + 3],
+        w[OVER_AT + 4 * b], w[OVER_AT + 4 * b + 1] = (
+            (first, second) if b < 2 else (first_turned, second_turned)
         )
-        if not abs(w[COST + b]) > CLEAR:
-            return UNSURE
-        if w[COST + b] < 0:
-            return PASSED
+        w[OVER_AT + 4 * b + 2] = third_turned if 0 < b < 3 else third
+        w[OVER_AT + 4 * b + 3] = bent if b % 2 == 0 else back
+        # The axial rotation counts by how far it turns the lower segment.
+        w[COST_AT + b] = worst(
+            worst(worst(w[OVER_AT + 4 * b], w[OVER_AT + 4 * b + 1]), w[OVER_AT + 4 * b + 2] * bend),
+            w[OVER_AT + 4 * b + 3],
+        )
+        if not abs(w[COST_AT + b]) > CLEAR_RADIANS:
+            return NOT_CLEAR
+        if w[COST_AT + b] < 0:
+            return NO_VIOLATION
     return verdict(w, 4, 4, tolerance, loose)
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "outside": "",
     "worst": "",
     "verdict": "",

@@ -16,7 +16,7 @@ from typing import Any, Final
 from posekit.compiled import anatomical_kernels, angle_kernels, projected_kernels, rigid_kernels
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
-from posekit.compiled.frame_kernels import PRESUMED
+from posekit.compiled.frame_kernels import PRESUMED_AT
 from posekit.compiled.projected_kernels import head_plane, hip_plane, projected_ball, projected_hinge
 from posekit.compiled.rigid_kernels import (
     distance,
@@ -26,26 +26,26 @@ from posekit.compiled.rigid_kernels import (
     unit,
     unknown,
 )
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
-DISTANCE: Final = 0
-PLACEMENT: Final = 1
-PELVIS: Final = 2
-NECK: Final = 3
-LIMB: Final = 4
-CAPSULES: Final = 5
-ANATOMICAL: Final = 6
-PROJECTED_BALL: Final = 7
-PROJECTED_HINGE: Final = 8
-HIP_PLANE: Final = 9
-HEAD_PLANE: Final = 10
+OF_DISTANCE: Final = 0
+OF_PLACEMENT: Final = 1
+OF_PELVIS: Final = 2
+OF_NECK: Final = 3
+OF_LIMB: Final = 4
+OF_CAPSULES: Final = 5
+OF_ANATOMICAL_LIMB: Final = 6
+OF_PROJECTED_BALL: Final = 7
+OF_PROJECTED_HINGE: Final = 8
+OF_HIP_PLANE: Final = 9
+OF_HEAD_PLANE: Final = 10
 """Kinds of screens."""
 
 CLEAR_GAP = 1e-6
 """Metres between two capsules from which they are clear of contact: a thousand times what the judge cares for."""
 
-PLACED = 14
+CAPSULE_NUMBERS = 14
 """Numbers that say where two capsules are."""
 
 
@@ -82,7 +82,7 @@ def capsules(w: Array, at: int) -> Any:
     starts_a, ends_a, starts_b, ends_b = int(w[at + 5]), int(w[at + 6]), int(w[at + 7]), int(w[at + 8])
     second = starts_a + ends_a
     if unknown(w, 0, second + starts_b + ends_b):
-        return PASSED
+        return NO_VIOLATION
     center_a, half_a, center_b, half_b, reach = w[at], w[at + 1], w[at + 2], w[at + 3], w[at + 4]
     far, near, deep = half_a + half_b + reach + CLEAR_GAP, reach + CLEAR_GAP, reach - CLEAR_GAP
     sx, sy, sz = mean(w, 0, starts_a)
@@ -96,9 +96,9 @@ def capsules(w: Array, at: int) -> Any:
     gx, gy, gz = tx - sx, ty - sy, tz - sz
     squared = gx * gx + gy * gy + gz * gz
     if not squared < math.inf:
-        return UNSURE
+        return NOT_CLEAR
     if far > 0 and squared > far * far:
-        return PASSED
+        return NO_VIOLATION
     ax, ay, az, bx, by, bz = half_a * ux, half_a * uy, half_a * uz, half_b * vx, half_b * vy, half_b * vz
     aa, bb = half_a * half_a, half_b * half_b
     ab = ax * bx + ay * by + az * bz
@@ -115,13 +115,13 @@ def capsules(w: Array, at: int) -> Any:
         least = min(least, apart(gx, gy, gz, ax, ay, az, clamp((ag + end * ab) / aa), bx, by, bz, end))
         least = min(least, apart(gx, gy, gz, ax, ay, az, end, bx, by, bz, clamp((end * ab - bg) / bb)))
     if near > 0 and least > near * near:
-        return PASSED
+        return NO_VIOLATION
     if not (deep > 0 and least < deep * deep):
-        return UNSURE
-    w[PRESUMED], w[PRESUMED + 1], w[PRESUMED + 2] = sx, sy, sz
-    w[PRESUMED + 7], w[PRESUMED + 8], w[PRESUMED + 9] = tx, ty, tz
-    onto(ux, uy, uz, w, PRESUMED + 3)
-    onto(vx, vy, vz, w, PRESUMED + 10)
+        return NOT_CLEAR
+    w[PRESUMED_AT], w[PRESUMED_AT + 1], w[PRESUMED_AT + 2] = sx, sy, sz
+    w[PRESUMED_AT + 7], w[PRESUMED_AT + 8], w[PRESUMED_AT + 9] = tx, ty, tz
+    onto(ux, uy, uz, w, PRESUMED_AT + 3)
+    onto(vx, vy, vz, w, PRESUMED_AT + 10)
     return 0
 
 
@@ -135,35 +135,35 @@ def onto(x: Any, y: Any, z: Any, q: Array, at: int) -> None:
 
 def screen(kind: int, w: Array, at: int) -> Any:
     """Screen one posture by one check, of a kind; see `posekit.compiled.frame_kernels.screen`."""
-    if kind == CAPSULES:
+    if kind == OF_CAPSULES:
         return capsules(w, at)
-    if kind == LIMB:
+    if kind == OF_LIMB:
         return limb(w, at)
-    if kind == DISTANCE:
+    if kind == OF_DISTANCE:
         return distance(w, at)
-    if kind == ANATOMICAL:
+    if kind == OF_ANATOMICAL_LIMB:
         return anatomical(w, at)
-    if kind == PLACEMENT:
+    if kind == OF_PLACEMENT:
         return placement(w, at)
-    if kind == PROJECTED_BALL:
+    if kind == OF_PROJECTED_BALL:
         return projected_ball(w, at)
-    if kind == PROJECTED_HINGE:
+    if kind == OF_PROJECTED_HINGE:
         return projected_hinge(w, at)
-    if kind == HIP_PLANE:
+    if kind == OF_HIP_PLANE:
         return hip_plane(w, at)
-    if kind == HEAD_PLANE:
+    if kind == OF_HEAD_PLANE:
         return head_plane(w, at)
-    if kind == PELVIS:
+    if kind == OF_PELVIS:
         return pelvis(w, at)
-    if kind == NECK:
+    if kind == OF_NECK:
         return neck(w, at)
-    return UNSURE
+    return NOT_CLEAR
 
 
-PARTS = (rigid_kernels, angle_kernels, anatomical_kernels, projected_kernels)
+KERNEL_PARTS = (rigid_kernels, angle_kernels, anatomical_kernels, projected_kernels)
 """Other modules whose kernels are compiled with these."""
 
-COMPILED = {
+COMPILED_TYPES = {
     "torso": "(f8[::1],)",
     "hips": "(f8[::1], i8)",
     "distance": "(f8[::1], i8)",

@@ -1,8 +1,8 @@
 """Loops that Numba compiles where it is installed (the extra ``fast``), once it pays.
 
-A module of kernels is plain Python on plain arrays, with the functions to compile listed in `COMPILED`, each with the
-types it takes (none: it is compiled into those that call it), and those of other modules in `PARTS`. They are compiled
-as copies that know each other; the module itself needs no Numba. Machine code is kept on disk in Numba's own
+A module of kernels is plain Python on plain arrays, with the functions to compile listed in `COMPILED_TYPES`, each with
+the types it takes (none: it is compiled into those that call it), and those of other modules in `KERNEL_PARTS`. They are
+compiled as copies that know each other; the module itself needs no Numba. Machine code is kept on disk in Numba's own
 cache, under names that carry a hash of the source and its constants: old code is never run for new sources.
 
 What runs compiled gives what runs uncompiled, so it may be switched at any moment. Importing Numba and loading the code
@@ -81,7 +81,7 @@ def path(chosen: Path_) -> Iterator[None]:
 
 
 def compiled(module: ModuleType, parts: ModuleType | None = None) -> Any:
-    """Return a module's kernels, compiled if Numba is there: an object with a function for each of `COMPILED`.
+    """Return a module's kernels, compiled if Numba is there: an object with a function for each of `COMPILED_TYPES`.
 
     Functions of `parts` take the place of those of the same name: a module may leave some to be filled in.
     """
@@ -139,13 +139,13 @@ def _linked(
         made[name] = make(copy, types)
         for names in spaces.values():
             names[name] = made[name]
-    return SimpleNamespace(**{name: made[name] for name, types in module.COMPILED.items() if types})
+    return SimpleNamespace(**{name: made[name] for name, types in module.COMPILED_TYPES.items() if types})
 
 
 def _of(module: ModuleType) -> dict[str, tuple[FunctionType, str]]:
-    """Return the functions to compile, with the types they take: those of the modules in `PARTS` first."""
-    wanted = {name: each for part in getattr(module, "PARTS", ()) for name, each in _of(part).items()}
-    return wanted | {name: (vars(module)[name], types) for name, types in module.COMPILED.items()}
+    """Return the functions to compile, with the types they take: those of the modules in `KERNEL_PARTS` first."""
+    wanted = {name: each for part in getattr(module, "KERNEL_PARTS", ()) for name, each in _of(part).items()}
+    return wanted | {name: (vars(module)[name], types) for name, types in module.COMPILED_TYPES.items()}
 
 
 @cache

@@ -14,23 +14,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled.tree_kernels import GROUP, LOST, OF_FRAME, OPEN, PLACE, Bytes, Ints, lift
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.tree_kernels import (
+    CODE_OF_LOST,
+    GROUP_COLUMN,
+    IS_OPEN,
+    OF_FRAME,
+    PLACE_COLUMN,
+    Bytes,
+    Ints,
+    lift,
+)
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
-CODE, PATHS = 0, 1
+CODE_COLUMN, PATH_COLUMNS = 0, 1
 """Columns of a node's row."""
 
-REASONS = 4
+UNJUDGED_STATES = 4
 """States of nodes that no check judges: at every level the first groups, before those of the checks."""
 
-SHIFT, OFFSET = 8, 2
+FRAME_SHIFT, PLACE_OFFSET = 8, 2
 """A verdict that is remembered: the number of the frame, shifted, and the place with an offset."""
 
-SURE, NOT_SURE, FULL = range(3)
+FRAME_GROWN, FRAME_LEFT, FRAME_FULL = range(3)
 """What becomes of a frame: it is grown, it is left, or there is no room for it."""
 
-ALIVE, GONE, ASKED, UNKNOWN = range(4)
+N_ALIVE, N_LOST, N_PRESUMED, N_UNSURE = range(4)
 """What rows are counted of: leaves, lost nodes, what is presumed, and frames that are left."""
 
 Table = NDArray[np.int64]
@@ -39,24 +48,24 @@ Table = NDArray[np.int64]
 MAX_POINTS, MAX_PRESUMED = 16, 16
 """Points that a rule may read, and numbers that it may presume."""
 
-PRESUMED, ROOM, NUMBERS = 48, 64, 128
+PRESUMED_AT, ROOM_AT, NUMBERS_AT = 48, 64, 128
 """Where in its one array a screen writes what is presumed, has room for what it needs, and where numbers begin."""
 
 
 def screen(kind: int, w: Array, at: int) -> Any:
-    """Tell what is clear in one posture: the first place violated, `PASSED` or `UNSURE`.
+    """Tell what is clear in one posture: the first place violated, `NO_VIOLATION` or `NOT_CLEAR`.
 
     Parameters
     ----------
     kind : int
         As the rule says.
     w : array
-        The posture's points, x, y, z each, metres; what is to be confirmed is put to `PRESUMED`; from `ROOM` to before
-        `NUMBERS` all may be overwritten.
+        The posture's points, x, y, z each, metres; what is to be confirmed is put to `PRESUMED_AT`; from `ROOM_AT` to
+        before `NUMBERS_AT` all may be overwritten.
     at : int
         Where the numbers of the rule begin.
     """
-    return UNSURE
+    return NOT_CLEAR
 
 
 def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) -> Any:
@@ -67,7 +76,7 @@ def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) 
     kind : int
     points : array (N, P, 3)
     w : array
-        As `screen` takes it, with the rule's numbers from `NUMBERS` on.
+        As `screen` takes it, with the rule's numbers from `NUMBERS_AT` on.
     places : int array (N,)
         Filled.
     presumed : array (N, W)
@@ -83,10 +92,10 @@ def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) 
         for p in range(points.shape[1]):
             for k in range(3):
                 w[3 * p + k] = points[i, p, k]
-        places[i] = screen(kind, w, NUMBERS)
+        places[i] = screen(kind, w, NUMBERS_AT)
         if places[i] >= 0:
             for k in range(presumed.shape[1]):
-                presumed[count, k] = w[PRESUMED + k]
+                presumed[count, k] = w[PRESUMED_AT + k]
             count += 1
     return count
 
@@ -171,23 +180,23 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
         The first frame for which there was no room; `end` if there was.
     """
     n_joints = parents.shape[0]
-    wide = PATHS + n_joints
+    wide = PATH_COLUMNS + n_joints
     half = nodes.shape[0] // 2
-    n_alive, n_lost, n_presumed, n_unsure = used[ALIVE], used[GONE], used[ASKED], used[UNKNOWN]
+    n_alive, n_lost, n_presumed, n_unsure = used[N_ALIVE], used[N_LOST], used[N_PRESUMED], used[N_UNSURE]
     for f in range(begin, end):
         if lifts:
             lift(f, f + 1, rays, unseen, parents, first, lengths, tolerance, table, states, reach)
-        here, there, status = 0, half, SURE
+        here, there, status = 0, half, FRAME_GROWN
         stem, count = starts[f - base], starts[f - base + 1] - starts[f - base]
         if count * wide > half:
             return f
         for i in range(count):
             node, code = here + i * wide, stems[stem + i]
-            nodes[node + CODE], nodes[node + PATHS] = code, 0
+            nodes[node + CODE_COLUMN], nodes[node + PATH_COLUMNS] = code, 0
             for k in range(1, n_joints):
-                nodes[node + PATHS + k] = 0
+                nodes[node + PATH_COLUMNS + k] = 0
                 if k <= span[0]:
-                    nodes[node + PATHS + k] = nodes[node + PATHS + parents[k]] << 1 | (
+                    nodes[node + PATH_COLUMNS + k] = nodes[node + PATH_COLUMNS + parents[k]] << 1 | (
                         code >> (span[0] - k) & 1
                     )
         for level in range(span[0], span[2] + 1):
@@ -197,84 +206,84 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
             last_check = span[3] if level == span[2] else levels[level + 1]
             many = count << fork
             if many * wide > half or n_lost + many > lost.shape[0]:
-                status = FULL
+                status = FRAME_FULL
                 break
             child, kept = there, 0
-            parent = PATHS + parents[level]
+            parent = PATH_COLUMNS + parents[level]
             for i in range(many):
                 node, side = here + (i >> fork) * wide, i & 1
-                path, code, state = 0, nodes[node + CODE], OPEN
+                path, code, state = 0, nodes[node + CODE_COLUMN], IS_OPEN
                 if not begins:
                     path, code = nodes[node + parent] << 1 | side, code << 1 | side
                     state = states[f, first[level] + path]
-                where, group = PASSED, 0
-                if state != OPEN:
-                    where, group = 0, (level - 1) * REASONS + state - 1
+                where, group = NO_VIOLATION, 0
+                if state != IS_OPEN:
+                    where, group = 0, (level - 1) * UNJUDGED_STATES + state - 1
                 else:
-                    for k in range(PATHS, PATHS + level + 1):
+                    for k in range(PATH_COLUMNS, PATH_COLUMNS + level + 1):
                         nodes[child + k] = nodes[node + k]
-                    nodes[child + CODE] = code
+                    nodes[child + CODE_COLUMN] = code
                     if not begins:
-                        nodes[child + PATHS + level] = path
+                        nodes[child + PATH_COLUMNS + level] = path
                     for c in range(first_check, last_check):
                         choice = checks[c, 4]
                         for s in range(checks[c, 2]):
                             tip = nodes[child + tips[c, s, 0]]
                             choice += (tip & tips[c, s, 1]) << tips[c, s, 2]
-                        if memory[choice] >> SHIFT == f - begin + 1:
-                            where = (memory[choice] & ((1 << SHIFT) - 1)) - OFFSET
+                        if memory[choice] >> FRAME_SHIFT == f - begin + 1:
+                            where = (memory[choice] & ((1 << FRAME_SHIFT) - 1)) - PLACE_OFFSET
                         else:
                             for p in range(checks[c, 3]):
                                 column = places[c, p, 1]
                                 if places[c, p, 0] >= 0:
-                                    column += nodes[child + PATHS + places[c, p, 0]]
+                                    column += nodes[child + PATH_COLUMNS + places[c, p, 0]]
                                 for k in range(3):
                                     w[3 * p + k] = table[f, column, k]
                             where = screen(checks[c, 0], w, checks[c, 5])
-                            memory[choice] = (f - begin + 1) << SHIFT | (where + OFFSET)
+                            memory[choice] = (f - begin + 1) << FRAME_SHIFT | (where + PLACE_OFFSET)
                             if where >= 0 and checks[c, 1] > 0:
                                 if n_presumed == presumed.shape[0]:
-                                    status = FULL
+                                    status = FRAME_FULL
                                     break
                                 for k in range(checks[c, 1]):
-                                    presumed[n_presumed, k] = w[PRESUMED + k]
+                                    presumed[n_presumed, k] = w[PRESUMED_AT + k]
                                 asked[n_presumed] = c
                                 n_presumed += 1
-                            elif where == UNSURE:
-                                status = NOT_SURE
+                            elif where == NOT_CLEAR:
+                                status = FRAME_LEFT
                                 break
                         if where >= 0:
-                            group = (n_joints - 1) * REASONS + checks[c, 6]
+                            group = (n_joints - 1) * UNJUDGED_STATES + checks[c, 6]
                             break
-                if status != SURE:
+                if status != FRAME_GROWN:
                     break
                 if where >= 0:
-                    lost[n_lost, GROUP], lost[n_lost, OF_FRAME] = group, f
-                    lost[n_lost, LOST], lost[n_lost, PLACE] = code, where
+                    lost[n_lost, GROUP_COLUMN], lost[n_lost, OF_FRAME] = group, f
+                    lost[n_lost, CODE_OF_LOST], lost[n_lost, PLACE_COLUMN] = code, where
                     n_lost += 1
                 else:
                     child += wide
                     kept += 1
-            if status != SURE:
+            if status != FRAME_GROWN:
                 break
             here, there, count = there, here, kept
-        if status == SURE and n_alive + count > alive.shape[0]:
-            status = FULL
-        if status == FULL:
+        if status == FRAME_GROWN and n_alive + count > alive.shape[0]:
+            status = FRAME_FULL
+        if status == FRAME_FULL:
             return f
-        if status == NOT_SURE:
+        if status == FRAME_LEFT:
             unsure[n_unsure] = f
             n_unsure += 1
-            n_lost, n_presumed = used[GONE], used[ASKED]
+            n_lost, n_presumed = used[N_LOST], used[N_PRESUMED]
         else:
             for i in range(count):
-                alive[n_alive, 0], alive[n_alive, 1] = f, nodes[here + i * wide + CODE]
+                alive[n_alive, 0], alive[n_alive, 1] = f, nodes[here + i * wide + CODE_COLUMN]
                 n_alive += 1
-        used[ALIVE], used[GONE], used[ASKED], used[UNKNOWN] = n_alive, n_lost, n_presumed, n_unsure
+        used[N_ALIVE], used[N_LOST], used[N_PRESUMED], used[N_UNSURE] = n_alive, n_lost, n_presumed, n_unsure
     return end
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "lift": "",
     "screen": "",
     "screens": "(i8, f8[:, :, ::1], f8[::1], i1[::1], f8[:, ::1])",

@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 
-TIGHT = 1e-9
+TIGHT_COST = 1e-9
 """Cost by which a bound may be off by rounding."""
 
 
-X, Y, Z, WEIGHT, VARIANCE, REACH, GIVE = range(7)
+AT_X, AT_Y, AT_Z, AT_WEIGHT, AT_VARIANCE, AT_REACH, AT_GIVE = range(7)
 """Columns of an end's channel: where it is, one over the square of the time since, its variance, walls, their give."""
 
 TO_VARIANCE, TO_GIVE, TO_KNOWN = 3, 4, 5
@@ -53,16 +53,16 @@ def step(ends: Array, to: Array, i: int, j: int, scale: Array, nu: float, walls:
     for c in range(ends.shape[1]):
         if to[j, c, TO_KNOWN] == 0.0 or (walls == 0.0 and scale[c] == 0.0):
             continue
-        x = to[j, c, X] - ends[i, c, X]
-        y = to[j, c, Y] - ends[i, c, Y]
-        z = to[j, c, Z] - ends[i, c, Z]
+        x = to[j, c, AT_X] - ends[i, c, AT_X]
+        y = to[j, c, AT_Y] - ends[i, c, AT_Y]
+        z = to[j, c, AT_Z] - ends[i, c, AT_Z]
         squared = x * x + y * y + z * z
         if walls > 0.0:
-            reach = ends[i, c, REACH] + ends[i, c, GIVE] + to[j, c, TO_GIVE]
+            reach = ends[i, c, AT_REACH] + ends[i, c, AT_GIVE] + to[j, c, TO_GIVE]
             if squared > reach * reach * (1 + 1e-12) + 1e-12:
                 return -1.0
-        weight = ends[i, c, WEIGHT] * scale[c]
-        wide = 1.0 + weight * (ends[i, c, VARIANCE] + to[j, c, TO_VARIANCE])
+        weight = ends[i, c, AT_WEIGHT] * scale[c]
+        wide = 1.0 + weight * (ends[i, c, AT_VARIANCE] + to[j, c, TO_VARIANCE])
         H *= wide
         G *= wide + weight * per * squared
         if G > most * H:
@@ -77,9 +77,9 @@ def turn(heading: Array, to: Array, i: int, j: int, joints: Ints, nu: float, mos
         c = joints[k]
         if to[j, c, TO_KNOWN] == 0.0:
             continue
-        x = to[j, c, X] - heading[i, k, X]
-        y = to[j, c, Y] - heading[i, k, Y]
-        z = to[j, c, Z] - heading[i, k, Z]
+        x = to[j, c, AT_X] - heading[i, k, AT_X]
+        y = to[j, c, AT_Y] - heading[i, k, AT_Y]
+        z = to[j, c, AT_Z] - heading[i, k, AT_Z]
         weight = heading[i, k, TURN_WEIGHT]
         wide = 1.0 + heading[i, k, TURN_NOISE] + weight * to[j, c, TO_VARIANCE]
         H *= wide
@@ -176,11 +176,11 @@ def arrive(  # noqa: PLR0912 -- calls with many arrays cost more than what they 
     for g in order:
         for j in range(len(own)):
             kind = 1 if fresh[g] or new[j] else 0
-            limit = most[kind] + TIGHT
+            limit = most[kind] + TIGHT_COST
             low = floor[g] + to_floor[j]
             if low > limit:
                 left = True
-                if low > max(most[0], most[1]) + TIGHT:
+                if low > max(most[0], most[1]) + TIGHT_COST:
                     break
                 continue
             found, which, stepped, wall = math.inf, -1, 0.0, True
@@ -223,7 +223,7 @@ def arrive(  # noqa: PLR0912 -- calls with many arrays cost more than what they 
 
 
 F1, F2, F3, I1, B1 = "f8[::1]", "f8[:, ::1]", "f8[:, :, ::1]", "i8[::1]", "b1[::1]"
-COMPILED = {
+COMPILED_TYPES = {
     "lay": f"({I1}, {I1}, {F3}, {F2}, {F3}, {F3})",
     "step": "",
     "turn": "",

@@ -13,9 +13,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from posekit.compiled.angle_kernels import TURN, laid_head
+from posekit.compiled.angle_kernels import TURN_AT, laid_head
 from posekit.compiled.rigid_kernels import between, torso, unit, unknown
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
 CLEAR_ANGLE = 1e-8
@@ -29,7 +29,7 @@ SHORTEST_PART = 1e-5
 
 IN_DEGREES = 180.0 / math.pi
 
-OUTSIDE, INSIDE, UNCLEAR = 1, 0, -1
+IS_OUTSIDE, IS_INSIDE, IS_UNCLEAR = 1, 0, -1
 """What is said of one place."""
 
 
@@ -56,22 +56,22 @@ def bounded(angle: Any, clear: Any, lower: Any, upper: Any, tolerance: Any) -> A
     """Compare an angle that is known to so many degrees with its bounds."""
     beyond = max(lower - angle, angle - upper) - tolerance
     if not abs(beyond) > clear:
-        return UNCLEAR
-    return OUTSIDE if beyond > 0 else INSIDE
+        return IS_UNCLEAR
+    return IS_OUTSIDE if beyond > 0 else IS_INSIDE
 
 
 def in_plane(x: Any, y: Any, size: Any, sign: Any, w: Array, at: int, lower: Any, upper: Any) -> Any:
     """Judge the angle from the second axis of a plane towards the first, times a sign; `size` is the whole vector's."""
     across = math.sqrt(x * x + y * y)
     if not abs(across - w[at + 1] * size) > CLEAR_PART * size:  # NaN too
-        return UNCLEAR
+        return IS_UNCLEAR
     if across < w[at + 1] * size:
-        return INSIDE  # it has no direction, and is not judged
+        return IS_INSIDE  # it has no direction, and is not judged
     if not across > SHORTEST_PART * size:
-        return UNCLEAR
+        return IS_UNCLEAR
     angle, clear = IN_DEGREES * math.atan2(x, y), CLEAR_ANGLE * size / across
     if abs(angle - w[at + 2]) <= clear:
-        return UNCLEAR
+        return IS_UNCLEAR
     if angle < w[at + 2]:
         angle += 360.0
     return bounded(sign * angle, clear, lower, upper, w[at])
@@ -83,17 +83,17 @@ def projected_ball(w: Array, at: int) -> Any:
     The numbers go on with 1 on the left and -1 on the right, the bounds of flexion and those of abduction.
     """
     if unknown(w, 0, 6):
-        return PASSED
+        return NO_VIOLATION
     x, y, z = between(w, 4, 5)
     x, y, z = in_torso(torso(w), x, y, z)
     size = math.sqrt(dot(x, y, z, x, y, z))
     flexion = in_plane(x, y, size, 1.0, w, at, w[at + 4], w[at + 5])
     abduction = in_plane(w[at + 3] * z, y, size, 1.0, w, at, w[at + 6], w[at + 7])
-    if flexion != INSIDE:
-        return 0 if flexion == OUTSIDE else UNSURE
-    if abduction != INSIDE:
-        return 1 if abduction == OUTSIDE else UNSURE
-    return PASSED
+    if flexion != IS_INSIDE:
+        return 0 if flexion == IS_OUTSIDE else NOT_CLEAR
+    if abduction != IS_INSIDE:
+        return 1 if abduction == IS_OUTSIDE else NOT_CLEAR
+    return NO_VIOLATION
 
 
 def projected_hinge(w: Array, at: int) -> Any:
@@ -103,7 +103,7 @@ def projected_hinge(w: Array, at: int) -> Any:
     above which it counts as flexed, and the hip's bounds where it is and where it is not.
     """
     if unknown(w, 0, 7):
-        return PASSED
+        return NO_VIOLATION
     R = torso(w)
     ux, uy, uz = between(w, 4, 5)
     vx, vy, vz = between(w, 5, 6)
@@ -116,27 +116,27 @@ def projected_hinge(w: Array, at: int) -> Any:
     bend = IN_DEGREES * math.atan2(size, dot(ux, uy, uz, vx, vy, vz))
     forward = w[at + 3] * wz + w[at] / IN_DEGREES * size
     if not (both > 0 and abs(forward) < math.inf):
-        return UNSURE
+        return NOT_CLEAR
     # Which way a limb bends that is all but straight is not clear; nor need it be where either is judged alike.
     unclear = not abs(forward) > CLEAR_PART * both
-    found = UNSURE
+    found = NOT_CLEAR
     for way in range(2):
         if not unclear and (forward > 0) == (way == 1):
             continue
         flexion = bend if way == 0 else -bend
-        place = PASSED
+        place = NO_VIOLATION
         hinge = bounded(flexion, CLEAR_ANGLE, w[at + 4], w[at + 5], w[at])
-        if hinge != INSIDE:
-            place = 0 if hinge == OUTSIDE else UNSURE
+        if hinge != IS_INSIDE:
+            place = 0 if hinge == IS_OUTSIDE else NOT_CLEAR
         elif w[at + 3] < 0:
             if not abs(flexion - w[at + 6]) > CLEAR_ANGLE:
-                return UNSURE
+                return NOT_CLEAR
             k = at + 7 if flexion > w[at + 6] else at + 9
             hip = in_plane(ux, uy, upper, 1.0, w, at, w[k], w[k + 1])
-            if hip != INSIDE:
-                place = 1 if hip == OUTSIDE else UNSURE
+            if hip != IS_INSIDE:
+                place = 1 if hip == IS_OUTSIDE else NOT_CLEAR
         if unclear and way == 1 and place != found:
-            return UNSURE
+            return NOT_CLEAR
         found = place
     return found
 
@@ -159,15 +159,15 @@ def tilted(nx: Any, ny: Any, nz: Any, ax: Any, ay: Any, az: Any, w: Array, at: i
             w[at + 6 + 2 * k],
             w[at + 7 + 2 * k],
         )
-        if found != INSIDE:
-            return k if found == OUTSIDE else UNSURE
-    return PASSED
+        if found != IS_INSIDE:
+            return k if found == IS_OUTSIDE else NOT_CLEAR
+    return NO_VIOLATION
 
 
 def hip_plane(w: Array, at: int) -> Any:
     """Screen the pelvis: the torso's four points, then both hips."""
     if unknown(w, 0, 6):
-        return PASSED
+        return NO_VIOLATION
     R = torso(w)
     x, y, z = (
         (w[12] + w[15]) / 2 - w[9],
@@ -185,16 +185,16 @@ def hip_plane(w: Array, at: int) -> Any:
 def head_plane(w: Array, at: int) -> Any:
     """Screen the neck: the torso's four points, then the head's five, whose offsets follow the bounds."""
     if unknown(w, 0, 9):
-        return PASSED
+        return NO_VIOLATION
     if not laid_head(w, at + 12):
-        return UNSURE
+        return NOT_CLEAR
     R = torso(w)
-    nx, ny, nz = in_torso(R, w[TURN], w[TURN + 3], w[TURN + 6])
-    cx, cy, cz = in_torso(R, w[TURN + 2], w[TURN + 5], w[TURN + 8])
+    nx, ny, nz = in_torso(R, w[TURN_AT], w[TURN_AT + 3], w[TURN_AT + 6])
+    cx, cy, cz = in_torso(R, w[TURN_AT + 2], w[TURN_AT + 5], w[TURN_AT + 8])
     return tilted(nx, ny, nz, -cx, -cy, -cz, w, at)
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "dot": "",
     "crossed": "",
     "in_torso": "",

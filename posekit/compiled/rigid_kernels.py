@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
-SHORTEST = 1e-4
+SHORTEST_METRES = 1e-4
 """Metres below which a line between points, or what is left of one square to another, has no clear direction."""
 
 CLEAR_LENGTH = 1e-12
@@ -22,14 +22,14 @@ CLEAR_LENGTH = 1e-12
 CLEAR_PLACE = 1e-10
 """The same of how far a point is from where the figure's would be, which takes a frame."""
 
-FAR = 1e3
+FAR_METRES = 1e3
 """Metres from the camera beyond which rounding is larger than was said."""
 
 
 def unit(x: Any, y: Any, z: Any) -> Any:
     """Return a vector scaled to length one; NaN where it is too short, or beyond all numbers."""
     size = math.sqrt(x * x + y * y + z * z)
-    if not SHORTEST < size < math.inf:
+    if not SHORTEST_METRES < size < math.inf:
         return math.nan, math.nan, math.nan
     return x / size, y / size, z / size
 
@@ -79,19 +79,19 @@ def hips(w: Array, first: int) -> Any:
 def distance(w: Array, at: int) -> Any:
     """Screen the distance between two points; the numbers are its lower and upper bound, metres."""
     if unknown(w, 0, 2):
-        return PASSED
+        return NO_VIOLATION
     x, y, z = between(w, 0, 1)
     value = math.sqrt(x * x + y * y + z * z)
     beyond = max(w[at] - value, value - w[at + 1])
     if not abs(beyond) > CLEAR_LENGTH * (1.0 + value):
-        return UNSURE
-    return 0 if beyond > 0 else PASSED
+        return NOT_CLEAR
+    return 0 if beyond > 0 else NO_VIOLATION
 
 
 def placement(w: Array, at: int) -> Any:
     """Screen how far the torso's points are from the figure's; the numbers are the tolerance, then these, metres."""
     if unknown(w, 0, 4):
-        return PASSED
+        return NO_VIOLATION
     a, b, c, d, e, f, g, h, i = torso(w)
     worst = 0.0
     for k in range(0, 12, 3):
@@ -99,21 +99,21 @@ def placement(w: Array, at: int) -> Any:
         x = w[0] + (a * u + b * v + c * t) - w[k]
         y = w[1] + (d * u + e * v + f * t) - w[k + 1]
         z = w[2] + (g * u + h * v + i * t) - w[k + 2]
-        if not abs(w[k]) + abs(w[k + 1]) + abs(w[k + 2]) < FAR:
-            return UNSURE
+        if not abs(w[k]) + abs(w[k + 1]) + abs(w[k + 2]) < FAR_METRES:
+            return NOT_CLEAR
         off = x * x + y * y + z * z
         if not off <= worst:  # NaN too
             worst = off
         if math.isnan(worst):
-            return UNSURE
+            return NOT_CLEAR
     worst = math.sqrt(worst)
     beyond = worst - w[at]
     if not abs(beyond) > CLEAR_PLACE * (1.0 + worst):
-        return UNSURE
-    return 0 if beyond > 0 else PASSED
+        return NOT_CLEAR
+    return 0 if beyond > 0 else NO_VIOLATION
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "unit": "",
     "unknown": "",
     "between": "",

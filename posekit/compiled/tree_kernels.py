@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from posekit.cameras.camera import COINCIDENT
 from posekit.geometry import Array
 
-OPEN, NO_SOLUTION, COINCIDENT_ENDS, BEHIND_CAMERA, MISSING = range(5)
-"""The values of `posekit.tree.candidates.Branch`, as plain numbers."""
+IS_OPEN, NO_SOLUTION, COINCIDENT_ENDS, BEHIND_CAMERA, IS_MISSING = range(5)
+"""The values of `posekit.tree.candidates.BranchState`, as plain numbers."""
 
-GROUP, OF_FRAME, LOST, PLACE = range(4)
+GROUP_COLUMN, OF_FRAME, CODE_OF_LOST, PLACE_COLUMN = range(4)
 """Columns of a lost node: who rejected it, its frame and code, and the place of the check."""
 
 Ints = NDArray[np.int32]
@@ -70,15 +70,17 @@ def lift(
                 far_valid = reachable and far > 0.0 and not tangent
                 a = first[j] + 2 * w
                 if unseen[f, j] or np.isnan(sx) or np.isnan(sy) or np.isnan(sz):
-                    states[f, a], states[f, a + 1] = OPEN, MISSING
+                    states[f, a], states[f, a + 1] = IS_OPEN, IS_MISSING
                 elif excess > tolerance and not (near_valid or far_valid):
                     states[f, a], states[f, a + 1] = NO_SOLUTION, NO_SOLUTION
                 else:
-                    states[f, a] = OPEN if near_valid else BEHIND_CAMERA
-                    states[f, a + 1] = OPEN if far_valid else COINCIDENT_ENDS if near_valid else BEHIND_CAMERA
+                    states[f, a] = IS_OPEN if near_valid else BEHIND_CAMERA
+                    states[f, a + 1] = (
+                        IS_OPEN if far_valid else COINCIDENT_ENDS if near_valid else BEHIND_CAMERA
+                    )
                 for b in range(2):
                     depth = far if b == 1 else near
-                    if states[f, a + b] != OPEN:
+                    if states[f, a + b] != IS_OPEN:
                         depth = np.nan
                     table[f, a + b, 0], table[f, a + b, 1], table[f, a + b, 2] = (
                         depth * x,
@@ -99,20 +101,20 @@ def sort(lost: Ints, groups: int) -> tuple[Ints, Ints, Bytes, NDArray[np.int64]]
     """
     start = np.zeros(groups + 1, np.int64)
     for i in range(len(lost)):
-        start[lost[i, GROUP] + 1] += 1
+        start[lost[i, GROUP_COLUMN] + 1] += 1
     for g in range(groups):
         start[g + 1] += start[g]
     at = start.copy()
     frame, code = np.empty(len(lost), np.int32), np.empty(len(lost), np.int32)
     place = np.empty(len(lost), np.int8)
     for i in range(len(lost)):
-        k = at[lost[i, GROUP]]
-        at[lost[i, GROUP]] += 1
-        frame[k], code[k], place[k] = lost[i, OF_FRAME], lost[i, LOST], lost[i, PLACE]
+        k = at[lost[i, GROUP_COLUMN]]
+        at[lost[i, GROUP_COLUMN]] += 1
+        frame[k], code[k], place[k] = lost[i, OF_FRAME], lost[i, CODE_OF_LOST], lost[i, PLACE_COLUMN]
     return frame, code, place, start
 
 
-COMPILED = {
+COMPILED_TYPES = {
     "lift": (
         "(i8, i8, f8[:, :, ::1], b1[:, ::1], i8[::1], i8[::1], f8[:, ::1], f8, "
         "f8[:, :, ::1], i1[:, ::1], f8[:, ::1])"

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-PASSED = -1
+NO_VIOLATION = -1
 """Of a screen: no place is violated."""
 
-UNSURE = -2
+NOT_CLEAR = -2
 """Of a screen: only the judge can tell."""

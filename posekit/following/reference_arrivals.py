@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled.path_kernels import TIGHT
+from posekit.compiled.path_kernels import TIGHT_COST
 from posekit.following.beam import Beam
 from posekit.following.channels import N_CHANNELS, NextSurvivors
 from posekit.following.floors import Arrivals, Floors
@@ -84,7 +84,7 @@ class _ArrivalSearch:
     def add(self, part: States, rows: NDArray[np.intp], begins: NDArray[np.intp]) -> None:
         """Go on from some groups of ends, `rows` of all, each of which begins at one of `begins`."""
         lowest = self.floors.ends[rows].min()
-        near = np.flatnonzero(lowest + self.floors.to <= self.most.max() + TIGHT)
+        near = np.flatnonzero(lowest + self.floors.to <= self.most.max() + TIGHT_COST)
         if len(near) < len(self.own):
             self.dropped = min(self.dropped, float(self.most.max()))
         if not len(near):
@@ -102,7 +102,7 @@ class _ArrivalSearch:
         least = np.minimum.reduceat(total, begins, axis=0)
         fresh = part.fresh[begins][:, None] | new
         self._tighten(least, fresh)
-        group, to = np.nonzero(least <= self.most[fresh.astype(int)] + TIGHT)
+        group, to = np.nonzero(least <= self.most[fresh.astype(int)] + TIGHT_COST)
         away = np.isfinite(least)
         away[group, to] = False
         self.dropped = min(self.dropped, float(least[away].min(initial=np.inf)))
@@ -122,7 +122,7 @@ class _ArrivalSearch:
             probed = total[probes] - low[probes] + turn_costs(part.take(probes), target, self.model)
             cheapest = probed[fresh[probes] == kind].min(initial=np.inf)
             self.most[kind] = min(self.most[kind], cheapest + self.slack)
-        close = total <= self.most[fresh.astype(int)] + TIGHT
+        close = total <= self.most[fresh.astype(int)] + TIGHT_COST
         ends, survivors = np.flatnonzero(close.any(axis=1)), np.flatnonzero(close.any(axis=0))
         if len(ends):
             both = np.ix_(ends, survivors)

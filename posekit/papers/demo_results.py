@@ -25,7 +25,7 @@ from posekit.recovery.result import result_of
 from posekit.safe_io.writing import write_lines
 from posekit.synthesis import random_views
 from posekit.validation.validate import validate
-from posekit.validators import PHYSICAL, Validator
+from posekit.validators import PHYSICAL_CHECKS, Validator
 from posekit.viewer.illustrate import illustrate
 from posekit.views.builtin import builtin_view, view_of
 
@@ -45,10 +45,10 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     """
     random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(DEMO_SEED)))
     jobs = (
-        ("seq1", builtin_view("seq1"), PHYSICAL),
-        ("seq2", builtin_view("seq2"), PHYSICAL),
-        ("seq1-walking", builtin_view("seq1"), (*PHYSICAL, "walking")),
-        ("random", random, PHYSICAL),
+        ("seq1", builtin_view("seq1"), PHYSICAL_CHECKS),
+        ("seq2", builtin_view("seq2"), PHYSICAL_CHECKS),
+        ("seq1-walking", builtin_view("seq1"), (*PHYSICAL_CHECKS, "walking")),
+        ("random", random, PHYSICAL_CHECKS),
     )
     rows = []
     for name, view, checks in jobs:

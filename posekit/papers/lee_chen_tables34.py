@@ -14,7 +14,7 @@ from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.settings import Tolerance
 from posekit.synthesis import SyntheticScene, Walker, walker_scene
 from posekit.synthesis.walker_scene import FRAME_TIME, SEQ1_CAMERA, SEQ2_CAMERA
-from posekit.validators import CHECKS
+from posekit.validators import ALL_CHECKS
 from posekit.views.builtin import view_of
 
 SEQUENCE_CAMERAS = {"seq1": SEQ1_CAMERA, "seq2": SEQ2_CAMERA}
@@ -135,7 +135,12 @@ def recover_sequence(found: Sequence1985) -> tuple[View, Recovery]:
 def _recover(scene: SyntheticScene, rules: tuple[int, ...]) -> Recovery:
     view = view_of(scene)
     return recover(
-        view, checks=CHECKS, ranges="table1", rules=rules, tolerance=PAPER_TOLERANCE, group=GROUPING_METRES
+        view,
+        checks=ALL_CHECKS,
+        ranges="table1",
+        rules=rules,
+        tolerance=PAPER_TOLERANCE,
+        group=GROUPING_METRES,
     )
 
 

@@ -57,7 +57,7 @@ def suite_of(
     return make_checks(figure, settings.checks, options)
 
 
-class Body(Protocol):
+class LiftedBody(Protocol):
     """A tree over points of the body, and the way from its leaves to the figure's joints."""
 
     @property

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.compiled.compiling import is_fast
-from posekit.compiled.verdicts import PASSED
+from posekit.compiled.verdicts import NO_VIOLATION
 from posekit.geometry import Array
 from posekit.recovery.body import ranges_of
 from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.noise import Noise
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.observed_frames import LIMIT_DEVIATION
-from posekit.refinement.tolerance import DEVIATIONS
+from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
 from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
 from posekit.tree import Check, Scope, screened
 from posekit.validators import CheckOptions, Judgement, judge, make_checks
@@ -33,7 +33,7 @@ def certified_within(noise: Noise) -> Tolerance:
     """
     worse = max(1.0, max(noise.by_segment.values()) / max(MEASURED_LENGTH_DEVIATIONS.values()))
     rigid = RIGID_TOLERANCE * worse
-    return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=DEVIATIONS * LIMIT_DEVIATION)
+    return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=ALLOWED_DEVIATIONS * LIMIT_DEVIATION)
 
 
 def certifying_checks(figure: Figure, settings: RecoverSettings, tolerance: Tolerance) -> list[Check]:
@@ -105,7 +105,7 @@ def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
     for check in checks:
         own = points[:, list(check.points)]
         if fast and check.rule is not None:
-            doubtful |= screened(check.rule, own)[0] != PASSED
+            doubtful |= screened(check.rule, own)[0] != NO_VIOLATION
         else:
             doubtful |= check.judge(own).violated.any(axis=1)
     return doubtful

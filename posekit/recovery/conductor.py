@@ -13,7 +13,7 @@ from posekit.body import Figure, load_figure
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.own.units import PER_METRE
-from posekit.recovery.body import Body, FigureBody, loaded
+from posekit.recovery.body import FigureBody, LiftedBody, loaded
 from posekit.recovery.camera_record import CameraRecords
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
@@ -151,7 +151,7 @@ def recover(
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=record, grower=grower)
 
 
-def _fit(view: View, body: Body, asked: RecoverSettings, tolerance: Tolerance | None) -> CameraFit:
+def _fit(view: View, body: LiftedBody, asked: RecoverSettings, tolerance: Tolerance | None) -> CameraFit:
     """Find the camera, and where it sees the root."""
     if not isinstance(view.camera, ScaledOrthographicModel):
         return fit_camera(view, body.figure, asked.rooting, tolerance)
@@ -160,7 +160,7 @@ def _fit(view: View, body: Body, asked: RecoverSettings, tolerance: Tolerance | 
     return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance)
 
 
-def _noise(view: View, body: Body, asked: RecoverSettings) -> Noise | None:
+def _noise(view: View, body: LiftedBody, asked: RecoverSettings) -> Noise | None:
     """Say what noise frames are refined with; None where they are not.
 
     Raises
@@ -180,7 +180,7 @@ def _noise(view: View, body: Body, asked: RecoverSettings) -> Noise | None:
     return Noise.of(view, asked.rooting.deviation, asked.length_deviation, asked=bool(asked.refine))
 
 
-def _nearer(asked: RecoverSettings, body: Body, count: int) -> NearerEnds | None:
+def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds | None:
     """Read the flips that were given by hand for a number of frames."""
     if asked.nearer is None:
         return None

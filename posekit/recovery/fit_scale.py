@@ -10,7 +10,7 @@ from posekit.formats.own import PER_METRE, Family, ScaledOrthographicModel, Unit
 from posekit.geometry import Array
 from posekit.linkages import LinkageFamily as Solutions
 from posekit.linkages import Minima, search
-from posekit.recovery.body import Body
+from posekit.recovery.body import LiftedBody
 from posekit.recovery.fit_camera import CameraFit
 from posekit.settings import EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.settings.scale import Scale, way_of
@@ -20,7 +20,7 @@ ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""
 
 
-def fit_scale(view: View, body: Body, scale: Scale | None, tolerance: Tolerance | None) -> CameraFit:
+def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tolerance | None) -> CameraFit:
     """Find the scales that each frame is to be recovered at, and put the root at depth zero.
 
     Parameters
@@ -75,7 +75,7 @@ def fit_scale(view: View, body: Body, scale: Scale | None, tolerance: Tolerance 
 
 
 def _family(
-    seen: Array, body: Body, choice: tuple[str, Scale], tolerance: Tolerance | None, unit: Unit
+    seen: Array, body: LiftedBody, choice: tuple[str, Scale], tolerance: Tolerance | None, unit: Unit
 ) -> Family:
     """Find the scales of one frame from its joints (14, 2), rescaled to square pixels."""
     name, scale = choice

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from posekit.cameras import Camera
 from posekit.formats.own import View
 from posekit.geometry import Array
-from posekit.recovery.body import Body, FigureBody, suite_of
+from posekit.recovery.body import FigureBody, LiftedBody, suite_of
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
 from posekit.settings import EXACT_TOLERANCE, Judged, RecoverSettings, Tolerance
@@ -51,7 +51,7 @@ class Grower:
 
     view: View
     fit: CameraFit
-    body: Body
+    body: LiftedBody
     settings: RecoverSettings
     nearer: NearerEnds | None = None
 
@@ -180,7 +180,7 @@ class Grower:
 
 
 def is_exact(
-    leaves: Leaves, body: Body, judged_by: Collection[str], *, fitted: bool = False
+    leaves: Leaves, body: LiftedBody, judged_by: Collection[str], *, fitted: bool = False
 ) -> NDArray[np.bool_]:
     """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
 

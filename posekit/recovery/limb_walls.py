@@ -16,7 +16,7 @@ from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_JOINTS
 from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
 from posekit.tree import Check, Place
 
-ANGLES: Final = 4
+MAX_ANGLES: Final = 4
 """The most angles of a limb that are judged."""
 
 TORSO_POINTS: Final = [JOINT[name] for name in TORSO]
@@ -75,7 +75,7 @@ class LimbWalls:
         points = np.repeat(self.figure.neutral_points[None, : len(JOINTS)], len(upper), axis=0)
         points[:, middle] = points[:, start] + upper @ part.T
         points[:, end] = points[:, middle] + lower @ part.T
-        above, below = np.full((2, ANGLES, len(upper)), -np.inf)
+        above, below = np.full((2, MAX_ANGLES, len(upper)), -np.inf)
         rows: dict[Place, int] = {}
         for check in self.checks[limb]:
             findings = check.judge(points[:, list(check.points)])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own import ScaledOrthographicModel, View
-from posekit.recovery.body import Body
+from posekit.recovery.body import LiftedBody
 
 NO_NECK: Final = "the neck, from which the tree grows, is not seen"
 """Why nothing grows in a calibrated frame that does not show the neck."""
@@ -28,7 +28,7 @@ def neckless(view: View) -> NDArray[np.bool_]:
     return np.asarray(np.isnan(view.image[:, 0, 0]))
 
 
-def trunkless(view: View, body: Body) -> NDArray[np.bool_]:
+def trunkless(view: View, body: LiftedBody) -> NDArray[np.bool_]:
     """Tell which frames (F,) show none of the joints that hang on the tree's root.
 
     The root alone is a position and no posture: wrists or knees that are seen beside it have nothing to hang on.
@@ -37,7 +37,7 @@ def trunkless(view: View, body: Body) -> NDArray[np.bool_]:
     return np.asarray(~seen[:, _hanging(body)].any(axis=1))
 
 
-def with_reasons(reasons: Sequence[str], body: Body, bare: NDArray[np.bool_]) -> list[str]:
+def with_reasons(reasons: Sequence[str], body: LiftedBody, bare: NDArray[np.bool_]) -> list[str]:
     """Say of `trunkless` frames why nothing grows in them; those that have a reason by now keep it."""
     joints = body.tree.joints
     hanging = ", ".join(joints[k] for k in _hanging(body).tolist())
@@ -52,7 +52,7 @@ def lost_to(without_neck: bool, without_trunk: bool) -> str:
     return NECK_LOST if without_neck else TRUNK_LOST if without_trunk else ROOT_LOST
 
 
-def _hanging(body: Body) -> NDArray[np.intp]:
+def _hanging(body: LiftedBody) -> NDArray[np.intp]:
     """Return the joints whose parent is the root, which is the first."""
     parents = np.asarray(body.tree.parents)
     return np.flatnonzero((parents == 0) & (np.arange(len(parents)) > 0))

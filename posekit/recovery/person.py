@@ -9,7 +9,7 @@ import numpy as np
 from posekit.body import Figure, stature_from_lengths
 from posekit.errors import InputError
 from posekit.formats.own import ScaledOrthographicModel, View
-from posekit.recovery.body import Body, FigureBody
+from posekit.recovery.body import FigureBody, LiftedBody
 from posekit.settings import RecoverSettings, Rooting
 
 CACHED_PERSONS = 32
@@ -40,7 +40,7 @@ def _person(
     return figure
 
 
-def body_of(view: View, figure: Figure, proportions: str) -> Body:
+def body_of(view: View, figure: Figure, proportions: str) -> LiftedBody:
     """Choose what the view's points are lifted into."""
     person = person_of(view, figure)
     stature = view.stature or stature_from_lengths(person.lengths)

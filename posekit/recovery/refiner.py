@@ -31,7 +31,7 @@ from posekit.recovery.noise import Noise
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
-from posekit.refinement.tolerance import DEVIATIONS
+from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
 from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
@@ -268,7 +268,7 @@ class Refiner:
         )
         # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
-        rigid = max(DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
+        rigid = max(ALLOWED_DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
         suite = under_noise(suite_of(self.settings, body.figure, tolerance), allowed.bound)
         tree = InterpretationTree(

@@ -21,7 +21,7 @@ from posekit.validators import worst_margins
 if TYPE_CHECKING:
     from posekit.body import Configurations
     from posekit.hidden import CompletedSurvivors
-    from posekit.recovery.body import Body
+    from posekit.recovery.body import LiftedBody
     from posekit.recovery.fit_camera import CameraFit
     from posekit.recovery.refined import RefinedSurvivors
 
@@ -60,7 +60,7 @@ class Batch:
     leaves: Leaves
     physical: NDArray[np.int64] | None
     checks: Sequence[Check]
-    body: Body
+    body: LiftedBody
     tolerance: Tolerance
     judged: Judged
     exact: NDArray[np.bool_]

@@ -20,10 +20,10 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINTS, PARENTS, TORSO
 from posekit.tree import Check, Findings, Loosening, Place
 
-LEAST = 0.02
+MIN_COSINE = 0.02
 """Cosine of the abduction down to which the other angles' allowance is reckoned."""
 
-TRUNK = len(TORSO) + 2
+N_TRUNK_JOINTS = len(TORSO) + 2
 """Joints of torso and hips: the first six."""
 
 
@@ -88,7 +88,7 @@ class NoisyRange(Check):
         if len(self.places) > 1 and self.places[1].angle == "abduction":
             # Beside the abduction axis the first angle turns faster than the direction, and the rotation with it.
             abduction = np.radians(findings.value[:, 1])
-            level = np.maximum(np.abs(np.cos(abduction)), LEAST)
+            level = np.maximum(np.abs(np.cos(abduction)), MIN_COSINE)
             tolerance[:, 0] /= level
             if len(self.places) > 2:
                 tolerance[:, 2] += np.abs(np.sin(abduction)) / level
@@ -122,11 +122,11 @@ class NoisyRange(Check):
 
     @cached_property
     def _limb(self) -> list[tuple[int, int]]:
-        return [pair for pair in self._segments if self.points[pair[1]] >= TRUNK]
+        return [pair for pair in self._segments if self.points[pair[1]] >= N_TRUNK_JOINTS]
 
     @cached_property
     def _trunk(self) -> list[tuple[int, int]]:
-        return [pair for pair in self._segments if self.points[pair[1]] < TRUNK]
+        return [pair for pair in self._segments if self.points[pair[1]] < N_TRUNK_JOINTS]
 
     @cached_property
     def _segments(self) -> list[tuple[int, int]]:

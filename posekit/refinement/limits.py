@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, cross, dot
 from posekit.refinement.figure_numbers import Bounds
 
-LEAST = 0.05
+MIN_COSINE = 0.05
 """Cosine of the second angle down to which its tangent is taken as it is in derivatives."""
 
-BRANCHES = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))
+LIMB_BRANCHES = ((0, 1.0), (1, 1.0), (0, -1.0), (1, -1.0))
 """Euler branch, and side of the hinge."""
 
 Signs = NDArray[np.int8]
@@ -166,7 +166,7 @@ def limb_limits(
             other[2] += np.pi
         other[3] *= hinge
         other -= middle
-        other -= TURN * np.round(other / TURN)
+        other -= FULL_TURN * np.round(other / FULL_TURN)
         total = ((_shortened(_beyond(other, half)) * weight) ** 2).sum(axis=0)
         better = total < best
         best = np.where(better, total, best)
@@ -197,7 +197,7 @@ def limb_rows(found: Limbs, out: Outside, f: Array, e: Array) -> Array:
     alpha, beta, rotation, bend = np.zeros((4, 7, len(limb)))
     alpha[0], alpha[4:] = 1.0, -b
     beta[1], beta[4:] = 1.0, a
-    per_alpha = alpha / np.maximum(cos_b, LEAST)
+    per_alpha = alpha / np.maximum(cos_b, MIN_COSINE)
     rotation[2], rotation[4:] = 1.0, -e.T
     rotation += per_alpha * (cos_b * cos_e * sin_g + sin_b * sin_e) + beta * (cos_e * cos_g)
     bend[3], bend[4:] = 1.0, f.T
@@ -213,7 +213,7 @@ def limb_rows(found: Limbs, out: Outside, f: Array, e: Array) -> Array:
     return rows
 
 
-TURN = 2 * np.pi
+FULL_TURN = 2 * np.pi
 
 
 def _beyond(away: Array, half: Array) -> Array:
@@ -236,7 +236,7 @@ def _possible(bounds: Bounds) -> list[tuple[int, float]]:
     either = ((bounds.upper[:, 3] > 0).any(), (bounds.lower[:, 3] < 0).any())
     return [
         (branch, hinge)
-        for branch, hinge in BRANCHES
+        for branch, hinge in LIMB_BRANCHES
         if (over_the_top or not branch) and either[int(hinge < 0)]
     ]
 
@@ -278,7 +278,7 @@ def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None
     lower, upper = bounds.lower[0, :, None], bounds.upper[0, :, None]
     middle, half = (lower + upper) / 2, (upper - lower) / 2
     away = np.arctan2(sine, cosine) - middle
-    away -= TURN * np.round(away / TURN)
+    away -= FULL_TURN * np.round(away / FULL_TURN)
     beyond = _beyond(away, half)
     over = beyond
     if watch is not None:
@@ -287,7 +287,7 @@ def ball_limits(parent: Array, child: Array, bounds: Bounds, watch: Signs | None
     felt = over != 0
     if not felt.any():
         return Ball(over, None, crossed)
-    cos_b = np.maximum(h, LEAST)
+    cos_b = np.maximum(h, MIN_COSINE)
     left, square = parent[:, 1], cos_b * cos_b
     jacobian = np.stack([(left + y * up) / square, axis, (up + y * left) / square])
     return Ball(over, jacobian * felt[:, None], crossed)

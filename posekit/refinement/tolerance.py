@@ -20,10 +20,10 @@ from posekit.errors import InputError
 from posekit.refinement.optics import optics_of
 from posekit.skeleton import PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
-DEVIATIONS = 3.0
+ALLOWED_DEVIATIONS = 3.0
 """Standard deviations that are allowed for, unless told otherwise: beyond them is one point in 370."""
 
-ROUNDING = 1e-6
+ROUNDING_METRES = 1e-6
 """Metres that the distances inside a found trunk may be off: they come from its own projections."""
 
 TRUNK_JOINTS = 6
@@ -61,7 +61,7 @@ def tolerance_of(
     figure: Figure,
     depth: float,
     *,
-    deviations: float = DEVIATIONS,
+    deviations: float = ALLOWED_DEVIATIONS,
     length_deviation: float = 0.0,
     root_depth_deviation: float = 0.0,
     trunks: bool = False,
@@ -119,7 +119,7 @@ def tolerance_of(
     turn = {joint: _turn(excess[joint], length) for joint, length in lengths.items()}
     limb = max(turn[joint] for joint in range(TRUNK_JOINTS, len(PARENTS)))
     if trunks:
-        rigid, trunk = ROUNDING, _turn(beside, lengths[3])
+        rigid, trunk = ROUNDING_METRES, _turn(beside, lengths[3])
     else:
         rigid, trunk = (
             max(_apart(pair, lengths, excess) for pair in RIGID_SEGMENTS) + tangent,

@@ -17,14 +17,14 @@ from posekit.geometry import Array, cross
 from posekit.geometry.batch_last import matrix_product, step_rotation
 from posekit.refinement.limits import Ball, Signs
 
-STEP = 1e-6
+STEP_RADIANS = 1e-6
 """Radians by which directions are turned for differences."""
 
-STEEPEST = 100.0
+MAX_SLOPE = 100.0
 """The most by which an angle follows a direction: beyond it another way to write the limb is judged."""
 
 
-REACH = 0.3
+REACH_RADIANS = 0.3
 """Radians up to which a limit that a step ran into is watched: farther off, another way to write the limb is judged."""
 
 
@@ -152,12 +152,12 @@ def ball_walls(
     # A turn about an axis of the camera is one about that axis as the parent sees it.
     for axis in range(3):
         spin = np.zeros((3, len(felt)))
-        spin[axis] = STEP
+        spin[axis] = STEP_RADIANS
         moved = matrix_product(step_rotation(spin), child[..., felt])
         higher, lower = walls.ball(part, np.einsum("ikn,ijn->nkj", parent[..., felt], moved)) or asked
         now = np.where(side[:, felt] > 0, higher, -lower)
-        slope[:, axis] = (now - over[:, felt]) / STEP
-    slope[~(np.abs(slope) < STEEPEST)] = 0.0
+        slope[:, axis] = (now - over[:, felt]) / STEP_RADIANS
+    slope[~(np.abs(slope) < MAX_SLOPE)] = 0.0
     jacobian = np.zeros((3, 3, over.shape[1]))
     jacobian[..., felt] = np.where(side[:, None, felt] != 0, slope, 0.0)
     return Ball(over, jacobian, crossed)
@@ -173,10 +173,10 @@ def wall_rows(walls: Walls, found: Beyond, parent: Array, directions: Array, tan
         for tangent in range(2):
             t = along[:, segment, tangent]
             moved = found.local.copy()
-            moved[segment] += STEP * np.einsum("mij,mi->mj", parent[k, :, :, m], t)
+            moved[segment] += STEP_RADIANS * np.einsum("mij,mi->mj", parent[k, :, :, m], t)
             moved[segment] /= np.sqrt(np.einsum("mi,mi->m", moved[segment], moved[segment]))[:, None]
-            slope = (_asked(walls, found, moved) - found.over) / STEP
-            slope = np.where((found.side != 0) & (np.abs(slope) < STEEPEST), slope, 0.0)
+            slope = (_asked(walls, found, moved) - found.over) / STEP_RADIANS
+            slope = np.where((found.side != 0) & (np.abs(slope) < MAX_SLOPE), slope, 0.0)
             rows[:, 2 * segment + tangent] = slope
             rows[:, 4:] -= slope[:, None] * cross(outward.T, t.T, axis=-2)
     return rows
@@ -184,7 +184,7 @@ def wall_rows(walls: Walls, found: Beyond, parent: Array, directions: Array, tan
 
 def _watched(crossed: Signs, watch: Signs, above: Array, below: Array) -> Signs:
     """Return which limits count: those that are passed, else those that are watched, where they are near."""
-    near = np.where(watch > 0, above, below) > -REACH
+    near = np.where(watch > 0, above, below) > -REACH_RADIANS
     return np.where((crossed == 0) & near, watch, crossed)
 
 

@@ -1,6 +1,6 @@
 """The binary interpretation tree and the protocol of the checks that prune it."""
 
-from posekit.tree.candidates import Branch as Branch
+from posekit.tree.candidates import BranchState as BranchState
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
 from posekit.tree.check import Loosening as Loosening

@@ -9,12 +9,12 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled.frame_kernels import REASONS
+from posekit.compiled.frame_kernels import UNJUDGED_STATES
 from posekit.geometry import Array
-from posekit.tree.candidates import Branch
+from posekit.tree.candidates import BranchState
 from posekit.tree.check import Check
 from posekit.tree.leaves import Leaves, Losses, Postponed
-from posekit.tree.plain import UNJUDGED, bound_of
+from posekit.tree.plain import UNJUDGED_NAMES, bound_of
 
 Indices = NDArray[np.int32]
 Sorted = tuple[Indices, Indices, NDArray[np.int8], NDArray[np.int64]]
@@ -50,11 +50,11 @@ def merged(
     if not grown:
         return roots.at(len(checks) - 1, roots.frame, roots.code)
     pruned: list[Losses] = []
-    joint_groups = (len(checks) - 1) * REASONS
+    joint_groups = (len(checks) - 1) * UNJUDGED_STATES
     first = 0
     for level, at in enumerate(checks):
-        for reason, name in UNJUDGED.items() if level else ():
-            group = (level - 1) * REASONS + int(reason) - 1
+        for reason, name in UNJUDGED_NAMES.items() if level else ():
+            group = (level - 1) * UNJUDGED_STATES + int(reason) - 1
             for lost, place in _lost(roots, level, grown, group, ordered):
                 where, measure = (roots.joints[level],), partial(_excess, lost, reason)
                 pruned.append(_losses(lost, name, where, "m", place, measure))
@@ -114,7 +114,7 @@ def _judged(lost: Leaves, check: Check, place: NDArray[np.int8]) -> tuple[Array,
     return findings.value[rows, place], lower[rows, place], upper[rows, place]
 
 
-def _excess(lost: Leaves, reason: Branch) -> tuple[Array, Array, Array]:
+def _excess(lost: Leaves, reason: BranchState) -> tuple[Array, Array, Array]:
     """Return by how much the segments of lost nodes are too short, and the bounds."""
     n = len(lost.code)
     return lost.excess(lost.level), np.full(n, -np.inf), np.full(n, bound_of(reason))

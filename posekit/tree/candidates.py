@@ -17,7 +17,7 @@ from posekit.geometry import Array
 from posekit.tree.bits import path_of
 
 
-class Branch(IntEnum):
+class BranchState(IntEnum):
     """What became of a near or far choice before anything judged it."""
 
     OPEN = 0
@@ -41,7 +41,7 @@ class Candidates:
     table : array (F, T + G + 1, 3)
         Positions, camera frame, metres; beyond the joints' the points that were given, and NaN for all that were not.
     states : int array (F, T)
-        `Branch`.
+        `BranchState`.
     reach : array (F, T)
         Metres by which the segment is too short for its image (positive; a tangent within the tolerance included) or
         reaches past its ray (negative).
@@ -74,7 +74,7 @@ class Candidates:
 
     @cached_property
     def branches(self) -> tuple[NDArray[np.int8], ...]:
-        """`Branch` by joint, (F, 2**depth) each."""
+        """`BranchState` by joint, (F, 2**depth) each."""
         return tuple(self.states[:, a:b] for a, b in pairwise(self.first))
 
     @cached_property
@@ -86,7 +86,7 @@ class Candidates:
         """Return the first joint of a frame that no branch reaches, and by how much (m) its segment is too short."""
         for joint, states in enumerate(self.branches):
             reached = np.isfinite(self.excess[joint][frame])
-            if reached.any() and (states[frame][reached] == Branch.NO_SOLUTION).all():
+            if reached.any() and (states[frame][reached] == BranchState.NO_SOLUTION).all():
                 return joint, float(self.excess[joint][frame][reached].min())
         return None
 
@@ -135,13 +135,13 @@ def lift_all(
         else:
             lift = _meet(rays[joint], start, lengths[joint], tolerance)
         valid = lift.valid
-        state = np.where(valid, np.int8(Branch.OPEN), np.int8(Branch.BEHIND_CAMERA))
-        state[..., 1][valid[..., 0] & ~valid[..., 1]] = Branch.COINCIDENT
+        state = np.where(valid, np.int8(BranchState.OPEN), np.int8(BranchState.BEHIND_CAMERA))
+        state[..., 1][valid[..., 0] & ~valid[..., 1]] = BranchState.COINCIDENT
         none = ~(valid[..., 0] | valid[..., 1])
-        state[(lift.excess > tolerance) & none] = Branch.NO_SOLUTION
+        state[(lift.excess > tolerance) & none] = BranchState.NO_SOLUTION
         unknown = np.isnan(start).any(axis=-1) | unseen[:, joint, None]
-        state[unknown] = (Branch.OPEN, Branch.MISSING)
-        lift.points[state != Branch.OPEN] = np.nan
+        state[unknown] = (BranchState.OPEN, BranchState.MISSING)
+        lift.points[state != BranchState.OPEN] = np.nan
         width = own.stop - own.start
         table[:, own] = lift.points.reshape(n, width, 3)
         states[:, own] = state.reshape(n, width)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from posekit.cameras import PinholeCamera
 from posekit.compiled import tree_kernels as kernels
 from posekit.compiled.compiling import compiled, n_threads
-from posekit.compiled.frame_kernels import REASONS
+from posekit.compiled.frame_kernels import UNJUDGED_STATES
 from posekit.geometry import Array
 from posekit.tree import plain
 from posekit.tree.blocks import FrameBlock, merged
@@ -28,7 +28,7 @@ from posekit.tree.leaves import Leaves, Losses, Pruned
 from posekit.tree.lifting import Lifting
 from posekit.tree.stretches import growing
 
-SHARES = 4
+BLOCKS_PER_THREAD = 4
 """Blocks of frames for each of several threads: frames are not alike, and whoever is done takes the next."""
 
 MIN_FRAMES, MAX_FRAMES = 50, 2000
@@ -73,7 +73,7 @@ def grow(lifting: Lifting, checks: Sequence[Sequence[Check]]) -> Leaves | None:
 def _blocks(n: int, least: int) -> list[tuple[int, int]]:
     """Part frames into blocks of about the same size, at least so large: several for each of several threads."""
     threads = n_threads()
-    size = min(max(-(-n // (threads * SHARES)), least), MAX_FRAMES) if threads > 1 else MAX_FRAMES
+    size = min(max(-(-n // (threads * BLOCKS_PER_THREAD)), least), MAX_FRAMES) if threads > 1 else MAX_FRAMES
     return [(k, min(k + size, n)) for k in range(0, n, size)]
 
 
@@ -93,13 +93,13 @@ def _spread(do: Callable[[Task], Result], tasks: Sequence[Task]) -> list[Result]
 def _grown_plainly(roots: Leaves, checks: Sequence[Sequence[Check]], frames: NDArray[np.int64]) -> FrameBlock:
     """Grow the trees of some frames, whose joints are lifted, by NumPy alone."""
     leaves = roots.at(0, frames.astype(np.int32), np.zeros(len(frames), dtype=np.int32))
-    groups = {name: int(reason) - 1 for reason, name in plain.UNJUDGED.items()}
+    groups = {name: int(reason) - 1 for reason, name in plain.UNJUDGED_NAMES.items()}
     lost = [np.empty((0, 4), dtype=np.int32)]
-    number = (len(checks) - 1) * REASONS
+    number = (len(checks) - 1) * UNJUDGED_STATES
     for level, at in enumerate(checks):
         if level:
             leaves = plain.branch(leaves, level)
-            lost += [_rows(one, (level - 1) * REASONS + groups[one.check]) for one in leaves.pruned]
+            lost += [_rows(one, (level - 1) * UNJUDGED_STATES + groups[one.check]) for one in leaves.pruned]
         for check in at:
             leaves = plain.apply(leaves.at(level, leaves.frame, leaves.code), check)
             lost += [_rows(one, number) for one in leaves.pruned]

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.compiled.frame_kernels import MAX_POINTS, MAX_PRESUMED, NUMBERS, PATHS
+from posekit.compiled.frame_kernels import MAX_POINTS, MAX_PRESUMED, NUMBERS_AT, PATH_COLUMNS
 from posekit.geometry import Array
 from posekit.tree.bits import path_of, support_of
 from posekit.tree.check import Check, Rule
@@ -157,14 +157,14 @@ def _laid_out(
     table = np.zeros((count, 7), dtype=np.int64)
     tips = np.zeros((count, max((len(each.tips) for *_, each in rules), default=1), 3), dtype=np.int64)
     points = np.zeros((count, max((len(each.joints) for *_, each in rules), default=1), 2), dtype=np.int64)
-    verdicts, at = 0, NUMBERS
+    verdicts, at = 0, NUMBERS_AT
     for c, (number, rule, each) in enumerate(rules):
         table[c] = rule.kind, rule.presumed, len(each.tips), len(each.joints), verdicts, at, number
         below = np.cumsum(each.bits[::-1])[::-1] - each.bits
-        tips[c, : len(each.tips)] = np.stack([PATHS + each.tips, (1 << each.bits) - 1, below], axis=-1)
+        tips[c, : len(each.tips)] = np.stack([PATH_COLUMNS + each.tips, (1 << each.bits) - 1, below], axis=-1)
         points[c, : len(each.joints), 0] = np.where(each.joints < joints, each.joints, -1)
         points[c, : len(each.joints), 1] = each.first
         at += len(rule.numbers)
         verdicts += each.choices
-    numbers = np.concatenate([np.zeros(NUMBERS), *(rule.numbers for _, rule, _ in rules)])
+    numbers = np.concatenate([np.zeros(NUMBERS_AT), *(rule.numbers for _, rule, _ in rules)])
     return Programme(levels, table, tips, points, numbers, verdicts, stretches)

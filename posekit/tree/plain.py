@@ -6,20 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.tree.bits import path_of, select
-from posekit.tree.candidates import Branch
+from posekit.tree.candidates import BranchState
 from posekit.tree.check import Check
 from posekit.tree.leaves import Leaves, Pruned
 
-UNJUDGED = {
-    Branch.NO_SOLUTION: "no_solution",
-    Branch.COINCIDENT: "coincident",
-    Branch.BEHIND_CAMERA: "behind_camera",
-    Branch.MISSING: "missing",
+UNJUDGED_NAMES = {
+    BranchState.NO_SOLUTION: "no_solution",
+    BranchState.COINCIDENT: "coincident",
+    BranchState.BEHIND_CAMERA: "behind_camera",
+    BranchState.MISSING: "missing",
 }
 """How the reasons of branches that no check judged are named, before the joint's name."""
 
 
-SPARSE = 32
+SPARSE_FROM = 32
 """Choices a node from which they are sorted: to look through a table of all that there might be would take longer."""
 
 Indices = NDArray[np.int32]
@@ -32,9 +32,9 @@ def branch(leaves: Leaves, joint: int) -> Leaves:
     path = select(joint, path_of(joint, leaves.parents))[code]
     state = leaves.candidates.branches[joint][frame, path]
     excess = leaves.candidates.excess[joint][frame, path]
-    open_ = state == Branch.OPEN
+    open_ = state == BranchState.OPEN
     pruned = leaves.pruned
-    for reason, name in UNJUDGED.items():
+    for reason, name in UNJUDGED_NAMES.items():
         dead = state == reason
         if dead.any():
             pruned = (
@@ -55,9 +55,9 @@ def branch(leaves: Leaves, joint: int) -> Leaves:
     return leaves.keep(open_, frame, code, joint, pruned)
 
 
-def bound_of(reason: Branch) -> float:
+def bound_of(reason: BranchState) -> float:
     """Return the bound that a branch without a solution broke: its segment's excess must not be positive."""
-    return 0.0 if reason is Branch.NO_SOLUTION else np.inf
+    return 0.0 if reason is BranchState.NO_SOLUTION else np.inf
 
 
 def apply(leaves: Leaves, check: Check) -> Leaves:
@@ -104,7 +104,7 @@ def choices(leaves: Leaves, check: Check) -> tuple[Indices, Indices]:
     first = leaves.frame[0]
     key = (leaves.frame - first).astype(np.int64) << len(support) | choice
     width = int(leaves.frame[-1] - first + 1) << len(support)
-    if width > SPARSE * len(key):
+    if width > SPARSE_FROM * len(key):
         _, found, inverse = np.unique(key, return_index=True, return_inverse=True)
         return found.astype(np.int32), inverse.reshape(-1).astype(np.int32)
     table: Indices = np.full(width, -1, dtype=np.int32)

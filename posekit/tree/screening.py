@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from posekit.compiled import check_kernels, frame_kernels
 from posekit.compiled.compiling import compiled
-from posekit.compiled.frame_kernels import NUMBERS
+from posekit.compiled.frame_kernels import NUMBERS_AT
 from posekit.geometry import Array
 from posekit.tree.check import Rule
 
@@ -25,13 +25,13 @@ def screened(rule: Rule, points: Array) -> tuple[NDArray[np.int8], Array | None]
     Returns
     -------
     places : int array (N,)
-        The first place violated, `posekit.compiled.verdicts.PASSED` or `UNSURE`.
+        The first place violated, `posekit.compiled.verdicts.NO_VIOLATION` or `NOT_CLEAR`.
     presumed : array (M, W) or None
         Of every place violated what is to be confirmed (`posekit.tree.Check.confirm`); None where nothing is presumed.
     """
     places = np.empty(len(points), dtype=np.int8)
     presumed = np.empty((len(points), rule.presumed))
-    w = np.concatenate([np.zeros(NUMBERS), rule.numbers])
+    w = np.concatenate([np.zeros(NUMBERS_AT), rule.numbers])
     count = compiled(frame_kernels, check_kernels).screens(
         rule.kind, np.ascontiguousarray(points), w, places, presumed
     )

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from posekit.compiled import check_kernels, frame_kernels
 from posekit.compiled import tree_kernels as kernels
 from posekit.compiled.compiling import compiled
-from posekit.compiled.frame_kernels import ALIVE, ASKED, GONE, MAX_PRESUMED, REASONS, UNKNOWN
+from posekit.compiled.frame_kernels import (
+    MAX_PRESUMED,
+    N_ALIVE,
+    N_LOST,
+    N_PRESUMED,
+    N_UNSURE,
+    UNJUDGED_STATES,
+)
 from posekit.geometry import Array
 from posekit.tree.blocks import FrameBlock
 from posekit.tree.check import Check
@@ -41,7 +48,7 @@ def growing(
         Whether joints are to be lifted and with what, as `posekit.compiled.frame_kernels.grow` takes it.
     """
     joints = len(roots.joints)
-    first_group = (joints - 1) * REASONS
+    first_group = (joints - 1) * UNJUDGED_STATES
 
     def grow_block(frames: tuple[int, int]) -> FrameBlock:
         alive = np.zeros((frames[1] - frames[0], 2), dtype=np.int32)
@@ -55,17 +62,20 @@ def growing(
                 run = _Run(programme, stretch, frames, alive)
                 run.grow(lifting, joints)
                 lifting = (False, *lift[1:])
-                alive = run.alive[: run.used[ALIVE]]
-                lost.append(run.lost[: run.used[GONE]])
+                alive = run.alive[: run.used[N_ALIVE]]
+                lost.append(run.lost[: run.used[N_LOST]])
                 presumed += run.questions(checks)
-                unsure.append(run.unsure[: run.used[UNKNOWN]])
+                unsure.append(run.unsure[: run.used[N_UNSURE]])
             if stretch.check is not None and len(alive):
                 nodes = roots.at(stretch.level, alive[:, 0].copy(), alive[:, 1].copy())
                 place = _first_violated(nodes, stretch.check)
                 dead = place >= 0
                 gone = np.empty((int(dead.sum()), 4), dtype=np.int32)
-                gone[:, kernels.GROUP], gone[:, kernels.PLACE] = first_group + stretch.number, place[dead]
-                gone[:, kernels.OF_FRAME : kernels.PLACE] = alive[dead]
+                gone[:, kernels.GROUP_COLUMN], gone[:, kernels.PLACE_COLUMN] = (
+                    first_group + stretch.number,
+                    place[dead],
+                )
+                gone[:, kernels.OF_FRAME : kernels.PLACE_COLUMN] = alive[dead]
                 lost.append(gone)
                 alive = np.ascontiguousarray(alive[~dead])
         left = np.concatenate([np.empty(0, dtype=np.int64), *unsure])
@@ -123,16 +133,16 @@ class _Run:
             if begin < end:
                 # One of them was full: what it will be of the frames that are left nobody knows.
                 nodes = np.empty(2 * len(nodes), dtype=np.int32)
-                self.alive = _longer(self.alive, self.used[ALIVE])
-                self.lost = _longer(self.lost, self.used[GONE])
+                self.alive = _longer(self.alive, self.used[N_ALIVE])
+                self.lost = _longer(self.lost, self.used[N_LOST])
                 self.presumed, self.asked = (
-                    _longer(each, self.used[ASKED]) for each in (self.presumed, self.asked)
+                    _longer(each, self.used[N_PRESUMED]) for each in (self.presumed, self.asked)
                 )
 
     def questions(self, checks: Sequence[Check]) -> list[tuple[Check, Array]]:
         """Return what is to be confirmed, by check."""
         table = self.programme.checks
-        which, told = self.asked[: self.used[ASKED]], self.presumed[: self.used[ASKED]]
+        which, told = self.asked[: self.used[N_PRESUMED]], self.presumed[: self.used[N_PRESUMED]]
         return [(checks[table[c, 6]], told[which == c][:, : table[c, 1]]) for c in np.unique(which).tolist()]
 
 

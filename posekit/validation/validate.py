@@ -25,7 +25,7 @@ from posekit.validators import Report as Verdicts
 from posekit.validators import Validator
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
-from posekit.validators.walking import WALKERS
+from posekit.validators.walking import THRESHOLDS_BY_WALKERS
 
 BATCH: Final = 4096
 """Postures that are judged at once."""
@@ -131,7 +131,7 @@ class JudgedWith(NamedTuple):
 
     The rigid tolerance is in metres, and that of the validators where less was allowed; the angle tolerance in degrees,
     the contact margin in metres (negative allows penetration); whose thresholds the rules of walking had is a name, as
-    `posekit.validators.walking.WALKERS` has it.
+    `posekit.validators.walking.THRESHOLDS_BY_WALKERS` has it.
     """
 
     rigid: float
@@ -177,12 +177,12 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
             angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
             margins.append(_number(said, "contact", asked, within=within))
     walkers = settings.get("walkers", "paper")
-    if not (isinstance(walkers, str) and walkers in WALKERS):
+    if not (isinstance(walkers, str) and walkers in THRESHOLDS_BY_WALKERS):
         raise refusal(
             "result",
             "settings.walkers",
             repr(walkers)[:40],
-            " or ".join(WALKERS),
+            " or ".join(THRESHOLDS_BY_WALKERS),
             "correct what made the result",
         )
     return JudgedWith(max(rigid), max(angles), min(margins), walkers)

@@ -23,7 +23,7 @@ from posekit.recovery import recover
 from posekit.skeleton import JOINTS
 from posekit.synthesis import seq1, seq2
 from posekit.synthesis.walker_scene import SEQ1_PHASE0, SEQ2_PHASE0, SEQ_VELOCITY
-from posekit.validators import CHECKS
+from posekit.validators import ALL_CHECKS
 from posekit.views.builtin import view_of
 
 PHASE0 = {"seq1": SEQ1_PHASE0, "seq2": SEQ2_PHASE0}
@@ -160,7 +160,7 @@ def test_levels_behave_as_the_papers_columns_do(name: str) -> None:
 def test_the_built_in_view_gives_the_same_counts(name: str) -> None:
     recovery = recover(
         view_of(SCENES[name]()),
-        checks=CHECKS,
+        checks=ALL_CHECKS,
         ranges="table1",
         rules=(1, 2),
         tolerance=PAPER_TOLERANCE,

@@ -23,7 +23,7 @@ from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
 from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
 from posekit.skeleton import HIPS, JOINT, JOINTS, SEGMENTS, TORSO, segment_name
 from posekit.synthesis import CameraSphere, random_views
-from posekit.validators import PHYSICAL, judge, load_ranges
+from posekit.validators import PHYSICAL_CHECKS, judge, load_ranges
 
 HUMAN = taylor_human()
 PERSON = load_figure().from_stature(1.75)
@@ -209,7 +209,7 @@ def test_there_are_2048_flips_and_they_are_those_of_brute_force(k):
     np.testing.assert_allclose(points, same, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("names", [("rigid-parts",), ("joint-range",), ("collision",), PHYSICAL])
+@pytest.mark.parametrize("names", [("rigid-parts",), ("joint-range",), ("collision",), PHYSICAL_CHECKS])
 def test_survivors_are_those_of_brute_force(names: Sequence[str]):
     left = 0
     for k in range(4):
@@ -235,7 +235,7 @@ def test_counts_are_those_of_the_trees_one_by_one():
         "rigid parts": ("rigid-parts",),
         "joint range, urdf": ("joint-range",),
         "collision": ("collision",),
-        "all, urdf": PHYSICAL,
+        "all, urdf": PHYSICAL_CHECKS,
     }
     assert set(rows) == set(names)
     for label, checks in names.items():

@@ -10,7 +10,7 @@ import pytest
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.tree import Branch, Check, Findings, InterpretationTree, Leaves
+from posekit.tree import BranchState, Check, Findings, InterpretationTree, Leaves, Place
 from posekit.tree.candidates import lift_all
 from posekit.validators import collision, joint_range, rigid_parts
 
@@ -335,14 +335,16 @@ def test_branches_behind_the_camera_are_named() -> None:
 def test_candidates_are_the_86_lifts() -> None:
     candidates = lift_all(CAMERA, *end_on(2), parents=PARENTS, lengths=LENGTHS, tolerance=0.0)
     assert sum(positions.shape[1] for positions in candidates.positions[1:]) == 86
-    assert all((branches == Branch.OPEN).all() for branches in candidates.branches)
+    assert all((branches == BranchState.OPEN).all() for branches in candidates.branches)
     assert candidates.too_short(0) is None
 
 
-class Seen:
+class Seen(Check):
     """A check that keeps what it was asked and rejects by a rule."""
 
-    name, where, unit = "seen", ("place",), "m"
+    name, unit = "seen", "m"
+    places = (Place(name="place"),)
+    points: tuple[int, ...] = ()
 
     def __init__(self, points: tuple[int, ...], *, limit: float = np.inf) -> None:
         self.points = points

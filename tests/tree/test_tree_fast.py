@@ -568,6 +568,6 @@ def test_without_a_folder_for_the_cache_it_is_compiled_for_this_process(
     monkeypatch.setattr(compiled, "_numba", lambda: fake_numba(failure))
     monkeypatch.setattr(compiled, "_LOADED", {})
     loops = compiled.compiled(kernels)
-    assert set(vars(loops)) == {name for name, types in kernels.COMPILED.items() if types}
+    assert set(vars(loops)) == {name for name, types in kernels.COMPILED_TYPES.items() if types}
     assert loops is compiled.compiled(kernels)
     assert_same(*one_view())

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.skeleton import DOFS, JOINT, SIDES
 from posekit.tree import screened
 from posekit.validators import Ranges, joint_range, load_ranges
@@ -81,9 +81,9 @@ def compare(check: AnatomicalLimb, points: np.ndarray) -> tuple[np.ndarray, np.n
     with np.errstate(invalid="ignore"):
         places, presumed = screened(check.rule, own)
         violated = check.judge(own).violated
-    first = np.where(violated.any(axis=1), violated.argmax(axis=1), PASSED)
+    first = np.where(violated.any(axis=1), violated.argmax(axis=1), NO_VIOLATION)
     assert presumed is None
-    clear = places != UNSURE
+    clear = places != NOT_CLEAR
     np.testing.assert_array_equal(places[clear], first[clear])
     return places, first
 
@@ -95,9 +95,9 @@ def test_what_is_clear_is_what_the_judge_says(name: str, tolerance: float) -> No
     unsure = []
     for check in limbs(TABLES[name], tolerance):
         places, first = compare(check, points)
-        assert (first != PASSED).any() or len(check.where) == 1
-        assert (first == PASSED).any()
-        unsure.append((places == UNSURE).mean())
+        assert (first != NO_VIOLATION).any() or len(check.where) == 1
+        assert (first == NO_VIOLATION).any()
+        unsure.append((places == NOT_CLEAR).mean())
     assert name == ONE_OF_TWO or np.mean(unsure) < 0.1
 
 
@@ -110,8 +110,8 @@ def test_limbs_whose_end_is_hidden_are_judged_by_what_is_seen(name: str, toleran
     for check in limbs(TABLES[name], tolerance):
         if len(check.limb) == 3:
             places, first = compare(check, points)
-            assert name == ONE_OF_TWO or (places == UNSURE).mean() < 0.02
-            lost += int((first != PASSED).sum())
+            assert name == ONE_OF_TWO or (places == NOT_CLEAR).mean() < 0.02
+            lost += int((first != NO_VIOLATION).sum())
     assert lost > 0
 
 
@@ -132,11 +132,11 @@ def test_straight_limbs_are_clear_where_their_rotation_is_not_seen(
         if len(check.limb) == 3:
             places, first = compare(check, points)
             if name == "the table" and bend < np.radians(tolerance) / 1000:
-                assert (places == UNSURE).mean() < 0.01
-                assert (first == PASSED).any() and (first != PASSED).any()
+                assert (places == NOT_CLEAR).mean() < 0.01
+                assert (first == NO_VIOLATION).any() and (first != NO_VIOLATION).any()
             # What depends on a rotation that could be any is left to the judge.
             if tolerance == 0.0 and bend <= 1e-9:
-                assert (places == UNSURE).all()
+                assert (places == NOT_CLEAR).all()
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -170,6 +170,6 @@ def test_what_cannot_be_judged_passes_or_is_left_to_the_judge() -> None:
             some[2] = some[2, :1]
             places, _ = compare(check, some)
             if k < len(check.points) - 1 or len(check.limb) == 2:
-                assert places[0] == PASSED
-            assert (places[1:3] == UNSURE).all()
+                assert places[0] == NO_VIOLATION
+            assert (places[1:3] == NOT_CLEAR).all()
         assert screened(check.rule, np.empty((0, len(check.points), 3)))[0].shape == (0,)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from posekit.validators.anatomical_shoulder import SEAM, elevation_and_plane, turn_offset
+from posekit.validators.anatomical_shoulder import SEAM_DEGREES, elevation_and_plane, turn_offset
 
 
 def wrapped(degrees: np.ndarray) -> np.ndarray:
@@ -27,7 +27,7 @@ def test_they_are_those_of_the_rotation_matrix(rng: np.random.Generator) -> None
     # The twist: what is left after the shortest swing that takes the hanging arm to its direction.
     x, y, z, w = R.as_quat().T
     twist = 2 * np.degrees(np.arctan2(z, w))
-    side = 90.0 - np.where(plane < SEAM, plane + 360.0, plane)
+    side = 90.0 - np.where(plane < SEAM_DEGREES, plane + 360.0, plane)
     turn = twist - (1 - np.cos(np.radians(elevation))) * side
     np.testing.assert_allclose(wrapped(turn_offset(flexion, abduction) + rotation - turn), 0, atol=1e-6)
     assert np.abs(x).max() > 0.5 < np.abs(y).max()
@@ -81,5 +81,5 @@ def test_the_seam_is_behind_the_back() -> None:
     for plane in np.arange(-179.0, 180.0, 5.0):
         step = wrapped(np.array([turn_at(plane + 0.01) - turn_at(plane)]))[0]
         assert abs(step) < 0.1
-    jump = wrapped(np.array([turn_at(SEAM + 1e-6) - turn_at(SEAM - 1e-6)]))[0]
+    jump = wrapped(np.array([turn_at(SEAM_DEGREES + 1e-6) - turn_at(SEAM_DEGREES - 1e-6)]))[0]
     assert abs(jump) == pytest.approx(180.0, abs=1e-3)  # 360 (1 - cos 60)

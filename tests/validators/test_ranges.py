@@ -9,10 +9,10 @@ from posekit.errors import InputError
 from posekit.skeleton import DOFS
 from posekit.tables.angles import PROJECTED_ANGLES
 from posekit.validators import Ranges, load_ranges
-from posekit.validators.ranges import SCHEMA, URDF_RANGES
+from posekit.validators.ranges import RANGES_SCHEMA, URDF_RANGES
 
-HEAD = f'schema = "{SCHEMA}"\nkind = "configuration"\n'
-PROJECTED = f'schema = "{SCHEMA}"\nkind = "projected"\n'
+HEAD = f'schema = "{RANGES_SCHEMA}"\nkind = "configuration"\n'
+PROJECTED = f'schema = "{RANGES_SCHEMA}"\nkind = "projected"\n'
 
 
 def load(folder: Path, text: str | bytes) -> Ranges:
@@ -89,9 +89,9 @@ WRONG = {
         'schema = "posekit.ranges/9"',
         'schema: got "posekit.ranges/9"; expected "posekit.ranges/1"',
     ),
-    "no kind": (f'schema = "{SCHEMA}"', "kind: got nothing; expected this field"),
+    "no kind": (f'schema = "{RANGES_SCHEMA}"', "kind: got nothing; expected this field"),
     "another kind": (
-        f'schema = "{SCHEMA}"\nkind = "euler"',
+        f'schema = "{RANGES_SCHEMA}"\nkind = "euler"',
         "kind: got \"euler\"; expected 'configuration' or 'projected'",
     ),
     "no TOML": (HEAD + "[neck\n", "not TOML"),

@@ -22,7 +22,7 @@ STANDING = FIGURE.neutral_points[None, :14].copy()
 
 @cache
 def validator(name: str, lengths: str = "model") -> Validator:
-    return Validator(name, lengths=lengths, bodies="capsules")  # type: ignore[arg-type]
+    return Validator(name, lengths=lengths, bodies="capsules")
 
 
 def configurations(name: str, count: int, seed: int) -> np.ndarray:

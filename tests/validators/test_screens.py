@@ -7,9 +7,9 @@ import pytest
 from posekit import tree
 from posekit.body import load_figure
 from posekit.compiled import angle_kernels
-from posekit.compiled.angle_kernels import TURN
-from posekit.compiled.frame_kernels import NUMBERS
-from posekit.compiled.verdicts import PASSED, UNSURE
+from posekit.compiled.angle_kernels import TURN_AT
+from posekit.compiled.frame_kernels import NUMBERS_AT
+from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import fit_rotation
 from posekit.skeleton import DOFS
 from posekit.tree import Check
@@ -65,7 +65,7 @@ def places(check: Check, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if presumed is not None:
         assert len(presumed) == (screened >= 0).sum()
         assert not len(presumed) or check.confirm(presumed)
-    return screened, np.where(violated.any(axis=1), violated.argmax(axis=1), PASSED)
+    return screened, np.where(violated.any(axis=1), violated.argmax(axis=1), NO_VIOLATION)
 
 
 @pytest.mark.parametrize("tolerance", SUITES)
@@ -74,7 +74,7 @@ def test_a_screen_never_contradicts_the_judge(tolerance: float, index: int) -> N
     check = SUITES[tolerance][index]
     for points in (postures(index), special(index)):
         screened, judged = places(check, points)
-        clear = screened != UNSURE
+        clear = screened != NOT_CLEAR
         np.testing.assert_array_equal(screened[clear], judged[clear])
 
 
@@ -82,9 +82,9 @@ def test_a_screen_never_contradicts_the_judge(tolerance: float, index: int) -> N
 def test_a_screen_is_hardly_ever_unsure_of_ordinary_postures(index: int) -> None:
     points = np.concatenate([postures(100 + index), FIGURE.neutral_points[None]])
     screened, judged = places(SUITES[1e-3][index], points)
-    assert (screened == UNSURE).mean() < 0.03
+    assert (screened == NOT_CLEAR).mean() < 0.03
     if SUITES[1e-3][index].name == "joint_range":
-        assert (judged >= 0).any() and (judged == PASSED).any()
+        assert (judged >= 0).any() and (judged == NO_VIOLATION).any()
 
 
 def test_the_polar_factor_is_the_best_rotation() -> None:
@@ -93,18 +93,18 @@ def test_the_polar_factor_is_the_best_rotation() -> None:
     for _ in range(20):
         seen = rng.normal(size=(5, 3))
         expected = fit_rotation(body, seen[None])[0]
-        w = np.empty(NUMBERS)
-        w[TURN : TURN + 9] = np.einsum("pi,pj->ij", seen, body).ravel()
+        w = np.empty(NUMBERS_AT)
+        w[TURN_AT : TURN_AT + 9] = np.einsum("pi,pj->ij", seen, body).ravel()
         if angle_kernels.polar(w):
-            X = w[TURN : TURN + 9].reshape(3, 3)
+            X = w[TURN_AT : TURN_AT + 9].reshape(3, 3)
             np.testing.assert_allclose(X, expected, rtol=0, atol=1e-11)
             np.testing.assert_allclose(X @ X.T, np.eye(3), rtol=0, atol=1e-12)
 
 
 def test_a_mirrored_or_flat_head_is_not_clear() -> None:
-    w = np.empty(NUMBERS)
+    w = np.empty(NUMBERS_AT)
     for C in (np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 0.0]), np.zeros((3, 3)), np.full((3, 3), np.nan)):
-        w[TURN : TURN + 9] = C.ravel()
+        w[TURN_AT : TURN_AT + 9] = C.ravel()
         assert not angle_kernels.polar(w)
 
 
@@ -118,7 +118,7 @@ def test_a_distance_at_its_bound_is_left_to_the_judge(off: float) -> None:
         length = np.linalg.norm(along, axis=1, keepdims=True)
         points[:, b] = points[:, a] + along / length * (length + 0.01 + off)
         screened, judged = places(check, points)
-        clear = screened != UNSURE
+        clear = screened != NOT_CLEAR
         assert clear.all() == (abs(off) > 1e-12)
         np.testing.assert_array_equal(screened[clear], judged[clear])
 
@@ -138,6 +138,6 @@ def test_straight_limbs_are_clear_where_their_rotation_is_not_judged(bend: float
     for check in SUITES[tolerance]:
         if len(check.where) == 4:
             screened, judged = places(check, points)
-            clear = screened != UNSURE
+            clear = screened != NOT_CLEAR
             np.testing.assert_array_equal(screened[clear], judged[clear])
             assert clear.mean() > (0.95 if 7 * bend < np.radians(tolerance) else -1)

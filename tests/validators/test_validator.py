@@ -13,7 +13,15 @@ from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
 from posekit.skeleton import JOINT, JOINTS, SEGMENTS, segment_name
 from posekit.synthesis import random_postures
-from posekit.validators import CHECKS, PHYSICAL, Report, Validator, check_names, load_ranges, make_checks
+from posekit.validators import (
+    ALL_CHECKS,
+    PHYSICAL_CHECKS,
+    Report,
+    Validator,
+    check_names,
+    load_ranges,
+    make_checks,
+)
 
 FIGURE = load_figure()
 STANDING = FIGURE.neutral_points[None, :14].copy()
@@ -203,7 +211,7 @@ def test_the_rigid_tolerance_is_the_callers() -> None:
 def test_a_posture_with_an_unknown_joint_is_undecided_never_valid(joint: str) -> None:
     joints = STANDING.copy()
     joints[0, JOINT[joint]] = np.nan
-    report = Validator(checks=CHECKS, rules=(1, 2, 3, 4, 5)).check(joints, HEAD)
+    report = Validator(checks=ALL_CHECKS, rules=(1, 2, 3, 4, 5)).check(joints, HEAD)
     assert report.verdicts == ["undecided"]
     assert (report.valid | report.invalid).tolist() == [False]
 
@@ -223,7 +231,7 @@ def test_one_unknown_coordinate_is_enough() -> None:
 
 
 def test_nothing_known_is_undecided() -> None:
-    report = Validator(checks=CHECKS).check(np.full((3, 14, 3), np.nan))
+    report = Validator(checks=ALL_CHECKS).check(np.full((3, 14, 3), np.nan))
     assert report.verdicts == ["undecided"] * 3
     assert np.isnan(report.fk_distance).all()
     assert np.isnan(report.q[:, 3:7]).all()
@@ -243,7 +251,7 @@ def test_the_three_verdicts_exclude_each_other() -> None:
 
 
 def test_no_postures_no_verdicts() -> None:
-    report = Validator(checks=CHECKS).check(np.empty((0, 14, 3)))
+    report = Validator(checks=ALL_CHECKS).check(np.empty((0, 14, 3)))
     assert report.verdicts == []
     assert report.q.shape == (0, FIGURE.model.nq)
 
@@ -304,8 +312,8 @@ def test_table1_judges_the_papers_angles() -> None:
 
 def test_walking_rules_are_switched_on_one_by_one() -> None:
     both_forward = posed(right_shoulder_flexion=40.0, left_shoulder_flexion=40.0)[:, :14]
-    assert not Validator(checks=CHECKS, rules=(2,)).check(both_forward, HEAD).invalid.any()
-    report = Validator(checks=CHECKS, rules=(1, 2)).check(both_forward, HEAD)
+    assert not Validator(checks=ALL_CHECKS, rules=(2,)).check(both_forward, HEAD).invalid.any()
+    report = Validator(checks=ALL_CHECKS, rules=(1, 2)).check(both_forward, HEAD)
     assert rejected_at(report) == {"walking/rule1.arms"}
     assert Validator().check(both_forward).verdicts == ["valid"]
 
@@ -314,12 +322,12 @@ def test_checks_are_applied_in_one_order_whatever_is_asked() -> None:
     validator = Validator(checks=("collision", "rigid-parts"))
     assert validator.checks == ("rigid-parts", "collision")
     assert [one.check for one in validator.check(STANDING).judgements] == ["rigid_parts", "collision"]
-    assert check_names(reversed(CHECKS)) == CHECKS
-    assert PHYSICAL == CHECKS[:3]
+    assert check_names(reversed(ALL_CHECKS)) == ALL_CHECKS
+    assert PHYSICAL_CHECKS == ALL_CHECKS[:3]
 
 
 def test_worst_is_the_smallest_margin() -> None:
-    for judgement in Validator(checks=CHECKS).check(STANDING).judgements:
+    for judgement in Validator(checks=ALL_CHECKS).check(STANDING).judgements:
         decided = judgement.margin[0][~np.isnan(judgement.margin[0])]
         assert judgement.worst.shape == (1,)
         assert np.isnan(judgement.worst[0]) if not len(decided) else judgement.worst[0] == decided.min()
@@ -328,7 +336,7 @@ def test_worst_is_the_smallest_margin() -> None:
 def test_a_check_that_decided_nothing_leaves_the_posture_undecided() -> None:
     """A standing person swings nothing: that is no evidence for walking, nor against it."""
     assert Validator().check(STANDING, HEAD).verdicts == ["valid"]
-    assert Validator(checks=CHECKS, rules=(1, 2)).check(STANDING, HEAD).verdicts == ["undecided"]
+    assert Validator(checks=ALL_CHECKS, rules=(1, 2)).check(STANDING, HEAD).verdicts == ["undecided"]
 
 
 # --- bad input ------------------------------------------------------------------------------------------
@@ -371,7 +379,7 @@ def test_malformed_heads_are_refused(head: np.ndarray, text: str) -> None:
         ({"checks": ()}, r"--checks: none is given, so nothing would be judged"),
         ({"ranges": "tabel1"}, r"--ranges tabel1: no such table or file"),
         ({"rules": (0,)}, r"--rules: 0 is not a rule"),
-        ({"rules": (6,), "checks": CHECKS}, r"--rules: 6 is not a rule"),
+        ({"rules": (6,), "checks": ALL_CHECKS}, r"--rules: 6 is not a rule"),
         ({"rigid_tolerance": np.nan}, r"the rigid tolerance is nan"),
         ({"rigid_tolerance": -0.01}, r"the rigid tolerance is -0.01"),
         ({"contact_margin": np.nan}, r"the contact margin is nan m"),
@@ -385,7 +393,9 @@ def test_impossible_options_are_refused(options: dict[str, Any], text: str) -> N
 
 def test_an_angle_tolerance_that_is_no_number_is_refused() -> None:
     with pytest.raises(InputError, match="the angle tolerance is nan"):
-        make_checks(FIGURE, PHYSICAL, ranges=load_ranges("urdf"), rigid_tolerance=0.0, angle_tolerance=np.nan)
+        make_checks(
+            FIGURE, PHYSICAL_CHECKS, ranges=load_ranges("urdf"), rigid_tolerance=0.0, angle_tolerance=np.nan
+        )
 
 
 def test_a_figure_that_cannot_be_read_is_refused(tmp_path: Any) -> None:

@@ -23,14 +23,19 @@ from posekit.settings import RecoverSettings, ValidateSettings
 from posekit.skeleton import DOFS
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
-from posekit.validators import PHYSICAL, Validator, make_checks
+from posekit.validators import PHYSICAL_CHECKS, Validator, make_checks
 from posekit.validators.joint_range import joint_range
 from posekit.validators.ranges import URDF_RANGES
-from posekit.validators.walking import PEOPLE, WALKERS, WalkingThresholds, thresholds_of
+from posekit.validators.walking import (
+    PEOPLE_THRESHOLDS,
+    THRESHOLDS_BY_WALKERS,
+    WalkingThresholds,
+    thresholds_of,
+)
 from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
-ALL = (*PHYSICAL, "walking")
+ALL = (*PHYSICAL_CHECKS, "walking")
 
 
 def passing() -> SyntheticScene:
@@ -59,8 +64,8 @@ def has_truth(recovery: Any, view: View) -> bool:
 
 
 def test_names_stand_for_thresholds() -> None:
-    assert dict(WALKERS) == {"paper": WalkingThresholds(), "people": PEOPLE}
-    assert thresholds_of("people") is PEOPLE
+    assert dict(THRESHOLDS_BY_WALKERS) == {"paper": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
+    assert thresholds_of("people") is PEOPLE_THRESHOLDS
     with pytest.raises(InputError, match="--walkers: 'giants'; expected paper or people"):
         thresholds_of("giants")
 
@@ -86,17 +91,17 @@ def test_every_way_to_ask_means_the_same(view: View) -> None:
     method = Method(settings=settings)
     np.testing.assert_array_equal(method.recover(view)[0].joints, expected)
     assert method.document()["walkers"] == "people"
-    verdicts = {name: Validator(checks=ALL, rules=(1,), walkers=name) for name in WALKERS}
+    verdicts = {name: Validator(checks=ALL, rules=(1,), walkers=name) for name in THRESHOLDS_BY_WALKERS}
     assert verdicts["people"].check(view.truth).verdicts == ["undecided"]  # no swing is large enough to say
     assert verdicts["paper"].check(view.truth).verdicts == ["invalid"]
     own = [
         check.thresholds.knee_swing
         for check in make_checks(
-            FIGURE, ("walking",), ranges=URDF_RANGES, rigid_tolerance=0.0, thresholds=PEOPLE
+            FIGURE, ("walking",), ranges=URDF_RANGES, rigid_tolerance=0.0, thresholds=PEOPLE_THRESHOLDS
         )
         if hasattr(check, "thresholds")
     ]
-    assert set(own) == {PEOPLE.knee_swing}
+    assert set(own) == {PEOPLE_THRESHOLDS.knee_swing}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
 from posekit.validators import walking
-from posekit.validators.walking import DEFAULT_RULES, PEOPLE, RULES, WalkingThresholds
+from posekit.validators.walking import DEFAULT_RULES, PEOPLE_THRESHOLDS, RULE_NUMBERS, WalkingThresholds
 
 FIGURE = load_figure()
 LIMITS = WalkingThresholds()
@@ -36,7 +36,7 @@ STRIDE = {
 
 
 def rejected(
-    points: np.ndarray, rules: Iterable[int] = RULES, thresholds: WalkingThresholds | None = None
+    points: np.ndarray, rules: Iterable[int] = RULE_NUMBERS, thresholds: WalkingThresholds | None = None
 ) -> set[str]:
     found = set()
     for check in walking(FIGURE, rules, thresholds):
@@ -45,7 +45,7 @@ def rejected(
     return found
 
 
-def values(points: np.ndarray, rules: Iterable[int] = RULES) -> dict[str, float]:
+def values(points: np.ndarray, rules: Iterable[int] = RULE_NUMBERS) -> dict[str, float]:
     found: dict[str, float] = {}
     for check in walking(FIGURE, rules):
         found |= dict(zip(check.where, check.judge(points[:, check.points]).value[0].tolist(), strict=True))
@@ -203,11 +203,13 @@ class TestTooCloseToTheTorso:
                 for name, angle in (("flexion", -10), ("abduction", 12), ("rotation", 15))}  # fmt: skip
         points = posture(**passing, **arms)
         assert {"rule1.legs", "rule1.arms", "rule5.knees", "rule4.right_arm"} <= rejected(points)
-        assert rejected(points, thresholds=PEOPLE) == set()
+        assert rejected(points, thresholds=PEOPLE_THRESHOLDS) == set()
         # But not: both legs far in front, or an arm and a leg of one side.
-        assert rejected(posture(right_hip_flexion=60, left_hip_flexion=55), (1,), PEOPLE) == {"rule1.legs"}
+        assert rejected(posture(right_hip_flexion=60, left_hip_flexion=55), (1,), PEOPLE_THRESHOLDS) == {
+            "rule1.legs"
+        }
         together = posture(right_shoulder_flexion=40, right_hip_flexion=50)
-        assert rejected(together, (2,), PEOPLE) == {"rule2.right"}
+        assert rejected(together, (2,), PEOPLE_THRESHOLDS) == {"rule2.right"}
 
     def test_thresholds_can_be_chosen(self) -> None:
         points = posture(right_hip_flexion=10, left_hip_flexion=10)
@@ -249,12 +251,13 @@ class TestTheBodyPlane:
 class TestSwitches:
     def test_each_rule_is_on_its_own(self) -> None:
         places = {
-            rule: {where for check in walking(FIGURE, (rule,)) for where in check.where} for rule in RULES
+            rule: {where for check in walking(FIGURE, (rule,)) for where in check.where}
+            for rule in RULE_NUMBERS
         }
         for rule, names in places.items():
             assert names
             assert all(name.startswith(f"rule{rule}.") for name in names)
-        everything = {where for check in walking(FIGURE, RULES) for where in check.where}
+        everything = {where for check in walking(FIGURE, RULE_NUMBERS) for where in check.where}
         assert everything == set.union(*places.values())
 
     def test_rules_1_and_2_are_the_default(self) -> None:
@@ -278,7 +281,7 @@ def test_a_missing_joint_never_rejects_and_leaves_its_rules_undecided(missing: s
     points = posture(**STRIDE, right_knee_flexion=40)
     k = POINTS.index(missing)
     points[:, k] = np.nan
-    for check in walking(FIGURE, RULES):
+    for check in walking(FIGURE, RULE_NUMBERS):
         findings = check.judge(points[:, check.points])
         assert not findings.violated.any()
         if k in check.points[9:]:
@@ -296,7 +299,7 @@ def test_the_mirror_image_has_the_mirrored_verdicts() -> None:
         return name.replace("right", "L").replace("left", "right").replace("L", "left")
 
     mirrored = (points * [1, -1, 1])[:, [POINTS.index(other(name)) for name in POINTS]]
-    checks = {check.where: check for check in walking(FIGURE, RULES)}
+    checks = {check.where: check for check in walking(FIGURE, RULE_NUMBERS)}
     for where, check in checks.items():
         twin = checks[tuple(other(place) for place in where)]
         ours, theirs = check.judge(points[:, check.points]), twin.judge(mirrored[:, twin.points])

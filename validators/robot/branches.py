@@ -14,14 +14,14 @@ from posekit.geometry import Array
 from posekit.robots.configuration_space import HINGES
 from posekit.validators.robot.subject import Subject
 
-SAME = 1e-9
+SAME_METRES = 1e-9
 """Metres, and entries of rotations, within which two placements are one."""
 
-TRIED = 3
+TRIED_CONFIGURATIONS = 3
 """Configurations at which a second solution is tried before it is believed."""
 
 
-class Ball(NamedTuple):
+class BallRotations(NamedTuple):
     """Three hinges in one place, by where they stand in q; the second solution turns the middle one to `half` - q."""
 
     first: int
@@ -50,15 +50,15 @@ class Branches:
                 [q[:, ball.first] + np.pi, ball.half - q[:, ball.middle], q[:, ball.last] + np.pi], axis=1
             )
             other = self._unwound(other)
-            better = self._outside(other, columns) < self._outside(q, columns) - SAME
+            better = self._outside(other, columns) < self._outside(q, columns) - SAME_METRES
             q[better] = other[better]
         return q
 
     @cached_property
-    def balls(self) -> tuple[Ball, ...]:
+    def balls(self) -> tuple[BallRotations, ...]:
         """Every three hinges that have a second solution: found by their axes, and tried."""
         model = self.subject.model
-        found: list[Ball] = []
+        found: list[BallRotations] = []
         taken: set[int] = set()
         for last in range(1, model.njoints):
             middle = model.parents[last]
@@ -67,7 +67,7 @@ class Branches:
             if 0 in chain or taken & set(chain) or not all(self._is_hinge(joint) for joint in chain):
                 continue
             apart = (model.jointPlacements[joint].translation for joint in (middle, last))
-            if any(np.abs(translation).max() > SAME for translation in apart):
+            if any(np.abs(translation).max() > SAME_METRES for translation in apart):
                 continue
             ball = self._second_solution(chain)
             if ball is not None:
@@ -78,20 +78,20 @@ class Branches:
     def _is_hinge(self, joint: int) -> bool:
         return self.subject.model.joints[joint].shortname() in HINGES
 
-    def _second_solution(self, chain: tuple[int, int, int]) -> Ball | None:
+    def _second_solution(self, chain: tuple[int, int, int]) -> BallRotations | None:
         model = self.subject.model
         at = [int(model.idx_qs[joint]) for joint in chain]
         rng = np.random.default_rng(0)
         for half in (np.pi, 0.0):
-            for _ in range(TRIED):
+            for _ in range(TRIED_CONFIGURATIONS):
                 q = pin.neutral(model)
                 q[at] = rng.uniform(-1.0, 1.0, 3)
                 other = q.copy()
                 other[at] = q[at[0]] + np.pi, half - q[at[1]], q[at[2]] + np.pi
-                if np.abs(self._rotation(q, chain[2]) - self._rotation(other, chain[2])).max() > SAME:
+                if np.abs(self._rotation(q, chain[2]) - self._rotation(other, chain[2])).max() > SAME_METRES:
                     break
             else:
-                return Ball(at[0], at[1], at[2], half)
+                return BallRotations(at[0], at[1], at[2], half)
         return None
 
     def _rotation(self, q: Array, joint: int) -> Array:

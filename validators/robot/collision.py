@@ -19,7 +19,7 @@ from posekit.validators.robot.near_pairs import NearPairs
 from posekit.validators.robot.subject import Subject
 from posekit.validators.suite import Judgement
 
-PLACE = "nearest pair"
+NEAREST_PAIR = "nearest pair"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,7 +113,7 @@ class SelfCollision:
             value[undecided] = np.nan
         return Judgement(
             check="collision",
-            where=(PLACE,),
+            where=(NEAREST_PAIR,),
             unit=("m",),
             value=value,
             lower=np.broadcast_to(self.contact_margin, value.shape),

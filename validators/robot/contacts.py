@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.validators.robot.near_pairs import NearPairs
 
-INSIDE: Final = 1e-6
+INSIDE_METRES: Final = 1e-6
 """Metres of penetration of two meshes from which their surfaces cross beyond doubt, so that their distance is nil."""
 
 
@@ -89,7 +89,9 @@ def find_contacts(
     distance: list[float] = []
     violated: list[bool] = []
     crossing = (
-        {} if meshes is None else {k: -INSIDE - float(margins[k]) for k in np.flatnonzero(meshes).tolist()}
+        {}
+        if meshes is None
+        else {k: -INSIDE_METRES - float(margins[k]) for k in np.flatnonzero(meshes).tolist()}
     )
     results = geometry_data.collisionResults
     chosen = q[rows]

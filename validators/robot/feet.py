@@ -13,7 +13,7 @@ from posekit.robots.body_point import frame_index
 from posekit.robots.kinematics import Kinematics
 from posekit.skeleton import SIDES
 
-LEG: Final = 0.491
+LEG_SHARE: Final = 0.491
 """Hip to ankle as a share of stature (Drillis & Contini 1966, in Winter 2009, fig. 4.1: 0.245 + 0.246)."""
 
 FOOT_LENGTH: Final = 0.152
@@ -21,7 +21,7 @@ FOOT_BREADTH: Final = 0.055
 ANKLE_HEIGHT: Final = 0.039
 """The foot as shares of stature (the same source)."""
 
-HEEL: Final = 0.25
+HEEL_SHARE: Final = 0.25
 """Share of the foot's length that lies behind the ankle: ours."""
 
 
@@ -90,14 +90,14 @@ def _made_up(kinematics: Kinematics) -> list[Corner]:
     corners = []
     for side in SIDES:
         hip, knee, ankle = (at[f"{side}_{joint}"] for joint in ("hip", "knee", "ankle"))
-        stature = (np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)) / LEG
+        stature = (np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)) / LEG_SHARE
         up = (knee - ankle) / np.linalg.norm(knee - ankle)
         left = at["left_hip"] - at["right_hip"]
         forward = np.cross(left, up)
         forward /= np.linalg.norm(forward)
         aside = np.cross(up, forward)
         joint = _joint_of(kinematics, f"{side}_ankle")
-        for along in (-HEEL, 1.0 - HEEL):
+        for along in (-HEEL_SHARE, 1.0 - HEEL_SHARE):
             for across in (-0.5, 0.5):
                 place = ankle + stature * (
                     along * FOOT_LENGTH * forward + across * FOOT_BREADTH * aside - ANKLE_HEIGHT * up

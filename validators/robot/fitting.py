@@ -17,22 +17,22 @@ from posekit.validators.robot.flips import Flip, find_flips
 from posekit.validators.robot.joint_range import beyond_limits
 from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE, Subject
 
-EXACT = 1e-4
+EXACT_METRES = 1e-4
 """Metres: a fit this close is the posture, and limits that cost no more than this are not the reason for a misfit."""
 
-STRICT = 1e-3
+STRICT_METRES = 1e-3
 """Metres: the closest that the first search is asked to come."""
 
-LESS = 0.01
+LESS_DEGREES = 0.01
 """Degrees by which another way to bend must be less outside the limits to be preferred."""
 
-SHAKES = 12
+SHAKEN_STARTS = 12
 """Starts around the best fit so far, in each round."""
 
 FEW_STEPS = 25
 """Steps of the search from such a start: what comes near goes on from there in the next round."""
 
-ROUNDS = (0.5, 1.0, 0.5, 1.0)
+ROUND_DEVIATIONS = (0.5, 1.0, 0.5, 1.0)
 """Standard deviation of the joints of such starts, radians or metres, round by round."""
 
 Bools = NDArray[np.bool_]
@@ -51,7 +51,7 @@ class Fit:
     free_q, free_residual : array (N, nq), (N, P)
         The same without limits, of all branches the one that is least outside them.
     kept_off : array (N,)
-        Metres by which the limits keep some point farther off; 0 where that is not more than `EXACT`.
+        Metres by which the limits keep some point farther off; 0 where that is not more than `EXACT_METRES`.
     """
 
     q: Array
@@ -114,16 +114,16 @@ class Fitter:
             else self._solver.solve_sequence(targets, sequence=sequence)
         )
         q, free_q = first.q.copy(), first.q.copy()
-        rows = np.flatnonzero(_worst(self._residual(q, targets)) > EXACT)
+        rows = np.flatnonzero(_worst(self._residual(q, targets)) > EXACT_METRES)
         rows = self._refit_free(targets, q, free_q, rows)
-        for start in range(-1, len(ROUNDS)):
+        for start in range(-1, len(ROUND_DEVIATIONS)):
             if not rows.size:
                 break
             few = targets[rows]
             other = self._inside(few, free_q[rows]) if start < 0 else self._from_around(few, q[rows], start)
             better = self._cost(other, few) < self._cost(q[rows], few)
             q[rows[better]] = other[better]
-            rows = rows[self._gain(targets, q, free_q, rows) > EXACT]
+            rows = rows[self._gain(targets, q, free_q, rows) > EXACT_METRES]
         rows = self._refit_free(targets, q, free_q, rows)
         kept_off = np.zeros(len(q))
         kept_off[rows] = self._gain(targets, q, free_q, rows)
@@ -157,7 +157,7 @@ class Fitter:
             kinematics=self.kinematics,
             lower=self.subject.lower,
             upper=self.subject.upper,
-            tolerance=max(self.tolerance, STRICT),
+            tolerance=max(self.tolerance, STRICT_METRES),
         )
 
     def _refit_free(
@@ -167,7 +167,7 @@ class Fitter:
         if not rows.size:
             return rows
         free_q[rows] = self._without_limits(targets[rows], q[rows])
-        rows = rows[self._gain(targets, q, free_q, rows) > EXACT]
+        rows = rows[self._gain(targets, q, free_q, rows) > EXACT_METRES]
         self._bend_otherwise(targets, free_q, rows)
         return rows
 
@@ -183,8 +183,8 @@ class Fitter:
                 return
             few = targets[rows]
             other = self._without_limits(few, flip.apply(free_q[rows]))
-            worse = _worst(self._residual(other, few) - self._residual(free_q[rows], few)) > EXACT
-            better = ~worse & (self._outside(other) < self._outside(free_q[rows]) - LESS)
+            worse = _worst(self._residual(other, few) - self._residual(free_q[rows], few)) > EXACT_METRES
+            better = ~worse & (self._outside(other) < self._outside(free_q[rows]) - LESS_DEGREES)
             free_q[rows[better]] = other[better]
 
     def _without_limits(self, targets: Array, start: Array) -> Array:
@@ -201,12 +201,12 @@ class Fitter:
     def _from_around(self, targets: Array, q: Array, start: int) -> Array:
         """Start from places around the best fit: the same steps from each posture, whatever else is in the batch."""
         at = self.kinematics.space.bounded_q
-        steps = np.random.default_rng(start).normal(0.0, ROUNDS[start], (SHAKES, len(at)))
-        starts, goals = np.repeat(q, SHAKES, axis=0), np.repeat(targets, SHAKES, axis=0)
+        steps = np.random.default_rng(start).normal(0.0, ROUND_DEVIATIONS[start], (SHAKEN_STARTS, len(at)))
+        starts, goals = np.repeat(q, SHAKEN_STARTS, axis=0), np.repeat(targets, SHAKEN_STARTS, axis=0)
         starts[:, at] += np.tile(steps, (len(q), 1))
         found = self._inside(goals, starts, FEW_STEPS)
-        best = np.argmin(self._cost(found, goals).reshape(len(q), SHAKES), axis=1)
-        return np.asarray(found.reshape(len(q), SHAKES, -1)[np.arange(len(q)), best])
+        best = np.argmin(self._cost(found, goals).reshape(len(q), SHAKEN_STARTS), axis=1)
+        return np.asarray(found.reshape(len(q), SHAKEN_STARTS, -1)[np.arange(len(q)), best])
 
     def _inside(self, targets: Array, start: Array, steps: int = MAX_STEPS) -> Array:
         """Descend inside the limits."""

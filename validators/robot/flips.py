@@ -10,13 +10,13 @@ from posekit.geometry import Array
 from posekit.robots.configuration_space import HINGES
 from posekit.robots.kinematics import Kinematics
 
-GRID: Final = 720
+GRID_ANGLES: Final = 720
 """Angles at which it is looked which bend places the points alike."""
 
-NEAR: Final = 0.02
+NEAR_METRES: Final = 0.02
 """Metres by which the points may then be off: robots' axes miss each other by so much. A descent closes it."""
 
-BEND: Final = 0.7
+GENERIC_BEND: Final = 0.7
 """Radians: a bend in no special position."""
 
 
@@ -53,13 +53,13 @@ def find_flips(kinematics: Kinematics) -> tuple[Flip, ...]:
             continue
         turn, bend = int(model.idx_qs[above]), int(model.idx_qs[joint])
         q = kinematics.generic[:1].copy()
-        q[:, bend] = BEND
-        other = np.repeat(q, GRID, axis=0)
+        q[:, bend] = GENERIC_BEND
+        other = np.repeat(q, GRID_ANGLES, axis=0)
         other[:, turn] += np.pi
-        other[:, bend] = np.linspace(-np.pi, np.pi, GRID, endpoint=False)
+        other[:, bend] = np.linspace(-np.pi, np.pi, GRID_ANGLES, endpoint=False)
         apart = kinematics.positions(other)[:, moved] - kinematics.positions(q)[:, moved]
         off = np.linalg.norm(apart, axis=2).max(axis=1)
         best = int(np.argmin(off))
-        if off[best] < NEAR:
-            flips.append(Flip(turn, bend, float(BEND + other[best, bend])))
+        if off[best] < NEAR_METRES:
+            flips.append(Flip(turn, bend, float(GENERIC_BEND + other[best, bend])))
     return tuple(flips)

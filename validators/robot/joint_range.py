@@ -13,7 +13,7 @@ from posekit.validators.suite import Judgement
 
 Bools = NDArray[np.bool_]
 
-ROWS: Final = 1024
+ROWS_AT_ONCE: Final = 1024
 """Configurations that are compared at once: they and the comparisons stay in the processor's cache."""
 
 
@@ -26,8 +26,8 @@ def outside_limits(subject: Subject, q: Array, *, tolerance: float) -> Bools:
     lower, upper = (np.full(q.shape[1], bound) for bound in (-np.inf, np.inf))
     lower[subject.index], upper[subject.index] = subject.lower[subject.index], subject.upper[subject.index]
     outside = np.zeros(len(q), dtype=np.bool_)
-    for start in range(0, len(q), ROWS):
-        part = q[start : start + ROWS]
+    for start in range(0, len(q), ROWS_AT_ONCE):
+        part = q[start : start + ROWS_AT_ONCE]
         some = np.flatnonzero(((part < lower) | (part > upper)).any(axis=1))
         if len(some):
             judged = judge_joint_range(subject, part[some], tolerance=tolerance)

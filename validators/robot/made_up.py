@@ -21,7 +21,7 @@ from posekit.robots.kinematics import Kinematics
 from posekit.robots.pairs import neutral_inside_limits
 from posekit.skeleton import SIDES
 
-SHORTEST: Final = 1e-3
+SHORTEST_METRES: Final = 1e-3
 """Metres: a part of a segment that is shorter gets no capsule of its own."""
 
 
@@ -33,7 +33,7 @@ class Segment(NamedTuple):
     end: str
 
 
-SEGMENTS: Final = (
+CAPSULE_SEGMENTS: Final = (
     Segment("torso", "neck", "pelvis"),
     Segment("hips", "right_hip", "left_hip"),
     *(
@@ -83,12 +83,12 @@ def fitted_capsules(kinematics: Kinematics) -> pin.GeometryModel:
     data = model.createData()
     pin.forwardKinematics(model, data, pin.neutral(model))
     parts_of: list[str] = []
-    for segment in SEGMENTS:
+    for segment in CAPSULE_SEGMENTS:
         if segment.start not in place or segment.end not in place:
             continue
         a, b, shape = place[segment.start], place[segment.end], shapes[segment.name]
         length = float(np.linalg.norm(b - a))
-        parts = _parts(kinematics, data, segment, shape) if length > SHORTEST else []
+        parts = _parts(kinematics, data, segment, shape) if length > SHORTEST_METRES else []
         for k, part in enumerate(parts):
             name = segment.name if len(parts) == 1 else f"{segment.name}_{k + 1}"
             start, end = a + part.start * (b - a), a + part.end * (b - a)
@@ -116,7 +116,7 @@ def _parts(kinematics: Kinematics, data: pin.Data, segment: Segment, shape: Shap
     a, along = place[segment.start], place[segment.end] - place[segment.start]
     at = [float((data.oMi[joint].translation - a) @ along / (along @ along)) for joint in cuts]
     edges = np.clip([0.0, *at, 1.0], shape.start, shape.end)
-    least = SHORTEST / float(np.linalg.norm(along))
+    least = SHORTEST_METRES / float(np.linalg.norm(along))
     return [
         Part(float(start), float(end), joint)
         for start, end, joint in zip(edges[:-1], edges[1:], bodies, strict=True)

@@ -38,7 +38,7 @@ PAIRS_FROM: Final = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Judged:
+class JudgedModel:
     """One model, and what judges its configurations; tables and pools are made once, when they are needed.
 
     Parameters
@@ -113,14 +113,16 @@ class Models:
         return "urdf" if self.robot.collision_pairs else "capsules"
 
     @cached_property
-    def own(self) -> Judged:
+    def own(self) -> JudgedModel:
         """The model with its own lengths."""
         lower, upper = self.limits
         subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
         needed = "balance" in self.settings.checks
-        return Judged(subject=subject, kinematics=self._mapped if needed else None, settings=self.settings)
+        return JudgedModel(
+            subject=subject, kinematics=self._mapped if needed else None, settings=self.settings
+        )
 
-    def with_lengths(self, lengths: Mapping[str, float], behind: bool | None) -> Judged:
+    def with_lengths(self, lengths: Mapping[str, float], behind: bool | None) -> JudgedModel:
         """Return the model with other segment lengths; the last one is kept."""
         key = (behind, *sorted(lengths.items()))
         if key not in self._kept:
@@ -144,11 +146,11 @@ class Models:
         return rigid_segments(self.kinematics)
 
     @cached_property
-    def mapped(self) -> Judged:
+    def mapped(self) -> JudgedModel:
         """The model with its own lengths and its points."""
         lower, upper = self.limits
         subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
-        return Judged(subject=subject, kinematics=self.kinematics, settings=self.settings)
+        return JudgedModel(subject=subject, kinematics=self.kinematics, settings=self.settings)
 
     def describe(self) -> dict[str, Any]:
         """List what decides the verdicts, as reports have it."""
@@ -165,7 +167,7 @@ class Models:
             }
         return settings
 
-    def _scaled(self, lengths: Mapping[str, float], behind: bool | None) -> Judged:
+    def _scaled(self, lengths: Mapping[str, float], behind: bool | None) -> JudgedModel:
         make_up = self.bodies == "capsules"
         result = scaled(self.kinematics, lengths, None if make_up else self._geometry, behind=behind)
         geometry = result.geometry
@@ -173,10 +175,10 @@ class Models:
             geometry = fitted_capsules(result.kinematics)
         lower, upper = self.limits
         subject = Subject(model=result.kinematics.model, lower=lower, upper=upper, geometry=geometry)
-        return Judged(subject=subject, kinematics=result.kinematics, settings=self.settings)
+        return JudgedModel(subject=subject, kinematics=result.kinematics, settings=self.settings)
 
     @cached_property
-    def _kept(self) -> dict[tuple[object, ...], Judged]:
+    def _kept(self) -> dict[tuple[object, ...], JudgedModel]:
         return {}
 
     @cached_property

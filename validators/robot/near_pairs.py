@@ -13,13 +13,13 @@ from posekit.geometry import Array
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.joint_chain import JointChain
 
-ROOM: Final = 1e-6
+ROOM_METRES: Final = 1e-6
 """Metres that balls are taken larger, for rounding."""
 
 ROOM_A_METRE: Final = 1e-12
 """As much more for each metre that the base, or a joint that slides, is away from the origin."""
 
-ROWS: Final = 256
+ROWS_AT_ONCE: Final = 256
 """Configurations that are looked at at once: some hundred pairs of them stay in the processor's cache."""
 
 
@@ -47,7 +47,7 @@ class NearPairs:
         self._joint = np.array([body.parentJoint for body in bodies], dtype=np.intp)
         pairs = np.array([(pair.first, pair.second) for pair in geometry.collisionPairs], dtype=np.intp)
         self._first, self._second = pairs.reshape(-1, 2).T
-        self._reach = radius[self._first] + radius[self._second] + margins + ROOM
+        self._reach = radius[self._first] + radius[self._second] + margins + ROOM_METRES
         self._chain: JointChain | None = None
         try:
             ConfigurationSpace(model)
@@ -60,8 +60,8 @@ class NearPairs:
         if self._chain is None:
             return np.ones((len(q), len(self._reach)), dtype=np.bool_)
         near = np.empty((len(q), len(self._reach)), dtype=np.bool_)
-        for start in range(0, len(q), ROWS):
-            near[start : start + ROWS] = self._of(self._chain, q[start : start + ROWS])
+        for start in range(0, len(q), ROWS_AT_ONCE):
+            near[start : start + ROWS_AT_ONCE] = self._of(self._chain, q[start : start + ROWS_AT_ONCE])
         return near
 
     def _of(self, chain: JointChain, q: Array) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, one_line, refusal
 
-UNLIMITED = 1e100
+UNLIMITED_FROM = 1e100
 """Radians or metres from which on a limit of the model is none."""
 
 
@@ -29,7 +29,7 @@ def load_joint_limits(name: str, model: pin.Model) -> tuple[Array, Array]:
         one variable.
     """
     lower, upper = model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
-    lower[lower < -UNLIMITED], upper[upper > UNLIMITED] = -np.inf, np.inf
+    lower[lower < -UNLIMITED_FROM], upper[upper > UNLIMITED_FROM] = -np.inf, np.inf
     if name == "urdf":
         return lower, upper
     for joint, (low, high) in _read(name, model).items():

@@ -11,7 +11,7 @@ from posekit.geometry import Array
 from posekit.robots.kinematics import Kinematics
 from posekit.validators.suite import Judgement
 
-RIGID = 1e-9
+RIGID_METRES = 1e-9
 """Metres by which the distance of two points of one body may change over configurations."""
 
 
@@ -20,7 +20,7 @@ def rigid_pairs(kinematics: Kinematics) -> NDArray[np.intp]:
     points = kinematics.positions(kinematics.generic)
     pairs = np.array(list(combinations(range(points.shape[1]), 2)), dtype=np.intp).reshape(-1, 2)
     distance = np.linalg.norm(points[:, pairs[:, 0]] - points[:, pairs[:, 1]], axis=2)
-    rigid: NDArray[np.intp] = pairs[np.ptp(distance, axis=0) < RIGID]
+    rigid: NDArray[np.intp] = pairs[np.ptp(distance, axis=0) < RIGID_METRES]
     return rigid
 
 

@@ -16,7 +16,7 @@ from posekit.validators.robot.deferred import Deferred
 from posekit.validators.robot.subject import CENTIMETRES_A_DEGREE
 from posekit.validators.suite import Judgement
 
-VERDICTS = ("valid", "invalid", "undecided")
+VERDICT_WORDS = ("valid", "invalid", "undecided")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,7 +81,7 @@ class Report:
     def verdicts(self) -> list[str]:
         """``valid``, ``invalid`` or ``undecided``, a posture each."""
         number = np.where(self.invalid, 1, np.where(self._decided, 0, 2))
-        return [VERDICTS[k] for k in number.tolist()]
+        return [VERDICT_WORDS[k] for k in number.tolist()]
 
     @cached_property
     def worst(self) -> Array:

@@ -18,13 +18,13 @@ from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.validators.robot.configurations import judge_quickly
 from posekit.validators.robot.fitting import Fit
 from posekit.validators.robot.joint_range import judge_joint_range
-from posekit.validators.robot.models import Judged, Models
+from posekit.validators.robot.models import JudgedModel, Models
 from posekit.validators.robot.reach import judge_reach
 from posekit.validators.robot.rigid_parts import judge_rigid_parts
 from posekit.validators.robot.settings import OF_POSITIONS, RobotSettings
 from posekit.validators.suite import Judgement
 
-CLEAR: Final = 0.5
+CLEAR_DEGREES: Final = 0.5
 """Degrees that a fit without limits must be outside one, beyond the tolerance, to be a violation."""
 
 CLEAR_A_METRE: Final = 100.0
@@ -59,7 +59,7 @@ class Verdict(NamedTuple):
     q: Array
     points: tuple[str, ...]
     residual: Array
-    models: list[Judged]
+    models: list[JudgedModel]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -142,7 +142,9 @@ class RobotValidator:
         judgements += _of_fits(judged, fit, seen=judged.fitter.seen(targets), complete=known)
         return Verdict(judgements, known, fit.judged_q, kinematics.names, fit.judged_residual, [judged])
 
-    def _model_for(self, postures: Array, lengths: Mapping[str, float] | None, behind: bool | None) -> Judged:
+    def _model_for(
+        self, postures: Array, lengths: Mapping[str, float] | None, behind: bool | None
+    ) -> JudgedModel:
         if self.settings.lengths == "model":
             return self.models.mapped
         lengths = segment_lengths(postures) if lengths is None else lengths
@@ -153,7 +155,7 @@ class RobotValidator:
         return self.models.with_lengths(lengths, shoulders_are_behind(postures) if behind is None else behind)
 
 
-def _of_configurations(judged: Judged, q: Array) -> Sequence[Judgement]:
+def _of_configurations(judged: JudgedModel, q: Array) -> Sequence[Judgement]:
     """Ask the checks of configurations; balance, which costs the forward kinematics, has no quick verdict."""
     settings = judged.settings
     judgements = judge_quickly(
@@ -167,7 +169,7 @@ def _of_configurations(judged: Judged, q: Array) -> Sequence[Judgement]:
     return judgements
 
 
-def _of_fits(judged: Judged, fit: Fit, *, seen: Bools, complete: Bools) -> list[Judgement]:
+def _of_fits(judged: JudgedModel, fit: Fit, *, seen: Bools, complete: Bools) -> list[Judgement]:
     """Ask the same checks of what was fitted to postures: nothing is said of a fit that is not near its posture."""
     settings, judgements = judged.settings, []
     residual = fit.judged_residual
@@ -183,7 +185,7 @@ def _of_fits(judged: Judged, fit: Fit, *, seen: Bools, complete: Bools) -> list[
                 undecided=far,
                 slack=np.where(
                     fit.kept_off > CLEAR_COST,
-                    CLEAR + CLEAR_A_METRE * misfit,
+                    CLEAR_DEGREES + CLEAR_A_METRE * misfit,
                     np.where(fit.suffers, np.inf, 0.0),
                 ),
             )

@@ -20,7 +20,7 @@ ROBOT_DEFAULT: Final = ROBOT_CHECKS[:4]
 OF_POSITIONS: Final = ("reach", "rigid-parts")
 """Checks of what was seen: a configuration has nothing to compare."""
 
-LENGTHS: Final[tuple[Lengths, ...]] = ("model", "median", "each")
+LENGTHS_CHOICES: Final[tuple[Lengths, ...]] = ("model", "median", "each")
 BODIES_FROM: Final[Mapping[str, str]] = {
     "urdf": "the URDF's collision bodies",
     "visual": "the URDF's visual bodies",
@@ -80,7 +80,7 @@ class RobotSettings:
         if not math.isfinite(self.contact_margin):
             raise InputError(f"the contact margin is {self.contact_margin!r} m; expected a finite length")
         options: tuple[tuple[str, str, tuple[str, ...]], ...] = (
-            ("--lengths", self.lengths, LENGTHS),
+            ("--lengths", self.lengths, LENGTHS_CHOICES),
             ("--bodies", self.bodies, ("auto", *BODIES_FROM)),
         )
         for option, given, known in options:

@@ -22,7 +22,7 @@ from posekit.geometry import Array, rotate_back
 from posekit.settings import MEASURED_TOLERANCE, Tolerance
 from posekit.skeleton import JOINT, JOINTS
 from posekit.tree import Check, Findings, Place, Scope
-from posekit.validators import PHYSICAL, AnyCheck, CheckOptions, Ranges, make_checks
+from posekit.validators import PHYSICAL_CHECKS, AnyCheck, CheckOptions, Ranges, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
 
 MIDDLES = ("mid_shoulders", "mid_hips")
@@ -154,7 +154,7 @@ class Completed(Check):
 
 def joint_checks(
     figure: Figure,
-    names: Iterable[AnyCheck] = PHYSICAL,
+    names: Iterable[AnyCheck] = PHYSICAL_CHECKS,
     *,
     ranges: Ranges,
     tolerance: Tolerance = MEASURED_TOLERANCE,
@@ -195,7 +195,7 @@ def joint_checks(
     motion = next((check.name for check in checks if check.scope is Scope.MOTION), "")
     if motion:
         raise InputError(
-            f"--checks: {motion} needs a head and a calibrated camera; expected some of {', '.join(PHYSICAL)}"
+            f"--checks: {motion} needs a head and a calibrated camera; expected some of {', '.join(PHYSICAL_CHECKS)}"
         )
     return [check for check in checks if max(check.points) < len(JOINTS) and not _is_limb(check)]
 
@@ -203,7 +203,7 @@ def joint_checks(
 def taylor_checks(
     figure: Figure,
     points: Sequence[str],
-    names: Iterable[AnyCheck] = PHYSICAL,
+    names: Iterable[AnyCheck] = PHYSICAL_CHECKS,
     *,
     ranges: Ranges,
     tolerance: Tolerance = MEASURED_TOLERANCE,

@@ -16,7 +16,7 @@ from posekit.geometry import Array
 from posekit.linkages import Linkage, SpanningTree, load_linkage, span
 from posekit.recovery.taylor_figure.completion import MIDDLES, Completion
 from posekit.skeleton import JOINT, segment_name
-from posekit.tree import Branch, Check, InterpretationTree, Leaves
+from posekit.tree import BranchState, Check, InterpretationTree, Leaves
 from posekit.tree.bits import path_of
 from posekit.validators.linkage import closure
 
@@ -149,7 +149,7 @@ class Human:
                 path = path << 1 | bits[ancestor]
             far = (depth[:, joint] > depth[:, parents[joint]]).astype(np.int32)
             state = leaves.candidates.branches[joint][rows, path << 1 | 1]
-            bits[joint] = np.where(state == Branch.COINCIDENT, 0, far).astype(np.int32)
+            bits[joint] = np.where(state == BranchState.COINCIDENT, 0, far).astype(np.int32)
             code = code << 1 | bits[joint]
         return code
 
