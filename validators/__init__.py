@@ -43,8 +43,8 @@ else:
                 "load_ranges",
             ),
             "registry": (
-                "CHECKS",
-                "PHYSICAL",
+                "ALL_CHECKS",
+                "PHYSICAL_CHECKS",
                 "AnyCheck",
                 "check_names",
                 "chosen_checks",

@@ -1,7 +1,7 @@
 """Loops that Numba compiles where it is installed (the extra ``fast``), once it pays.
 
-A module of kernels is plain Python on plain arrays, with the functions to compile listed in `COMPILED_TYPES`, each with
-the types it takes (none: it is compiled into those that call it), and those of other modules in `KERNEL_PARTS`. They are
+A module of kernels is plain Python on plain arrays. The functions to compile are listed in `COMPILED_TYPES`, each with
+the types it takes (none: it is compiled into its callers), and those of other modules in `KERNEL_PARTS`. They are
 compiled as copies that know each other; the module itself needs no Numba. Machine code is kept on disk in Numba's own
 cache, under names that carry a hash of the source and its constants: old code is never run for new sources.
 
