@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from posekit.formats.keypoints import KeyPoints, chosen
+from posekit.formats.given_file import GivenFile
+from posekit.formats.keypoints import KeyPoints, chosen, key_point_formats
 from posekit.formats.keypoints.coco_parts import PARTS, SEEN
 from posekit.formats.keypoints.mediapipe_names import NAMES
 from posekit.formats.keypoints.rows import whole
@@ -30,6 +31,12 @@ def write_keypoints(path: Path, keypoints: KeyPoints, format: str) -> None:
     """Write key points as a detector would, in a format with or without one of its layouts."""
     one, layout = chosen(format)
     WRITERS[one.name](path, keypoints if layout is None else in_layout(keypoints, layout))
+
+
+def suiting(path: Path) -> list[str]:
+    """List the formats of key points that a file or folder looks like, whatever its name."""
+    given = GivenFile(path)
+    return [one.name for one in key_point_formats().values() if one.looks_like(given)]
 
 
 def view_keypoints(view: View, format: str, skeleton: str = "") -> KeyPoints:

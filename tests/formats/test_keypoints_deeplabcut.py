@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.reading import read_keypoints, suiting
+from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_of
 from posekit.tables.file_model import validated
 from posekit.tables.skeleton_map import SkeletonMapTable
-from tests.detector_files import write_keypoints
+from tests.detector_files import suiting, write_keypoints
 
 COCO = load_skeleton_map("coco_17")
 

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_names import NAMES
-from posekit.formats.keypoints.reading import read_keypoints, suiting
+from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map
-from tests.detector_files import write_keypoints
+from tests.detector_files import suiting, write_keypoints
 
 MEDIAPIPE = load_skeleton_map("mediapipe_33")
 PLACES = np.random.default_rng(33).uniform(-0.1, 1.2, (33, 4)).round(4)

@@ -14,11 +14,11 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
-from posekit.formats.keypoints.reading import read_keypoints, suiting
+from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_of
 from posekit.tables.file_model import validated
 from posekit.tables.skeleton_map import SkeletonMapTable
-from tests.detector_files import write_keypoints
+from tests.detector_files import suiting, write_keypoints
 
 COCO, H36M, HALPE = map(load_skeleton_map, ("coco_17", "h36m_17", "halpe_26"))
 STANDING = {

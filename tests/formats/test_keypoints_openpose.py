@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.reading import read_keypoints, suiting
+from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map
-from tests.detector_files import write_keypoints
+from tests.detector_files import suiting, write_keypoints
 
 BODY_25, BODY_25B, COCO_18 = map(load_skeleton_map, ("body_25", "body_25b", "coco_18"))
 FACES = {

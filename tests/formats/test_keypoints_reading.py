@@ -19,9 +19,9 @@ from posekit.formats.keypoints.reading import (
     is_format,
     key_point_formats,
     read_keypoints,
-    suiting,
 )
 from posekit.formats.skeleton_maps import load_skeleton_map, skeleton_map_names
+from tests.detector_files import suiting
 
 COCO = load_skeleton_map("coco_17")
 PERSON = [40, 50, 2] * 17

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.reading import read_keypoints, suiting
+from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map
-from tests.detector_files import write_keypoints
+from tests.detector_files import suiting, write_keypoints
 
 LAYOUT = load_skeleton_map("coco_wholebody_133")
 PARTS = (

@@ -24,7 +24,6 @@ from posekit.safe_io import cut, nearest, one_line, read_text, refusal, shown
 MAX_BYTES: Final = 200_000_000
 """``images.txt`` lists every point of every picture."""
 
-FOCAL: Final = {"f": ("fx", "fy"), "fx": ("fx",), "fy": ("fy",)}
 MODELS: Final[dict[str, tuple[str, ...]]] = {
     "SIMPLE_PINHOLE": ("f", "cx", "cy"),
     "PINHOLE": ("fx", "fy", "cx", "cy"),

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from posekit.formats.keypoints.reading import is_format as is_format
     from posekit.formats.keypoints.reading import key_point_formats as key_point_formats
     from posekit.formats.keypoints.reading import read_keypoints as read_keypoints
-    from posekit.formats.keypoints.reading import suiting as suiting
     from posekit.formats.keypoints.sides import SideCheck as SideCheck
     from posekit.formats.keypoints.sides import check_sides as check_sides
     from posekit.formats.keypoints.sides import swap as swap
@@ -35,7 +34,6 @@ else:
                 "is_format",
                 "key_point_formats",
                 "read_keypoints",
-                "suiting",
             ),
             "sides": (
                 "SideCheck",

@@ -19,11 +19,6 @@ def key_point_formats() -> dict[str, KeyPointFormat]:
     return {one.name: one for one in formats(Content.KEY_POINTS) if isinstance(one, KeyPointFormat)}
 
 
-def suiting(path: str | Path) -> list[str]:
-    """List the formats that a file or folder looks like."""
-    return [one.name for one in _candidates(GivenFile(Path(path)))]
-
-
 def read_keypoints(
     path: str | Path, format: str | None = None, layout: SkeletonMap | None = None
 ) -> KeyPoints:

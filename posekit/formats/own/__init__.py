@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures import read_postures as read_postures
     from posekit.formats.own.postures import write_postures as write_postures
     from posekit.formats.own.postures_q import NamedConfigurations as NamedConfigurations
-    from posekit.formats.own.postures_q import holds_configurations as holds_configurations
     from posekit.formats.own.postures_q import read_configurations as read_configurations
     from posekit.formats.own.postures_q import write_configurations as write_configurations
     from posekit.formats.own.reading import read_json as read_json
@@ -83,7 +82,6 @@ else:
             ),
             "postures_q": (
                 "NamedConfigurations",
-                "holds_configurations",
                 "read_configurations",
                 "write_configurations",
             ),

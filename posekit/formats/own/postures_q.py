@@ -89,17 +89,6 @@ class NamedConfigurations:
         return q
 
 
-def holds_configurations(path: str | Path) -> bool:
-    """Tell whether a file holds configurations: by its schema, or an NPZ without one by ``q`` without ``joints``."""
-    if suffix(path, ".json", ".npz") == ".npz":
-        with open_npz(path) as archive:
-            if "schema" in archive.names:
-                return str(archive.array("schema", "U", ())) == CONFIGURATIONS_SCHEMA
-            return "q" in archive.names and "joints" not in archive.names
-    document = read_json(path)
-    return isinstance(document, dict) and document.get("schema") == CONFIGURATIONS_SCHEMA
-
-
 def read_configurations(path: str | Path) -> NamedConfigurations:
     """Read configurations.
 
