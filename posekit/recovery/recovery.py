@@ -114,7 +114,7 @@ class FrameRecovery:
     number: int = 0
     cameras: CameraRecords | None = None
 
-    @property
+    @cached_property
     def _rows(self) -> slice:
         if self.batch is None:
             return slice(0, 0)

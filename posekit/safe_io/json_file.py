@@ -33,6 +33,8 @@ _TOO_LARGE: Final = "split it, or use .npz where the command takes it"
 _STRING = re.compile(rb'"[^"\\]*+(?:\\.[^"\\]*+)*+(?:"|\\?\Z)', re.DOTALL)
 _NOT_BRACKETS = bytes(byte for byte in range(256) if byte not in b"[]{}")
 _CHUNK = 1 << 20
+_ANY_DIGIT = bytes.maketrans(b"123456789", b"000000000")
+_LONG_NUMBERS = (b"0" * 200, b"0e000", b"0e+000", b"0E000", b"0E+000")
 
 
 class _SuspiciousError(ValueError):
@@ -74,14 +76,10 @@ def parse_json(path: str | Path, data: bytes) -> Any:
     """Parse JSON that came from `path`, with the checks of `read_json`."""
     text = decode(path, data)
     _check_size(path, data)
+    # Looking at each number costs as much as parsing it: that is left out where none can be too large.
+    looked_at: dict[str, Any] = {"parse_float": _finite, "parse_int": _integer} if _may_overflow(data) else {}
     try:
-        return json.loads(
-            text,
-            object_pairs_hook=_unique,
-            parse_float=_finite,
-            parse_int=_integer,
-            parse_constant=_constant,
-        )
+        return json.loads(text, object_pairs_hook=_unique, parse_constant=_constant, **looked_at)
     except _SuspiciousError:
         raise _suspicion(path, text) from None
     except json.JSONDecodeError as error:
@@ -135,6 +133,15 @@ def nesting(data: bytes) -> tuple[int, int]:
         level = int(levels[-1])
         containers += int(opening.sum())
     return deepest, containers
+
+
+def _may_overflow(data: bytes) -> bool:
+    """Tell whether a number may be one that no float64 holds: it has 200 digits in a row, or 3 in its exponent.
+
+    One with fewer is below 10^299, as 199 digits times 10^99 are.
+    """
+    digits = data.translate(_ANY_DIGIT)
+    return any(long in digits for long in _LONG_NUMBERS)
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

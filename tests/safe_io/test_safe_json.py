@@ -180,3 +180,28 @@ def test_long_and_odd_keys_stay_on_one_line(tmp_path):
     assert len(text) < 300
     text = refusal_of(tmp_path, '{"\\u0007' + "k" * 1000 + '": NaN}')
     assert len(text) < 300
+
+
+@pytest.mark.parametrize(
+    "number",
+    [
+        "1" * 199 + "e99",
+        "1" * 200 + "e99",
+        "1" * 308,
+        "-" + "1" * 307,
+        "1e307",
+        "1E+307",
+        "1e-999",
+        "0." + "0" * 400 + "1",
+    ],
+)
+def test_a_long_number_that_a_float_holds_is_read(number: str) -> None:
+    assert parse_json("x", f"[{number}]".encode()) == [json.loads(number)]
+
+
+@pytest.mark.parametrize(
+    "number", ["1" * 211 + "e99", "1" * 309, "1" * 310 + ".5", "1e309", "1E+0999", "-9e999"]
+)
+def test_a_number_that_no_float_holds_is_refused(number: str) -> None:
+    with pytest.raises(InputError, match="expected a finite number"):
+        parse_json("x", f"[{number}]".encode())
