@@ -124,27 +124,6 @@ class LinkageFamily:
         """The matrices of what is seen."""
         return incidence(self.linkage, self.seen.tolist())
 
-    def scale_from_stature(self, pixels: float) -> float:
-        """Return s from the height of the object in pixels (Taylor 2000, §3.2).
-
-        Raises
-        ------
-        InputError
-            Where the linkage has no height, or the pixels are not finite and positive.
-        CameraError
-            Where s is below the bound.
-        """
-        height = self.linkage.height
-        if height is None:
-            raise InputError(
-                f"linkage {self.linkage.name} has no height; add height to it, or give the scale itself"
-            )
-        if not (np.isfinite(pixels) and pixels > 0):
-            raise InputError(f"stature is {pixels:g} pixels; expected a finite number above zero")
-        s = float(pixels) / height
-        self.foreshortening(s)
-        return s
-
     def foreshortening(self, s: ArrayLike) -> Array:
         """Return dZ >= 0 of each segment at some scales (..., S), units of length (Taylor 2000, eq. 2).
 

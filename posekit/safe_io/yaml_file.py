@@ -17,7 +17,7 @@ from posekit.safe_io.refusal import cut, one_line, refusal, shown
 
 MAX_DEPTH: Final = 16
 """How deep lists and maps may nest."""
-LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+YAML_LOADER: Final = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 """The one in C, where PyYAML was built with it: ten times as fast, the same events."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?")
@@ -56,7 +56,7 @@ def parse_yaml(text: str, source: str | Path) -> Any:
         place = f"line {text.count(chr(10), 0, odd.start()) + 1}"
         raise refusal(source, place, "a character that does not print", "YAML", "save the file again")
     try:
-        return _tree(source, yaml.parse(text, Loader=LOADER))
+        return _tree(source, yaml.parse(text, Loader=YAML_LOADER))
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
         place = "" if mark is None else f"line {mark.line + 1} column {mark.column + 1}"

@@ -97,16 +97,6 @@ def test_an_impossible_scale_is_refused(s: float) -> None:
         hinge().foreshortening(s)
 
 
-def test_the_scale_follows_from_the_stature() -> None:
-    assert hinge(height=4.0).scale_from_stature(40.0) == 10.0
-    with pytest.raises(CameraError, match="s = 7 is below the bound: b-c"):
-        hinge(height=4.0).scale_from_stature(28.0)
-    with pytest.raises(InputError, match="linkage hinge has no height"):
-        hinge().scale_from_stature(28.0)
-    with pytest.raises(InputError, match="stature is nan pixels"):
-        hinge(height=4.0).scale_from_stature(np.nan)
-
-
 def test_a_flip_decides_which_end_is_nearer() -> None:
     points = hinge().points(10.0, [[1, 1], [-1, 1]])
     expected = np.array([[0, 0, 0], [3, 0, 4], [3, 1.6, 5.2]])
