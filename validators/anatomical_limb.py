@@ -12,7 +12,7 @@ from functools import reduce
 
 import numpy as np
 
-from posekit.geometry import Array
+from posekit.geometry import Array, other_branch, other_hinge, turned_near
 from posekit.tables.angles import DERIVED_ANGLES
 from posekit.validators.anatomical import OUTWARD_SIGNS, Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
@@ -33,24 +33,13 @@ def writings(angles: Array) -> Array:
     :math:`(\alpha, \beta, \gamma) \to (\alpha + 180, 180 - \beta, \gamma + 180)` is the same rotation;
     :math:`(\gamma, \varepsilon) \to (\gamma + 180, -\varepsilon)` gives the lower segment the same direction.
     """
-    a, b = angles[:, 0], angles[:, 1]
+    turned = other_branch(angles, half_turn=180.0)
     if angles.shape[1] == 2:
-        return np.stack([angles, np.stack([a + 180, 180 - b], axis=-1)], axis=1)
-    g, e = angles[:, 2], angles[:, 3]
-    return np.stack(
-        [
-            angles,
-            np.stack([a, b, g + 180, -e], axis=-1),
-            np.stack([a + 180, 180 - b, g + 180, e], axis=-1),
-            np.stack([a + 180, 180 - b, g, -e], axis=-1),
-        ],
-        axis=1,
-    )
-
-
-def turned_near(angles: Array, middle: Array | float) -> Array:
-    """Add full turns so that angles lie within half a turn of a middle, degrees."""
-    return np.asarray(middle + np.mod(angles - middle + 180.0, 360.0) - 180.0)
+        return np.stack([angles, turned], axis=1)
+    bent, both = (other_hinge(each, half_turn=180.0) for each in (angles, turned))
+    # An axial rotation that is turned twice is as it was.
+    both[:, 2] = angles[:, 2]
+    return np.stack([angles, bent, turned, both], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,7 +149,7 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
     ]
     ends = {(name, side): anatomy.motions[name].end(side) for name in names for side in LIMIT_SIDES}
     columns = [
-        turned_near(written[..., k], (ends[name, "lower"][0] + ends[name, "upper"][0]) / 2)
+        turned_near(written[..., k], (ends[name, "lower"][0] + ends[name, "upper"][0]) / 2, half_turn=180.0)
         for k, name in enumerate(names)
     ]
     readings = dict(zip(names, columns, strict=True))
@@ -238,7 +227,7 @@ def _turn_walls(anatomy: Anatomy, angles: Array, readings: Mapping[str, Array]) 
     branch = np.array([0.0, 0.0, 180.0, 180.0])[: rotation.shape[1]]
     offset = turn_offset(angles[:, 0], angles[:, 1])[:, None] + branch
     middle = sum((mean for mean, _ in bounds), start=np.zeros(rotation.shape)) / max(len(bounds), 1)
-    shift = rotation - turned_near(rotation + offset, middle)
+    shift = rotation - turned_near(rotation + offset, middle, half_turn=180.0)
     return [
         Wall(place=2, side=coupling.side, mean=mean + shift, spread=spread)
         for coupling, (mean, spread) in zip(couplings, bounds, strict=True)

@@ -18,10 +18,10 @@ from dataclasses import replace
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.geometry import Array
+from posekit.geometry import Array, other_branch, turned_near
 from posekit.skeleton import DOFS, SIDES
 from posekit.validators.anatomical import Anatomy
-from posekit.validators.anatomical_limb import HINGE_OF_BALL, limb_walls, turned_near
+from posekit.validators.anatomical_limb import HINGE_OF_BALL, limb_walls
 
 
 def plausibility(angles: Array, anatomy: Anatomy) -> Array:
@@ -88,8 +88,8 @@ def _ball_excess(anatomy: Anatomy, joint: str, angles: Array) -> Array:
     lower, upper = (
         np.array([anatomy.motions[name].end(side) for name in names]) for side in ("lower", "upper")
     )
-    other = np.stack([angles[:, 0] + 180, 180 - angles[:, 1], angles[:, 2] + 180], axis=-1)
-    both = turned_near(np.stack([angles, other], axis=1), (lower[:, 0] + upper[:, 0]) / 2)
+    both = np.stack([angles, other_branch(angles, half_turn=180.0)], axis=1)
+    both = turned_near(both, (lower[:, 0] + upper[:, 0]) / 2, half_turn=180.0)
     beyond = np.fmax((lower[:, 0] - both) / lower[:, 1], (both - upper[:, 0]) / upper[:, 1])
     return _most_plausible(np.fmax(beyond, 0.0))
 

@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.linkages.robot_linkage import Carried
 from posekit.robots import Robot
 from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
@@ -201,7 +201,7 @@ def _squared_distances(points: Array, pairs: Groups) -> Array:
 def six_volumes(points: Array, quads: Groups) -> Array:
     """Return (b - a) x (c - a) . (d - a) of quadruples (T, 4) of points (N, P, 3): (N, T)."""
     a, b, c, d = (points[:, quads[:, k]] for k in range(4))
-    return np.asarray(np.einsum("nti,nti->nt", np.cross(b - a, c - a), d - a))
+    return np.asarray(np.einsum("nti,nti->nt", cross(b - a, c - a), d - a))
 
 
 def _circle(values: Array, limits: tuple[float, float]) -> tuple[Array, Array]:

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.linkages.robot_linkage import Carried
 
 MIN_SINE = 0.05
@@ -64,7 +64,7 @@ def place_axis_point(points: Array, axis_point: AxisPoint) -> Array:
     """Place an axis point (N, 3) in postures given by the points before it (N, P, 3)."""
     a, b, c = (points[:, corner] for corner in axis_point.corners)
     alpha, beta, gamma = axis_point.numbers
-    return np.asarray(a + alpha * (b - a) + beta * (c - a) + gamma * np.cross(b - a, c - a))
+    return np.asarray(a + alpha * (b - a) + beta * (c - a) + gamma * cross(b - a, c - a))
 
 
 def find_axis_points(carried: Carried) -> tuple[AxisPoint, ...]:
@@ -126,7 +126,7 @@ def _corners(carried: Carried, body: int) -> tuple[int, int, int] | None:
     for triple in combinations(on.tolist(), 3):
         a, b, c = carried.place[body, list(triple)]
         sides = np.linalg.norm([b - a, c - a, c - b], axis=1)
-        sine = float(np.linalg.norm(np.cross(b - a, c - a)) / max(np.prod(np.sort(sides)[1:]), 1e-300))
+        sine = float(np.linalg.norm(cross(b - a, c - a)) / max(np.prod(np.sort(sides)[1:]), 1e-300))
         if sine > best * (1 + 1e-9):
             best, corners = sine, triple
     return corners
@@ -137,7 +137,7 @@ def _axis_point(
 ) -> AxisPoint:
     a, b, c = carried.place[body, list(corners)]
     u, v = b - a, c - a
-    normal = np.cross(u, v)
+    normal = cross(u, v)
     alpha, beta, gamma = np.linalg.solve(np.stack([u, v, normal], axis=1), place - a)
     loose = [looseness[corner] for corner in corners]
     turned = abs(gamma) * (

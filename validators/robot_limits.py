@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.linkages.robot_linkage import Carried
 from posekit.robots import Robot
 from posekit.tree import Check, Findings, Place
@@ -269,7 +269,7 @@ class RobotLimits:
         bound = FLAT_PART * self._attainable.extent(quads) ** 2
         for three in combinations(range(4), 3):
             a, b, c = (self._samples[:, quads[:, k]] for k in three)
-            area = np.linalg.norm(np.cross(b - a, c - a), axis=-1).max(axis=0)
+            area = np.linalg.norm(cross(b - a, c - a), axis=-1).max(axis=0)
             flat |= area < bound
         return flat
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, cross
+from posekit.geometry import Array, cross, other_branch, turned_near
 from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
 FREE = 1e-6
@@ -56,9 +56,7 @@ class Limits:
 
     def nearest_turn(self, angles: Array) -> Array:
         """Add full turns so that each angle (..., K) lies within half a turn of the middle of its limits."""
-        middle = (self.lower + self.upper) / 2
-        turn = 2 * np.pi
-        return middle + np.mod(angles - middle + np.pi, turn) - np.pi
+        return turned_near(angles, (self.lower + self.upper) / 2)
 
     def cost(self, angles: Array) -> Array:
         """Return how far outside the limits branches (..., K) are, radians, to choose among them.
@@ -188,8 +186,7 @@ def _direction_branches(upper: Array) -> Array:
     alpha = np.arctan2(-upper[:, 0], -upper[:, 2])
     beta = np.arctan2(upper[:, 1], np.hypot(upper[:, 0], upper[:, 2]))
     first = np.stack([alpha, beta], axis=-1)
-    second = np.stack([alpha + np.pi, np.pi - beta], axis=-1)
-    return np.stack([first, second], axis=1)
+    return np.stack([first, other_branch(first)], axis=1)
 
 
 def _into_ball(lower: Array, alpha: Array, beta: Array) -> Array:

@@ -6,6 +6,9 @@ Everything is for a batch: vectors are (..., 3), quaternions (..., 4) in Pinocch
 axis. Nothing here depends on how large the batch is, so a posture has the same numbers alone and among thousands.
 """
 
+from posekit.geometry.angles import other_branch as other_branch
+from posekit.geometry.angles import other_hinge as other_hinge
+from posekit.geometry.angles import turned_near as turned_near
 from posekit.geometry.arrays import Array as Array
 from posekit.geometry.quaternions import quaternion_conjugate as quaternion_conjugate
 from posekit.geometry.quaternions import quaternion_exp as quaternion_exp

@@ -9,7 +9,9 @@ that points along the abduction axis.
 With the angles of `posekit.body.angles` the tangents of the upper direction d are the directions in which
 :math:`\alpha` and :math:`\beta` carry it, :math:`a = \partial d / \cos\beta\, \partial\alpha` and
 :math:`b = \partial d / \partial\beta`; those of the lower one :math:`f = \partial / \sin\varepsilon\,\partial\gamma`
-and :math:`e = \partial / \partial\varepsilon`. The other Euler branch has the same four, up to sign.
+and :math:`e = \partial / \partial\varepsilon`. The other Euler branch has the same four, up to sign. Angles are written
+anew here, batch last, because their sines and cosines are what the tangents are made of; the tests hold them, and what
+is inside, to the closed form's.
 """
 
 from __future__ import annotations

@@ -15,6 +15,8 @@ from posekit.geometry import (
     dot,
     fit_rotation,
     frame_along,
+    other_branch,
+    other_hinge,
     perpendicular,
     quaternion_conjugate,
     quaternion_exp,
@@ -29,6 +31,7 @@ from posekit.geometry import (
     rotation_from_quaternion,
     rotation_from_vector,
     shorter_quaternion,
+    turned_near,
     unit,
     vector_from_rotation,
 )
@@ -199,3 +202,32 @@ def test_the_scalar_forms_of_compiled_loops_are_these(rng):
         near(square(*v, *a), left)
         frame = np.stack([cross(a, left), left, -a], axis=-1)
         near(np.reshape(frame_of(*left, *a), (3, 3)), frame)
+
+
+@pytest.mark.parametrize("half_turn", [np.pi, 180.0])
+def test_other_writings_of_a_limb_place_it_alike(rng, half_turn):
+    angles = rng.uniform(-half_turn, half_turn, size=(30, 4))
+
+    def placed(each):
+        a, b, c, e = np.moveaxis(each * np.pi / half_turn, -1, 0)
+        ball = coordinate_rotation(1, a) @ coordinate_rotation(0, b) @ coordinate_rotation(2, c)
+        return ball[..., 2], (ball @ coordinate_rotation(1, e))[..., 2]
+
+    for other in (
+        other_branch(angles, half_turn=half_turn),
+        other_hinge(angles, half_turn=half_turn),
+        other_hinge(other_branch(angles, half_turn=half_turn), half_turn=half_turn),
+    ):
+        for found, expected in zip(placed(other), placed(angles), strict=True):
+            near(found, expected)
+    near(other_branch(angles[:, :2], half_turn=half_turn), other_branch(angles, half_turn=half_turn)[:, :2])
+    twice = other_branch(other_branch(angles, half_turn=half_turn), half_turn=half_turn)
+    near(turned_near(twice - angles, 0.0, half_turn=half_turn), 0.0, 1e-12)
+
+
+def test_angles_are_turned_to_within_half_a_turn_of_a_middle(rng):
+    angles, middle = rng.uniform(-20, 20, size=(2, 100))
+    found = turned_near(angles, middle)
+    assert (np.abs(found - middle) <= np.pi).all()
+    near((found - angles) / (2 * np.pi), np.round((found - angles) / (2 * np.pi)), 1e-12)
+    assert turned_near(np.array(540.0), 0.0, half_turn=180.0) == -180.0

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.validators.robot.feet import Corner
 from posekit.validators.suite import Judgement
 
@@ -97,6 +97,6 @@ def _turn(a: Array, b: Array, c: Array) -> float:
 def _plane(up: Array) -> Array:
     """Return two axes (3, 2) across a unit vector, a right-handed pair."""
     least = np.eye(3)[int(np.argmin(np.abs(up)))]
-    x = np.cross(least, up)
+    x = cross(least, up)
     x /= np.linalg.norm(x)
-    return np.stack([x, np.cross(up, x)], axis=1)
+    return np.stack([x, cross(up, x)], axis=1)

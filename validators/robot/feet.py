@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.robots.body_point import frame_index
 from posekit.robots.kinematics import Kinematics
 from posekit.skeleton import SIDES
@@ -93,9 +93,9 @@ def _made_up(kinematics: Kinematics) -> list[Corner]:
         stature = (np.linalg.norm(knee - hip) + np.linalg.norm(ankle - knee)) / LEG_SHARE
         up = (knee - ankle) / np.linalg.norm(knee - ankle)
         left = at["left_hip"] - at["right_hip"]
-        forward = np.cross(left, up)
+        forward = cross(left, up)
         forward /= np.linalg.norm(forward)
-        aside = np.cross(up, forward)
+        aside = cross(up, forward)
         joint = _joint_of(kinematics, f"{side}_ankle")
         for along in (-HEEL_SHARE, 1.0 - HEEL_SHARE):
             for across in (-0.5, 0.5):

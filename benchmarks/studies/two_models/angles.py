@@ -9,7 +9,7 @@ import numpy as np
 
 from posekit.body import Figure, with_head
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.geometry import Array
+from posekit.geometry import Array, other_branch, other_hinge
 from posekit.skeleton import DOFS, HIPS, JOINT, SIDES, TORSO
 
 TO_ISB: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -71,11 +71,11 @@ def readings(angles: Angles) -> dict[str, list[Array]]:
     """
     found: dict[str, list[Array]] = {}
     for part, dofs in PARTS.items():
-        f, a, r, *bend = (angles[dof] for dof in dofs)
-        ways = [[f, a, r, *bend], [f + 180, 180 - a, r + 180, *bend]]
-        if bend:
-            ways += [[f, a, r + 180, -bend[0]], [f + 180, 180 - a, r, -bend[0]]]
-        found[part] = [np.stack(way, axis=1) for way in ways]
+        way = np.stack([angles[dof] for dof in dofs], axis=1)
+        ways = [way, other_branch(way, half_turn=180.0)]
+        if len(dofs) > 3:
+            ways += [other_hinge(each, half_turn=180.0) for each in ways]
+        found[part] = ways
     return found
 
 

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.geometry import Array, coordinate_rotation
+from posekit.geometry import Array, coordinate_rotation, other_branch, turned_near
 
 ORDER: Final = (0, 2, 1)
 """The axes of the three angles."""
@@ -56,12 +56,12 @@ def continuous(angles: Array) -> Array:
         return angles
     _hold_locked(angles)
     # A frame's branch against the one before is the same for both branches of that one: parity adds up.
-    step = _wrapped(np.diff(angles, axis=0))
-    other = _wrapped(_other_branch(angles[1:]) - angles[:-1])
+    step = turned_near(np.diff(angles, axis=0), 0.0)
+    other = turned_near(other_branch(angles[1:]) - angles[:-1], 0.0)
     turns = (other**2).sum(axis=-1) < (step**2).sum(axis=-1)
     odd = np.zeros(angles.shape[:2], dtype=bool)
     odd[1:] = np.cumsum(turns, axis=0) % 2 == 1
-    angles[odd] = _other_branch(angles[odd])
+    angles[odd] = other_branch(angles[odd])
     return np.unwrap(angles, axis=0)
 
 
@@ -75,13 +75,3 @@ def _hold_locked(angles: Array) -> None:
     held = np.take_along_axis(angles[..., 0], last, axis=0)
     angles[..., 2] += np.where(locked, np.sin(angles[..., 1]) * (held - angles[..., 0]), 0.0)
     angles[..., 0] = np.where(locked, held, angles[..., 0])
-
-
-def _other_branch(angles: Array) -> Array:
-    a, b, c = np.moveaxis(angles, -1, 0)
-    return np.stack([a + np.pi, np.pi - b, c + np.pi], axis=-1)
-
-
-def _wrapped(angles: Array) -> Array:
-    """Bring differences of angles to within half a turn."""
-    return np.mod(angles + np.pi, 2 * np.pi) - np.pi
