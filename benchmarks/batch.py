@@ -32,7 +32,16 @@ from pathlib import Path
 
 import numpy as np
 
-from posekit.batch import Progress, Recipe, Summary, read_frames, run_batch, shard_paths, write_view_table
+from posekit.batch import (
+    Progress,
+    Recipe,
+    Summary,
+    Workers,
+    read_frames,
+    run_batch,
+    shard_paths,
+    write_view_table,
+)
 from posekit.body import load_figure
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import View
@@ -128,7 +137,7 @@ def timed(
 ) -> tuple[Summary, Steady]:
     """Run a batch, and look at its rate."""
     steady = Steady(memory)
-    return run_batch([table], out, recipe, jobs=jobs, progress=steady.see), steady
+    return run_batch([table], out, recipe, Workers(jobs=jobs), progress=steady.see), steady
 
 
 def scale(given: argparse.Namespace, place: Path) -> None:
@@ -209,7 +218,9 @@ def kills(given: argparse.Namespace, place: Path) -> None:
     print(
         f"killed {dict(struck)}, begun {begun + 1} times; the last: exit {last.returncode}: {last.stdout.strip()}"
     )
-    reference = run_batch([table], place / "left-alone", Recipe(rank=False, shard_frames=200), jobs=2)
+    reference = run_batch(
+        [table], place / "left-alone", Recipe(rank=False, shard_frames=200), Workers(jobs=2)
+    )
     found: Counter[int] = Counter()
     for frames in read_frames(out):
         found.update(frames.column("frame").to_pylist())

@@ -20,7 +20,7 @@ import numpy as np
 from posekit.body import load_figure
 from posekit.papers.taylor_views import StudyPictures, exact_views
 from posekit.recovery.taylor_figure.completion import Completion, joint_checks, taylor_checks
-from posekit.recovery.taylor_figure.human import FLIPS, taylor_human
+from posekit.recovery.taylor_figure.human import N_FLIPS, taylor_human
 from posekit.settings import PHOTOGRAPH_TOLERANCE
 from posekit.synthesis import CameraSphere, random_views
 from posekit.tree import Check
@@ -88,7 +88,7 @@ def main() -> None:
     completion = Completion(figure=FIGURE, points=HUMAN.points)
     grow(views[0], checks)  # coal's models are built at the first call
 
-    print(f"{len(checks)} checks, {FLIPS} flips a view")
+    print(f"{len(checks)} checks, {N_FLIPS} flips a view")
     tree_time = loop_time = 0.0
     for k, view in enumerate(views):
         runs = [timed(partial(grow, view, checks)) for _ in range(given.repeat)]

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from posekit.batch.reading import read_shards as read_shards
     from posekit.batch.reading import shard_paths as shard_paths
     from posekit.batch.recipe import Recipe as Recipe
+    from posekit.batch.run import Workers as Workers
     from posekit.batch.run import run_batch as run_batch
     from posekit.batch.running import Progress as Progress
     from posekit.batch.running import Summary as Summary
@@ -30,7 +31,7 @@ else:
                 "shard_paths",
             ),
             "recipe": ("Recipe",),
-            "run": ("run_batch",),
+            "run": ("Workers", "run_batch"),
             "running": (
                 "Progress",
                 "Summary",

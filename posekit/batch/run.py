@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -28,14 +29,47 @@ DEFAULT_RETRIES: Final = 2
 """Times that a shard is tried again whose process died."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Workers:
+    """The processes that share the work of a batch.
+
+    Parameters
+    ----------
+    jobs : int, optional
+        Processes; as many as cores if not given. A script that asks for them needs ``if __name__ == "__main__"``.
+    retries : int
+        How often a shard is tried again whose process died.
+    cluster : str
+        A Ray cluster's address, or ``local``; empty for processes of this machine.
+
+    Raises
+    ------
+    InputError
+        Where a number is impossible.
+    """
+
+    jobs: int | None = None
+    retries: int = DEFAULT_RETRIES
+    cluster: str = ""
+
+    def __post_init__(self) -> None:
+        if self.jobs is not None and self.jobs < 1:
+            raise InputError(f"--jobs: {self.jobs}; expected one or more processes")
+        if self.retries < 0:
+            raise InputError(f"--retries: {self.retries}; expected zero or more")
+
+    def pool(self) -> Pool:
+        """Make the pool that they work in."""
+        count = self.jobs or _cores()
+        return RayPool(self.cluster, count, self.retries) if self.cluster else LocalPool(count, self.retries)
+
+
 def run_batch(
     inputs: Sequence[str | Path],
     output: str | Path,
     recipe: Recipe | None = None,
+    workers: Workers | None = None,
     *,
-    jobs: int | None = None,
-    retries: int = DEFAULT_RETRIES,
-    cluster: str = "",
     overwrite: bool = False,
     mixed: bool = False,
     progress: Callable[[Progress], None] | None = None,
@@ -52,12 +86,8 @@ def run_batch(
         The run's folder; an earlier run of the same settings goes on.
     recipe : Recipe, optional
         What is asked of every frame.
-    jobs : int, optional
-        Processes; as many as cores if not given. A script that calls this needs ``if __name__ == "__main__"``.
-    retries : int
-        How often a shard is tried again whose process died.
-    cluster : str
-        A Ray cluster's address, or ``local``; empty for processes of this machine.
+    workers : Workers, optional
+        Who does it: a process a core if not given.
     overwrite : bool
         Whether the results of another run in the folder may be removed.
     mixed : bool
@@ -80,14 +110,12 @@ def run_batch(
     began = time.monotonic()
     recipe = recipe or Recipe()
     extra("pyarrow.parquet", "parquet", "posekit batch")
-    _check(jobs, retries)
     output = Path(output)
     given = [Path(one) for one in inputs]
     list_inputs(given, output)  # refuses what is not there before a folder is made
     settings = recipe.document()
     hash = digests.of_values(settings)
-    count = jobs or _cores()
-    pool: Pool = RayPool(cluster, count, retries) if cluster else LocalPool(count, retries)
+    pool = (workers or Workers()).pool()
     with run_folder(output) as folder, _ended_as_interrupted():
         before = known_before(folder, settings, hash, overwrite)
         listing = list_inputs(given, output, before.root if before else None)
@@ -122,13 +150,6 @@ def _ended_as_interrupted() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, kept)
-
-
-def _check(jobs: int | None, retries: int) -> None:
-    if jobs is not None and jobs < 1:
-        raise InputError(f"--jobs: {jobs}; expected one or more processes")
-    if retries < 0:
-        raise InputError(f"--retries: {retries}; expected zero or more")
 
 
 def _cores() -> int:

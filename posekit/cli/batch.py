@@ -105,7 +105,9 @@ def batch(
     who: Who,
 ) -> None:
     """Recover an archive: every frame once, whatever dies on the way; exit 1 where some shards failed."""
-    from posekit.batch import Recipe, run_batch
+    from posekit.batch import Recipe, Workers, run_batch
+
+    workers = Workers(jobs=jobs, retries=retries, cluster=cluster)
 
     recipe = Recipe(
         source=source_of(reading, who, proportions=proportions, deviation=uncertain.deviation),
@@ -128,9 +130,7 @@ def batch(
                 inputs,
                 output,
                 recipe,
-                jobs=jobs,
-                retries=retries,
-                cluster=cluster,
+                workers,
                 overwrite=overwrite,
                 mixed=mixed,
                 progress=progress,

@@ -7,7 +7,7 @@ from typing import Final
 from posekit.recovery.recovery import Recovery
 from posekit.settings import MEASURED_TOLERANCE
 
-NAMED: Final = 3
+MAX_FRAMES_EXPLAINED: Final = 3
 """Empty frames of which the least violation is told."""
 
 
@@ -24,7 +24,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
     lines = []
     if empty:
         from posekit.recovery.least_violation import least_violation
-    for k in empty[:NAMED]:
+    for k in empty[:MAX_FRAMES_EXPLAINED]:
         frame = recovery.frames[k]
         allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, frame.number, allowed)
@@ -34,8 +34,8 @@ def advice_lines(recovery: Recovery) -> list[str]:
             lines.append(
                 f"frame {k + 1}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"
             )
-    if len(empty) > NAMED and lines:
-        lines.append(f"and {len(empty) - NAMED} more frames without a posture")
+    if len(empty) > MAX_FRAMES_EXPLAINED and lines:
+        lines.append(f"and {len(empty) - MAX_FRAMES_EXPLAINED} more frames without a posture")
     # Frames whose neck could not be placed say as much of lengths as those with one: often a limb is what forbids it.
     lost = [
         frame.number

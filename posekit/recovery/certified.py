@@ -13,8 +13,7 @@ from posekit.compiled.compiling import is_fast
 from posekit.compiled.verdicts import NO_VIOLATION
 from posekit.geometry import Array
 from posekit.recovery.body import ranges_of
-from posekit.recovery.contact import contact_under_noise
-from posekit.recovery.noise import Noise
+from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.observed_frames import LIMIT_DEVIATION
 from posekit.refinement.tolerance import ALLOWED_DEVIATIONS

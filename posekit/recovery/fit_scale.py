@@ -16,7 +16,7 @@ from posekit.settings import EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.settings.scale import Scale, way_of
 from posekit.skeleton import HEAD, JOINT
 
-ROUNDING = 1e-9
+RELATIVE_ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""
 
 
@@ -98,7 +98,7 @@ def _family(
         s = float(scale.value or 0.0) / (body.stature if scale.how == "stature" else 1.0)
         longest = float(linkage.lengths[solutions.bounding])
         lost = longest * (bound / s - 1)
-        if lost > _allowed(name, tolerance) + ROUNDING * longest:
+        if lost > _allowed(name, tolerance) + RELATIVE_ROUNDING * longest:
             per = PER_METRE[unit]
             raise InputError(
                 f"--scale: {s / per:.6g} pixels a {unit} is below {bound / per:.6g}, which {segment} needs: it is "

@@ -31,7 +31,7 @@ MOST_HIDDEN = 1000
 WORTH_ASKING = 64
 """Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
 
-TRUNK = tuple(JOINT[name] for name in TORSO[1:])
+TRUNK_JOINTS = tuple(JOINT[name] for name in TORSO[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -143,7 +143,7 @@ class Grower:
         where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
         """
         unseen = np.asarray(np.isnan(image).any(axis=2))
-        placed = (~unseen[:, TRUNK]).sum(axis=1) >= 2
+        placed = (~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2
         hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
         too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
         self._warn_of(frame[too_many & placed])

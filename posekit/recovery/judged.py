@@ -15,7 +15,7 @@ from posekit.geometry import Array
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.upright import Up
 from posekit.recovery.body import ranges_of
-from posekit.recovery.contact import contact_under_noise
+from posekit.recovery.noise import contact_under_noise
 from posekit.settings import (
     EXACT_TOLERANCE,
     MEASURED_TOLERANCE,

@@ -15,13 +15,13 @@ from posekit.tree import Leaves
 from posekit.tree.bits import path_of, select
 from posekit.validators import Judgement, judge
 
-SMALL: Final = {"m": 0.01, "deg": 5.0}
+UNIT_VIOLATIONS: Final = {"m": 0.01, "deg": 5.0}
 """Violations that weigh the same, by unit: a centimetre is five degrees of a shin."""
 
-REACH: Final = 10.0
+REACH_METRES: Final = 10.0
 """Metres by which a segment may be too short for its image while the least violation is looked for."""
 
-LOOKED_AT: Final = 256
+MAX_BRANCHES_JUDGED: Final = 256
 """Branches whose collisions are asked about: those with the least other violations."""
 
 
@@ -74,7 +74,7 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
     """Look for the branch of a frame that breaks the checks least.
 
     All 8192 branches are lifted, with segments as long as their images need, and judged as a whole: the least sum of
-    violations wins, each counted in `SMALL` ones.
+    violations wins, each counted in `UNIT_VIOLATIONS` ones.
 
     Parameters
     ----------
@@ -101,15 +101,15 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
         grower.body.image(grower.view.image[grower.fit.frame[rows]]),
         [],
         given=grower.fit.head[rows],
-        tolerance=REACH,
+        tolerance=REACH_METRES,
     )
     if not len(leaves.code):
         return None
     points = grower.body.points(leaves)
     short = np.maximum(leaves.length_residual() - allowed.tangent, 0.0)
     plain = judge([check for check in checks if not check.slow], points)
-    weight = short / SMALL["m"] + sum(_weight(each) for each in plain)
-    best = np.argsort(weight, kind="stable")[:LOOKED_AT]
+    weight = short / UNIT_VIOLATIONS["m"] + sum(_weight(each) for each in plain)
+    best = np.argsort(weight, kind="stable")[:MAX_BRANCHES_JUDGED]
     bodies = judge([check for check in checks if check.slow], points[best])
     chosen = int(np.argmin(weight[best] + sum(_weight(each) for each in bodies)))
     row = int(best[chosen])
@@ -118,7 +118,7 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
         *(one for each in plain for one in _excesses(each, row)),
         *(one for each in bodies for one in _excesses(each, chosen)),
     ]
-    excesses.sort(key=lambda one: -one.beyond / SMALL.get(one.unit, 1.0))
+    excesses.sort(key=lambda one: -one.beyond / UNIT_VIOLATIONS.get(one.unit, 1.0))
     return LeastViolation(branch=leaves.branches()[row], excesses=tuple(excesses))
 
 
@@ -128,7 +128,7 @@ def _beyond(judgement: Judgement) -> Array:
 
 
 def _weight(judgement: Judgement) -> Array:
-    small = np.array([SMALL.get(unit, 1.0) for unit in judgement.unit])
+    small = np.array([UNIT_VIOLATIONS.get(unit, 1.0) for unit in judgement.unit])
     return np.asarray((_beyond(judgement) / small).sum(axis=1))
 
 

@@ -16,27 +16,27 @@ from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
-from posekit.recovery.noise import TRUNK, Noise
+from posekit.recovery.noise import N_TRUNK_JOINTS, Noise
 from posekit.recovery.recovery import Recovery
 from posekit.refinement import LengthDoubt, diagnose
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS, segment_name
 
-DOUBTED_WITH: Final = 12
+MAX_FRAMES_DIAGNOSED: Final = 12
 """Frames, spread over all that are empty, in which wrong lengths are looked for."""
 
-TOLD: Final = 3
+MAX_LENGTHS_NAMED: Final = 3
 """Lengths that are doubted aloud."""
 
-ALIKE: Final = 1.2
+ALIKE_FACTOR: Final = 1.2
 """Factors that differ by no more than this are one."""
 
-FRAMES, SHARE = 3, 1 / 3
+MIN_FRAMES, MIN_SHARE = 3, 1 / 3
 """A length is too short where as many frames need a longer one, and this share of them: one may have a wrong point."""
 
-PIXELS: Final = 2.0
+ASSUMED_DEVIATION_PIXELS: Final = 2.0
 """Standard deviation of image points of which nobody says it."""
 
-OF_LIMBS: Final = frozenset(segment_name(pair) for pair in SEGMENTS if max(pair) >= TRUNK)
+LIMB_SEGMENTS: Final = frozenset(segment_name(pair) for pair in SEGMENTS if max(pair) >= N_TRUNK_JOINTS)
 """Segments of arms and legs: shoulders, pelvis and hips tell the depth without them."""
 
 
@@ -61,7 +61,7 @@ def doubt_lines(recovery: Recovery, grower: Grower, lost: list[int]) -> list[str
         return []
     said = recovery.settings.get("noise")
     noise = (
-        Noise(deviation=PIXELS)
+        Noise(deviation=ASSUMED_DEVIATION_PIXELS)
         if said is None
         else Noise(deviation=said["deviation"], offset=said["offset"], lengths=said["lengths"])
     )
@@ -69,7 +69,7 @@ def doubt_lines(recovery: Recovery, grower: Grower, lost: list[int]) -> list[str
     given = np.array([fit.placements is None or fit.placements[k] is None for k in lost])
     told = bool(given.any())
     frames = frames[given] if told else frames
-    frames = frames[np.linspace(0, len(frames) - 1, min(DOUBTED_WITH, len(frames))).astype(np.intp)]
+    frames = frames[np.linspace(0, len(frames) - 1, min(MAX_FRAMES_DIAGNOSED, len(frames))).astype(np.intp)]
     try:
         doubts = _doubts(
             recovery,
@@ -83,34 +83,37 @@ def doubt_lines(recovery: Recovery, grower: Grower, lost: list[int]) -> list[str
     if not told:
         return _of_limbs(doubts)
     factors = [doubt.needed / doubt.stated for doubt in doubts]
-    if len(doubts) > len(SEGMENT_NAMES) / 2 and max(factors) < ALIKE * min(factors):
+    if len(doubts) > len(SEGMENT_NAMES) / 2 and max(factors) < ALIKE_FACTOR * min(factors):
         return [
             f"all lengths look stated at {1 / float(np.median(factors)):.2f} of what the pictures need: check unit, "
             "stature and root"
         ]
-    return [_said(doubt) for doubt in doubts if _borne_out(doubt)][:TOLD]
+    return [_said(doubt) for doubt in doubts if _borne_out(doubt)][:MAX_LENGTHS_NAMED]
 
 
 def _of_limbs(doubts: list[LengthDoubt]) -> list[str]:
     """Name arms and legs that are too short at the depth that torso and hips tell."""
     short = [doubt for doubt in doubts if doubt.needed > doubt.stated and _borne_out(doubt)]
-    if any(doubt.segment not in OF_LIMBS for doubt in doubts) or not short:
+    if any(doubt.segment not in LIMB_SEGMENTS for doubt in doubts) or not short:
         return []
     factors = [doubt.needed / doubt.stated for doubt in short]
-    if len(short) > len(OF_LIMBS) / 2:
+    if len(short) > len(LIMB_SEGMENTS) / 2:
         share = 1 / float(np.median(factors))
         return [
             f"{len(short)} lengths of limbs look stated at {share:.2f} of what shoulders, pelvis and hips need; "
             "those are too long, or arms and legs too short: check all lengths"
         ]
-    return [f"{_said(doubt)} (the neck placed by shoulders, pelvis and hips)" for doubt in short[:TOLD]]
+    return [
+        f"{_said(doubt)} (the neck placed by shoulders, pelvis and hips)"
+        for doubt in short[:MAX_LENGTHS_NAMED]
+    ]
 
 
 def _borne_out(doubt: LengthDoubt) -> bool:
     """Tell whether enough frames need a longer one; that one is never seen so long, all of them say."""
     if doubt.needed <= doubt.stated:
         return True
-    return doubt.unexplained >= max(min(FRAMES, doubt.frames), SHARE * doubt.frames)
+    return doubt.unexplained >= max(min(MIN_FRAMES, doubt.frames), MIN_SHARE * doubt.frames)
 
 
 def _said(doubt: LengthDoubt) -> str:
@@ -142,7 +145,7 @@ def _placed_by_trunk(recovery: Recovery, grower: Grower, frames: NDArray[np.intp
     if not isinstance(camera, PinholeCamera):
         raise PosekitError("the camera is not known")
     image = view.image[frames].copy()
-    image[:, TRUNK:] = np.nan
+    image[:, N_TRUNK_JOINTS:] = np.nan
     found = place(
         PinholeCamera(K=np.asarray(camera.K).reshape(-1, 3, 3)[0], distortion=camera.distortion),
         recovery.figure,

@@ -25,8 +25,12 @@ LEAST_CONFIDENCE: Final = 0.25
 LEAST_LENGTHS: Final = 1e-4
 """Relative deviations of lengths below this count as none."""
 
-TRUNK: Final = 6
+N_TRUNK_JOINTS: Final = 6
 """Joints of torso and hips: the first six."""
+
+CONTACT_UNDER_NOISE_METRES: Final = 0.03
+"""Metres by which bodies may come nearer than they should, before refinement and after it: depths are off by as much,
+and refinement knows nothing of bodies."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +86,9 @@ class Noise:
     @property
     def limb(self) -> float:
         """The largest of the limbs' lengths."""
-        return max(self.by_segment[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= TRUNK)
+        return max(
+            self.by_segment[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= N_TRUNK_JOINTS
+        )
 
     @property
     def rigid(self) -> float:
@@ -130,3 +136,8 @@ def refuse_deviation(view: View, deviation: float | None) -> None:
             f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
             "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
         )
+
+
+def contact_under_noise(asked: float) -> float:
+    """Return the margin (m) that bodies must keep under noise; negative allows penetration, as in `asked`."""
+    return asked - CONTACT_UNDER_NOISE_METRES

@@ -22,12 +22,11 @@ from posekit.hidden import CompletedSurvivors
 from posekit.ranking import deviation_of_noise
 from posekit.recovery.body import ranges_of, suite_of
 from posekit.recovery.certified import Contradiction, certified_within, certifying_checks
-from posekit.recovery.contact import contact_under_noise
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
 from posekit.recovery.limb_walls import LimbWalls
-from posekit.recovery.noise import Noise
+from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise

@@ -17,16 +17,16 @@ from posekit.settings.rooting import DETECTED_DEVIATION, DETECTED_OFFSET
 if TYPE_CHECKING:
     from posekit.cameras.neck import NeckPlacement
 
-DEVIATION: Final = 2.0
+DEFAULT_DEVIATION_PIXELS: Final = 2.0
 """Standard deviation (px) of image points of which the view says none, unless a detector saw them."""
 
-RELATIVE: Final = 1e-3
+IMAGE_PLANE_DEVIATION: Final = 1e-3
 """The same on the image plane of a `lee-chen` camera, as a fraction of f: some 2 pixels of most cameras."""
 
-STEP: Final = 0.02
+TOLERANCE_STEP_METRES: Final = 0.02
 """Metres to which tolerances are rounded up, so that frames of nearly the same are grown together."""
 
-SHORTEST: Final = 0.24
+FOREARM_METRES: Final = 0.24
 """Metres: a forearm. A segment of this length is turned most by what its ends are off."""
 
 
@@ -45,9 +45,11 @@ def place_roots(
     from posekit.cameras.neck import place
 
     detected = bool(view.derived)
-    deviation = rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEVIATION)
+    deviation = (
+        rooting.deviation or view.deviation or (DETECTED_DEVIATION if detected else DEFAULT_DEVIATION_PIXELS)
+    )
     if isinstance(view.camera, LeeChenModel):
-        deviation = RELATIVE * float(view.camera.f or 1.0)
+        deviation = IMAGE_PLANE_DEVIATION * float(view.camera.f or 1.0)
     K = camera.K if camera.K.ndim == 2 else camera.K[frames]
     return place(
         PinholeCamera(K=K, distortion=camera.distortion),
@@ -64,8 +66,9 @@ def place_roots(
 
 def tolerance_of(placement: NeckPlacement) -> Tolerance:
     """Return what a tree that grows from a placed neck is judged with: as far off as its image points let it be."""
-    rigid, tangent = (STEP * math.ceil(value / STEP) for value in (placement.tolerance, placement.tangent))
-    angle = math.degrees(math.atan2(tangent, SHORTEST))
+    step = TOLERANCE_STEP_METRES
+    rigid, tangent = (step * math.ceil(value / step) for value in (placement.tolerance, placement.tangent))
+    angle = math.degrees(math.atan2(tangent, FOREARM_METRES))
     return Tolerance(rigid=rigid, tangent=tangent, placement=False, angle=angle)
 
 

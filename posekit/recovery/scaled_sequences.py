@@ -13,8 +13,6 @@ import numpy as np
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError, PosekitError
 from posekit.following import (
-    PATH_SEPARATION_METRES,
-    Beam,
     Following,
     MotionModel,
     Paths,
@@ -27,22 +25,22 @@ from posekit.recovery.person import person_of
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.sequences import follow, survivor_frames
 
-SPREAD: Final = 2.0
+SPREAD_DEVIATIONS: Final = 2.0
 """Deviations to either side of the lengths that are given within which scales are tried."""
 
-FIRST: Final = 5
+FIRST_SCALES: Final = 5
 """Scales that are tried first, evenly spaced."""
 
-ROUNDS: Final = 3
+REFINING_ROUNDS: Final = 3
 """How often the scales half-way between the best and its neighbours are tried after that."""
 
-SURE: Final = 0.01
+BEST_PATH_DEVIATION: Final = 0.01
 """How far off, relatively, scales are that the best path tells (docs, "Sequences"): what it costs says much less."""
 
-MOST: Final = 0.15
+MAX_DEVIATION: Final = 0.15
 """The largest deviation of lengths that is taken for one."""
 
-FIXED: Final = ("given", "head")
+FIXED_ROOTS: Final = ("given", "head")
 """Ways to a neck whose distance does not come from the lengths."""
 
 
@@ -83,8 +81,6 @@ def follow_scaled(
     figure: Figure | None = None,
     k: int = 2,
     model: MotionModel | None = None,
-    beam: Beam | None = None,
-    apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> ScaledFollowing:
     r"""Follow a person whose lengths are known up to a common factor, and tell the factor.
@@ -108,8 +104,9 @@ def follow_scaled(
         Relative, of the lengths that are given.
     figure : Figure, optional
         What the view's lengths are applied to; the built-in one if not given.
-    k, model, beam, apart
-        As of `posekit.recovery.sequences.follow`, for the paths at the end.
+    k, model
+        As of `posekit.recovery.sequences.follow`, for the paths at the end; what else that takes, say to it with the
+        recovery that is found.
     progress : callable, optional
         Told how many scales were tried, and how many will be at most.
 
@@ -125,9 +122,9 @@ def follow_scaled(
     PosekitError
         Where no scale leaves a posture: what is said of the lengths as they are.
     """
-    if not (math.isfinite(deviation) and 0 < deviation <= MOST):
+    if not (math.isfinite(deviation) and 0 < deviation <= MAX_DEVIATION):
         raise InputError(
-            f"deviation of the lengths: {deviation!r}; expected a fraction above 0, at most {MOST:g}"
+            f"deviation of the lengths: {deviation!r}; expected a fraction above 0, at most {MAX_DEVIATION:g}"
         )
     if isinstance(view.camera, ScaledOrthographicModel):
         raise InputError(
@@ -147,24 +144,24 @@ def follow_scaled(
         recovering=recovering or partial(recover, figure=figure, refine=refine),
         deviation=deviation,
         model=model,
-        beam=beam,
         progress=progress,
     )
-    for scale in [1.0, *np.linspace(1 - SPREAD * deviation, 1 + SPREAD * deviation, FIRST).tolist()]:
+    spread = SPREAD_DEVIATIONS * deviation
+    for scale in [1.0, *np.linspace(1 - spread, 1 + spread, FIRST_SCALES).tolist()]:
         trial.run(round(scale, 6))
     if not any(trial.paths.values()):
         if trial.refusal is not None:
             raise trial.refusal
         follow(trial.recover(1.0))  # says that no frame has a posture
-    for _ in range(ROUNDS):
+    for _ in range(REFINING_ROUNDS):
         for scale in trial.between():
             trial.run(scale)
     choice = trial.choice()
     recovery = trial.recover(choice.between)
-    following = follow(recovery, k=k, model=model, beam=beam, apart=apart)
+    following = follow(recovery, k=k, model=model)
     return ScaledFollowing(
         scale=choice.between,
-        deviation=math.hypot(choice.deviation, SURE),
+        deviation=math.hypot(choice.deviation, BEST_PATH_DEVIATION),
         choice=choice,
         recovery=recovery,
         following=following,
@@ -180,7 +177,6 @@ class _Trials:
     recovering: Callable[[View], Recovery]
     deviation: float
     model: MotionModel | None
-    beam: Beam | None
     progress: Callable[[int, int], None] | None
 
     def __post_init__(self) -> None:
@@ -200,7 +196,7 @@ class _Trials:
         self.cost[scale], self.paths[scale] = self._tried(scale)
         self.cost[scale] += 0.5 * (math.log(scale) / self.deviation) ** 2
         if self.progress is not None:
-            self.progress(len(self.cost), FIRST + 2 * ROUNDS)
+            self.progress(len(self.cost), FIRST_SCALES + 2 * REFINING_ROUNDS)
 
     def _tried(self, scale: float) -> tuple[float, Paths | None]:
         model = self.model or MotionModel()
@@ -217,7 +213,7 @@ class _Trials:
         misfit = [
             np.zeros(len(frame)) if frame.chi2 is None else -frame.chi2 / 2 for frame in recovery.frames
         ]
-        paths = best_paths(survivor_frames(recovery.frames, misfit), model=model, beam=self.beam)
+        paths = best_paths(survivor_frames(recovery.frames, misfit), model=model)
         return float(paths.cost[0]), paths
 
     def between(self) -> list[float]:
@@ -240,7 +236,7 @@ def _check(recovery: Recovery) -> None:
     """Refuse what does not tell a scale."""
     for number, frame in enumerate(recovery.frames):
         placement = frame.placement
-        if placement is not None and placement.method not in (*FIXED, "none"):
+        if placement is not None and placement.method not in (*FIXED_ROOTS, "none"):
             raise InputError(
                 f"the scale of the lengths: frame {number} has its neck by {placement.method}, from the lengths "
                 "themselves; expected a neck that is given, or a head of six points; give root in every frame"

@@ -25,13 +25,13 @@ from posekit.geometry import Array
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.skeleton import JOINT, JOINTS
 
-PLACED: Final = 0.06
+PLACED_NECK_METRES: Final = 0.06
 """Metres that a survivor's neck is off where it had to be placed: so far apart are the places that are tried."""
 
-CERTAIN: Final = 0.02
+KNOWN_RADIUS_METRES: Final = 0.02
 """Metres: a joint that was not seen and can be elsewhere by more is not known to the paths."""
 
-VAGUE: Final = 1.0
+MAX_DEVIATION_METRES: Final = 1.0
 """Metres beyond which it does not matter how far off a joint is."""
 
 
@@ -181,7 +181,9 @@ def _seen(frame: FrameRecovery) -> Array:
     if not inferred:
         return frame.joints
     joints = frame.joints.copy()
-    open_ones = {name for one in inferred for name, region in one.items() if not region.radius <= CERTAIN}
+    open_ones = {
+        name for one in inferred for name, region in one.items() if not region.radius <= KNOWN_RADIUS_METRES
+    }
     joints[:, [JOINT[name] for name in open_ones]] = np.nan
     return joints
 
@@ -190,7 +192,7 @@ def _deviation(frame: FrameRecovery) -> Array:
     """Return how far off the joints of survivors are (N, 14), metres."""
     if frame.refined is not None:
         spread = np.sqrt(np.trace(frame.refined.covariance, axis1=2, axis2=3))
-        return np.where(np.isfinite(spread), np.minimum(spread, VAGUE), 0.0)
+        return np.where(np.isfinite(spread), np.minimum(spread, MAX_DEVIATION_METRES), 0.0)
     off = 0.0 if frame.judged in (None, "exact") else frame.spread
     return np.full((len(frame), len(JOINTS)), np.hypot(off, _neck_deviation(frame)))
 
@@ -201,7 +203,7 @@ def _neck_deviation(frame: FrameRecovery) -> float:
     if placement is None or placement.method in ("given", "none"):
         return 0.0
     told = len(placement.necks) == 1 and np.isfinite(placement.deviation)
-    return min(placement.deviation, PLACED) if told else PLACED
+    return min(placement.deviation, PLACED_NECK_METRES) if told else PLACED_NECK_METRES
 
 
 def _about_neck(frame: SurvivorFrame) -> SurvivorFrame:

@@ -12,7 +12,7 @@ from posekit.recovery.recovery import FrameRecovery, Recovery
 if TYPE_CHECKING:
     from posekit.following.following import Following
 
-SHOWN = 4
+MAX_SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""
 
 
@@ -22,10 +22,10 @@ def summary_lines(recovery: Recovery) -> list[str]:
     lines = [
         f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected by (leaves, 8192 a tree)"
     ]
-    cut = len(frames) - 2 * SHOWN
+    cut = len(frames) - 2 * MAX_SHOWN
     for k, frame in frames:
-        if cut > 1 and SHOWN <= k < len(frames) - SHOWN:
-            if k == SHOWN:
+        if cut > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
+            if k == MAX_SHOWN:
                 lines.append(f"{'…':>5} {cut} frames between")
             continue
         lines.append(_frame_line(k, frame))
@@ -62,7 +62,7 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
     lost = Counter(frame.rejected).most_common()
     if not len(frame):  # what the last ones died of comes first
         lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
-    most = ", ".join(f"{reason} {count}" for reason, count in lost[:SHOWN])
+    most = ", ".join(f"{reason} {count}" for reason, count in lost[:MAX_SHOWN])
     return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
 
 

@@ -27,13 +27,13 @@ from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
 from posekit.validators.walking import THRESHOLDS_BY_WALKERS
 
-BATCH: Final = 4096
+POSTURES_AT_ONCE: Final = 4096
 """Postures that are judged at once."""
 
-QUICK: Final = 4
+CONFIGURATIONS_FACTOR: Final = 4
 """Times as many configurations, which need no search: the fewer calls, the less time is lost between threads."""
 
-LISTED: Final = 10_000
+MAX_LISTED: Final = 10_000
 """Postures that a report lists one by one: all of a file that has no more, else the first that are not valid."""
 
 Detail = Literal["findings", "margins", "verdicts"]
@@ -94,15 +94,17 @@ def validate(
     places: dict[ReportPlace, int] = {}
     parts: list[VerdictColumns] = []
     listed: list[PostureReport] = []
-    all_listed = len(given) <= LISTED
+    all_listed = len(given) <= MAX_LISTED
     for first, verdicts in _batches(validator, given):
         contacts = _contacts(verdicts, distances, every=detail != "verdicts")
         columns = columns_of(verdicts, contacts, places, checks, margins=detail != "verdicts")
         parts.append(columns)
-        if detail != "findings" or (not all_listed and len(listed) == LISTED):
+        if detail != "findings" or (not all_listed and len(listed) == MAX_LISTED):
             continue
         rows = (
-            np.arange(len(columns)) if all_listed else np.flatnonzero(columns.verdict)[: LISTED - len(listed)]
+            np.arange(len(columns))
+            if all_listed
+            else np.flatnonzero(columns.verdict)[: MAX_LISTED - len(listed)]
         )
         listed += list_postures(
             verdicts, contacts, columns, list(places), rows, every=every, first=None if all_listed else first
@@ -207,7 +209,7 @@ def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdict
     lengths = behind = None
     if given.joints is not None and validator.lengths == "median":
         lengths, behind = segment_lengths(given.joints), shoulders_are_behind(given.joints)
-    size = BATCH * (QUICK if given.q is not None else 1)
+    size = POSTURES_AT_ONCE * (CONFIGURATIONS_FACTOR if given.q is not None else 1)
     for first in range(0, len(given), size):
         rows = slice(first, first + size)
         if given.q is not None:

@@ -12,7 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from posekit.batch import Recipe, digests, read_frames, run_batch, run_shard, shard_paths, write_view_table
+from posekit.batch import (
+    Recipe,
+    Workers,
+    digests,
+    read_frames,
+    run_batch,
+    run_shard,
+    shard_paths,
+    write_view_table,
+)
 from posekit.batch.durable import PARTS_FOLDER
 from posekit.batch.shard import shards_of
 from posekit.batch.staging import Staging, stage
@@ -93,7 +102,7 @@ def test_what_crashes_is_named_and_the_rest_is_done(
 ) -> None:
     out = tmp_path / "out"
     monkeypatch.setenv("BATCH_TEST_POISON", "1")
-    summary = run_batch([archive / "short.parquet"], out, RECIPE, jobs=2, retries=1, work=crashing)
+    summary = run_batch([archive / "short.parquet"], out, RECIPE, Workers(jobs=2, retries=1), work=crashing)
     (failure,) = summary.failures
     assert (failure.start, failure.stop, failure.attempts, failure.died) == (POISON, POISON + 2, 2, True)
     assert failure.error == "its process was ended by signal 11 (SIGSEGV)"
@@ -146,7 +155,7 @@ def test_interrupted_and_killed_and_run_to_the_end(archive: Path, tmp_path: Path
         raise AssertionError("a worker outlived its run")
     there = len(shard_paths(out))
     assert there < FRAMES // 2
-    summary = run_batch([archive / "long.parquet"], out, RECIPE, jobs=1)
+    summary = run_batch([archive / "long.parquet"], out, RECIPE, Workers(jobs=1))
     assert (summary.skipped, summary.frames) == (there, FRAMES)
     assert_whole(archive, out, "long.parquet", FRAMES)
 
@@ -156,7 +165,9 @@ def test_a_ray_cluster_one_worker_of_which_is_killed_gives_the_same_bytes(
 ) -> None:
     pytest.importorskip("ray")
     out = tmp_path / "out"
-    summary = run_batch([archive / "short.parquet"], out, RECIPE, jobs=2, cluster="local", work=crashing)
+    summary = run_batch(
+        [archive / "short.parquet"], out, RECIPE, Workers(jobs=2, cluster="local"), work=crashing
+    )
     assert (tmp_path / "marker").exists()
     assert (summary.frames, summary.failures) == (12, ())
     assert_whole(archive, out, "short.parquet", 12)

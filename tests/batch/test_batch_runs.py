@@ -20,6 +20,7 @@ from posekit.batch import (
     Progress,
     Recipe,
     Shard,
+    Workers,
     read_frames,
     read_shards,
     run_batch,
@@ -334,9 +335,9 @@ def test_a_run_in_another_thread_works(archive: Path, tmp_path: Path) -> None:
     ("options", "says"),
     [({"jobs": 0}, "--jobs: 0"), ({"retries": -1}, "--retries: -1")],
 )
-def test_impossible_numbers_are_refused(options: dict, says: str, archive: Path, tmp_path: Path) -> None:
+def test_impossible_numbers_are_refused(options: dict, says: str) -> None:
     with pytest.raises(InputError, match=says):
-        run_batch([archive], tmp_path / "out", RECIPE, **options)
+        Workers(**options)
 
 
 @pytest.mark.parametrize(

@@ -271,8 +271,8 @@ def test_a_large_file_is_judged_in_batches_and_listed_in_part(run, monkeypatch: 
     np.savez("q.npz", q=q)
     at_once = Validator(HUMAN, checks=("joint-range", "collision")).check(q=q)
     run("q.npz", "--urdf", "human", "-o", "whole.csv")
-    monkeypatch.setattr(module, "BATCH", 32)
-    monkeypatch.setattr(module, "LISTED", 20)
+    monkeypatch.setattr(module, "POSTURES_AT_ONCE", 32)
+    monkeypatch.setattr(module, "MAX_LISTED", 20)
     outcome = run("q.npz", "--urdf", "human", "-o", "r.json")
     report = read_report("r.json")
     bad = np.flatnonzero(at_once.invalid)
@@ -291,7 +291,7 @@ def test_the_lengths_are_those_of_the_whole_file(monkeypatch: pytest.MonkeyPatch
     module = importlib.import_module("posekit.validation.validate")
     joints = np.concatenate([STANDING * scale for scale in (0.99, 1.0, 1.0, 1.01)])
     whole = pipeline_validate(Validator(HUMAN), files.Postures(joints=joints))
-    monkeypatch.setattr(module, "BATCH", 1)
+    monkeypatch.setattr(module, "POSTURES_AT_ONCE", 1)
     parts = pipeline_validate(Validator(HUMAN), files.Postures(joints=joints))
     assert whole.settings == parts.settings
     for a, b in zip(whole.postures, parts.postures, strict=True):

@@ -17,8 +17,8 @@ from posekit.papers.taylor_protocol import MARKED_ANGLES, MARKED_JOINTS, accurac
 from posekit.papers.taylor_study import synthetic_study
 from posekit.papers.taylor_survival import survival, survival_lines
 from posekit.papers.taylor_views import exact_views, photographs
-from posekit.recovery.taylor_figure.completion import NEEDS, Completion, joint_checks, taylor_checks
-from posekit.recovery.taylor_figure.human import FLIPS, Human, taylor_human
+from posekit.recovery.taylor_figure.completion import COMPLETED_FROM, Completion, joint_checks, taylor_checks
+from posekit.recovery.taylor_figure.human import N_FLIPS, Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
 from posekit.settings import MEASURED_TOLERANCE, PHOTOGRAPH_TOLERANCE
 from posekit.skeleton import HIPS, JOINT, JOINTS, SEGMENTS, TORSO, segment_name
@@ -97,7 +97,7 @@ def test_what_the_tree_has_is_left_as_it_is():
     points = np.random.default_rng(0).normal(size=(3, len(HUMAN.points), 3))
     joints = Completion(figure=PERSON, points=HUMAN.points).complete(points)
     for name in JOINTS:
-        if name not in NEEDS:
+        if name not in COMPLETED_FROM:
             np.testing.assert_array_equal(joints[:, JOINT[name]], points[:, HUMAN.points.index(name)])
 
 
@@ -202,8 +202,8 @@ def test_there_are_2048_flips_and_they_are_those_of_brute_force(k):
     leaves = HUMAN.grow(SEEN.image[k : k + 1], SEEN.lengths[k : k + 1], SEEN.scale[k : k + 1])
     points = leaves.postures()
     bodies, flips = brute_force(k)
-    assert len(points) == FLIPS == 2048
-    assert len(set(flips_of(points))) == FLIPS
+    assert len(points) == N_FLIPS == 2048
+    assert len(set(flips_of(points))) == N_FLIPS
     order = {flip: row for row, flip in enumerate(flips)}
     same = bodies[[order[flip] for flip in flips_of(points)]]
     np.testing.assert_allclose(points, same, rtol=0, atol=1e-9)
@@ -214,7 +214,7 @@ def test_survivors_are_those_of_brute_force(names: Sequence[str]):
     left = 0
     for k in range(4):
         bodies, flips = brute_force(k)
-        bad = np.zeros(FLIPS, dtype=bool)
+        bad = np.zeros(N_FLIPS, dtype=bool)
         for judgement in judge(
             joint_checks(PERSON, names, ranges=URDF, tolerance=LOOSE), complete_by_hand(bodies)
         ):
@@ -225,7 +225,7 @@ def test_survivors_are_those_of_brute_force(names: Sequence[str]):
         assert set(flips_of(leaves.postures())) == expected
         assert len(leaves.code) == len(expected)
         left += len(expected)
-    assert 0 < left < 4 * FLIPS
+    assert 0 < left < 4 * N_FLIPS
 
 
 def test_counts_are_those_of_the_trees_one_by_one():
@@ -245,7 +245,7 @@ def test_counts_are_those_of_the_trees_one_by_one():
             assert rows[label].count[k] == len(leaves.code)
             true = HUMAN.code(leaves, SEEN.truth[k : k + 1])
             assert rows[label].truth[k] == np.isin(true, leaves.code)[0]
-    assert (rows["none"].count == FLIPS).all()
+    assert (rows["none"].count == N_FLIPS).all()
     assert rows["none"].truth.all()
     assert rows["none"].pair.all()
 
@@ -314,9 +314,9 @@ def test_the_bound_leaves_one_segment_flat_and_less_is_said_to_be_short():
         np.testing.assert_array_equal(told.short, flat.scale < least.scale)
         assert not least.short.any()
         leaves = HUMAN.grow(least.image, least.lengths, least.scale)
-        np.testing.assert_array_equal(np.bincount(leaves.frame), FLIPS // 2)
+        np.testing.assert_array_equal(np.bincount(leaves.frame), N_FLIPS // 2)
         short = HUMAN.grow(flat.image, flat.lengths, flat.scale)
-        assert (np.bincount(short.frame)[flat.short] < FLIPS).all()
+        assert (np.bincount(short.frame)[flat.short] < N_FLIPS).all()
 
 
 def test_from_far_away_the_protocol_finds_the_truth():
@@ -382,7 +382,7 @@ def test_the_synthetic_study_is_the_same_every_time_and_its_tables_are_rectangul
     assert len(full) == 1 + 2 * 6
     for table in full:
         assert len({len(row) for row in table}) == 1
-    assert (study.exact[0].count == FLIPS).all()
+    assert (study.exact[0].count == N_FLIPS).all()
 
 
 def test_tables_of_nothing_chosen_say_so():

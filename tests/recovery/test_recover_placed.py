@@ -12,7 +12,7 @@ import posekit
 from posekit.errors import InputError
 from posekit.formats.own import Result, View, read_result, write_result
 from posekit.recovery.result import result_of
-from posekit.recovery.rooting import DEVIATION, tolerance_of
+from posekit.recovery.rooting import DEFAULT_DEVIATION_PIXELS, tolerance_of
 from posekit.settings import Rooting
 from posekit.synthesis import random_views
 from posekit.views.builtin import forget_camera, view_of
@@ -85,9 +85,9 @@ def test_a_method_can_be_asked_for(method: str) -> None:
 def test_the_views_own_deviation_counts_before_the_default() -> None:
     view = blind(3, noise=1.0)
     default = posekit.recover(view).frames[0].placement
-    said = posekit.recover(replace(view, deviation=2 * DEVIATION)).frames[0].placement
+    said = posekit.recover(replace(view, deviation=2 * DEFAULT_DEVIATION_PIXELS)).frames[0].placement
     asked = (
-        posekit.recover(replace(view, deviation=9.0), rooting=Rooting(deviation=2 * DEVIATION))
+        posekit.recover(replace(view, deviation=9.0), rooting=Rooting(deviation=2 * DEFAULT_DEVIATION_PIXELS))
         .frames[0]
         .placement
     )

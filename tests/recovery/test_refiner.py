@@ -18,8 +18,7 @@ from posekit.formats import own as files
 from posekit.formats.own import View
 from posekit.recovery import recover, survival
 from posekit.recovery.certified import certified_within
-from posekit.recovery.contact import contact_under_noise
-from posekit.recovery.noise import Noise
+from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS

@@ -11,7 +11,7 @@ import posekit
 from posekit.errors import InputError, PosekitError
 from posekit.following import Paths, ScaleChoice
 from posekit.formats.own import OpenCVModel, View
-from posekit.recovery.scaled_sequences import SURE, follow_scaled
+from posekit.recovery.scaled_sequences import BEST_PATH_DEVIATION, follow_scaled
 from posekit.settings import EXACT_TOLERANCE
 from posekit.synthesis import CameraPlacements, Walker
 from posekit.synthesis.camera_sphere import CameraSphere
@@ -58,7 +58,7 @@ def test_the_scale_of_lengths_that_are_off_is_told(view):
     told, factor = [], 1.05
     found = follow_scaled(off_by(view, factor), progress=lambda *count: told.append(count))
     assert found.scale * factor == pytest.approx(1.0, abs=0.02)
-    assert SURE <= found.deviation < 0.02
+    assert BEST_PATH_DEVIATION <= found.deviation < 0.02
     assert not found.at_the_end
     neck = "neck-pelvis"
     assert found.recovery.figure.lengths[neck] == pytest.approx(

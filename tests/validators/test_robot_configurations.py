@@ -168,7 +168,7 @@ def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     given = NamedConfigurations(q=some_q("human"))
     module = importlib.import_module("posekit.validation.validate")
     whole = validate(validator("human"), given, detail="verdicts").columns
-    monkeypatch.setattr(module, "BATCH", 17)
+    monkeypatch.setattr(module, "POSTURES_AT_ONCE", 17)
     parts = validate(validator("human"), given, detail="verdicts").columns
     assert whole is not None
     assert parts is not None

@@ -12,7 +12,7 @@ from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.linkages import Linkage
 from posekit.recovery.body import ranges_of
-from posekit.recovery.taylor_figure.completion import NEEDS, Completion, taylor_checks
+from posekit.recovery.taylor_figure.completion import COMPLETED_FROM, Completion, taylor_checks
 from posekit.recovery.taylor_figure.human import Human, taylor_human
 from posekit.recovery.taylor_figure.proportions import TABLE_1, figure_of
 from posekit.settings import RecoverSettings, Tolerance
@@ -35,7 +35,7 @@ class TaylorBody:
 
     figure: Figure
     stature: float
-    inferred: tuple[str, ...] = tuple(NEEDS)
+    inferred: tuple[str, ...] = tuple(COMPLETED_FROM)
 
     @staticmethod
     def of(stature: float, figure: Figure) -> TaylorBody:

@@ -25,9 +25,9 @@ from posekit.tree import Check, Findings, Place, Scope
 from posekit.validators import PHYSICAL_CHECKS, AnyCheck, CheckOptions, Ranges, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
 
-MIDDLES = ("mid_shoulders", "mid_hips")
-SHOULDERS = ("right_shoulder", "left_shoulder")
-NEEDS = {"pelvis": MIDDLES, "neck": (*SHOULDERS, *MIDDLES)}
+MIDDLE_POINTS = ("mid_shoulders", "mid_hips")
+SHOULDER_POINTS = ("right_shoulder", "left_shoulder")
+COMPLETED_FROM = {"pelvis": MIDDLE_POINTS, "neck": (*SHOULDER_POINTS, *MIDDLE_POINTS)}
 """The points of Taylor's human that place the two joints which it lacks; it has the others itself."""
 
 
@@ -51,7 +51,7 @@ class Completion:
     points: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        needed = [name for name in JOINTS if name not in NEEDS] + list(MIDDLES)
+        needed = [name for name in JOINTS if name not in COMPLETED_FROM] + list(MIDDLE_POINTS)
         missing = [name for name in needed if name not in self.points]
         if missing:
             raise InputError(
@@ -86,7 +86,7 @@ class Completion:
 
     def reads(self, joints: Iterable[int]) -> tuple[int, ...]:
         """Return the tree's points that place some joints of `posekit.skeleton.JOINTS`, in tree order."""
-        names = {name for joint in joints for name in NEEDS.get(JOINTS[joint], (JOINTS[joint],))}
+        names = {name for joint in joints for name in COMPLETED_FROM.get(JOINTS[joint], (JOINTS[joint],))}
         return tuple(sorted(self.points.index(name) for name in names))
 
     def place(self, joints: Sequence[int], points: Array, given: Sequence[int]) -> Array:
@@ -99,13 +99,13 @@ class Completion:
         return self.place(range(len(JOINTS)), points, range(len(self.points)))
 
     def _place(self, joint: str, at: dict[str, Array]) -> Array:
-        if joint not in NEEDS:
+        if joint not in COMPLETED_FROM:
             return at[joint]
-        shoulders, hips = (at[name] for name in MIDDLES)
+        shoulders, hips = (at[name] for name in MIDDLE_POINTS)
         pelvis = shoulders + self.fraction * (hips - shoulders)
         if joint == "pelvis":
             return pelvis
-        frame = hips_frame(pelvis, *(at[name] for name in SHOULDERS))
+        frame = hips_frame(pelvis, *(at[name] for name in SHOULDER_POINTS))
         return np.asarray(shoulders + np.einsum("nij,j->ni", frame, self.neck))
 
 

@@ -14,13 +14,13 @@ from posekit.cameras import ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages import Linkage, SpanningTree, load_linkage, span
-from posekit.recovery.taylor_figure.completion import MIDDLES, Completion
+from posekit.recovery.taylor_figure.completion import MIDDLE_POINTS, Completion
 from posekit.skeleton import JOINT, segment_name
 from posekit.tree import BranchState, Check, InterpretationTree, Leaves
 from posekit.tree.bits import path_of
 from posekit.validators.linkage import closure
 
-FLIPS = 1 << 11
+N_FLIPS = 1 << 11
 """Two for each of the eleven segments (Taylor 2000, §4)."""
 
 
@@ -42,11 +42,12 @@ class Human:
     linkage: Linkage
 
     def __post_init__(self) -> None:
-        missing = [name for name in MIDDLES if name not in self.linkage.nodes]
+        missing = [name for name in MIDDLE_POINTS if name not in self.linkage.nodes]
         unknown = [name for name in self.linkage.points if name not in JOINT]
         if missing or unknown or len(self.linkage.points) != 12:
             raise InputError(
-                f"linkage {self.linkage.name}: not Taylor's human; expected his 12 points and {', '.join(MIDDLES)}"
+                f"linkage {self.linkage.name}: not Taylor's human; expected his 12 points and "
+                f"{', '.join(MIDDLE_POINTS)}"
             )
 
     @cached_property
@@ -76,7 +77,7 @@ class Human:
         lengths = []
         for a, b in self.linkage.segments:
             ends = (self.linkage.nodes[a], self.linkage.nodes[b])
-            lengths.append(spine if set(ends) == set(MIDDLES) else named[_named(ends)])
+            lengths.append(spine if set(ends) == set(MIDDLE_POINTS) else named[_named(ends)])
         return np.array(lengths)
 
     def measure(self, points: Array) -> Array:
