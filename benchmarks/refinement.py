@@ -40,7 +40,7 @@ from posekit.refinement import (
     tolerance_of,
     under_noise,
 )
-from posekit.settings import MEASURED_TOLERANCE, Tolerance
+from posekit.settings import MEASURED_TOLERANCE, RIGID_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
@@ -257,10 +257,8 @@ def certificates(views: int) -> None:
             start = time.process_time()
             recovery = recover(view, ranges=ranges, length_deviation=0.0)
             spent = time.process_time() - start
-            judged = recovered_with(result_of(recovery)).judged
-            validator = Validator(
-                ranges=ranges, angle_tolerance=judged.angle, contact_margin=judged.contact_margin
-            )
+            judged = recovered_with(result_of(recovery)).settings
+            validator = Validator(settings=judged, ranges=ranges, rigid_tolerance=RIGID_TOLERANCE)
             counts = [len(frame) for frame in recovery.frames]
             joints = np.concatenate([frame.joints for frame in recovery.frames])
             near = best(np.repeat(np.arange(len(scene)), counts), joints, scene.joints_cam)

@@ -201,7 +201,7 @@ def validate(
     from posekit.formats import own as files
     from posekit.formats.own.report import columns_of
     from posekit.formats.own.report_table import summary_table
-    from posekit.settings import RIGID_TOLERANCE
+    from posekit.settings import ValidateSettings
 
     if output is not None:
         distinct(postures, output)
@@ -211,48 +211,42 @@ def validate(
     if not _count(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
-    judged = validation.JudgedWith(rigid=RIGID_TOLERANCE, angle=0.001, contact_margin=0.0, walkers="paper")
+    judged = ValidateSettings(up=(0.0, 0.0, 1.0) if given.up is None else given.up)
     if given.result is not None:
         with about(postures):
             own, judged = validation.recovered_with(given.result)
             figure = urdf or own
-    rigid_tolerance = rigid_tolerance or f"{100 * judged.rigid:g}cm"
-    angle_tolerance = judged.angle if angle_tolerance is None else angle_tolerance
-    walkers = walkers or judged.walkers
-    # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
-    own_margin = judged.contact_margin if urdf in ("", "stick_figure") else 0.0
-    margin = signed_length(contact_margin, "--contact-margin") if contact_margin else own_margin
-    validator = validators.Validator(
-        figure,
-        checks=split(checks) if checks else None,
+    if urdf not in ("", "stick_figure"):
+        # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
+        judged = judged.changed(contact_margin=0.0)
+    asked: dict[str, Any] = {
+        "checks": split(checks) if checks else None,
+        "walkers": walkers or None,
+        "rigid_tolerance": files.parse_length(rigid_tolerance, name="--rigid-tolerance")
+        if rigid_tolerance
+        else None,
+        "angle_tolerance": angle_tolerance,
+        "contact_margin": signed_length(contact_margin, "--contact-margin") if contact_margin else None,
+        "lengths": lengths or None,
+        "joint_map": joint_map or None,
+        "srdf": srdf or None,
+        "untrusted": None if trusted is None else not trusted,
+        "up": _direction(up) if up else None,
+    }
+    settings = judged.changed(
         ranges=ranges,
         rules=rule_numbers(rules),
-        walkers=walkers,
-        rigid_tolerance=files.parse_length(rigid_tolerance, name="--rigid-tolerance"),
-        angle_tolerance=angle_tolerance,
-        contact_margin=margin,
-        lengths=lengths or None,
-        joint_map=joint_map or None,
         bodies=bodies,
-        srdf=srdf or None,
         package_dirs=package_dir or (),
-        untrusted=None if trusted is None else not trusted,
-        up=_direction(up, given.up),
+        **{name: value for name, value in asked.items() if value is not None},
     )
-    settings = {
-        "urdf": urdf or ("stick_figure" if figure == "stick_figure" else "as recovered"),
-        "ranges": ranges,
-        "rules": rules,
-        "walkers": walkers,
-        "rigid_tolerance": rigid_tolerance,
-        "angle_tolerance": angle_tolerance,
-        "contact_margin": contact_margin or f"{100 * margin:g}cm",
-    }
+    validator = validators.Validator(figure, settings)
+    own_name = "stick_figure" if figure == "stick_figure" else "as recovered"
     with about(postures):
         report = validation.validate(
             validator,
             given.postures,
-            settings=settings,
+            settings={"urdf": urdf or own_name},
             every=every,
             sequence=_clips(given) if sequence else None,
             distances=distances,
@@ -263,9 +257,10 @@ def validate(
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)
-    if angle_tolerance >= LOOSE or margin < 0:
+    if settings.angle_tolerance >= LOOSE or settings.contact_margin < 0:
         typer.echo(
-            f"judged with {angle_tolerance:g} degrees of tolerance, and {100 * margin:g} cm between bodies"
+            f"judged with {settings.angle_tolerance:g} degrees of tolerance, and {100 * settings.contact_margin:g} cm "
+            "between bodies"
         )
     if output is not None:
         typer.echo(f"written: {output}")
@@ -307,10 +302,8 @@ def _clips(given: _Input) -> Any:
     return np.zeros(_count(given.postures), dtype=np.intp) if given.clip is None else given.clip
 
 
-def _direction(text: str, of_file: Array | None) -> Any:
+def _direction(text: str) -> Any:
     """Read the direction up."""
-    if not text:
-        return (0.0, 0.0, 1.0) if of_file is None else of_file
     if text not in UPS:
         raise InputError(f"--up: {text!r}; expected one of +x, -x, +y, -y, +z, -z")
     axis, sign = UPS[text]

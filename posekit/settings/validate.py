@@ -103,16 +103,15 @@ class ValidateSettings:
         """Return the same settings with some of them changed, by the names of the fields."""
         return replace(self, **changes) if changes else self
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the settings that decide verdicts as values that JSON has."""
+    def told(self) -> dict[str, Any]:
+        """Say what decided verdicts as a report does: in the words of the command line."""
         return {
-            "checks": None if self.checks is None else [check.to_json() for check in self.checks],
             "ranges": self.ranges if isinstance(self.ranges, str) else self.ranges.name,
-            "rules": list(self.rules),
+            "rules": ",".join(map(str, self.rules)),
             "walkers": self.walkers,
-            "rigid_tolerance": self.rigid_tolerance,
+            "rigid_tolerance": f"{100 * self.rigid_tolerance:g}cm",
             "angle_tolerance": self.angle_tolerance,
-            "contact_margin": self.contact_margin,
+            "contact_margin": f"{100 * self.contact_margin:g}cm",
         }
 
 

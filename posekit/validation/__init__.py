@@ -1,6 +1,5 @@
 """Whole files judged: postures or configurations to verdicts and reports."""
 
-from posekit.validation.validate import JudgedWith as JudgedWith
 from posekit.validation.validate import RecoveredWith as RecoveredWith
 from posekit.validation.validate import recovered_with as recovered_with
 from posekit.validation.validate import validate as validate

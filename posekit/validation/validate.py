@@ -18,7 +18,7 @@ from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, join
 from posekit.recovery.judged import tolerances_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
-from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE
+from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
@@ -56,7 +56,7 @@ def validate(
     validator: Validator,
     postures: Postures | NamedConfigurations,
     *,
-    settings: dict[str, Any] | None = None,
+    settings: Mapping[str, Any] | None = None,
     every: bool = False,
     sequence: NDArray[np.intp] | None = None,
     distances: bool | None = None,
@@ -69,7 +69,7 @@ def validate(
     validator : Validator
     postures : Postures or Configurations
     settings : dict, optional
-        What decided the verdicts, to be written with them.
+        What else is to be written of what decided the verdicts: the settings of the validator are.
     every : bool
         List every finding, not only violations and each check's worst.
     sequence : int array (N,), optional
@@ -116,6 +116,7 @@ def validate(
             **validator.describe(),
             "checks": applied,
             **_lengths_of(validator, given),
+            **validator.settings.told(),
             **(settings or {}),
         },
         postures=tuple(listed),
@@ -128,25 +129,14 @@ def validate(
     )
 
 
-class JudgedWith(NamedTuple):
-    """What the frames of a result were judged with: of several kinds of frames, what allows most.
+class RecoveredWith(NamedTuple):
+    """Whose postures a result holds, and settings that judge them by what they were recovered with.
 
-    The rigid tolerance is in metres, and that of the validators where less was allowed; the angle tolerance in degrees,
-    the contact margin in metres (negative allows penetration); whose thresholds the rules of walking had is a name, as
-    `posekit.validators.walking.THRESHOLDS_BY_WALKERS` has it.
+    Of several kinds of frames, by what allowed most; and no more strictly than is usual.
     """
 
-    rigid: float
-    angle: float
-    contact_margin: float
-    walkers: str
-
-
-class RecoveredWith(NamedTuple):
-    """Whose postures a result holds, and what they were judged with."""
-
     figure: Figure
-    judged: JudgedWith
+    settings: ValidateSettings
 
 
 def recovered_with(result: Result) -> RecoveredWith:
@@ -166,7 +156,7 @@ def recovered_with(result: Result) -> RecoveredWith:
     return RecoveredWith(figure, _judged(settings))
 
 
-def _judged(settings: Mapping[str, Any]) -> JudgedWith:
+def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
     """Return what frames were judged with."""
     judged = settings.get("judged")
     kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
@@ -187,7 +177,12 @@ def _judged(settings: Mapping[str, Any]) -> JudgedWith:
             " or ".join(THRESHOLDS_BY_WALKERS),
             "correct what made the result",
         )
-    return JudgedWith(max(rigid), max(angles), min(margins), walkers)
+    return ValidateSettings(
+        rigid_tolerance=max(rigid),
+        angle_tolerance=max(angles),
+        contact_margin=min(margins),
+        walkers=walkers,
+    )
 
 
 def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:

@@ -22,7 +22,7 @@ from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
-from posekit.settings import MEASURED_TOLERANCE
+from posekit.settings import MEASURED_TOLERANCE, RIGID_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
@@ -170,16 +170,14 @@ def test_every_survivor_is_valid_by_the_result_itself(
     recovery = recover(view, ranges=ranges)
 
     def verdicts(recovery: Recovery, *, heads: bool) -> list[str]:
-        judged = recovered_with(result_of(recovery)).judged
-        validator = Validator(
-            ranges=ranges, angle_tolerance=judged.angle, contact_margin=judged.contact_margin
-        )
+        judged = recovered_with(result_of(recovery)).settings
+        validator = Validator(settings=judged, ranges=ranges, rigid_tolerance=RIGID_TOLERANCE)
         points = np.concatenate(
             [frame.batch.points[frame._rows] for frame in recovery.frames if frame.batch is not None]
         )
         return validator.check(points[:, :14], points[:, 14:] if heads else None).verdicts
 
-    assert recovered_with(result_of(recovery)).judged.angle == 6.0
+    assert recovered_with(result_of(recovery)).settings.angle_tolerance == 6.0
     for heads in (False, True):
         assert "invalid" not in verdicts(recovery, heads=heads)
     named = {reason for frame in recovery.frames for reason in frame.rejected}

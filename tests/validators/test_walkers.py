@@ -151,19 +151,21 @@ def test_the_command_line_takes_them(
 def test_a_result_says_what_its_frames_were_judged_with() -> None:
     scene = random_views(FIGURE, 3, np.random.default_rng(0))
     exact = result_of(recover(view_of(scene), contact_margin=0.01))
-    assert tuple(recovered_with(exact).judged) == (0.03, pytest.approx(1e-3), 0.01, "paper")
+    told = recovered_with(exact).settings
+    assert (told.rigid_tolerance, told.angle_tolerance) == (0.03, pytest.approx(1e-3))
+    assert (told.contact_margin, told.walkers) == (0.01, "paper")
     noisy = view_of(scene.with_noise(2.0, np.random.default_rng(1)))
     noisy = replace(noisy, deviation=2.0, root=scene.joints_cam[:, 0])
     refined = result_of(recover(noisy, contact_margin=-0.01))
     assert refined.settings["refined"]["contact"] == pytest.approx(-0.04)
-    told = recovered_with(refined).judged
+    told = recovered_with(refined).settings
     assert told.contact_margin == pytest.approx(-0.04)
-    assert told.angle == refined.settings["refined"]["angle"]
+    assert told.angle_tolerance == refined.settings["refined"]["angle"]
     older = replace(refined, settings={**refined.settings, "refined": {"angle": 14.0}})
-    assert recovered_with(older).judged.contact_margin == -0.01
+    assert recovered_with(older).settings.contact_margin == -0.01
     uncertain = result_of(recover(noisy, length_deviation=0.05))
     assert (
-        recovered_with(uncertain).judged.rigid
+        recovered_with(uncertain).settings.rigid_tolerance
         == uncertain.settings["refined"]["rigid"]
         == pytest.approx(0.075)
     )
