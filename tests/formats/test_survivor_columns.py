@@ -1,0 +1,117 @@
+"""The one table of a survivor's columns: what is in files follows from it, and a new column is one row of it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from posekit.batch.columns import BATCH_COLUMNS, value_columns
+from posekit.batch.recipe import Recipe
+from posekit.body import load_figure
+from posekit.formats.own import ResultFrame, schema, write_result
+from posekit.formats.own.column import column, columns_in
+from posekit.formats.own.npz import open_npz, write_npz
+from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods, SurvivorColumns
+from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
+from posekit.formats.own.survivor_models import model_of
+from posekit.formats.own.survivor_npz import survivor_arrays, survivors_in
+from posekit.geometry import Array
+from posekit.recovery import recover, result_of
+from posekit.synthesis import random_views
+from posekit.views.builtin import view_of
+
+NQ, COUNT = 5, 3
+EXTENTS = {"q": NQ, "margins": ["collision"]}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WiderColumns(SurvivorColumns):
+    """A table with one row more."""
+
+    schema_title: ClassVar = ("Wider", "One survivor, and how far its wrists are apart.")
+
+    reach: Array = column("From wrist to wrist, in `unit`.", length_power=1, null="number", batch_place=8)
+
+
+def some(table: type[SurvivorColumns] = SurvivorColumns, **more: Any) -> Any:
+    rng = np.random.default_rng(1)
+    return table(
+        joints=rng.normal(size=(COUNT, 14, 3)),
+        q=rng.normal(size=(COUNT, NQ)),
+        branches=["01" * 6 + "0"] * COUNT,
+        margins={"collision": np.array([0.5, np.nan, -1.0])},
+        fk_distance=np.zeros(COUNT),
+        length_residual=np.array([0.0, 0.01, np.nan]),
+        **more,
+    )
+
+
+def test_the_schema_has_the_columns_with_their_meanings() -> None:
+    posture = schema("result")["$defs"]["ResultPosture"]
+    assert list(posture["properties"]) == [found.key for found in SURVIVOR_COLUMNS.values()]
+    for found in SURVIVOR_COLUMNS.values():
+        assert posture["properties"][found.key]["description"] == found.meaning
+    assert set(posture["required"]) == {
+        found.key for found in SURVIVOR_COLUMNS.values() if not found.optional
+    }
+    refined = schema("result")["$defs"]["ResultRefined"]["properties"]
+    assert list(refined) == list(columns_in(Likelihoods))
+
+
+def test_a_results_files_hold_the_columns(tmp_path: Path) -> None:
+    recovery = recover(view_of(random_views(load_figure(), 2, np.random.default_rng(3))), group=0.05)
+    result = result_of(recovery)
+    write_result(tmp_path / "a.json", result)
+    write_result(tmp_path / "a.npz", result)
+    known = [name for name in SURVIVOR_COLUMNS if getattr(result.frames[0], name) is not None]
+    posture = json.loads((tmp_path / "a.json").read_text())["frames"][0]["postures"][0]
+    assert list(posture) == [SURVIVOR_COLUMNS[name].key for name in known]
+    with open_npz(tmp_path / "a.npz") as archive:
+        assert {name.partition("/")[0] for name in archive.names} >= set(known)
+    assert set(SURVIVOR_COLUMNS) < set(ResultFrame.__dataclass_fields__)
+
+
+def test_a_batch_holds_what_the_table_gives_it_in_its_order() -> None:
+    assert [found.batch_place for found in BATCH_COLUMNS] == sorted(
+        {found.batch_place for found in BATCH_COLUMNS}
+    )
+    plain = value_columns(Recipe())
+    assert plain == ("probability", "scale", "length_residual", "chi2")
+    every = value_columns(Recipe(q=True, margins=True))
+    assert every[: len(plain)] == plain
+    assert {"margin.collision", "fk_distance", "q.x"} <= set(every)
+    assert value_columns(Recipe(rank=False)) == plain[1:]
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_a_row_more_is_a_column_more_in_json(unit: Any) -> None:
+    wider = some(WiderColumns, reach=np.array([1.5, np.nan, 0.25]))
+    rows = survivor_rows(wider, unit)
+    assert [row["reach"] for row in rows][1] is None
+    model: Any = model_of(WiderColumns)
+    assert (
+        model.model_json_schema()["properties"]["reach"]["description"] == "From wrist to wrist, in `unit`."
+    )
+    read = [model.model_validate(row) for row in rows]
+    back = WiderColumns(**survivor_columns(WiderColumns, read, unit, extents=EXTENTS, carried=frozenset()))
+    np.testing.assert_allclose(back.reach, wider.reach, rtol=1e-15)
+    np.testing.assert_allclose(back.joints, wider.joints, rtol=1e-15)
+    assert back.branches == wider.branches and back.groups is None
+    with pytest.raises(ValueError, match="reach"):
+        model.model_validate({key: value for key, value in rows[0].items() if key != "reach"})
+
+
+@pytest.mark.parametrize("unit", ["m", "cm", "mm"])
+def test_a_row_more_is_an_array_more_in_npz(tmp_path: Path, unit: Any) -> None:
+    wider = some(WiderColumns, reach=np.array([1.5, np.nan, 0.25]))
+    with (tmp_path / "a.npz").open("wb") as file:
+        write_npz(file, survivor_arrays(WiderColumns, [wider], unit, carried=frozenset()))
+    with open_npz(tmp_path / "a.npz") as archive:
+        found = survivors_in(archive, WiderColumns, np.array([COUNT]), unit, extents=EXTENTS)
+    assert "reach" in found and found["groups"] is None
+    back = WiderColumns(**{name: None if values is None else values[0] for name, values in found.items()})
+    np.testing.assert_allclose(back.reach, wider.reach, rtol=1e-15)
+    np.testing.assert_allclose(back.margins["collision"], wider.margins["collision"], rtol=1e-15)
