@@ -112,6 +112,7 @@ def test_a_row_more_is_an_array_more_in_npz(tmp_path: Path, unit: Any) -> None:
     with open_npz(tmp_path / "a.npz") as archive:
         found = survivors_in(archive, WiderColumns, np.array([COUNT]), unit, extents=EXTENTS)
     assert "reach" in found and found["groups"] is None
-    back = WiderColumns(**{name: None if values is None else values[0] for name, values in found.items()})
+    of_frame: dict[str, Any] = {name: None if rows is None else rows[0] for name, rows in found.items()}
+    back = WiderColumns(**of_frame)
     np.testing.assert_allclose(back.reach, wider.reach, rtol=1e-15)
     np.testing.assert_allclose(back.margins["collision"], wider.margins["collision"], rtol=1e-15)
