@@ -17,7 +17,7 @@ from pathlib import Path
 
 from benchmarks.comparison import engines, gate, growth, process, trees, validation
 from benchmarks.comparison.charts import draw
-from benchmarks.comparison.measure import QUICK, TINY, Section, Sizes, machine
+from benchmarks.comparison.measure import QUICK_SIZES, TINY_SIZES, Section, Sizes, machine
 from posekit.formats.markdown import table_lines
 
 SECTIONS: dict[str, Callable[[Sizes], Section]] = {
@@ -44,9 +44,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--gate", action="store_true", help="compare with the baseline")
     parser.add_argument("--strict", action="store_true", help="exit 1 where a ratio fell")
-    parser.add_argument("--baseline", type=Path, default=gate.BASELINE)
+    parser.add_argument("--baseline", type=Path, default=gate.BASELINE_PATH)
     parser.add_argument(
-        "--tolerance", type=float, default=gate.TOLERANCE, help="share by which a ratio may fall"
+        "--tolerance", type=float, default=gate.RATIO_TOLERANCE, help="share by which a ratio may fall"
     )
     parser.add_argument("--write-baseline", action="store_true", help="make this run the baseline")
     given = parser.parse_args(arguments)
@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
     if not 0 <= given.tolerance <= 1:
         parser.error(f"--tolerance: {given.tolerance!r}; expected a share, 0 to 1")
     baseline = gate.read_baseline(given.baseline) if given.gate else {}
-    sizes = TINY if given.tiny else QUICK if given.quick else Sizes()
+    sizes = TINY_SIZES if given.tiny else QUICK_SIZES if given.quick else Sizes()
     about = machine()
     sections = []
     for name in names:

@@ -48,15 +48,17 @@ from posekit.formats.own import View
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
-PIECE = 5000
-MIB = 2**20
+PIECE_VIEWS = 5000
+BYTES_PER_MIB = 2**20
 
 
 def views(count: int, distinct: int) -> Iterator[View]:
     """Draw views in pieces, the same again after so many."""
-    for start in range(0, count, PIECE):
+    for start in range(0, count, PIECE_VIEWS):
         seed = start % distinct
-        yield view_of(random_views(load_figure(), min(PIECE, count - start), np.random.default_rng(seed)))
+        yield view_of(
+            random_views(load_figure(), min(PIECE_VIEWS, count - start), np.random.default_rng(seed))
+        )
 
 
 class Memory(threading.Thread):
@@ -97,7 +99,7 @@ def children(pid: int) -> list[int]:
         return []
 
 
-WARM = 0.4
+WARM_UP_SHARE = 0.4
 """Part of a run after which its workers are compared: until then each loads compiled loops, which it does once whatever
 comes after."""
 
@@ -119,7 +121,7 @@ class Steady:
     def rates(self) -> tuple[float, float]:
         """Views a second by the clock, and by the processor time of all workers."""
         later, cpu_later, done_later = self.seen[-1]
-        clock, cpu, done = next(one for one in self.seen if one[2] >= WARM * done_later)
+        clock, cpu, done = next(one for one in self.seen if one[2] >= WARM_UP_SHARE * done_later)
         return (done_later - done) / (later - clock), (done_later - done) / (cpu_later - cpu)
 
 
@@ -153,11 +155,16 @@ def scale(given: argparse.Namespace, place: Path) -> None:
     size = sum(path.stat().st_size for path in shard_paths(place / "all"))
     print(f"load averages {os.getloadavg()}, {os.cpu_count()} cores\n")
     print(
-        f"{summary.frames:,} views, {summary.survivors:,} survivors in {summary.shards} shards, {size / MIB:,.0f} MiB: "
-        f"{summary.seconds:.0f} s; {steady.rates[1]:,.0f} views a second of processor time\n"
+        f"{summary.frames:,} views, {summary.survivors:,} survivors in {summary.shards} shards, "
+        f"{size / BYTES_PER_MIB:,.0f} MiB: {summary.seconds:.0f} s; "
+        f"{steady.rates[1]:,.0f} views a second of processor time\n"
     )
     rows = [
-        [f"{10 * k}-{10 * k + 10} %", f"{memory.driver[k] / MIB:.0f}", f"{memory.worker[k] / MIB:.0f}"]
+        [
+            f"{10 * k}-{10 * k + 10} %",
+            f"{memory.driver[k] / BYTES_PER_MIB:.0f}",
+            f"{memory.worker[k] / BYTES_PER_MIB:.0f}",
+        ]
         for k in range(10)
     ]
     print("\n".join(table_lines(["part of the run", "driver, MiB", "a worker, MiB"], rows)), "\n")
@@ -245,7 +252,7 @@ def alone(table: Path, out: Path, recipe: Recipe) -> tuple[float, float]:
     return timed(table, out, recipe, 1)[1].rates
 
 
-LEAST = 20_000
+MIN_VIEWS_COMPARED = 20_000
 """Views below which one worker and two are not compared."""
 
 
@@ -263,8 +270,12 @@ def main() -> None:
     parser.add_argument("--cluster", default="")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    if given.two < LEAST or (given.study == "scale" and given.views is not None and given.views < LEAST):
-        parser.error(f"--views, --two: expected {LEAST:,} or more: fewer are done before they can be timed")
+    if given.two < MIN_VIEWS_COMPARED or (
+        given.study == "scale" and given.views is not None and given.views < MIN_VIEWS_COMPARED
+    ):
+        parser.error(
+            f"--views, --two: expected {MIN_VIEWS_COMPARED:,} or more: fewer are done before they can be timed"
+        )
     given.views = given.views or (200_000 if given.study == "scale" else 20_000)
     place = Path(tempfile.mkdtemp(prefix="batch-"))
     try:

@@ -31,7 +31,7 @@ from posekit.validators import load_ranges
 from posekit.validators.collision import PairCollision
 from posekit.views.builtin import view_of
 
-RADII: Mapping[str, Mapping[str, float]] = {
+RADIUS_FACTORS: Mapping[str, Mapping[str, float]] = {
     "the figure's": {},
     "4 cm at the shank": {"shank": 0.04 / 0.032},
     "3.5 cm at the upper arm": {"upper_arm": 0.035 / 0.025},
@@ -101,7 +101,7 @@ def of_survivors(clips: Sequence[Clip], scenes: Sequence[SyntheticScene]) -> Non
             true = [code == true_code(frame, truth) for code in frame.branches]
             left.append((recovery.figure, frame.joints, np.array(true, dtype=bool)))
     rows = []
-    for name, larger in RADII.items():
+    for name, larger in RADIUS_FACTORS.items():
         counts: list[int] = []
         kept, alone, taken = [], Counter[str](), 0
         for figure, joints, mine in left:

@@ -26,26 +26,26 @@ from posekit.synthesis import CameraSphere, random_views
 from posekit.tree import Check
 from posekit.validators import load_ranges
 
-HUMAN = taylor_human()
-FIGURE = load_figure().from_stature(1.75)
-RANGES = load_ranges("urdf")
+TAYLOR_HUMAN = taylor_human()
+STICK_FIGURE = load_figure().from_stature(1.75)
+URDF_RANGES = load_ranges("urdf")
 
 Flips = tuple[bool, ...]
 
 
 def grow(view: StudyPictures, checks: Sequence[Check]) -> set[Flips]:
     """Grow the tree of one view and say which flips survive."""
-    return flips_of(HUMAN.grow(view.image, view.lengths, view.scale, checks).postures())
+    return flips_of(TAYLOR_HUMAN.grow(view.image, view.lengths, view.scale, checks).postures())
 
 
 def loop(view: StudyPictures, checks: Sequence[Check], completion: Completion) -> set[Flips]:
     """Ask the checks about one flip after the other, of all 2^11."""
-    linkage = HUMAN.linkage
+    linkage = TAYLOR_HUMAN.linkage
     place = linkage.place_nodes(view.image - view.image.mean(axis=1, keepdims=True))[0] / view.scale[0]
     apart = np.array([np.linalg.norm(place[a] - place[b]) for a, b in linkage.segments])
     depth = np.sqrt(np.maximum(view.lengths.reshape(-1) ** 2 - apart**2, 0.0))
-    parents, segments = HUMAN.spanned.tree.parents, HUMAN.spanned.segments
-    nodes = HUMAN.spanned.nodes
+    parents, segments = TAYLOR_HUMAN.spanned.tree.parents, TAYLOR_HUMAN.spanned.segments
+    nodes = TAYLOR_HUMAN.spanned.nodes
     survivors = set()
     for far in product((False, True), repeat=len(depth)):
         points = np.zeros((len(nodes), 3))
@@ -66,7 +66,9 @@ def loop(view: StudyPictures, checks: Sequence[Check], completion: Completion) -
 
 def flips_of(postures: np.ndarray) -> set[Flips]:
     """Say of postures (N, 14, 3) which segments go away from the camera."""
-    start, end = ([HUMAN.spanned.joint(segment[k]) for segment in HUMAN.linkage.segments] for k in (0, 1))
+    start, end = (
+        [TAYLOR_HUMAN.spanned.joint(segment[k]) for segment in TAYLOR_HUMAN.linkage.segments] for k in (0, 1)
+    )
     return {tuple(row) for row in (postures[:, end, 2] > postures[:, start, 2]).tolist()}
 
 
@@ -81,11 +83,15 @@ def main() -> None:
     parser.add_argument("--views", type=int, default=5)
     parser.add_argument("--repeat", type=int, default=5)
     given = parser.parse_args()
-    scene = random_views(FIGURE, given.views, np.random.default_rng(0), CameraSphere(distance=(3.0, 6.0)))
-    views = list(exact_views(HUMAN, [scene])[0].parts(1))
-    checks = taylor_checks(FIGURE, HUMAN.points, ranges=RANGES, tolerance=PHOTOGRAPH_TOLERANCE)
-    plain = joint_checks(FIGURE, ranges=RANGES, tolerance=PHOTOGRAPH_TOLERANCE)
-    completion = Completion(figure=FIGURE, points=HUMAN.points)
+    scene = random_views(
+        STICK_FIGURE, given.views, np.random.default_rng(0), CameraSphere(distance=(3.0, 6.0))
+    )
+    views = list(exact_views(TAYLOR_HUMAN, [scene])[0].parts(1))
+    checks = taylor_checks(
+        STICK_FIGURE, TAYLOR_HUMAN.points, ranges=URDF_RANGES, tolerance=PHOTOGRAPH_TOLERANCE
+    )
+    plain = joint_checks(STICK_FIGURE, ranges=URDF_RANGES, tolerance=PHOTOGRAPH_TOLERANCE)
+    completion = Completion(figure=STICK_FIGURE, points=TAYLOR_HUMAN.points)
     grow(views[0], checks)  # coal's models are built at the first call
 
     print(f"{len(checks)} checks, {N_FLIPS} flips a view")

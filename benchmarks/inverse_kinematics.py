@@ -26,8 +26,8 @@ from posekit.robots.ik import InverseKinematics
 from posekit.robots.joint_map import find_joint_map
 from posekit.robots.kinematics import Kinematics
 
-STEPS = 200
-MET = 1e-3
+MAX_STEPS = 200
+MET_METRES = 1e-3
 
 
 def main() -> None:
@@ -103,20 +103,20 @@ def pink_loop(kinematics: Kinematics, targets: np.ndarray, start: np.ndarray) ->
         wanted.append(task)
     bounds = [limits.ConfigurationLimit(model, config_limit_gain=1.0)]
     worst = np.inf
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         velocity = pink.solve_ik(
             configuration, wanted, 1.0, solver="quadprog", damping=1e-8, limits=bounds, safety_break=False
         )
         configuration.integrate_inplace(velocity, 1.0)
         worst = float(np.linalg.norm(kinematics.positions(configuration.q[None])[0] - targets, axis=1).max())
-        if worst < MET:
+        if worst < MET_METRES:
             break
     return worst
 
 
 def report(name: str, seconds: float, worst: np.ndarray) -> None:
     print(
-        f"{name:34} {seconds * 1e3:8.2f} ms a posture, {(worst < MET).mean():6.1%} met, "
+        f"{name:34} {seconds * 1e3:8.2f} ms a posture, {(worst < MET_METRES).mean():6.1%} met, "
         f"median {np.median(worst):.1e} m"
     )
 

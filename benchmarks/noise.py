@@ -20,7 +20,7 @@ from posekit.recovery import recover
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
-NEAR = 0.035
+NEAR_METRES = 0.035
 """Metres of mean joint error within which a survivor counts as near the truth."""
 
 
@@ -51,7 +51,7 @@ def main() -> None:
                     f"{(counts == 0).mean():.0%}",
                     f"{np.median(counts):.0f}",
                     f"{best:.2g}",
-                    f"{(errors < NEAR).mean():.0%}",
+                    f"{(errors < NEAR_METRES).mean():.0%}",
                 )
             )
     head = (

@@ -19,38 +19,38 @@ from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.framing import fitted_eye
 from posekit.viewer.scene.world import upright_world
 
-SIZE = (640, 480)
-PICTURES, STARTS, FRAMES = 40, 3, 100
+PICTURE_SIZE = (640, 480)
+N_PICTURES, N_STARTS, N_FRAMES = 40, 3, 100
 
 
 def main() -> None:
     view = posekit.builtin_view("seq1")
     subject = subject_of(posekit.result_of(posekit.recover(view)), view)
     world = upright_world(subject.points())
-    chosen = [frame.chosen([k % len(frame)]) for k in range(PICTURES // 5) for frame in subject.frames]
+    chosen = [frame.chosen([k % len(frame)]) for k in range(N_PICTURES // 5) for frame in subject.frames]
     made = [compose(shown, figure=subject.figure, world=world, style=Style()) for shown in chosen]
     eye = fitted_eye(made[0].points, world, azimuth=55, elevation=14)
 
     start = time.perf_counter()
-    for composition in made[:STARTS]:
+    for composition in made[:N_STARTS]:
         with Studio() as studio:
-            studio.draw(composition.scene, eye, size=SIZE)
-    alone = (time.perf_counter() - start) / STARTS
+            studio.draw(composition.scene, eye, size=PICTURE_SIZE)
+    alone = (time.perf_counter() - start) / N_STARTS
 
     with Studio() as studio:
-        studio.draw(made[0].scene, eye, size=SIZE)
+        studio.draw(made[0].scene, eye, size=PICTURE_SIZE)
         start = time.perf_counter()
         for composition in made:
-            studio.draw(composition.scene, eye, size=SIZE)
+            studio.draw(composition.scene, eye, size=PICTURE_SIZE)
         together = (time.perf_counter() - start) / len(made)
-    print(f"{SIZE[0]}x{SIZE[1]} pixels, drawn twice as large, camera and rays included")
+    print(f"{PICTURE_SIZE[0]}x{PICTURE_SIZE[1]} pixels, drawn twice as large, camera and rays included")
     print(f"a browser for each picture: {alone:6.3f} s a picture")
     print(f"one browser for all:        {together:6.3f} s a picture, {1 / together:.1f} a second")
     print(f"ratio:                      {alone / together:6.1f}")
 
-    frames = morph(subject, FRAMES)
+    frames = morph(subject, N_FRAMES)
     with tempfile.TemporaryDirectory() as folder:
-        for size in (SIZE, (1280, 720)):
+        for size in (PICTURE_SIZE, (1280, 720)):
             start = time.perf_counter()
             count = write_picture(
                 Path(folder) / "walk.gif",

@@ -34,14 +34,14 @@ from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINT, JOINTS, PARENTS, SIDES, TREE_SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 
-NOISE = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0)
-ORDER: tuple[RootMethod, ...] = ("search", "torso", "head", "auto")
-HEADER = (
+NOISE_PIXELS = (0.0, 1.0, 2.0, 5.0, 10.0, 15.0)
+METHOD_ORDER: tuple[RootMethod, ...] = ("search", "torso", "head", "auto")
+TABLE_HEADER = (
     f"{'':>8} {'px':>4} {'cm':>4} {'inside':>7} {'kept':>6} {'median':>7} {'95 %':>7} {'necks':>6} {'step':>6} "
     f"{'frames/s':>9}"
 )
-PIXELS = (1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 15.0)
-TOLD = (*((px, 0.0) for px in PIXELS), (2.0, 0.01), (5.0, 0.01), (5.0, 0.02))
+TOLD_PIXELS = (1.0, 2.0, 3.0, 4.0, 5.0, 8.0, 15.0)
+TOLD_NOISE = (*((px, 0.0) for px in TOLD_PIXELS), (2.0, 0.01), (5.0, 0.01), (5.0, 0.02))
 """Deviations (px) and offsets (m) that the methods are told of real postures and detections."""
 
 
@@ -68,8 +68,8 @@ def row(
 
 
 def table(scene: SyntheticScene, rng: np.random.Generator) -> None:
-    for method in ORDER:
-        for noise in NOISE:
+    for method in METHOD_ORDER:
+        for noise in NOISE_PIXELS:
             noisy = scene.with_noise(noise, rng)
             start = time.perf_counter()
             found = place(
@@ -100,10 +100,10 @@ def steps(scene: SyntheticScene) -> None:
 
 def captured(path: Path, rng: np.random.Generator) -> None:
     """Real postures, whose torso is not rigid, seen exactly."""
-    print(f"\nreal postures, seen exactly; what the methods are told, px and cm\n{HEADER}")
+    print(f"\nreal postures, seen exactly; what the methods are told, px and cm\n{TABLE_HEADER}")
     scenes = mocap_scenes(read_capture(path), 480, rng)
     depths = np.concatenate([scene.joints_cam[:, 0, 2] for scene in scenes])
-    for deviation, offset in TOLD:
+    for deviation, offset in TOLD_NOISE:
         found: list[NeckPlacement] = []
         start = time.perf_counter()
         for scene in scenes:
@@ -150,11 +150,12 @@ def trial(folder: Path, figure: Figure) -> None:
     error = np.linalg.norm(camera.project(cam) - image, axis=-1)
     print(
         f"\nreal detections, {len(image)} frames, {np.nanmedian(error):.1f} px from the truth (median), "
-        f"{np.median(cam[:, 0, 2]):.2f} m away; what the methods are told, px and cm\n{HEADER}  tolerance, tangent (m)"
+        f"{np.median(cam[:, 0, 2]):.2f} m away; what the methods are told, px and cm\n"
+        f"{TABLE_HEADER}  tolerance, tangent (m)"
     )
     head = pixels[:, [0, 2, 1, 4, 3]]
-    for method in ORDER:
-        for deviation, offset in TOLD:
+    for method in METHOD_ORDER:
+        for deviation, offset in TOLD_NOISE:
             start = time.perf_counter()
             found = place(camera, person, image, head, method=method, deviation=deviation, offset=offset)
             row(method, (deviation, offset), found, cam[:, 0, 2], time.perf_counter() - start)
@@ -226,7 +227,7 @@ def main() -> None:
     options = parser.parse_args()
     figure, rng = load_figure(), np.random.default_rng(0)
     scene = random_views(figure, options.views, rng)
-    print(HEADER)
+    print(TABLE_HEADER)
     table(scene, rng)
     steps(scene)
     if options.capture:

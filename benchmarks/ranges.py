@@ -37,9 +37,9 @@ from posekit.validators.anatomical_limb import limb_walls
 from posekit.validators.anatomical_plausibility import plausibility
 from posekit.views.builtin import view_of
 
-TABLES = ("table1", "urdf", "anatomical")
-SPREADS = tuple(np.round(np.arange(0.0, 3.01, 0.1), 1).tolist())
-WANTED = 0.995
+RANGE_TABLES = ("table1", "urdf", "anatomical")
+SPREAD_FACTORS = tuple(np.round(np.arange(0.0, 3.01, 0.1), 1).tolist())
+WANTED_SHARE = 0.995
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -106,18 +106,18 @@ def row(tally: Tally) -> list[str]:
 
 
 def acceptance(clips: Sequence[Clip]) -> None:
-    tables = {name: load_ranges(name) for name in TABLES}
+    tables = {name: load_ranges(name) for name in RANGE_TABLES}
     actions = sorted({clip.action for clip in clips})
     groups = {"all": list(clips)} | {a: [clip for clip in clips if clip.action == a] for a in actions}
     rows = [
         [action, str(sum(len(clip.points) for clip in group))]
-        + [f"{accepted(group, tables[name]):.2%}" for name in TABLES]
+        + [f"{accepted(group, tables[name]):.2%}" for name in RANGE_TABLES]
         for action, group in groups.items()
     ]
     print("Accepted, true joints, all frames\n")
-    print("\n".join(table_lines(["action", "frames", *TABLES], rows)))
+    print("\n".join(table_lines(["action", "frames", *RANGE_TABLES], rows)))
     print("What rejects (a frame counts at every place)\n")
-    for name in TABLES:
+    for name in RANGE_TABLES:
         places: Counter[str] = Counter()
         for clip in clips:
             places.update({where: int(bad.sum()) for where, bad in clip.rejected(tables[name])[1].items()})
@@ -127,12 +127,16 @@ def acceptance(clips: Sequence[Clip]) -> None:
 
 def cross_validation(clips: Sequence[Clip]) -> None:
     halves = {"odd clips": clips[0::2], "even clips": clips[1::2]}
-    curve = {name: np.array([accepted(half, widened(k)) for k in SPREADS]) for name, half in halves.items()}
+    curve = {
+        name: np.array([accepted(half, widened(k)) for k in SPREAD_FACTORS]) for name, half in halves.items()
+    }
     rows = []
     for fitted, other in (("odd clips", "even clips"), ("even clips", "odd clips")):
-        enough = np.flatnonzero(curve[fitted] >= WANTED)
-        k = int(enough[0]) if len(enough) else len(SPREADS) - 1
-        rows.append([fitted, f"{SPREADS[k]:g}", f"{curve[fitted][k]:.2%}", other, f"{curve[other][k]:.2%}"])
+        enough = np.flatnonzero(curve[fitted] >= WANTED_SHARE)
+        k = int(enough[0]) if len(enough) else len(SPREAD_FACTORS) - 1
+        rows.append(
+            [fitted, f"{SPREAD_FACTORS[k]:g}", f"{curve[fitted][k]:.2%}", other, f"{curve[other][k]:.2%}"]
+        )
     print("Spreads chosen on half of the clips\n")
     print("\n".join(table_lines(["fitted on", "spreads", "accepted there", "reported on", "accepted"], rows)))
 
@@ -217,7 +221,7 @@ def curve(clips: Sequence[Clip], scenes: Sequence[SyntheticScene]) -> None:
 
 
 def views(scenes: Sequence[SyntheticScene]) -> None:
-    tallies = {name: evaluate(scenes, load_ranges(name)) for name in TABLES}
+    tallies = {name: evaluate(scenes, load_ranges(name)) for name in RANGE_TABLES}
     print(f"Survivors of {sum(map(len, scenes))} views, measured tolerance, all physical checks\n")
     head = ["ranges", "truth among survivors", "survivors, mean", "median", "95 %"]
     print("\n".join(table_lines(head, [[name, *row(tally)] for name, tally in tallies.items()])))
@@ -228,12 +232,13 @@ def views(scenes: Sequence[SyntheticScene]) -> None:
     print(f"table1 kills the truth in {np.mean(~kept):.1%} of them\n")
     print("Truth among survivors by action\n")
     rows = [
-        [action, str(len(found))] + [f"{np.mean(tallies[name].retained[action]):.1%}" for name in TABLES]
+        [action, str(len(found))]
+        + [f"{np.mean(tallies[name].retained[action]):.1%}" for name in RANGE_TABLES]
         for action, found in sorted(tallies["table1"].retained.items())
     ]
-    print("\n".join(table_lines(["action", "views", *TABLES], rows)))
+    print("\n".join(table_lines(["action", "views", *RANGE_TABLES], rows)))
     print("What kills the truth\n")
-    for name in TABLES:
+    for name in RANGE_TABLES:
         killers = tallies[name].killers.most_common()
         print(f"- {name}: " + ", ".join(f"{reason} {count}" for reason, count in killers))
     print()
@@ -268,7 +273,7 @@ def speed(clips: Sequence[Clip]) -> None:
     figure = load_figure()
     best: dict[str, float] = {}
     for _ in range(5):
-        for name in TABLES:
+        for name in RANGE_TABLES:
             checks = joint_range(figure, load_ranges(name), tolerance=MEASURED_TOLERANCE.angle)
             start = time.process_time()
             for check in checks:
@@ -280,7 +285,7 @@ def speed(clips: Sequence[Clip]) -> None:
     plausibility(angles, anatomy)
     seconds = time.process_time() - start
     print(f"Time of the checks on {len(points)} postures, urdf = 1: ", end="")
-    print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in TABLES), end="; ")
+    print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in RANGE_TABLES), end="; ")
     print(f"plausibility {seconds / best['urdf']:.2f}")
 
 
@@ -291,13 +296,13 @@ def tree_speed(scenes: Sequence[SyntheticScene]) -> None:
         best: dict[str, float] = {}
         with path(way):
             for _ in range(4):
-                for name in TABLES:
+                for name in RANGE_TABLES:
                     start = time.process_time()
                     for view in views:
                         recover(view, checks=CHECKS, ranges=name, tolerance=MEASURED_TOLERANCE)
                     best[name] = min(best.get(name, np.inf), time.process_time() - start)
         print(f"Time of recovery, {way} path, urdf = 1: ", end="")
-        print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in TABLES))
+        print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in RANGE_TABLES))
 
 
 def main() -> None:

@@ -43,7 +43,7 @@ from posekit.synthesis import Capture, read_capture
 from posekit.views.given_views import given_views
 from posekit.views.source import Source
 
-TEMPERATURES = (0.002, 0.004, 0.008, 0.016, 0.032)
+TEMPERATURES_METRES = (0.002, 0.004, 0.008, 0.016, 0.032)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +118,7 @@ def cross_validate(
     return probability, {name: float(np.mean(values)) for name, values in weights.items()}
 
 
-HEAD = [
+TABLE_HEAD = [
     "N, mean",
     "log-loss",
     "first is nearest",
@@ -200,7 +200,7 @@ def report(every: Sequence[Views], capture: Capture) -> None:
         probability, weights = cross_validate(fitted, every, Priors(capture, groups), How())
         scores = [Scores(views, p) for views, p in zip(every, probability, strict=True)]
         rows = [[views.name, *one.row()] for views, one in zip(every, scores, strict=True)]
-        show(["views", *HEAD], rows, f"Held out by {label}, up known")
+        show(["views", *TABLE_HEAD], rows, f"Held out by {label}, up known")
         print("weights: " + ", ".join(f"{name} {value:.2f}" for name, value in weights.items()) + "\n")
         if label == "action":
             for views, one in zip(fitted, scores, strict=False):
@@ -239,14 +239,16 @@ def ablation(every: Sequence[Views], capture: Capture) -> None:
             tables[k].append([label, *Scores(views, p).row()])
     for views, rows in zip(fitted, tables, strict=True):
         show(
-            ["terms", *HEAD], rows, f"Terms, weights fitted anew each time, {views.name}, held out by action"
+            ["terms", *TABLE_HEAD],
+            rows,
+            f"Terms, weights fitted anew each time, {views.name}, held out by action",
         )
 
 
 def temperatures(every: Sequence[Views], capture: Capture) -> None:
     fitted = [views for views in every if views.name.startswith("anatomical")]
     rows = []
-    for temperature in TEMPERATURES:
+    for temperature in TEMPERATURES_METRES:
         priors = Priors(capture, list(capture.actions), temperature)
         probability, weights = cross_validate(fitted, fitted, priors, How())
         for views, p in zip(fitted, probability, strict=True):

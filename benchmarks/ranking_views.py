@@ -25,8 +25,8 @@ from posekit.validators import load_ranges
 from posekit.validators.anatomical_plausibility import plausibility
 from posekit.views.builtin import view_of
 
-CHECKS = ("rigid-parts", "joint-range", "collision")
-SOURCE = (
+CHECK_NAMES = ("rigid-parts", "joint-range", "collision")
+PRIOR_SOURCE = (
     "CMU Graphics Lab Motion Capture Database, mocap.cs.cmu.edu, created with funding from NSF EIA-0196217, free to "
     "use: 16 clips of one skeleton (basketball, signals, directing traffic, jumping, running, soccer, walking), each "
     "clip counting the same, left and right exchanged; fitted by benchmarks/ranking.py"
@@ -103,7 +103,7 @@ def views_of(
             tolerance = BEFORE_REFINEMENT
         start = time.perf_counter()
         rooting = Rooting(deviation=noise) if placed else None
-        recovery = recover(view, checks=CHECKS, ranges=ranges, tolerance=tolerance, rooting=rooting)
+        recovery = recover(view, checks=CHECK_NAMES, ranges=ranges, tolerance=tolerance, rooting=rooting)
         seconds += time.perf_counter() - start
         placements = [frame.placement for frame in recovery.frames]
         pixel = scene.joints_cam[:, 0, 2] / float(scene.camera.K[0, 0])
@@ -185,6 +185,10 @@ class Priors:
         if key not in self.made:
             rows = ~np.isin(self.groups[self.clip], groups)
             self.made[key] = fit_prior(
-                self.points[rows], self.up, self.share[rows], temperature=self.temperature, source=SOURCE
+                self.points[rows],
+                self.up,
+                self.share[rows],
+                temperature=self.temperature,
+                source=PRIOR_SOURCE,
             )
         return self.made[key]

@@ -26,7 +26,7 @@ from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
 from posekit.tree.bits import path_of
 from posekit.views.builtin import view_of
 
-CHECKS = ("rigid-parts", "joint-range", "collision")
+CHECK_NAMES = ("rigid-parts", "joint-range", "collision")
 
 
 class Tally:
@@ -111,7 +111,7 @@ def main() -> None:
     for ranges in ("table1", "urdf"):
         for centimetres in (0.5, 1, 2, 3, 4, 5):
             tolerance = replace(MEASURED_TOLERANCE, rigid=centimetres / 100)
-            rows.append([ranges, f"{centimetres:g}", *evaluate(scenes, ranges, tolerance, CHECKS).row()])
+            rows.append([ranges, f"{centimetres:g}", *evaluate(scenes, ranges, tolerance, CHECK_NAMES).row()])
     print("\n".join(table_lines(["ranges", "rigid tolerance, cm", *head], rows)))
 
     print("Angle tolerance against truth and survivors\n")
@@ -119,20 +119,22 @@ def main() -> None:
     for ranges in ("table1", "urdf"):
         for degrees in (1e-3, 1, 2, 3, 5):
             tolerance = replace(MEASURED_TOLERANCE, angle=degrees)
-            rows.append([ranges, f"{degrees:g}", *evaluate(scenes, ranges, tolerance, CHECKS).row()])
+            rows.append([ranges, f"{degrees:g}", *evaluate(scenes, ranges, tolerance, CHECK_NAMES).row()])
     print("\n".join(table_lines(["ranges", "angle tolerance, deg", *head], rows)))
 
     print("By check, at the default tolerance\n")
     rows = []
     for ranges in ("table1", "urdf"):
-        for checks in (("rigid-parts",), ("rigid-parts", "joint-range"), CHECKS):
+        for checks in (("rigid-parts",), ("rigid-parts", "joint-range"), CHECK_NAMES):
             rows.append(
                 [ranges, " + ".join(checks), *evaluate(scenes, ranges, MEASURED_TOLERANCE, checks).row()]
             )
     print("\n".join(table_lines(["ranges", "checks", *head], rows)))
 
     print("By action, all checks, at the default tolerance\n")
-    tallies = {ranges: evaluate(scenes, ranges, MEASURED_TOLERANCE, CHECKS) for ranges in ("table1", "urdf")}
+    tallies = {
+        ranges: evaluate(scenes, ranges, MEASURED_TOLERANCE, CHECK_NAMES) for ranges in ("table1", "urdf")
+    }
     rows = [
         [action, str(len(found)), f"{np.mean(found):.1%}", f"{np.mean(tallies['urdf'].retained[action]):.1%}"]
         for action, found in sorted(tallies["table1"].retained.items())

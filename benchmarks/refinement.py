@@ -48,17 +48,17 @@ from posekit.validation.validate import recovered_with
 from posekit.validators import PHYSICAL_CHECKS, Validator, load_ranges, make_checks
 from posekit.views.builtin import view_of
 
-NEAR = 0.035
+NEAR_METRES = 0.035
 """Metres of mean joint error within which a survivor counts as near the truth."""
 
-PIXELS = (0.5, 1.0, 2.0, 5.0)
+NOISE_PIXELS = (0.5, 1.0, 2.0, 5.0)
 ROOT_DEPTH = 0.1
-HOPELESS = 60.0
+HOPELESS_CHI2 = 60.0
 MOST_LEAVES = 350_000
-OF = {"urdf": 1, "table1": 60, "anatomical": 10}
+VIEWS_PER_POSTURE_INSIDE = {"urdf": 1, "table1": 60, "anatomical": 10}
 """Ranges, and of how many random views about one or more are inside them."""
 
-CONTACT = -0.03
+CONTACT_METRES = -0.03
 """Metres: what bodies may overlap under noise."""
 
 Leaves = tuple[NDArray[np.intp], np.ndarray]
@@ -111,7 +111,7 @@ def derived(sight: ObservedFrames, pixels: float) -> Leaves:
     tolerance = Tolerance(
         rigid=allowed.rigid, tangent=allowed.tangent, placement=False, angle=min(allowed.angle, 180.0)
     )
-    return grow(sight, tolerance, CONTACT)
+    return grow(sight, tolerance, CONTACT_METRES)
 
 
 def on_trunks(sight: ObservedFrames, pixels: float, trunks: Trunks | None = None) -> Leaves:
@@ -131,7 +131,7 @@ def on_trunks(sight: ObservedFrames, pixels: float, trunks: Trunks | None = None
         sight.camera,
         trunks.root,
         trunks.image,
-        under_noise(checks_of(sight.figure, tolerance, CONTACT), allowed.bound),
+        under_noise(checks_of(sight.figure, tolerance, CONTACT_METRES), allowed.bound),
         tolerance=tolerance.tangent,
     )
     postures = leaves.postures()
@@ -170,7 +170,7 @@ class Outcome:
         ]
 
 
-HEAD = (
+TABLE_HEAD = (
     "frames without a posture",
     "leaves, median",
     "within 3.5 cm",
@@ -193,18 +193,18 @@ def best(frame: NDArray[np.intp], joints: np.ndarray, truth: np.ndarray) -> np.n
 def outcome(sight: ObservedFrames, leaves: Leaves, truth: np.ndarray) -> Outcome:
     frame, postures = leaves
     n = len(truth)
-    refined = refine(sight, postures, frame=frame, hopeless=HOPELESS)
+    refined = refine(sight, postures, frame=frame, hopeless=HOPELESS_CHI2)
     explained = refined.explained()
     merged = merge(refined, keep=explained).refined
     kept = best(merged.frame, merged.joints, truth)
     return Outcome(
         leaves=float(np.median(np.bincount(frame, minlength=n))),
-        leaves_near=float((best(frame, postures, truth) < NEAR).mean()),
+        leaves_near=float((best(frame, postures, truth) < NEAR_METRES).mean()),
         empty=float((np.bincount(merged.frame, minlength=n) == 0).mean()),
-        refined_near=float((best(frame, refined.joints, truth) < NEAR).mean()),
+        refined_near=float((best(frame, refined.joints, truth) < NEAR_METRES).mean()),
         explained=float(np.median(np.bincount(frame[explained], minlength=n))),
         merged=float(np.median(np.bincount(merged.frame, minlength=n))),
-        kept_near=float((kept < NEAR).mean()),
+        kept_near=float((kept < NEAR_METRES).mean()),
         median_error=float(np.median(kept[np.isfinite(kept)])) if np.isfinite(kept).any() else np.inf,
     )
 
@@ -222,25 +222,25 @@ def by_refiner(scene: SyntheticScene, image: np.ndarray, pixels: float, lengths:
     refiner = Refiner(grower=grower, noise=Noise(deviation=pixels, lengths=lengths))
     lifted = refiner.lift(np.arange(len(view)))
     frame, postures, truth = lifted.frame[lifted.hypothesis], lifted.postures(), scene.joints_cam
-    refined = refine(lifted.seen.sight, postures, frame=lifted.hypothesis, hopeless=HOPELESS)
+    refined = refine(lifted.seen.sight, postures, frame=lifted.hypothesis, hopeless=HOPELESS_CHI2)
     sifted = refiner.refine(lifted)
     kept = frame[sifted.kept], sifted.survivors.joints
     n, near = len(view), best(*kept, truth)
     return Outcome(
         leaves=float(np.median(np.bincount(frame, minlength=n))),
-        leaves_near=float((best(frame, postures, truth) < NEAR).mean()),
+        leaves_near=float((best(frame, postures, truth) < NEAR_METRES).mean()),
         empty=float((np.bincount(kept[0], minlength=n) == 0).mean()),
-        refined_near=float((best(frame, refined.joints, truth) < NEAR).mean()),
+        refined_near=float((best(frame, refined.joints, truth) < NEAR_METRES).mean()),
         explained=float(np.median(np.bincount(frame[sifted.explained], minlength=n))),
         merged=float(np.median(np.bincount(kept[0], minlength=n))),
-        kept_near=float((near < NEAR).mean()),
+        kept_near=float((near < NEAR_METRES).mean()),
         median_error=float(np.median(near[np.isfinite(near)])),
     )
 
 
 def legal(ranges: str, views: int) -> SyntheticScene:
     """Return random views whose true postures are inside some ranges, heads too."""
-    scene = random_views(load_figure(), views * OF[ranges], np.random.default_rng(0))
+    scene = random_views(load_figure(), views * VIEWS_PER_POSTURE_INSIDE[ranges], np.random.default_rng(0))
     validator = Validator(ranges=ranges, checks=("joint-range",))
     verdicts = np.array(validator.check(scene.joints_cam, scene.head_cam).verdicts)
     return scene.select(np.flatnonzero(verdicts == "valid")[:views])
@@ -249,9 +249,9 @@ def legal(ranges: str, views: int) -> SyntheticScene:
 def certificates(views: int) -> None:
     print("\nCertificates: what `validate` says of `recover`'s survivors, exact necks and lengths\n")
     rows = []
-    for ranges in OF:
+    for ranges in VIEWS_PER_POSTURE_INSIDE:
         scene = legal(ranges, views)
-        for pixels in PIXELS:
+        for pixels in NOISE_PIXELS:
             view = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
             view = replace(view, deviation=pixels, root=scene.joints_cam[:, 0])
             start = time.process_time()
@@ -267,7 +267,7 @@ def certificates(views: int) -> None:
                     ranges,
                     f"{pixels:g}",
                     f"{len(scene)}",
-                    f"{(near < NEAR).mean():.1%}",
+                    f"{(near < NEAR_METRES).mean():.1%}",
                     f"{(np.array(counts) == 0).mean():.1%}",
                     f"{len(joints)}",
                     f"{validator.check(joints).verdicts.count('invalid')}",
@@ -298,7 +298,7 @@ def retention(views: int) -> None:
     print("\nWhat is kept: random legal postures, exact lengths\n")
     scene = random_views(load_figure(), views, np.random.default_rng(0))
     rows = []
-    for pixels in PIXELS:
+    for pixels in NOISE_PIXELS:
         image = scene.with_noise(pixels, np.random.default_rng(1)).image
         for name, depth in (("exact", 0.0), ("10 cm", ROOT_DEPTH)):
             root = root_prior(scene, depth, np.random.default_rng(2))
@@ -312,23 +312,23 @@ def retention(views: int) -> None:
                     continue
                 leaves = way(sight, pixels)
                 if len(leaves[0]) > MOST_LEAVES:
-                    near = (best(*leaves, scene.joints_cam) < NEAR).mean()
+                    near = (best(*leaves, scene.joints_cam) < NEAR_METRES).mean()
                     count = np.median(np.bincount(leaves[0], minlength=views))
                     rows.append([f"{pixels:g}", name, label, "-", f"{count:.0f}", f"{near:.1%}", *["-"] * 5])
                     continue
                 rows.append([f"{pixels:g}", name, label, *outcome(sight, leaves, scene.joints_cam).row()])
             truth = refine(sight, scene.joints_cam)
             error = np.linalg.norm(truth.joints - scene.joints_cam, axis=-1).mean(axis=1)
-            cells = ["-", "1", "100.0%", f"{(error < NEAR).mean():.1%}", "1", "1", "-"]
+            cells = ["-", "1", "100.0%", f"{(error < NEAR_METRES).mean():.1%}", "1", "1", "-"]
             rows.append([f"{pixels:g}", name, "from the truth", *cells, f"{np.median(error) * 1000:.0f}"])
-    print("\n".join(table_lines(["noise, px", "neck", "tree", *HEAD], rows)))
+    print("\n".join(table_lines(["noise, px", "neck", "tree", *TABLE_HEAD], rows)))
 
 
 def calibration(truths: int) -> None:
     print("\nHow sure: true postures refined from themselves\n")
     scene = random_views(load_figure(), truths, np.random.default_rng(3))
     rows = []
-    for pixels in PIXELS:
+    for pixels in NOISE_PIXELS:
         seen = scene.with_noise(pixels, np.random.default_rng(4))
         root = root_prior(scene, 0.0, np.random.default_rng(5))
         sight = ObservedFrames(
@@ -379,7 +379,7 @@ def cost(views: int) -> None:
     print("\nWhat it costs: CPU time, ratios to growing the tree on noisy points with fixed tolerances\n")
     scene = random_views(load_figure(), views, np.random.default_rng(6))
     rows = []
-    for pixels in PIXELS:
+    for pixels in NOISE_PIXELS:
         image = scene.with_noise(pixels, np.random.default_rng(7)).image
         root = root_prior(scene, 0.0, np.random.default_rng(8))
         sight = ObservedFrames(
@@ -389,13 +389,13 @@ def cost(views: int) -> None:
         wide = timed(lambda sight=sight, pixels=pixels: derived(sight, pixels))  # type: ignore[misc]
         trunks = find_trunks(sight)
         frame, postures = on_trunks(sight, pixels, trunks)
-        refined = refine(sight, postures, frame=frame, hopeless=HOPELESS)
+        refined = refine(sight, postures, frame=frame, hopeless=HOPELESS_CHI2)
         explained = refined.explained()
         kept = merge(refined, keep=explained).refined
         parts = (
             timed(lambda sight=sight: find_trunks(sight)),  # type: ignore[misc]
             timed(lambda sight=sight, pixels=pixels, trunks=trunks: on_trunks(sight, pixels, trunks)),  # type: ignore[misc]
-            timed(lambda s=sight, p=postures, f=frame: refine(s, p, frame=f, hopeless=HOPELESS)),  # type: ignore[misc]
+            timed(lambda s=sight, p=postures, f=frame: refine(s, p, frame=f, hopeless=HOPELESS_CHI2)),  # type: ignore[misc]
             timed(lambda r=refined, k=explained: merge(r, keep=k)),  # type: ignore[misc]
             timed(lambda r=kept: replace(r).covariance),  # type: ignore[misc]
         )
@@ -431,7 +431,7 @@ def real(capture: Path, frames: int) -> None:
     print("\nReal motion: lengths are each clip's medians, with deviations\n")
     scenes = mocap_scenes(read_capture(capture), frames, np.random.default_rng(0))
     rows = []
-    for pixels in PIXELS:
+    for pixels in NOISE_PIXELS:
         for label in ("fixed", "on trunks"):
             total = []
             for k, scene in enumerate(scenes):
@@ -451,7 +451,7 @@ def real(capture: Path, frames: int) -> None:
             weight = np.array([count for count, _ in total]) / sum(count for count, _ in total)
             fields = [[*vars(result).values()] for _, result in total]
             rows.append([f"{pixels:g}", label, *Outcome(*(weight @ np.array(fields)).tolist()).row()])
-    print("\n".join(table_lines(["noise, px", "tree", *HEAD], rows)))
+    print("\n".join(table_lines(["noise, px", "tree", *TABLE_HEAD], rows)))
 
 
 def main() -> None:

@@ -31,27 +31,27 @@ from posekit.synthesis.viewpoints import look_at
 from posekit.tree import InterpretationTree
 from posekit.validators import PHYSICAL_CHECKS, load_ranges, make_checks
 
-HEIGHT = 1.4
-RATE = 30.0
-FRAMES = 60
-DISTANCES = (4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
-OTHERS = ("basketball_1", "basketball_signal_1", "jumping_1", "jumping_2", "soccer_1", "soccer_2")
-START = {"basketball_signal_1": 200}
+CAMERA_HEIGHT_METRES = 1.4
+FRAMES_PER_SECOND = 30.0
+N_FRAMES = 60
+CAMERA_DISTANCES_METRES = (4.0, 5.0, 6.0, 7.0, 8.0, 10.0)
+OTHER_CLIPS = ("basketball_1", "basketball_signal_1", "jumping_1", "jumping_2", "soccer_1", "soccer_2")
+FIRST_FRAMES = {"basketball_signal_1": 200}
 """Frame that a clip is taken from; else the second, since the first is the rest posture."""
 
 TRUNK_LENGTHS, LIMB_LENGTHS = 0.04, 0.01
 """Relative deviations of lengths of real bodies."""
 
-CONTACT = -0.03
-HOPELESS = 60.0
-PLACED = 0.06
+CONTACT_METRES = -0.03
+HOPELESS_CHI2 = 60.0
+PLACED_DEVIATION_METRES = 0.06
 """Metres that survivors are off where the neck was placed: so far apart are the places."""
 
 
-def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> SyntheticScene:
+def walker_scene(yaw: float, frames: int = N_FRAMES, distance: float = 5.0) -> SyntheticScene:
     """Let the walker pass a standing camera."""
     walker, sphere = Walker(), CameraSphere()
-    at = np.arange(frames) / RATE
+    at = np.arange(frames) / FRAMES_PER_SECOND
     q = walker.configurations(walker.phase(at, 0.1))
     q[:, :3] += walker.travel(at, 0.1)
     points = walker.figure.forward_kinematics(q)
@@ -72,8 +72,8 @@ def walker_scene(yaw: float, frames: int = FRAMES, distance: float = 5.0) -> Syn
 def clip_scene(capture: Capture, clip: str, yaw: float) -> SyntheticScene:
     """See a clip from a side: 0 is from ahead, 90 from its right."""
     index = capture.clip_index(clip)
-    first = START.get(clip.rsplit("/", maxsplit=1)[-1], 1)
-    rows = capture.frames_of(index)[first : first + FRAMES]
+    first = FIRST_FRAMES.get(clip.rsplit("/", maxsplit=1)[-1], 1)
+    rows = capture.frames_of(index)[first : first + N_FRAMES]
     part = replace(
         capture,
         points=capture.points[rows].copy(),
@@ -89,10 +89,10 @@ def clip_scene(capture: Capture, clip: str, yaw: float) -> SyntheticScene:
     right /= np.linalg.norm(right)
     ahead = np.cross(part.up, right)
     error: PosekitError | None = None
-    for distance in DISTANCES:
+    for distance in CAMERA_DISTANCES_METRES:
         side = math.cos(math.radians(yaw)) * ahead + math.sin(math.radians(yaw)) * right
         position = middle + distance * side
-        position += (HEIGHT - position @ part.up) * part.up
+        position += (CAMERA_HEIGHT_METRES - position @ part.up) * part.up
         try:
             return mocap_scene(part, clip, np.random.default_rng(0), position=position)
         except PosekitError as found:
@@ -110,7 +110,7 @@ def scenes(capture: Capture | None, yaws: int) -> Iterator[tuple[str, str, int, 
         if action in ("walking", "running"):
             for yaw in range(0, 360, 360 // yaws):
                 yield action, clip, yaw, clip_scene(capture, clip, yaw)
-        elif clip.split("/")[-1] in OTHERS:
+        elif clip.split("/")[-1] in OTHER_CLIPS:
             for yaw in (20, 200):
                 yield "other", clip, yaw, clip_scene(capture, clip, yaw)
 
@@ -162,7 +162,7 @@ def exact(scene: SyntheticScene, *, rooted: bool = True) -> Recovered:
         SurvivorFrame(
             time=frame.time,
             joints=frame.joints,
-            deviation=np.full(frame.joints.shape[:2], 0.0 if rooted else PLACED),
+            deviation=np.full(frame.joints.shape[:2], 0.0 if rooted else PLACED_DEVIATION_METRES),
             branches=frame.branches,
         )
         for frame in found
@@ -202,7 +202,7 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
         rigid_tolerance=rigid,
         rigid_mode="distances",
         angle_tolerance=1.0,
-        contact_margin=CONTACT,
+        contact_margin=CONTACT_METRES,
     )
     tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=trunks.tree_lengths(figure))
     leaves = tree.grow(
@@ -210,7 +210,7 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     )
     postures = leaves.postures()
     own = trunks.carries(leaves.frame, postures)
-    refined = refine(sight, postures[own], frame=trunks.frame[leaves.frame[own]], hopeless=HOPELESS)
+    refined = refine(sight, postures[own], frame=trunks.frame[leaves.frame[own]], hopeless=HOPELESS_CHI2)
     kept = merge(refined, keep=refined.explained()).refined
     spread = kept.deviation
 

@@ -56,12 +56,12 @@ from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Capture, SyntheticScene, read_capture
 
 TOLD_APART = math.radians(15.0)
-LIMBS = ((5, 7), (6, 8), (9, 11), (10, 12))
+LIMB_SEGMENTS = ((5, 7), (6, 8), (9, 11), (10, 12))
 """Segments of the two arms and the two legs, in tree order."""
 
-RATE = 30.0
-LAG = 10
-COSTS = ("not ranked", "by action", "by clip")
+FRAMES_PER_SECOND = 30.0
+LAG_FRAMES = 10
+PRIOR_KINDS = ("not ranked", "by action", "by clip")
 """What the prior was not fitted to, where survivors are ranked."""
 
 
@@ -83,7 +83,7 @@ def limbs_right(joints: np.ndarray, truth: np.ndarray, least: float) -> np.ndarr
     """Tell which limb-frames (T, 4) have the true sides; segments that stand out by less than `least` pass."""
     true = elevations(truth)
     right = ((elevations(joints) > 0) == (true > 0)) | (np.abs(true) < least)
-    return np.stack([right[:, a] & right[:, b] for a, b in LIMBS], axis=1)
+    return np.stack([right[:, a] & right[:, b] for a, b in LIMB_SEGMENTS], axis=1)
 
 
 def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict[str, float]:
@@ -93,7 +93,7 @@ def outcome(frames: list[SurvivorFrame], truth: np.ndarray, near: float) -> dict
     seconds = time.process_time() - start
     joints = path.joints[0]
     start = time.process_time()
-    live = np.stack([found.joints for found in follow(frames, LAG)])
+    live = np.stack([found.joints for found in follow(frames, LAG_FRAMES)])
     live_seconds = time.process_time() - start
     full = [k for k, frame in enumerate(frames) if len(frame)]
     errors = {k: error(frames[k].joints, truth[k]) for k in full}
@@ -139,14 +139,14 @@ def follow(frames: list[SurvivorFrame], lag: int, beam: Beam | None = None) -> I
     yield from follower.finish()
 
 
-HEAD = (
+TABLE_HEAD = (
     ("survivors", "survivors, median", "{:.0f}"),
     ("truth kept", "frames with the truth", "{:.1%}"),
     ("random", "random, mm", "{:.0f}"),
     ("first", "first of each frame, mm", "{:.0f}"),
     ("path", "path, mm", "{:.1f}"),
     ("smoothed", "smoothed, mm", "{:.1f}"),
-    ("live", f"live, lag {LAG}, mm", "{:.1f}"),
+    ("live", f"live, lag {LAG_FRAMES}, mm", "{:.1f}"),
     ("best", "best of each frame, mm", "{:.1f}"),
     ("limbs", "limb-frames right", "{:.1%}"),
     ("told apart", "told apart: path", "{:.1%}"),
@@ -169,22 +169,22 @@ def accuracy(capture: Capture | None, yaws: int, seed: int) -> None:
                 recovered = noisy(seen, pixels, real=bool(clip))
             else:
                 recovered = exact(scene)
-            for costs in COSTS if clip else (COSTS[0], COSTS[2]):
+            for costs in PRIOR_KINDS if clip else (PRIOR_KINDS[0], PRIOR_KINDS[2]):
                 result = outcome(costed(recovered, priors, clip, costs), scene.joints_cam, near)
                 found[action, costs].append(result)
-                if costs == COSTS[2]:
+                if costs == PRIOR_KINDS[2]:
                     by_side[action, yaw].append((result["path"], result["told apart"]))
         for (action, costs), results in found.items():
-            cells = [form.format(np.mean([one[key] for one in results])) for key, _, form in HEAD]
+            cells = [form.format(np.mean([one[key] for one in results])) for key, _, form in TABLE_HEAD]
             table.append([f"{pixels:g}", action, costs, str(len(results)), *cells])
             paths = np.array([one["path"] for one in results])
-            if costs == COSTS[2]:
+            if costs == PRIOR_KINDS[2]:
                 far.append([f"{pixels:g}", action, f"{np.mean(paths > 40):.0%}", f"{paths.max():.0f}"])
         for (action, yaw), values in by_side.items():
             if action in ("walking", "running"):
                 path, told = np.mean(values, axis=0)
                 sides.append([f"{pixels:g}", action, str(yaw), f"{path:.1f}", f"{told:.1%}"])
-    head = ["noise, px", "motion", "ranked", "sequences", *(label for _, label, _ in HEAD)]
+    head = ["noise, px", "motion", "ranked", "sequences", *(label for _, label, _ in TABLE_HEAD)]
     show("Accuracy", head, table)
     if sides:
         show(
@@ -206,7 +206,7 @@ def sure(capture: Capture | None, seed: int) -> None:
     for number, (_, clip, _, scene) in enumerate(scenes(capture, 4)):
         found = noisy(scene.with_noise(2.0, np.random.default_rng(seed + number)), 2.0, real=bool(clip))
         for apart in (0.25, 0.5):
-            paths = best_paths(costed(found, priors, clip, COSTS[2]), k=2, apart=apart)
+            paths = best_paths(costed(found, priors, clip, PRIOR_KINDS[2]), k=2, apart=apart)
             if len(paths) < 2:
                 continue
             differ = np.linalg.norm(paths.joints[0] - paths.joints[1], axis=-1).max(axis=1) > apart
@@ -236,7 +236,7 @@ def crowd(count: int, frames: int, seed: int) -> list[SurvivorFrame]:
             for child in range(1, len(JOINTS)):
                 if rng.random() < 0.3:
                     postures[one, child, 2] += 2 * (joints[PARENTS[child], 2] - joints[child, 2])
-        found.append(SurvivorFrame(time=k / RATE, joints=postures))
+        found.append(SurvivorFrame(time=k / FRAMES_PER_SECOND, joints=postures))
     return found
 
 
@@ -258,7 +258,7 @@ def speed(capture: Capture | None) -> None:
         for one in ("plain", "fast"):
             with loops(one):
                 repeats = 3 if count < 500 else 1
-                live = timed(lambda frames=frames: list(follow(frames, LAG)), repeats)  # type: ignore[misc]
+                live = timed(lambda frames=frames: list(follow(frames, LAG_FRAMES)), repeats)  # type: ignore[misc]
                 offline = timed(lambda frames=frames: best_paths(frames), repeats)  # type: ignore[misc]
             cells += [f"{len(frames) / live:.0f}", f"{len(frames) / offline:.0f}"]
         rows.append(cells)
@@ -266,9 +266,9 @@ def speed(capture: Capture | None) -> None:
         "Speed: frames/s of CPU time on one core, crowds of mirrored limbs",
         [
             "survivors a frame",
-            f"live, lag {LAG}, without Numba",
+            f"live, lag {LAG_FRAMES}, without Numba",
             "offline",
-            f"live, lag {LAG}, compiled",
+            f"live, lag {LAG_FRAMES}, compiled",
             "offline",
         ],
         rows,
@@ -289,7 +289,7 @@ def speed(capture: Capture | None) -> None:
             ranking = timed(lambda found=found, prior=prior: found.ranked(prior), 1)  # type: ignore[misc]
             frames = found.ranked(prior)
             with loops("fast"):
-                following = timed(lambda frames=frames: list(follow(frames, LAG)), 1)  # type: ignore[misc]
+                following = timed(lambda frames=frames: list(follow(frames, LAG_FRAMES)), 1)  # type: ignore[misc]
             spent = (following, following + ranking, following + ranking + recovering)
             median = np.median([len(frame) for frame in frames])
             rows.append(
@@ -301,7 +301,7 @@ def speed(capture: Capture | None) -> None:
                 ]
             )
     show(
-        f"Live, lag {LAG}: frames a second of CPU time on one core (recovery and ranking of all frames at once)",
+        f"Live, lag {LAG_FRAMES}: frames a second of CPU time on one core (recovery and ranking of all frames at once)",
         ["noise, px", "motion", "survivors, median", "followed", "and ranked", "and recovered"],
         rows,
     )
@@ -381,7 +381,7 @@ def depth(capture: Capture | None) -> None:
         placements = place(scene.camera, scene.figure, scene.image, np.full((len(scene), 5, 2), np.nan))
         told = np.array([one.estimate for one in placements])
         recovered = exact(scene, rooted=False)
-        for costs in (COSTS[0], COSTS[2]):
+        for costs in (PRIOR_KINDS[0], PRIOR_KINDS[2]):
             frames = costed(recovered, priors, clip, costs)
             path: Paths = best_paths(frames)
             joints = path.joints[0]

@@ -49,7 +49,7 @@ from posekit.views.builtin import view_of
 Floats = NDArray[np.float64]
 Kept = NDArray[np.bool_]
 
-UNIFORM = Tolerance(
+UNIFORM_TOLERANCE = Tolerance(
     rigid=0.03, tangent=MEASURED_TOLERANCE.tangent, placement=False, angle=MEASURED_TOLERANCE.angle
 )
 """What all four distances were allowed before each had its own tolerance."""
@@ -81,7 +81,7 @@ class Score:
         ]
 
 
-HEAD = ["rule", "true branch", "within 10 mm", "branch lost", "10 mm lost", "median", "mean", "95 %"]
+TABLE_HEAD = ["rule", "true branch", "within 10 mm", "branch lost", "10 mm lost", "median", "mean", "95 %"]
 
 
 def score(label: str, torsos: Torsos, kept: Kept, views: int) -> Score:
@@ -168,7 +168,7 @@ def study(title: str, scenes: Sequence[SyntheticScene], ranges: str) -> dict[str
     }
     best = oracles(scenes, ranges, views)
     every = [nothing, now, *(one for curve in curves.values() for one in curve), *best]
-    print("\n".join(table_lines(HEAD, [one.row for one in every])))
+    print("\n".join(table_lines(TABLE_HEAD, [one.row for one in every])))
     return {**curves, "d: joints, oracle": best, "chosen": [now]}
 
 
@@ -228,7 +228,7 @@ def draws(capture: Capture, ranges: str, views: int, seeds: range) -> list[list[
     """Draw frames and cameras several times: what the chosen tolerances keep of all."""
     rows = []
     every = [torsos_of(mocap_scenes(capture, views, np.random.default_rng(seed)), ranges) for seed in seeds]
-    for name, bounds in (("3 cm for all", np.full(4, UNIFORM.rigid)), ("hips 7.5 mm", CHOSEN)):
+    for name, bounds in (("3 cm for all", np.full(4, UNIFORM_TOLERANCE.rigid)), ("hips 7.5 mm", CHOSEN)):
         scores = [score("", one, (np.abs(one.off) <= bounds).all(axis=1), views) for one in every]
         counts = np.concatenate([one.counts for one in scores])
         medians = ", ".join(f"{np.median(one.counts):.0f}" for one in scores)
@@ -251,7 +251,7 @@ def whole(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> list[list[
     views = [view_of(scene) for scene in scenes]
     for ranges in tables:
         table = load_ranges(ranges)
-        both = {"3 cm for all": UNIFORM, "hips 7.5 mm": MEASURED_TOLERANCE}
+        both = {"3 cm for all": UNIFORM_TOLERANCE, "hips 7.5 mm": MEASURED_TOLERANCE}
         for name, tolerance in both.items():
             counts, near = [], []
             recovered = [recover(view, checks=CHECKS, ranges=table, tolerance=tolerance) for view in views]
@@ -276,7 +276,7 @@ def speed(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> str:
     """Time the trees alone, best of nine turns each: what the own tolerances take of what one for all does."""
     told = []
     for ranges in tables:
-        seconds = {UNIFORM: np.inf, MEASURED_TOLERANCE: np.inf}
+        seconds = {UNIFORM_TOLERANCE: np.inf, MEASURED_TOLERANCE: np.inf}
         grown = []
         for scene in scenes:
             body = FigureBody(figure=scene.figure, stature=1.7)
@@ -294,7 +294,7 @@ def speed(scenes: Sequence[SyntheticScene], tables: Sequence[str]) -> str:
                     tolerance=tolerance.tangent,
                 )
             seconds[tolerance] = min(seconds[tolerance], time.process_time() - start)
-        told.append(f"{ranges} {seconds[MEASURED_TOLERANCE] / seconds[UNIFORM]:.2f}")
+        told.append(f"{ranges} {seconds[MEASURED_TOLERANCE] / seconds[UNIFORM_TOLERANCE]:.2f}")
     return "Time of the trees, 3 cm for all = 1: " + ", ".join(told)
 
 
@@ -306,7 +306,7 @@ def unstated_noise(count: int = 400) -> list[list[str]]:
         seen = view_of(scene.with_noise(pixels, np.random.default_rng(1)))
         view = replace(seen, root=scene.joints_cam[:, 0], head_image=np.full(seen.head_image.shape, np.nan))
         found = {}
-        for name, tolerance in (("3 cm for all", UNIFORM), ("hips 7.5 mm", MEASURED_TOLERANCE)):
+        for name, tolerance in (("3 cm for all", UNIFORM_TOLERANCE), ("hips 7.5 mm", MEASURED_TOLERANCE)):
             frames = recover(view, checks=CHECKS, tolerance=tolerance).frames
             errors = [
                 np.linalg.norm(frame.joints - truth, axis=-1).mean(axis=-1).min(initial=np.inf)

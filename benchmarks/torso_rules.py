@@ -14,14 +14,14 @@ from posekit.skeleton import RIGID_SEGMENTS
 Floats = NDArray[np.float64]
 Kept = NDArray[np.bool_]
 
-QUANTILE = 0.995
-FLOOR = 0.005
+TORSO_QUANTILE = 0.995
+MIN_SPREAD_METRES = 0.005
 """Metres: least spread of a distance. The shoulders and hips of these recordings are rods; people's are not."""
 
-SWEEP = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)
-CHOSEN = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
+SWEEP_FACTORS = (0.25, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0, 6.0)
+CHOSEN_TOLERANCES = np.array([MEASURED_TOLERANCE.distances.of(segment) for segment in RIGID_SEGMENTS])
 
-BENDING = np.array([[1.0, 0, 0, 0], [0, 0.5, 0.5, 0], [0, 0.5, -0.5, 0], [0, 0, 0, 1.0]])
+BENDING_BASIS = np.array([[1.0, 0, 0, 0], [0, 0.5, 0.5, 0], [0, 0.5, -0.5, 0], [0, 0, 0, 1.0]])
 """Takes the four distances to width, shrug (both sides longer), side bend (one longer, one shorter) and hips."""
 
 
@@ -38,20 +38,20 @@ def uniform(torsos: Torsos) -> list[tuple[str, Kept]]:
 
 
 def spread(off: Floats, rows: NDArray[np.bool_]) -> Floats:
-    return np.asarray(np.maximum(np.quantile(np.abs(off[rows]), QUANTILE, axis=0), FLOOR))
+    return np.asarray(np.maximum(np.quantile(np.abs(off[rows]), TORSO_QUANTILE, axis=0), MIN_SPREAD_METRES))
 
 
 def earned(torsos: Torsos) -> list[tuple[str, Kept]]:
     """One bound a distance: so many times its spread."""
     spreads = crossed(torsos, lambda rows: spread(torsos.off, rows))
     times = (np.abs(torsos.off) / spreads).max(axis=1)
-    return [(f"{k:g} spreads", times <= k) for k in SWEEP]
+    return [(f"{k:g} spreads", times <= k) for k in SWEEP_FACTORS]
 
 
 def hips_alone(torsos: Torsos) -> list[tuple[str, Kept]]:
     """Shoulders and sides as chosen; the hips from all that they are given to nearly nothing."""
     off = np.abs(torsos.off)
-    others = (off[:, :3] <= CHOSEN[:3]).all(axis=1)
+    others = (off[:, :3] <= CHOSEN_TOLERANCES[:3]).all(axis=1)
     return [
         (f"hips {t * 100:g} cm", others & (off[:, 3] <= t))
         for t in (0.0025, 0.005, 0.0075, 0.01, 0.015, 0.02)
@@ -62,19 +62,19 @@ def one_sided(torsos: Torsos) -> list[tuple[str, Kept]]:
     """Likewise, longer and shorter each by its own spread."""
 
     def fit(rows: NDArray[np.bool_]) -> Floats:
-        ends = np.quantile(torsos.off[rows], [1 - QUANTILE, QUANTILE], axis=0)
-        return np.stack([np.minimum(ends[0], -FLOOR), np.maximum(ends[1], FLOOR)])
+        ends = np.quantile(torsos.off[rows], [1 - TORSO_QUANTILE, TORSO_QUANTILE], axis=0)
+        return np.stack([np.minimum(ends[0], -MIN_SPREAD_METRES), np.maximum(ends[1], MIN_SPREAD_METRES)])
 
     ends = crossed(torsos, fit)
     times = np.maximum(torsos.off / ends[:, 0], torsos.off / ends[:, 1]).max(axis=1)
-    return [(f"{k:g} spreads", times <= k) for k in SWEEP]
+    return [(f"{k:g} spreads", times <= k) for k in SWEEP_FACTORS]
 
 
 def bending(torsos: Torsos) -> list[tuple[str, Kept]]:
     """One bound for width, shrug, side bend and hips each."""
-    off = torsos.off @ BENDING.T
+    off = torsos.off @ BENDING_BASIS.T
     times = (np.abs(off) / crossed(torsos, lambda rows: spread(off, rows))).max(axis=1)
-    return [(f"{k:g} spreads", times <= k) for k in SWEEP]
+    return [(f"{k:g} spreads", times <= k) for k in SWEEP_FACTORS]
 
 
 def mahalanobis(torsos: Torsos) -> list[tuple[str, Kept]]:
@@ -82,7 +82,7 @@ def mahalanobis(torsos: Torsos) -> list[tuple[str, Kept]]:
 
     def fit(rows: NDArray[np.bool_]) -> Floats:
         off = torsos.off[rows]
-        return np.asarray(np.linalg.inv(off.T @ off / len(off) + (FLOOR / 2) ** 2 * np.eye(4)))
+        return np.asarray(np.linalg.inv(off.T @ off / len(off) + (MIN_SPREAD_METRES / 2) ** 2 * np.eye(4)))
 
     weight = crossed(torsos, fit)
     away = np.sqrt(np.einsum("ni,nij,nj->n", torsos.off, weight, torsos.off))
@@ -93,14 +93,14 @@ def sliding_spine(torsos: Torsos) -> list[tuple[str, Kept]]:
     """Bounds as chosen for shoulders and sides; hips as near as a spine that gives so much allows, to first order."""
     rate = np.abs(per_spine_length(torsos.joints)[:, 3])
     off = np.abs(torsos.off)
-    sides = (off[:, :3] <= CHOSEN[:3]).all(axis=1)
+    sides = (off[:, :3] <= CHOSEN_TOLERANCES[:3]).all(axis=1)
     return [
         (f"{give * 1000:g} mm", sides & (off[:, 3] <= 0.002 + np.minimum(rate * give, 0.03)))
         for give in (0.0, 0.0005, 0.001, 0.002, 0.004, 0.008)
     ]
 
 
-RULES: dict[str, Callable[[Torsos], list[tuple[str, Kept]]]] = {
+TORSO_RULES: dict[str, Callable[[Torsos], list[tuple[str, Kept]]]] = {
     "a: one tolerance for all": uniform,
     "b: one for each distance": earned,
     "b: the same, one-sided": one_sided,

@@ -18,17 +18,17 @@ from posekit.validators import load_ranges, make_checks
 
 Floats = NDArray[np.float64]
 
-CHECKS = ("rigid-parts", "joint-range", "collision")
-LOOSE = 0.12
+CHECK_NAMES = ("rigid-parts", "joint-range", "collision")
+LOOSE_METRES = 0.12
 """Metres: torsos whose distances are off by more are not looked at."""
 
-NEAR = 0.01
+NEAR_METRES = 0.01
 """Metres of mean joint error within which a survivor is the truth."""
 
-TRUNK = 6
+N_TRUNK_JOINTS = 6
 """Joints of torso and hips: the first six, five branches."""
 
-ELEVATION, RETRACTION = 13.0, 22.0
+ELEVATION_DEGREES, RETRACTION_DEGREES = 13.0, 22.0
 """Degrees that the clavicle rises and goes back until the arm is overhead: the middles of 11 to 15 and 15 to 29
 (Ludewig et al. 2004, J Orthop Sports Phys Ther 34:140, 39 people)."""
 
@@ -49,8 +49,8 @@ class Torsos:
     count : int array (T,)
         Leaves that have this torso.
     near, true, branch : bool array (T,)
-        Whether one of them is within `NEAR` of the truth; whether it takes the true branch at every joint; whether the
-        torso itself does.
+        Whether one of them is within `NEAR_METRES` of the truth; whether it takes the true branch at every joint;
+        whether the torso itself does.
     """
 
     view: NDArray[np.intp]
@@ -86,9 +86,9 @@ def torsos_of(
     for clip, scene in enumerate(scenes):
         checks = make_checks(
             scene.figure,
-            CHECKS,
+            CHECK_NAMES,
             ranges=table,
-            rigid_tolerance=LOOSE,
+            rigid_tolerance=LOOSE_METRES,
             rigid_mode="distances",
             angle_tolerance=MEASURED_TOLERANCE.angle,
         )
@@ -98,7 +98,7 @@ def torsos_of(
         figure = np.array([scene.figure.lengths[segment_name(segment)] for segment in SEGMENTS])
         lengths = np.zeros((len(JOINTS), len(scene), 1))
         for k, (_, joint) in enumerate(TREE_SEGMENTS):
-            lengths[joint, :, 0] = own[:, k] if own_lengths and joint < TRUNK else figure[k]
+            lengths[joint, :, 0] = own[:, k] if own_lengths and joint < N_TRUNK_JOINTS else figure[k]
         lengths[JOINT["pelvis"]] += spine
         tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=lengths)
         leaves = tree.grow(
@@ -118,13 +118,13 @@ def torsos_of(
 
 def _torsos(leaves: Leaves, truth: Floats, figure: Floats, own: Floats, clip: int, first_view: int) -> Torsos:
     code = true_codes(leaves, truth)
-    shift = len(TREE_SEGMENTS) - (TRUNK - 1)
-    key = (leaves.frame.astype(np.intp) << (TRUNK - 1)) | (leaves.code >> shift)
+    shift = len(TREE_SEGMENTS) - (N_TRUNK_JOINTS - 1)
+    key = (leaves.frame.astype(np.intp) << (N_TRUNK_JOINTS - 1)) | (leaves.code >> shift)
     keys, first, torso = np.unique(key, return_index=True, return_inverse=True)
-    frame = keys >> (TRUNK - 1)
+    frame = keys >> (N_TRUNK_JOINTS - 1)
     postures = leaves.postures()
     error = np.linalg.norm(postures - truth[leaves.frame], axis=-1).mean(axis=1)
-    joints = postures[first][:, :TRUNK]
+    joints = postures[first][:, :N_TRUNK_JOINTS]
     ends = np.array(RIGID_SEGMENTS)
     away = np.linalg.norm(joints[:, ends[:, 0]] - joints[:, ends[:, 1]], axis=-1)
     return Torsos(
@@ -134,9 +134,9 @@ def _torsos(leaves: Leaves, truth: Floats, figure: Floats, own: Floats, clip: in
         off=away - figure,
         off_truth=away - own[frame],
         count=np.bincount(torso, minlength=len(keys)),
-        near=np.bincount(torso, error < NEAR, len(keys)) > 0,
+        near=np.bincount(torso, error < NEAR_METRES, len(keys)) > 0,
         true=np.bincount(torso, leaves.code == code[leaves.frame], len(keys)) > 0,
-        branch=(code >> shift)[frame] == (keys & ((1 << (TRUNK - 1)) - 1)),
+        branch=(code >> shift)[frame] == (keys & ((1 << (N_TRUNK_JOINTS - 1)) - 1)),
     )
 
 
@@ -171,7 +171,7 @@ def per_spine_length(joints: Floats) -> Floats:
         return np.asarray(along / np.linalg.norm(along, axis=-1, keepdims=True))
 
     moved = np.zeros_like(joints)
-    for parent, joint in TREE_SEGMENTS[2 : TRUNK - 1]:
+    for parent, joint in TREE_SEGMENTS[2 : N_TRUNK_JOINTS - 1]:
         along = direction(parent, joint)
         slope = np.einsum("ni,ni->n", along, ray[:, joint])
         slope = np.where(np.abs(slope) < 0.02, np.copysign(0.02, slope), slope)
@@ -202,7 +202,7 @@ def with_clavicles(capture: Capture) -> Capture:
         pivot = middle + 0.02 * sign * left_axis + 0.06 * forward_axis
         forward, left, height = np.einsum("nji,nj->in", R, points[:, shoulder] - pivot)
         beside = sign * left
-        back, up = np.radians(RETRACTION) * raised, np.radians(ELEVATION) * raised
+        back, up = np.radians(RETRACTION_DEGREES) * raised, np.radians(ELEVATION_DEGREES) * raised
         forward, beside = (
             forward * np.cos(back) - beside * np.sin(back),
             beside * np.cos(back) + forward * np.sin(back),
@@ -218,7 +218,7 @@ def with_clavicles(capture: Capture) -> Capture:
 def with_spine(capture: Capture, times: float) -> Capture:
     """Let the distance from neck to pelvis vary so many times as much about its median; the legs go with it."""
     points = np.array(capture.points)
-    moving = [JOINT[name] for name in JOINTS if name == "pelvis" or name.split("_")[-1] in LOWER]
+    moving = [JOINT[name] for name in JOINTS if name == "pelvis" or name.split("_")[-1] in LOWER_LIMB]
     for clip in range(len(capture.names)):
         rows = np.flatnonzero(capture.clip == clip)
         spine = points[rows, JOINT["pelvis"]] - points[rows, 0]
@@ -228,4 +228,4 @@ def with_spine(capture: Capture, times: float) -> Capture:
     return replace(capture, points=points)
 
 
-LOWER = ("hip", "knee", "ankle")
+LOWER_LIMB = ("hip", "knee", "ankle")

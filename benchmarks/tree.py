@@ -40,10 +40,10 @@ from posekit.tree import Check, InterpretationTree, Leaves, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
 from posekit.views.builtin import view_of
 
-CHUNK = 2000
+CHUNK_FRAMES = 2000
 """Frames a call."""
 
-PROCESSES = 2
+N_PROCESSES = 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +86,9 @@ class Job:
         )
 
 
-def grow(job: Job, checks: list[Check], frames: slice = slice(None), chunk: int = CHUNK) -> list[Leaves]:
+def grow(
+    job: Job, checks: list[Check], frames: slice = slice(None), chunk: int = CHUNK_FRAMES
+) -> list[Leaves]:
     """Grow the trees of some frames."""
     tree = InterpretationTree(joints=JOINTS, parents=PARENTS, lengths=job.lengths)
     rows = np.arange(len(job.image))[frames]
@@ -151,7 +153,7 @@ def against_brute_force(job: Job, views: int) -> None:
             )
             rows.append((f"{path}, one view a call", seconds / views))
             _, seconds = min((timed(lambda: grow(job, checks)) for _ in range(3)), key=lambda pair: pair[1])
-            rows.append((f"{path}, batches of {CHUNK}", seconds / len(job.image)))
+            rows.append((f"{path}, batches of {CHUNK_FRAMES}", seconds / len(job.image)))
         for name, ours in (("batched", batched), ("one at a time", single)):
             same = sum(np.array_equal(np.sort(a), np.sort(b)) for a, b in zip(brute, ours, strict=True))
             print(f"survivors identical to brute force, {path}, {name}: {same} of {views} views")
@@ -241,18 +243,18 @@ def recover_rates(name: str, views: Sequence[View]) -> None:
         f"  the first time: {persons * 1e3:.1f} ms a view more, for persons that are new and code that is loaded"
     )
     context = get_context("spawn")
-    begin, results = context.Barrier(PROCESSES), context.Queue()
-    workers = [context.Process(target=_worker, args=(views, begin, results)) for _ in range(PROCESSES)]
+    begin, results = context.Barrier(N_PROCESSES), context.Queue()
+    workers = [context.Process(target=_worker, args=(views, begin, results)) for _ in range(N_PROCESSES)]
     for worker in workers:
         worker.start()
     turns = list(zip(*(results.get() for _ in workers), strict=True))
     for worker in workers:
         worker.join()
     seconds = min(max(wall for wall, _ in turn) for turn in turns)
-    cost = min(sum(busy for _, busy in turn) for turn in turns) / (PROCESSES * frames)
+    cost = min(sum(busy for _, busy in turn) for turn in turns) / (N_PROCESSES * frames)
     print(
-        f"  {PROCESSES} processes:  {PROCESSES * frames / seconds:8.0f} views/s, "
-        f"{cost * 1e6:6.1f} us of processor time a view: {PROCESSES / cost:.0f} views/s of {PROCESSES} idle cores"
+        f"  {N_PROCESSES} processes:  {N_PROCESSES * frames / seconds:8.0f} views/s, "
+        f"{cost * 1e6:6.1f} us of processor time a view: {N_PROCESSES / cost:.0f} views/s of {N_PROCESSES} idle cores"
     )
 
 

@@ -21,8 +21,8 @@ import numpy as np
 from benchmarks.studies.two_models import reasons
 from benchmarks.studies.two_models.angles import excess, figure_limits, in_human_order
 from benchmarks.studies.two_models.human import (
-    HELD,
-    HUMAN,
+    HELD_JOINTS,
+    HUMAN_NAME,
     Counterpart,
     joint_columns,
     limits_of_human,
@@ -32,7 +32,7 @@ from benchmarks.studies.two_models.human import (
     ranges_text,
     without_collision,
 )
-from benchmarks.studies.two_models.labelled import KINDS, Labelled, labelled_postures
+from benchmarks.studies.two_models.labelled import ILLEGAL_KINDS, Labelled, labelled_postures
 from posekit import Validator, load_figure
 from posekit.body import Figure
 from posekit.formats.markdown import table_lines
@@ -43,8 +43,8 @@ from posekit.synthesis import Capture, read_capture
 from posekit.synthesis.mocap import clip_lengths
 from posekit.validators import Report
 
-VERDICTS = ("valid", "invalid", "undecided")
-STRICT = 1e-3
+VERDICT_NAMES = ("valid", "invalid", "undecided")
+STRICT_DISTANCE = 1e-3
 
 
 def main() -> None:
@@ -92,7 +92,7 @@ def write_held(figure: Figure, counterparts: dict[str, Counterpart], folder: Pat
     """Write the mapped ranges with a trunk that is rigid, as the stick figure's; return the file's name."""
     path = folder / "held.toml"
     limits = limits_on_human(figure_limits(figure), counterparts)
-    path.write_text(ranges_text(limits | dict.fromkeys(HELD, (0.0, 0.0))), encoding="utf-8")
+    path.write_text(ranges_text(limits | dict.fromkeys(HELD_JOINTS, (0.0, 0.0))), encoding="utf-8")
     return str(path)
 
 
@@ -107,7 +107,7 @@ def synthetic(figure: Figure, counterparts: dict[str, Counterpart], n: int, seed
             ("mapped ranges", str(mapped_ranges())),
             ("its own limits", "urdf"),
         ):
-            validator = Validator(HUMAN, ranges=ranges)
+            validator = Validator(HUMAN_NAME, ranges=ranges)
             theirs = validator.check(postures.joints, lengths=figure.lengths)
             expected = excess(angles, limits_of_human(theirs, counterparts))
             for checks, one, other in (
@@ -126,10 +126,10 @@ def agreement(postures: Labelled, ours: Report, theirs: Report) -> list[str]:
     kinds = np.array(postures.kind)
     one, other = np.array(ours.verdicts), np.array(theirs.verdicts)
     rows = []
-    for kind in ("legal", *KINDS, "all"):
+    for kind in ("legal", *ILLEGAL_KINDS, "all"):
         rows_of = (kinds == kind) | (kind == "all")
         counts = [
-            " / ".join(str(int((verdicts[rows_of] == each).sum())) for each in VERDICTS)
+            " / ".join(str(int((verdicts[rows_of] == each).sum())) for each in VERDICT_NAMES)
             for verdicts in (one, other)
         ]
         rows.append([kind, str(rows_of.sum()), *counts, f"{(one == other)[rows_of].mean():.1%}"])
@@ -163,8 +163,8 @@ def examples(
         out = [
             f"{joint} {judged.value[k, i]:.2f} outside [{judged.lower[k, i]:g}, {judged.upper[k, i]:g}]"
             for i, joint in enumerate(judged.where)
-            if np.nan_to_num(judged.value[k, i] - judged.upper[k, i]) > STRICT
-            or np.nan_to_num(judged.lower[k, i] - judged.value[k, i]) > STRICT
+            if np.nan_to_num(judged.value[k, i] - judged.upper[k, i]) > STRICT_DISTANCE
+            or np.nan_to_num(judged.lower[k, i] - judged.value[k, i]) > STRICT_DISTANCE
         ]
         spine = [
             f"{np.degrees(theirs.q[k, columns[j]]):.2f}" for j in ("middle_thoracic_Z", "middle_thoracic_X")
@@ -228,16 +228,16 @@ class Tally:
 
 def real(figure: Figure, capture: Capture, every: int, held: str) -> None:
     judges = {
-        "stick, table1": (None, "table1", STRICT),
+        "stick, table1": (None, "table1", STRICT_DISTANCE),
         "stick, table1, 2 deg": (None, "table1", MEASURED_TOLERANCE.angle),
-        "stick, urdf": (None, "urdf", STRICT),
+        "stick, urdf": (None, "urdf", STRICT_DISTANCE),
         "stick, urdf, 2 deg": (None, "urdf", MEASURED_TOLERANCE.angle),
-        "human, mapped": (HUMAN, str(mapped_ranges()), STRICT),
-        "human, mapped, 2 deg": (HUMAN, str(mapped_ranges()), MEASURED_TOLERANCE.angle),
-        "human, held rigid": (HUMAN, held, STRICT),
-        "human, held rigid, 2 deg": (HUMAN, held, MEASURED_TOLERANCE.angle),
-        "human, own": (HUMAN, "urdf", STRICT),
-        "human, own, 2 deg": (HUMAN, "urdf", MEASURED_TOLERANCE.angle),
+        "human, mapped": (HUMAN_NAME, str(mapped_ranges()), STRICT_DISTANCE),
+        "human, mapped, 2 deg": (HUMAN_NAME, str(mapped_ranges()), MEASURED_TOLERANCE.angle),
+        "human, held rigid": (HUMAN_NAME, held, STRICT_DISTANCE),
+        "human, held rigid, 2 deg": (HUMAN_NAME, held, MEASURED_TOLERANCE.angle),
+        "human, own": (HUMAN_NAME, "urdf", STRICT_DISTANCE),
+        "human, own, 2 deg": (HUMAN_NAME, "urdf", MEASURED_TOLERANCE.angle),
     }
     print("All frames, the stick figure\n")
     tallies = {}
@@ -300,8 +300,10 @@ def report(tallies: dict[str, Tally]) -> None:
 
 def crossed(ours: Tally, theirs: Tally) -> None:
     pairs = Counter(zip(ours.frames, theirs.frames, strict=True))
-    rows = [[a, *(str(pairs[a, b]) for b in VERDICTS)] for a in VERDICTS[:2]]
-    print("\n".join(table_lines(["stick figure, urdf", *(f"human, mapped: {b}" for b in VERDICTS)], rows)))
+    rows = [[a, *(str(pairs[a, b]) for b in VERDICT_NAMES)] for a in VERDICT_NAMES[:2]]
+    print(
+        "\n".join(table_lines(["stick figure, urdf", *(f"human, mapped: {b}" for b in VERDICT_NAMES)], rows))
+    )
     why = Counter(
         (a, ours.why[k], b, theirs.why[k])
         for k, (a, b) in enumerate(zip(ours.frames, theirs.frames, strict=True))

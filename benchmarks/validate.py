@@ -22,13 +22,13 @@ from posekit.robots import load_robot
 from posekit.robots.joint_map import postures_of
 from posekit.validators import Validator
 
-REPEATS = 7
+N_REPEATS = 7
 
 
 def least(ways: dict[str, Callable[[], object]]) -> dict[str, float]:
     """Time each way in turn, and return the least of each, seconds."""
     seconds: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range(REPEATS):
+    for _ in range(N_REPEATS):
         for name, way in ways.items():
             start = time.process_time()
             way()

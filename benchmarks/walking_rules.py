@@ -30,9 +30,9 @@ from posekit.validators import load_ranges, walking
 from posekit.validators.walking import DEFAULT_RULES, PEOPLE_THRESHOLDS, RULE_NUMBERS, WalkingThresholds
 from posekit.views.builtin import view_of
 
-ACTION = "walking"
-THRESHOLDS = {"default": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
-SETS = ((), *((rule,) for rule in RULE_NUMBERS), DEFAULT_RULES, (1, 2, 3), RULE_NUMBERS)
+WALKING_ACTION = "walking"
+THRESHOLD_SETS = {"default": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
+RULE_SETS = ((), *((rule,) for rule in RULE_NUMBERS), DEFAULT_RULES, (1, 2, 3), RULE_NUMBERS)
 
 
 def judged(clip: Clip, rule: int, thresholds: WalkingThresholds) -> dict[str, Findings]:
@@ -48,8 +48,8 @@ def lost(clip: Clip, rule: int, thresholds: WalkingThresholds) -> NDArray[np.boo
 
 
 def on_true_joints(clips: Sequence[Clip]) -> None:
-    actions = sorted({clip.action for clip in clips}, key=lambda action: (action != ACTION, action))
-    for name, thresholds in THRESHOLDS.items():
+    actions = sorted({clip.action for clip in clips}, key=lambda action: (action != WALKING_ACTION, action))
+    for name, thresholds in THRESHOLD_SETS.items():
         rows = [
             [str(rule)]
             + [
@@ -60,8 +60,8 @@ def on_true_joints(clips: Sequence[Clip]) -> None:
         ]
         print(f"Frames whose true posture a rule kills, {name} thresholds\n")
         print("\n".join(table_lines(["rule", *actions], rows)))
-    walkers = [clip for clip in clips if clip.action == ACTION]
-    for name, thresholds in THRESHOLDS.items():
+    walkers = [clip for clip in clips if clip.action == WALKING_ACTION]
+    for name, thresholds in THRESHOLD_SETS.items():
         rows = []
         for rule in RULE_NUMBERS:
             each = ", ".join(f"{lost(clip, rule, thresholds).mean():.1%}" for clip in walkers)
@@ -120,7 +120,7 @@ def on_views(scenes: Sequence[SyntheticScene]) -> None:
             joints = frame.joints
             mine = np.array([code == true_code(frame, truth) for code in frame.branches], dtype=bool)
             points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
-            for name, thresholds in THRESHOLDS.items():
+            for name, thresholds in THRESHOLD_SETS.items():
                 killed = {
                     rule: np.logical_or.reduce(
                         [
@@ -130,7 +130,7 @@ def on_views(scenes: Sequence[SyntheticScene]) -> None:
                     )
                     for rule in RULE_NUMBERS
                 }
-                for rules in SETS:
+                for rules in RULE_SETS:
                     kept = ~np.logical_or.reduce(
                         [np.zeros(len(joints), dtype=bool), *(killed[r] for r in rules)]
                     )
@@ -169,15 +169,15 @@ def main() -> None:
     capture = read_capture(given.capture)
     clips = clips_of(capture)
     on_true_joints(clips)
-    cross_validation([clip for clip in clips if clip.action == ACTION])
-    walkers = sum(action == ACTION for action in capture.actions)
+    cross_validation([clip for clip in clips if clip.action == WALKING_ACTION])
+    walkers = sum(action == WALKING_ACTION for action in capture.actions)
     if not walkers:
-        print(f"no clip of {ACTION}: no views")
+        print(f"no clip of {WALKING_ACTION}: no views")
         return
     # Frames are drawn evenly over all clips: so many that the walkers' share is what was asked for.
     drawn = -(-given.views * len(capture.actions) // walkers)
     scenes = mocap_scenes(capture, drawn, np.random.default_rng(given.seed))
-    on_views([scene for scene in scenes if scene.labels[0] == ACTION])
+    on_views([scene for scene in scenes if scene.labels[0] == WALKING_ACTION])
 
 
 if __name__ == "__main__":

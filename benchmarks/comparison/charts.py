@@ -11,8 +11,8 @@ from benchmarks.comparison.measure import Chart
 from posekit.viewer.plots import save
 from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing
 
-COLOURS = (LEFT_COLOUR, RIGHT_COLOUR, MUTED_COLOUR)
-MARKS = ("o", "s", "^")
+LINE_COLOURS = (LEFT_COLOUR, RIGHT_COLOUR, MUTED_COLOUR)
+LINE_MARKS = ("o", "s", "^")
 
 
 def draw(chart: Chart, folder: Path, suffix: str = ".svg") -> str:
@@ -45,7 +45,7 @@ def _bars(axes: Any, chart: Chart) -> None:
 
 
 def _lines(axes: Any, chart: Chart) -> None:
-    for line, colour, mark in zip(chart.lines, COLOURS, MARKS, strict=False):
+    for line, colour, mark in zip(chart.lines, LINE_COLOURS, LINE_MARKS, strict=False):
         axes.plot(line.x, line.y, color=colour, marker=mark, ms=4, lw=1.3, label=line.name)
     axes.set_xlabel(chart.x)
     axes.set_ylabel(chart.y)

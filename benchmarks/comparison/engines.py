@@ -22,7 +22,7 @@ from posekit.body import Figure, load_figure
 Array = NDArray[np.float64]
 Verdicts = NDArray[np.bool_]
 
-TOUCHING = 1e-6
+TOUCHING_METRES = 1e-6
 """Metres: two engines may differ about bodies that are so near to touching."""
 
 
@@ -196,7 +196,7 @@ def compare(figure: Figure, q: Array, verdicts: Verdicts, reference: Verdicts) -
     """Compare verdicts; where bodies nearly touch, differing is counted apart."""
     wrong = np.flatnonzero(verdicts != reference)
     distances = least_distances(figure, q[wrong])
-    touch = np.abs(distances) <= TOUCHING
+    touch = np.abs(distances) <= TOUCHING_METRES
     return Comparison(
         equal=len(q) - len(wrong), asked=len(q), touching=int(touch.sum()), distances=distances[~touch]
     )
@@ -245,7 +245,7 @@ def section(sizes: Sizes) -> Section:
 def _said(one: Comparison) -> str:
     parts = []
     if one.touching:
-        parts.append(f"{one.touching} within {TOUCHING:g} m of touching")
+        parts.append(f"{one.touching} within {TOUCHING_METRES:g} m of touching")
     if len(one.distances):
         parts.append(", ".join(f"{distance:.2g} m" for distance in one.distances[:5]))
     return "; ".join(parts)

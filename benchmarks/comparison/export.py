@@ -11,7 +11,7 @@ from collections.abc import Iterable
 import numpy as np
 import pinocchio as pin
 
-AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
+JOINT_AXES = {"JointModelRX": "1 0 0", "JointModelRY": "0 1 0", "JointModelRZ": "0 0 1"}
 
 
 def mjcf(model: pin.Model, geometry: pin.GeometryModel) -> str:
@@ -96,8 +96,8 @@ def _children(model: pin.Model) -> dict[int, list[int]]:
 
 def _axis(model: pin.Model, joint: int) -> str:
     kind = model.joints[joint].shortname()
-    if kind in AXES:
-        return AXES[kind]
+    if kind in JOINT_AXES:
+        return JOINT_AXES[kind]
     # Beside the axes: what a small turn about it is.
     data = model.joints[joint].createData()
     model.joints[joint].calc(data, np.zeros(model.nq), np.zeros(model.nv))

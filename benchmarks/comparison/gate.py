@@ -8,17 +8,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-SCHEMA: Final = "posekit.benchmarks/1"
-BASELINE: Final = Path(__file__).resolve().parents[1] / "baseline.json"
+BASELINE_SCHEMA: Final = "posekit.benchmarks/1"
+BASELINE_PATH: Final = Path(__file__).resolve().parents[1] / "baseline.json"
 
-TOLERANCE: Final = 0.3
+RATIO_TOLERANCE: Final = 0.3
 """By how much of itself a ratio may fall before it is said: shared machines differ by so much between runs."""
 
 
 def write_baseline(path: Path, ratios: Mapping[str, float], machine: Mapping[str, Any]) -> None:
     """Write the ratios of a run, with what they ran on."""
     document = {
-        "schema": SCHEMA,
+        "schema": BASELINE_SCHEMA,
         "machine": dict(machine),
         "ratios": {name: float(f"{ratio:.3g}") for name, ratio in sorted(ratios.items())},
     }
@@ -38,13 +38,13 @@ def read_baseline(path: Path) -> dict[str, float]:
     except (OSError, ValueError) as error:
         raise SystemExit(f"{path}: no baseline ({error}); write one with --write-baseline") from error
     ratios = document.get("ratios") if isinstance(document, dict) else None
-    if not isinstance(ratios, dict) or document.get("schema") != SCHEMA:
-        raise SystemExit(f"{path}: no baseline of {SCHEMA}; write one with --write-baseline")
+    if not isinstance(ratios, dict) or document.get("schema") != BASELINE_SCHEMA:
+        raise SystemExit(f"{path}: no baseline of {BASELINE_SCHEMA}; write one with --write-baseline")
     return {str(name): float(ratio) for name, ratio in ratios.items()}
 
 
 def warnings_of(
-    ratios: Mapping[str, float], baseline: Mapping[str, float], tolerance: float = TOLERANCE
+    ratios: Mapping[str, float], baseline: Mapping[str, float], tolerance: float = RATIO_TOLERANCE
 ) -> list[str]:
     """Say which ratios fell by more than the tolerance, or are no numbers; what was not measured is passed over.
 

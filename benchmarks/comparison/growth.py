@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.comparison.measure import Chart, Line, Section, Sizes, least
-from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
+from benchmarks.comparison.trees import CHUNK_VIEWS, grow, on, paths, physical_checks
 from posekit.body import Figure, load_figure
 from posekit.settings import EXACT_TOLERANCE, MEASURED_TOLERANCE
 from posekit.skeleton import JOINTS
@@ -15,9 +15,9 @@ from posekit.synthesis import SyntheticScene, random_views
 from posekit.tree import Check
 
 Way = Callable[[], list[np.ndarray]]
-NOISE = (0.0, 1.0, 2.0, 5.0)
+NOISE_PIXELS = (0.0, 1.0, 2.0, 5.0)
 JOINT_COUNTS = (4, 6, 8, 10, 12, 14)
-GROUPS = 5
+N_GROUPS = 5
 """Groups of views by their number of survivors."""
 
 
@@ -64,8 +64,8 @@ def section(sizes: Sizes) -> Section:
     return Section(
         title="What the cost grows with",
         text=f"The same {len(scene)} views. Joints: the tree over the first ones alone, with the checks that read no "
-        f"others. Survivors: the views in {GROUPS} groups, by how many they have. Noise: on the image points, with the "
-        "tolerances for measured points, at zero noise too.",
+        f"others. Survivors: the views in {N_GROUPS} groups, by how many they have. Noise: on the image points, "
+        "with the tolerances for measured points, at zero noise too.",
         head=("what", "path", "µs a view", "survivors, median"),
         rows=rows,
         ratios=ratios,
@@ -86,7 +86,7 @@ def _measured(study: Study, path: str, repeats: int) -> tuple[list[float], list[
 
 
 def _frames(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
-    some = min(len(scene), CHUNK)
+    some = min(len(scene), CHUNK_VIEWS)
 
     def ways(size: int) -> Way:
         firsts = range(0, some - size + 1, size)
@@ -101,7 +101,7 @@ def _frames(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study
 
 
 def _joints(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
-    some = scene.select(np.arange(min(len(scene), 2 * CHUNK)))
+    some = scene.select(np.arange(min(len(scene), 2 * CHUNK_VIEWS)))
 
     def way(joints: int) -> Way:
         known = [check for check in checks if max(check.points) < joints] if joints < len(JOINTS) else checks
@@ -113,7 +113,7 @@ def _joints(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study
 def _survivors(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> Study:
     counts = np.array([len(codes) for codes in grow(figure, scene, checks)])
     found: Study = {}
-    for rows in np.array_split(np.argsort(counts, kind="stable"), GROUPS):
+    for rows in np.array_split(np.argsort(counts, kind="stable"), N_GROUPS):
         part = scene.select(rows)
         at = float(np.median(counts[rows]))
         found[at] = (lambda part=part: grow(figure, part, checks)), len(part)  # type: ignore[misc]
@@ -122,9 +122,9 @@ def _survivors(figure: Figure, scene: SyntheticScene, checks: list[Check]) -> St
 
 def _noise(figure: Figure, scene: SyntheticScene) -> Study:
     checks = physical_checks(figure, MEASURED_TOLERANCE)
-    some = scene.select(np.arange(min(len(scene), CHUNK)))
+    some = scene.select(np.arange(min(len(scene), CHUNK_VIEWS)))
     found: Study = {}
-    for sigma in NOISE:
+    for sigma in NOISE_PIXELS:
         seen = some.with_noise(sigma, np.random.default_rng(1)) if sigma else some
         found[sigma] = (
             (lambda seen=seen: grow(figure, seen, checks, tangent=MEASURED_TOLERANCE.tangent)),  # type: ignore[misc]

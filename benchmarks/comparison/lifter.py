@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-SIZES = ((32, 1024), (1024, 1024), (1024, 1024), (1024, 1024), (1024, 1024), (1024, 48))
-RUNS = 20
+LAYER_SIZES = ((32, 1024), (1024, 1024), (1024, 1024), (1024, 1024), (1024, 1024), (1024, 48))
+N_RUNS = 20
 
 
 class Lifter(NamedTuple):
@@ -41,9 +41,9 @@ def make_lifter(batch: int, image: NDArray[np.float64]) -> Lifter:
     flat = np.nan_to_num(image.reshape(len(image), -1))[:batch]
     points[: len(flat), : flat.shape[1]] = flat / max(float(np.abs(flat).max(initial=0.0)), 1.0)
     if util.find_spec("torch") is not None:
-        return Lifter(f"lifter, PyTorch, {batch} a call", _torch(points), RUNS * batch)
+        return Lifter(f"lifter, PyTorch, {batch} a call", _torch(points), N_RUNS * batch)
     note = "PyTorch is not installed: the lifter's layers ran in NumPy, with NumPy's own threads"
-    return Lifter(f"lifter, NumPy, {batch} a call", _numpy(points), RUNS * batch, note)
+    return Lifter(f"lifter, NumPy, {batch} a call", _numpy(points), N_RUNS * batch, note)
 
 
 def _torch(points: NDArray[np.float32]) -> Callable[[], object]:
@@ -57,13 +57,13 @@ def _torch(points: NDArray[np.float32]) -> Callable[[], object]:
             nn.Linear(size_in, size_out), nn.BatchNorm1d(size_out), nn.ReLU(), nn.Dropout(0.5)
         )
 
-    first, *blocks, last = SIZES
+    first, *blocks, last = LAYER_SIZES
     layers = [block(*first).eval(), *(block(*size).eval() for size in blocks), nn.Linear(*last).eval()]
     given = torch.from_numpy(points)
 
     def run() -> object:
         with torch.inference_mode():
-            for _ in range(RUNS):
+            for _ in range(N_RUNS):
                 x = layers[0](given)
                 for k in (1, 3):
                     x = x + layers[k + 1](layers[k](x))
@@ -75,8 +75,8 @@ def _torch(points: NDArray[np.float32]) -> Callable[[], object]:
 
 def _numpy(points: NDArray[np.float32]) -> Callable[[], object]:
     rng = np.random.default_rng(0)
-    weights = [rng.normal(0, 0.02, size).astype(np.float32) for size in SIZES]
-    scales = [np.ones(size[1], dtype=np.float32) for size in SIZES]
+    weights = [rng.normal(0, 0.02, size).astype(np.float32) for size in LAYER_SIZES]
+    scales = [np.ones(size[1], dtype=np.float32) for size in LAYER_SIZES]
 
     def layer(x: NDArray[np.float32], k: int) -> NDArray[np.float32]:
         y: NDArray[np.float32] = x @ weights[k]
@@ -85,7 +85,7 @@ def _numpy(points: NDArray[np.float32]) -> Callable[[], object]:
         return y
 
     def run() -> object:
-        for _ in range(RUNS):
+        for _ in range(N_RUNS):
             x = layer(points, 0)
             for k in (1, 3):
                 x = x + layer(layer(x, k), k + 1)

@@ -11,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
-PACKAGES = ("numpy", "pin", "coal", "numba", "mujoco", "pybullet", "python-fcl", "torch")
+LISTED_PACKAGES = ("numpy", "pin", "coal", "numba", "mujoco", "pybullet", "python-fcl", "torch")
 
 
 class Cost(NamedTuple):
@@ -106,8 +106,8 @@ class Sizes:
     memory: int = 100_000
 
 
-QUICK = Sizes(views=500, brute=5, configurations=10_000, slow=1000, repeats=3, starts=2, memory=20_000)
-TINY = Sizes(views=12, brute=1, configurations=200, slow=20, repeats=1, starts=1, memory=500)
+QUICK_SIZES = Sizes(views=500, brute=5, configurations=10_000, slow=1000, repeats=3, starts=2, memory=20_000)
+TINY_SIZES = Sizes(views=12, brute=1, configurations=200, slow=20, repeats=1, starts=1, memory=500)
 
 
 def machine() -> dict[str, Any]:
@@ -119,7 +119,7 @@ def machine() -> dict[str, Any]:
         "system": platform.system(),
         "python": platform.python_version(),
         "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
-        "versions": {name: found for name in PACKAGES if (found := version(name))},
+        "versions": {name: found for name in LISTED_PACKAGES if (found := version(name))},
     }
 
 

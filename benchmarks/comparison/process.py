@@ -11,9 +11,9 @@ from pathlib import Path
 
 from benchmarks.comparison.measure import Chart, Cost, Section, Sizes
 
-ROOT = Path(__file__).resolve().parents[2]
+REPOSITORY_ROOT = Path(__file__).resolve().parents[2]
 
-STARTS = {
+START_COMMANDS = {
     "python -c pass": "pass",
     "import posekit": "import posekit",
     "posekit --help": "import sys; sys.argv = ['posekit', '--help']; from posekit.cli import main; main()",
@@ -21,7 +21,7 @@ STARTS = {
     "import, tree of one view": "from benchmarks.comparison.process import one_view; one_view()",
 }
 
-GROW = "from benchmarks.comparison.process import grow_views; grow_views({views})"
+GROW_CODE = "from benchmarks.comparison.process import grow_views; grow_views({views})"
 
 
 def one_view() -> None:
@@ -36,15 +36,15 @@ def grow_views(views: int) -> None:
     """Grow so many trees, call by call, and print this process's peak of memory, KB."""
     import numpy as np
 
-    from benchmarks.comparison.trees import CHUNK, grow, on, paths, physical_checks
+    from benchmarks.comparison.trees import CHUNK_VIEWS, grow, on, paths, physical_checks
     from posekit.body import load_figure
     from posekit.synthesis import random_views
 
     figure = load_figure()
     checks = physical_checks(figure)
-    scene = random_views(figure, CHUNK, np.random.default_rng(0))
+    scene = random_views(figure, CHUNK_VIEWS, np.random.default_rng(0))
     with on(paths()[-1]):
-        for _ in range(max(1, views // CHUNK)):
+        for _ in range(max(1, views // CHUNK_VIEWS)):
             grow(figure, scene, checks)
     print(_peak())
 
@@ -60,9 +60,9 @@ def _peak() -> int:
 
 def start_up(sizes: Sizes) -> Section:
     """Start each several times, in turns."""
-    costs: dict[str, list[Cost]] = {name: [] for name in STARTS}
+    costs: dict[str, list[Cost]] = {name: [] for name in START_COMMANDS}
     for _ in range(sizes.starts):
-        for name, code in STARTS.items():
+        for name, code in START_COMMANDS.items():
             costs[name].append(_run(code)[1])
     least = {name: Cost(min(c.cpu for c in all_), min(c.wall for c in all_)) for name, all_ in costs.items()}
     base = least["python -c pass"].cpu
@@ -93,7 +93,7 @@ def start_up(sizes: Sizes) -> Section:
 def memory(sizes: Sizes) -> Section:
     """Grow few and many views in a process each, and compare their peaks."""
     few = max(1, sizes.memory // 10)
-    peaks = {views: int(_run(GROW.format(views=views))[0]) / 1024 for views in (few, sizes.memory)}
+    peaks = {views: int(_run(GROW_CODE.format(views=views))[0]) / 1024 for views in (few, sizes.memory)}
     return Section(
         title="Memory",
         text="Peak of a process that grows trees call by call, one core; the views are made once.",
@@ -107,7 +107,12 @@ def _run(code: str) -> tuple[str, Cost]:
     environment = os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     done = subprocess.run(
-        [sys.executable, "-c", code], check=True, cwd=ROOT, stdout=subprocess.PIPE, text=True, env=environment
+        [sys.executable, "-c", code],
+        check=True,
+        cwd=REPOSITORY_ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=environment,
     )
     wall = time.perf_counter() - start
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

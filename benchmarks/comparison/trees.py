@@ -28,7 +28,7 @@ from posekit.tree import Check, InterpretationTree, enumerate_leaves
 from posekit.validators import judge, load_ranges, make_checks
 from posekit.views.builtin import view_of
 
-CHUNK = 250
+CHUNK_VIEWS = 250
 """Views grown in one call: their tables stay in the processor's cache."""
 
 Codes = list[NDArray[np.int32]]
@@ -65,8 +65,8 @@ def grow(
     )
     whole = joints == len(JOINTS)
     codes: Codes = []
-    for first in range(0, len(scene), CHUNK):
-        part = slice(first, first + CHUNK)
+    for first in range(0, len(scene), CHUNK_VIEWS):
+        part = slice(first, first + CHUNK_VIEWS)
         leaves = tree.grow(
             scene.camera,
             scene.joints_cam[part, 0],
@@ -180,7 +180,7 @@ def section(sizes: Sizes) -> Section:
     return Section(
         title="From a view to its survivors",
         text=f"{len(scene)} random legal views of the stick figure, exact image points, neck and head known, in calls "
-        f"of {CHUNK}; {len(some)} of them by brute force. Survivors: median {np.median(counts):.0f}, 95 % up to "
+        f"of {CHUNK_VIEWS}; {len(some)} of them by brute force. Survivors: median {np.median(counts):.0f}, 95 % up to "
         f"{np.percentile(counts, 95):.0f}. One thread each.",
         head=("way", "µs a view", "views/s of one core", "brute force = 1", "survivors as brute force's"),
         rows=[
@@ -211,4 +211,4 @@ def _left_out() -> tuple[str, ...]:
     return () if "fast" in paths() else ("the fast path: numba is not installed",)
 
 
-__all__ = ["CHUNK", "Lifter", "grow", "on", "paths", "physical_checks", "section"]
+__all__ = ["CHUNK_VIEWS", "Lifter", "grow", "on", "paths", "physical_checks", "section"]

@@ -21,8 +21,8 @@ from posekit.robots import load_robot
 from posekit.validation import validate
 from posekit.validators import Validator
 
-ROBOTS = ("stick_figure", "human", "simple_humanoid")
-FAILING = 0.03
+ROBOT_NAMES = ("stick_figure", "human", "simple_humanoid")
+FAILING_SHARE = 0.03
 """Share of the configurations that some check rejects: what real recordings have."""
 
 
@@ -31,7 +31,7 @@ def section(sizes: Sizes) -> Section:
     rows: list[tuple[str, ...]] = []
     ratios: dict[str, float] = {}
     bars: dict[str, float] = {}
-    for name in ROBOTS:
+    for name in ROBOT_NAMES:
         robot, count = load_robot(name), sizes.configurations
         validator = Validator(robot, checks=("joint-range", "collision"))
         q = mixed(validator, count)
@@ -67,9 +67,10 @@ def section(sizes: Sizes) -> Section:
         bars |= {f"{name}, {what}": cost.cpu / base for what, cost in costs.items() if what != "bare"}
     return Section(
         title="Validating configurations",
-        text=f"{sizes.configurations} configurations, {FAILING:.0%} of them outside a limit or colliding; limits and "
-        "self-collision, one thread. `verdicts` is `Validator.check(q=…).valid`; `a file's` is everything that "
-        "`posekit validate` does with the configurations it has read, with the pairs and depths of those that fail.",
+        text=f"{sizes.configurations} configurations, {FAILING_SHARE:.0%} of them outside a limit or colliding; "
+        "limits and self-collision, one thread. `verdicts` is `Validator.check(q=…).valid`; `a file's` is everything "
+        "that `posekit validate` does with the configurations it has read, with the pairs and depths of those that "
+        "fail.",
         head=("robot", "pairs", "bare, µs", "verdicts / bare", "a file's / bare", "verdicts as bare's"),
         rows=rows,
         ratios=ratios,
@@ -103,7 +104,7 @@ def mixed(validator: Validator, count: int) -> Any:
     drawn[:, 7:] = np.random.default_rng(0).uniform(lower - 0.01, upper + 0.01, (len(drawn), len(lower)))
     invalid = validator.check(q=drawn).invalid
     rng = np.random.default_rng(1)
-    bad = rng.random(count) < FAILING
+    bad = rng.random(count) < FAILING_SHARE
     good_rows = rng.choice(np.flatnonzero(~invalid), count)
     bad_rows = rng.choice(np.flatnonzero(invalid), count)
     return drawn[np.where(bad, bad_rows, good_rows)]

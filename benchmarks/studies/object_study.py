@@ -12,7 +12,7 @@ from posekit.objects.drawn_views import draw_view
 from posekit.objects.object_recovery import recover_object
 from posekit.settings.scale import Scale
 
-FOUND = 1e-5
+FOUND_DISTANCE = 1e-5
 """Metres, of the object's longest segment, within which a survivor is the truth."""
 
 
@@ -60,7 +60,7 @@ def study_object(
     truth = view.truth
     result = recover_object(view, thing, scale=scale)
     depth = truth[:, :1] * np.array([0.0, 0.0, 1.0])
-    near = FOUND * float(thing.working.lengths.max())
+    near = FOUND_DISTANCE * float(thing.working.lengths.max())
     right = [
         np.linalg.norm(frame.points - goal, axis=-1).max(axis=1, initial=0.0) <= near
         for frame, goal in zip(result.frames, truth - depth, strict=True)

@@ -25,11 +25,11 @@ def load(monkeypatch: pytest.MonkeyPatch):
 def small(load, monkeypatch: pytest.MonkeyPatch):
     """Return `main` without the slow witnesses: engines that are not needed, and real starts."""
     process, lifter = load("benchmarks.comparison.process"), load("benchmarks.comparison.lifter")
-    monkeypatch.setattr(process, "STARTS", {"python -c pass": "pass", "import": "import posekit"})
-    monkeypatch.setattr(process, "GROW", "print({views})")
+    monkeypatch.setattr(process, "START_COMMANDS", {"python -c pass": "pass", "import": "import posekit"})
+    monkeypatch.setattr(process, "GROW_CODE", "print({views})")
     monkeypatch.setattr(lifter, "util", _Without("torch", lifter.util))
-    monkeypatch.setattr(lifter, "SIZES", ((32, 64), *[(64, 64)] * 4, (64, 48)))
-    monkeypatch.setattr(lifter, "RUNS", 1)
+    monkeypatch.setattr(lifter, "LAYER_SIZES", ((32, 64), *[(64, 64)] * 4, (64, 48)))
+    monkeypatch.setattr(lifter, "N_RUNS", 1)
     return load("benchmarks.__main__").main
 
 
@@ -99,10 +99,10 @@ def test_the_gate_compares_ratios_with_a_tolerance(load) -> None:
 
 def test_the_committed_baseline_is_one(load) -> None:
     gate = load("benchmarks.comparison.gate")
-    ratios = gate.read_baseline(gate.BASELINE)
+    ratios = gate.read_baseline(gate.BASELINE_PATH)
     assert ratios
     assert all(ratio > 0 and np.isfinite(ratio) for ratio in ratios.values())
-    document = json.loads(gate.BASELINE.read_text(encoding="utf-8"))
+    document = json.loads(gate.BASELINE_PATH.read_text(encoding="utf-8"))
     assert set(document) == {"schema", "machine", "ratios"}
     assert document["machine"]["versions"]["pin"]
 

@@ -13,8 +13,8 @@ import pytest
 from benchmarks.studies.two_models import reasons
 from benchmarks.studies.two_models.angles import angles_of, excess, figure_limits, in_human_order, readings
 from benchmarks.studies.two_models.human import (
-    HELD,
-    HUMAN,
+    HELD_JOINTS,
+    HUMAN_NAME,
     Counterpart,
     joint_columns,
     limits_of_human,
@@ -24,8 +24,8 @@ from benchmarks.studies.two_models.human import (
     ranges_text,
     without_collision,
 )
-from benchmarks.studies.two_models.labelled import KINDS, Labelled, labelled_postures
-from benchmarks.studies.two_models.reasons import CAPSULES, LONG_TRUNK, ORDER, SEARCH
+from benchmarks.studies.two_models.labelled import ILLEGAL_KINDS, Labelled, labelled_postures
+from benchmarks.studies.two_models.reasons import CAPSULE_REASON, LONG_TRUNK, SEARCH_REASON, SPINE_ORDER
 from posekit import Validator, load_figure
 from posekit.body import Figure
 from posekit.errors import InputError
@@ -54,7 +54,7 @@ def held(
     """The mapped ranges with a trunk that is rigid, as the stick figure's."""
     path = tmp_path_factory.mktemp("ranges") / "held.toml"
     limits = limits_on_human(figure_limits(figure), counterparts)
-    path.write_text(ranges_text(limits | dict.fromkeys(HELD, (0.0, 0.0))), encoding="utf-8")
+    path.write_text(ranges_text(limits | dict.fromkeys(HELD_JOINTS, (0.0, 0.0))), encoding="utf-8")
     return path
 
 
@@ -65,7 +65,7 @@ def labelled(figure: Figure) -> Labelled:
 
 @pytest.fixture(scope="module")
 def judged(figure: Figure, labelled: Labelled, held: Path) -> tuple[Report, Report]:
-    human = Validator(HUMAN, ranges=str(held))
+    human = Validator(HUMAN_NAME, ranges=str(held))
     return Validator(figure).check(labelled.joints), human.check(labelled.joints, lengths=figure.lengths)
 
 
@@ -107,7 +107,7 @@ def test_the_human_reads_each_angle_as_the_table_says(
         dof for dof in counterparts if figure_limits(figure)[dof][0] < turn < figure_limits(figure)[dof][1]
     ]
     q = np.array([configuration(figure, **{dof: turn}) for dof in dofs])
-    human = Validator(HUMAN, ranges=str(held), checks=("reach", "joint-range"))
+    human = Validator(HUMAN_NAME, ranges=str(held), checks=("reach", "joint-range"))
     report = human.check(figure.forward_kinematics(q)[:, : len(JOINTS)], lengths=figure.lengths)
     assert report.verdicts == ["valid"] * len(dofs)
     columns = joint_columns(human)
@@ -161,7 +161,7 @@ def test_the_human_turns_its_spine_in_the_order_that_is_said(
 ) -> None:
     q = random_postures(figure, 16, np.random.default_rng(2))
     postures = figure.forward_kinematics(q)[:, : len(JOINTS)]
-    human = Validator(HUMAN, ranges=str(held), checks=("reach", "joint-range"))
+    human = Validator(HUMAN_NAME, ranges=str(held), checks=("reach", "joint-range"))
     report = human.check(postures, lengths=figure.lengths)
     assert report.fk_distance.max() < 1e-4
     angles, columns = in_human_order(figure, postures), joint_columns(human)
@@ -185,7 +185,7 @@ def test_the_closed_form_places_the_human_on_the_posture(
 ) -> None:
     q = random_postures(figure, 200, np.random.default_rng(4))
     postures = figure.forward_kinematics(q)[:, : len(JOINTS)]
-    model = load_robot(HUMAN, geometry=False).model
+    model = load_robot(HUMAN_NAME, geometry=False).model
     kinematics = scaled(find_joint_map(model).kinematics(model), figure.lengths).kinematics
     order = [kinematics.names.index(joint) for joint in JOINTS]
     off = {}
@@ -208,7 +208,7 @@ def test_the_closed_form_places_the_human_on_the_posture(
 
 
 def test_half_are_legal_and_the_kinds_are_balanced(labelled: Labelled) -> None:
-    assert Counter(labelled.kind) == {"legal": 25} | dict.fromkeys(KINDS, 5)
+    assert Counter(labelled.kind) == {"legal": 25} | dict.fromkeys(ILLEGAL_KINDS, 5)
     assert labelled.joints.shape == (50, 14, 3)
 
 
@@ -266,7 +266,7 @@ def test_the_human_agrees_but_for_the_order_of_its_spine(
         ]
         assert 0 < len(differ) <= 0.2 * len(why)
         for k in differ:
-            assert why[k].startswith(ORDER) or (
+            assert why[k].startswith(SPINE_ORDER) or (
                 why[k] == LONG_TRUNK and labelled.what[k].startswith("neck-pelvis")
             )
             assert other.verdicts[k] != "valid"
@@ -282,8 +282,8 @@ def test_each_reason_is_told_from_the_others(labelled: Labelled, judged: tuple[R
     struck = Report(
         judgements=human.judgements, complete=human.complete, q=human.q, fk_distance=human.fk_distance
     )
-    assert reasons(labelled, stick, struck, inside, mapped=True)[legal] == CAPSULES
+    assert reasons(labelled, stick, struck, inside, mapped=True)[legal] == CAPSULE_REASON
     hit[legal] = False
     other = next(k for k, (a, b) in enumerate(zip(stick.verdicts, human.verdicts, strict=True)) if a > b)
     assert stick.verdicts[other] == "valid"
-    assert reasons(labelled, stick, human, inside, mapped=True)[other] == SEARCH
+    assert reasons(labelled, stick, human, inside, mapped=True)[other] == SEARCH_REASON

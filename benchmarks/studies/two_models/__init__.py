@@ -10,8 +10,8 @@ from benchmarks.studies.two_models.angles import excess as excess
 from benchmarks.studies.two_models.angles import figure_limits as figure_limits
 from benchmarks.studies.two_models.angles import in_human_order as in_human_order
 from benchmarks.studies.two_models.angles import readings as readings
-from benchmarks.studies.two_models.human import HELD as HELD
-from benchmarks.studies.two_models.human import HUMAN as HUMAN
+from benchmarks.studies.two_models.human import HELD_JOINTS as HELD_JOINTS
+from benchmarks.studies.two_models.human import HUMAN_NAME as HUMAN_NAME
 from benchmarks.studies.two_models.human import Counterpart as Counterpart
 from benchmarks.studies.two_models.human import joint_columns as joint_columns
 from benchmarks.studies.two_models.human import limits_of_human as limits_of_human
@@ -20,7 +20,7 @@ from benchmarks.studies.two_models.human import mapped_ranges as mapped_ranges
 from benchmarks.studies.two_models.human import measure_counterparts as measure_counterparts
 from benchmarks.studies.two_models.human import ranges_text as ranges_text
 from benchmarks.studies.two_models.human import without_collision as without_collision
-from benchmarks.studies.two_models.labelled import KINDS as KINDS
+from benchmarks.studies.two_models.labelled import ILLEGAL_KINDS as ILLEGAL_KINDS
 from benchmarks.studies.two_models.labelled import Labelled as Labelled
 from benchmarks.studies.two_models.labelled import labelled_postures as labelled_postures
 from benchmarks.studies.two_models.reasons import reasons as reasons

@@ -15,7 +15,7 @@ from posekit.skeleton import DOFS, HIPS, JOINT, SIDES, TORSO
 TO_ISB: Final = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From x forward, y left, z up to x forward, y up, z right."""
 
-PARTS: Final[Mapping[str, tuple[str, ...]]] = {
+PART_DOFS: Final[Mapping[str, tuple[str, ...]]] = {
     "pelvis": ("pelvis.flexion", "pelvis.bending", "pelvis.rotation"),
     **{
         f"{side}_{joint}": (
@@ -28,7 +28,7 @@ PARTS: Final[Mapping[str, tuple[str, ...]]] = {
 }
 """The angles that place each part, in the order of their rotations; not the neck's: the human has no face."""
 
-JUDGED: Final = tuple(dof for dofs in PARTS.values() for dof in dofs)
+JUDGED_DOFS: Final = tuple(dof for dofs in PART_DOFS.values() for dof in dofs)
 
 Angles = Mapping[str, Array]
 Limits = Mapping[str, tuple[float, float]]
@@ -37,12 +37,12 @@ Limits = Mapping[str, tuple[float, float]]
 def figure_limits(figure: Figure) -> dict[str, tuple[float, float]]:
     """Return the figure's limits without the neck's, degrees."""
     lower, upper = np.degrees(figure.limits.lower), np.degrees(figure.limits.upper)
-    return {dof: (float(lower[k]), float(upper[k])) for k, dof in enumerate(DOFS) if dof in JUDGED}
+    return {dof: (float(lower[k]), float(upper[k])) for k, dof in enumerate(DOFS) if dof in JUDGED_DOFS}
 
 
 def angles_of(figure: Figure, q: Array) -> dict[str, Array]:
     """Return the stick figure's angles in configurations (N, nq), degrees, without the neck's."""
-    return {dof: np.degrees(q[:, column(figure, dof)]) for dof in JUDGED}
+    return {dof: np.degrees(q[:, column(figure, dof)]) for dof in JUDGED_DOFS}
 
 
 def in_human_order(figure: Figure, postures: Array) -> dict[str, Array]:
@@ -70,7 +70,7 @@ def readings(angles: Angles) -> dict[str, list[Array]]:
     Representing Attitude, 5.6). A limb has two more, as it may bend backward after half a turn about itself.
     """
     found: dict[str, list[Array]] = {}
-    for part, dofs in PARTS.items():
+    for part, dofs in PART_DOFS.items():
         way = np.stack([angles[dof] for dof in dofs], axis=1)
         ways = [way, other_branch(way, half_turn=180.0)]
         if len(dofs) > 3:
@@ -83,7 +83,7 @@ def excess(angles: Angles, limits: Limits) -> dict[str, Array]:
     """Return, by part, how far its angles are outside limits (N,), degrees, in the reading that is least outside."""
     found = {}
     for part, ways in readings(angles).items():
-        lower, upper = np.array([limits[dof] for dof in PARTS[part]]).T
+        lower, upper = np.array([limits[dof] for dof in PART_DOFS[part]]).T
         width, outside = upper - lower, []
         for way in ways:
             past = np.mod(way - lower, 360.0)  # from the lower limit, upward

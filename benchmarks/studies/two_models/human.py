@@ -11,21 +11,21 @@ from typing import Final, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.studies.two_models.angles import JUDGED, Limits, column
+from benchmarks.studies.two_models.angles import JUDGED_DOFS, Limits, column
 from posekit.body import Figure
 from posekit.skeleton import JOINTS
 from posekit.validators import Report, Validator
 
-HUMAN: Final = "human"
-MAPPED: Final = "human_as_stick_figure.toml"
+HUMAN_NAME: Final = "human"
+MAP_FILE: Final = "human_as_stick_figure.toml"
 
-BEND: Final = 60.0
+BEND_DEGREES: Final = 60.0
 """Degrees by which elbows and knees are bent while joints are compared, so that axial rotations show."""
 
-TURN: Final = 20.0
+TURN_DEGREES: Final = 20.0
 """Degrees by which one joint is turned."""
 
-HELD: Final = (
+HELD_JOINTS: Final = (
     "middle_thoracic_Z",
     "middle_thoracic_X",
     "right_clavicle_joint_X",
@@ -44,7 +44,7 @@ class Counterpart(NamedTuple):
 
 def mapped_ranges() -> Path:
     """Return the file of the stick figure's ranges on the human's joints."""
-    return Path(str(resources.files("posekit.urdf") / "ranges" / MAPPED))
+    return Path(str(resources.files("posekit.urdf") / "ranges" / MAP_FILE))
 
 
 def without_collision(report: Report) -> Report:
@@ -72,19 +72,19 @@ def measure_counterparts(figure: Figure, validator: Validator | None = None) -> 
         By the names in `posekit.skeleton.DOFS`, without the neck's.
     """
     base = pin.neutral(figure.model)
-    for dof in JUDGED:
+    for dof in JUDGED_DOFS:
         if "elbow" in dof or "knee" in dof:
-            base[column(figure, dof)] = np.radians(BEND)
-    q = np.tile(base, (len(JUDGED) + 1, 1))
-    for row, dof in enumerate(JUDGED, start=1):
-        q[row, column(figure, dof)] += np.radians(TURN)
+            base[column(figure, dof)] = np.radians(BEND_DEGREES)
+    q = np.tile(base, (len(JUDGED_DOFS) + 1, 1))
+    for row, dof in enumerate(JUDGED_DOFS, start=1):
+        q[row, column(figure, dof)] += np.radians(TURN_DEGREES)
     postures = figure.forward_kinematics(q)[:, : len(JOINTS)]
-    validator = validator or Validator(HUMAN, checks=("reach",))
+    validator = validator or Validator(HUMAN_NAME, checks=("reach",))
     columns = joint_columns(validator)
     names, at = list(columns), list(columns.values())
     read = np.degrees(validator.check(postures, lengths=figure.lengths).q[:, at])
     found = {}
-    for row, dof in enumerate(JUDGED, start=1):
+    for row, dof in enumerate(JUDGED_DOFS, start=1):
         turned = read[row] - read[0]
         k = int(np.argmax(np.abs(turned)))
         sign = int(np.sign(turned[k]))

@@ -8,7 +8,14 @@ from typing import Final
 
 import numpy as np
 
-from benchmarks.studies.two_models.angles import JUDGED, PARTS, angles_of, column, excess, figure_limits
+from benchmarks.studies.two_models.angles import (
+    JUDGED_DOFS,
+    PART_DOFS,
+    angles_of,
+    column,
+    excess,
+    figure_limits,
+)
 from posekit.body import Figure
 from posekit.body.capsules import Capsule
 from posekit.errors import InputError
@@ -16,7 +23,7 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, SIDES
 from posekit.synthesis import random_postures
 
-KINDS: Final = (
+ILLEGAL_KINDS: Final = (
     "beyond a limit",
     "bent the wrong way",
     "arm through the trunk",
@@ -25,25 +32,25 @@ KINDS: Final = (
 )
 """Kinds of illegal postures."""
 
-BEYOND: Final = (10.0, 60.0)
+BEYOND_DEGREES: Final = (10.0, 60.0)
 """Degrees beyond a limit."""
 
-CLEARLY: Final = 5.0
+CLEAR_DEGREES: Final = 5.0
 """Degrees by which an illegal posture is outside the limits however its angles are read."""
 
-VISIBLE: Final = (0.3, 0.15)
+MIN_VISIBLE: Final = (0.3, 0.15)
 """Cosine of the middle angle, sine of the bend, below which a limb's angles are hardly to be told apart."""
 
-DEEP: Final = 0.02
+DEEP_METRES: Final = 0.02
 """Metres of penetration that are no matter of rounding."""
 
-DRAWS: Final = 50
+N_DRAWS: Final = 50
 """Ways of an arm that are tried at once."""
 
-LONGER: Final = (0.05, 0.15)
+STRETCH_METRES: Final = (0.05, 0.15)
 """Metres by which a segment is stretched: more than the 3 cm that rigid parts may give."""
 
-STRETCHED: Final[Mapping[str, Mapping[tuple[str, str], tuple[str, ...]]]] = {
+STRETCHED_SEGMENTS: Final[Mapping[str, Mapping[tuple[str, str], tuple[str, ...]]]] = {
     "limb": {
         (f"{side}_{joints[k]}", f"{side}_{joints[k + 1]}"): tuple(
             f"{side}_{joint}" for joint in joints[k + 1 :]
@@ -82,7 +89,7 @@ class Labelled:
     joints : array (N, 14, 3)
         Metres.
     kind : tuple of str
-        ``legal``, or one of `KINDS`.
+        ``legal``, or one of `ILLEGAL_KINDS`.
     what : tuple of str
         What was changed, and by how much.
     """
@@ -120,15 +127,15 @@ def labelled_postures(figure: Figure, n: int, rng: np.random.Generator) -> Label
     InputError
         Where n is not a positive multiple of the number of kinds.
     """
-    if n < 1 or n % len(KINDS):
-        raise InputError(f"{n} postures were asked for; expected a positive multiple of {len(KINDS)}")
+    if n < 1 or n % len(ILLEGAL_KINDS):
+        raise InputError(f"{n} postures were asked for; expected a positive multiple of {len(ILLEGAL_KINDS)}")
     legal = random_postures(figure, n, rng)
     joints = [*figure.forward_kinematics(legal)[:, : len(JOINTS)]]
     kinds, whats = ["legal"] * n, [""] * n
     makers = (_beyond, _wrong_way, _through_trunk, _limb_stretched, _trunk_stretched)
-    for kind, make in zip(KINDS, makers, strict=True):
+    for kind, make in zip(ILLEGAL_KINDS, makers, strict=True):
         done = 0
-        while done < n // len(KINDS):
+        while done < n // len(ILLEGAL_KINDS):
             made = make(figure, legal[rng.integers(n)].copy(), rng)
             if made is not None:
                 joints.append(made[0])
@@ -151,8 +158,8 @@ def penetration(points: Array, one: Capsule, other: Capsule) -> Array:
 
 def _beyond(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
     """Push one angle beyond a limit; hinges only beyond the upper one."""
-    dof = JUDGED[rng.integers(len(JUDGED))]
-    amount = rng.uniform(*BEYOND)
+    dof = JUDGED_DOFS[rng.integers(len(JUDGED_DOFS))]
+    amount = rng.uniform(*BEYOND_DEGREES)
     up = "elbow" in dof or "knee" in dof or rng.random() < 0.5
     lower, upper = figure_limits(figure)[dof]
     return _pushed(
@@ -161,19 +168,19 @@ def _beyond(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
 
 
 def _wrong_way(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
-    hinges = [dofs[-1] for part, dofs in PARTS.items() if part != "pelvis"]
-    amount = rng.uniform(*BEYOND)
+    hinges = [dofs[-1] for part, dofs in PART_DOFS.items() if part != "pelvis"]
+    amount = rng.uniform(*BEYOND_DEGREES)
     return _pushed(figure, q, hinges[rng.integers(len(hinges))], -amount, f"{-amount:+.0f}")
 
 
 def _pushed(figure: Figure, q: Array, dof: str, angle: float, said: str) -> Made:
     """Set an angle (degrees): it must be outside however it is read, be seen, and be all that is wrong."""
     q[column(figure, dof)] = np.radians(angle)
-    part = next(part for part, dofs in PARTS.items() if dof in dofs)
-    angles = {name: q[column(figure, name)] for name in PARTS[part]}
+    part = next(part for part, dofs in PART_DOFS.items() if dof in dofs)
+    angles = {name: q[column(figure, name)] for name in PART_DOFS[part]}
     _, middle, _, *bend = angles.values()
-    seen = abs(np.cos(middle)) > VISIBLE[0] and all(abs(np.sin(angle)) > VISIBLE[1] for angle in bend)
-    if not seen or excess(angles_of(figure, q[None]), figure_limits(figure))[part][0] < CLEARLY:
+    seen = abs(np.cos(middle)) > MIN_VISIBLE[0] and all(abs(np.sin(angle)) > MIN_VISIBLE[1] for angle in bend)
+    if not seen or excess(angles_of(figure, q[None]), figure_limits(figure))[part][0] < CLEAR_DEGREES:
         return None
     return None if figure.collides(q[None])[0] else (_placed(figure, q), f"{dof} {said}")
 
@@ -181,34 +188,34 @@ def _pushed(figure: Figure, q: Array, dof: str, angle: float, said: str) -> Made
 def _through_trunk(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
     """Turn one arm until it is inside the trunk: points on the two capsules' axes prove it."""
     side = SIDES[rng.integers(2)]
-    dofs = PARTS[f"{side}_shoulder"]
+    dofs = PART_DOFS[f"{side}_shoulder"]
     lower, upper = np.radians([figure_limits(figure)[dof] for dof in dofs]).T
-    many = np.tile(q, (DRAWS, 1))
-    many[:, [column(figure, dof) for dof in dofs]] = rng.uniform(lower, upper, (DRAWS, len(dofs)))
+    many = np.tile(q, (N_DRAWS, 1))
+    many[:, [column(figure, dof) for dof in dofs]] = rng.uniform(lower, upper, (N_DRAWS, len(dofs)))
     points = figure.forward_kinematics(many)
     capsules = {capsule.link: capsule for capsule in figure.capsules}
     pairs = [("torso", f"{side}_upper_arm"), ("torso", f"{side}_forearm"), ("hips", f"{side}_forearm")]
     depth = np.stack([penetration(points, capsules[trunk], capsules[arm]) for trunk, arm in pairs], axis=1)
-    row = int(np.argmax(depth.max(axis=1) >= DEEP))
-    if depth[row].max() < DEEP:
+    row = int(np.argmax(depth.max(axis=1) >= DEEP_METRES))
+    if depth[row].max() < DEEP_METRES:
         return None
     trunk, arm = pairs[int(np.argmax(depth[row]))]
     return points[row, : len(JOINTS)], f"{trunk}-{arm} {depth[row].max() * 100:.0f} cm"
 
 
 def _limb_stretched(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
-    return _stretched(_placed(figure, q), STRETCHED["limb"], rng)
+    return _stretched(_placed(figure, q), STRETCHED_SEGMENTS["limb"], rng)
 
 
 def _trunk_stretched(figure: Figure, q: Array, rng: np.random.Generator) -> Made:
-    return _stretched(_placed(figure, q), STRETCHED["trunk"], rng)
+    return _stretched(_placed(figure, q), STRETCHED_SEGMENTS["trunk"], rng)
 
 
 def _stretched(
     joints: Array, segments: Mapping[tuple[str, str], Sequence[str]], rng: np.random.Generator
 ) -> Made:
     start, end = list(segments)[rng.integers(len(segments))]
-    longer = rng.uniform(*LONGER)
+    longer = rng.uniform(*STRETCH_METRES)
     along = joints[JOINT[end]] - joints[JOINT[start]]
     joints[[JOINT[joint] for joint in segments[start, end]]] += longer * along / np.linalg.norm(along)
     return joints, f"{start}-{end} +{longer * 100:.0f} cm"

@@ -11,13 +11,13 @@ from benchmarks.studies.two_models.angles import Angles
 from benchmarks.studies.two_models.labelled import Labelled
 from posekit.validators import Report
 
-ORDER: Final = "order of the spine's rotations"
+SPINE_ORDER: Final = "order of the spine's rotations"
 OTHER_LIMIT: Final = "the human's own limit"
 LONG_TRUNK: Final = "no proof: a spine with joints has no one length"
 OTHER_JOINTS: Final = "joints that the stick figure has not"
-CAPSULES: Final = "made-up capsules"
-LITTLE: Final = ", too little to call"
-SEARCH: Final = "another configuration, or none, was found"
+CAPSULE_REASON: Final = "made-up capsules"
+TOO_LITTLE: Final = ", too little to call"
+SEARCH_REASON: Final = "another configuration, or none, was found"
 
 
 def reasons(postures: Labelled, stick: Report, human: Report, expected: Angles, *, mapped: bool) -> list[str]:
@@ -41,16 +41,16 @@ def reasons(postures: Labelled, stick: Report, human: Report, expected: Angles, 
         if one == other:
             found.append("")
         elif ours[k] != theirs[k]:
-            found.append(CAPSULES)
+            found.append(CAPSULE_REASON)
         elif postures.kind[k] == "trunk stretched":
             found.append(LONG_TRUNK)
         elif one == "valid" and worst[k] <= 0:
-            found.append(SEARCH)
+            found.append(SEARCH_REASON)
         elif other == "valid" and worst[k] > 0:
             found.append(OTHER_JOINTS)
         else:
-            why = ORDER if mapped and pelvis_alone[k] else OTHER_LIMIT
-            found.append(why + LITTLE if other == "undecided" else why)
+            why = SPINE_ORDER if mapped and pelvis_alone[k] else OTHER_LIMIT
+            found.append(why + TOO_LITTLE if other == "undecided" else why)
     return found
 
 
