@@ -12,11 +12,11 @@ import numpy as np
 
 from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints import KeyPoints, chosen, key_point_formats
-from posekit.formats.keypoints.coco_parts import PARTS, SEEN
-from posekit.formats.keypoints.mediapipe_names import NAMES
+from posekit.formats.keypoints.coco_parts import FLAGGED_POINTS, WHOLEBODY_PARTS
+from posekit.formats.keypoints.mediapipe_names import LANDMARK_NAMES
 from posekit.formats.keypoints.rows import whole
 from posekit.formats.own import OpenCVModel, View
-from posekit.formats.skeleton_maps import LANDMARK, LANDMARKS, SkeletonMap, load_skeleton_map
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, LANDMARK_ORDER, SkeletonMap, load_skeleton_map
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.skeleton import HEAD, JOINT, JOINTS
 
@@ -61,11 +61,11 @@ def view_keypoints(view: View, format: str, skeleton: str = "") -> KeyPoints:
 
 def _landmarks(values: np.ndarray) -> np.ndarray:
     """Add the girdles' middles to joints and head points (F, 19, n)."""
-    found = np.full((len(values), len(LANDMARKS), values.shape[-1]), np.nan)
+    found = np.full((len(values), len(LANDMARK_ORDER), values.shape[-1]), np.nan)
     found[:, : len(JOINTS) + len(HEAD)] = values
     for middle, part in (("mid_shoulders", "shoulder"), ("mid_hips", "hip")):
         sides = [JOINT[f"{side}_{part}"] for side in ("right", "left")]
-        found[:, LANDMARK[middle]] = values[:, sides].mean(axis=1)
+        found[:, LANDMARK_INDEX[middle]] = values[:, sides].mean(axis=1)
     return found
 
 
@@ -74,7 +74,7 @@ def scatter(layout: SkeletonMap, landmarks: np.ndarray) -> np.ndarray:
     values = np.full((*landmarks.shape[:-2], len(layout.points), landmarks.shape[-1]), np.nan)
     for landmark, parts in layout.landmarks.items():
         if len(parts) == 1 and parts[0] in layout.points:
-            values[..., layout.points.index(parts[0]), :] = landmarks[..., LANDMARK[landmark], :]
+            values[..., layout.points.index(parts[0]), :] = landmarks[..., LANDMARK_INDEX[landmark], :]
     return values
 
 
@@ -90,7 +90,7 @@ def in_layout(keypoints: KeyPoints, layout: SkeletonMap) -> KeyPoints:
         if plain(name) in own:
             moved[:, k] = values[:, own[plain(name)]]
     landmarks = scatter(layout, keypoints.layout.gather(values))
-    placed = scatter(layout, np.ones((1, len(LANDMARKS), 1)))[0, :, 0] == 1
+    placed = scatter(layout, np.ones((1, len(LANDMARK_ORDER), 1)))[0, :, 0] == 1
     moved[:, placed] = landmarks[:, placed]
     moved[np.isnan(moved[..., 0])] = np.nan
     return replace(
@@ -210,13 +210,13 @@ def _coco_results(path: Path, keypoints: KeyPoints) -> None:
 def _wholebody(path: Path, keypoints: KeyPoints) -> None:
     keypoints = in_layout(keypoints, load_skeleton_map("coco_wholebody_133"))
     visible = np.where(keypoints.occluded, 1.0, 2.0)
-    sure = keypoints.confidence[:, SEEN:]
-    visible[:, SEEN:] = np.where((sure > 0) & (sure < 1), sure, 1)
+    sure = keypoints.confidence[:, FLAGGED_POINTS:]
+    visible[:, FLAGGED_POINTS:] = np.where((sure > 0) & (sure < 1), sure, 1)
     people = []
     for row in _flat(keypoints.points, visible):
         one: dict[str, Any] = {}
         start = 0
-        for name, count, flag in PARTS:
+        for name, count, flag in WHOLEBODY_PARTS:
             one[name] = row[3 * start : 3 * (start + count)]
             start += count
             if flag:
@@ -244,7 +244,9 @@ def _mediapipe_json(keypoints: KeyPoints) -> str:
         if not np.isnan(keypoints.size[index]).any():
             frame["image_width"], frame["image_height"] = keypoints.size[index].tolist()
         rows = np.flatnonzero(keypoints.frame == index).tolist()
-        frame["pose_landmarks"] = [[_landmark(keypoints, row, k) for k in range(len(NAMES))] for row in rows]
+        frame["pose_landmarks"] = [
+            [_landmark(keypoints, row, k) for k in range(len(LANDMARK_NAMES))] for row in rows
+        ]
         frames.append(frame)
     return json.dumps({"landmarks": "mediapipe pose 33", "frames": frames})
 
@@ -263,7 +265,7 @@ def _mediapipe_table(keypoints: KeyPoints) -> str:
     for row, frame in enumerate(keypoints.frame.tolist()):
         person = count[frame] = count.get(frame, -1) + 1
         time = keypoints.time[frame]
-        for k, name in enumerate(NAMES):
+        for k, name in enumerate(LANDMARK_NAMES):
             x, y = keypoints.points[row, k].tolist()
             if not np.isnan(x):
                 sure = float(keypoints.confidence[row, k])

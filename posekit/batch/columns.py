@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from posekit.batch.image_rows import N_IMAGE_POINTS, ImageRows
 from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
-from posekit.formats.motion.survivors import COORDINATES
+from posekit.formats.motion.survivors import COORDINATE_COLUMNS
 from posekit.formats.own.column import Column, columns_in
 from posekit.formats.own.survivor_columns import Likelihoods, SurvivorColumns
 from posekit.geometry import Array
@@ -191,7 +191,7 @@ def schema_of(recipe: Recipe) -> Any:
             ("survivors", pa.int32()),
             ("survivor", pa.int32()),
             ("branches", pa.string()),
-            *((name, pa.float64()) for name in (*COORDINATES, *value_columns(recipe))),
+            *((name, pa.float64()) for name in (*COORDINATE_COLUMNS, *value_columns(recipe))),
             *((name, text) for name in TEXT_COLUMNS if name != "input"),
         ]
     )
@@ -205,7 +205,7 @@ def table_of(frames: ShardFrames, input: str, person: int, schema: Any) -> Any:
     filled = frames.count[of_row] > 0
     starts = np.cumsum(repeated) - repeated
     survivor = np.where(filled, np.arange(len(of_row)) - starts[of_row], NO_SURVIVOR)
-    flat = frames.joints.reshape(-1, len(COORDINATES))
+    flat = frames.joints.reshape(-1, len(COORDINATE_COLUMNS))
     columns: dict[str, Any] = {
         "input": _dictionary(pa, (input,), np.zeros(len(of_row), dtype=np.int32)),
         "person": np.full(len(of_row), person, dtype=np.int32),
@@ -214,7 +214,7 @@ def table_of(frames: ShardFrames, input: str, person: int, schema: Any) -> Any:
         "survivors": frames.count[of_row].astype(np.int32),
         "survivor": survivor.astype(np.int32),
         "branches": _strings(pa, frames.branches, filled),
-        **{name: _scattered(flat[:, k], filled) for k, name in enumerate(COORDINATES)},
+        **{name: _scattered(flat[:, k], filled) for k, name in enumerate(COORDINATE_COLUMNS)},
         **{name: _dictionary(pa, getattr(frames, name), of_row) for name in TEXT_COLUMNS if name != "input"},
     }
     for name in schema.names:

@@ -34,7 +34,7 @@ from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, swap
 from posekit.formats.own import CameraModel, ScaledOrthographicModel, View, read_view
 from posekit.formats.recognising import recognise
-from posekit.formats.skeleton_maps import LANDMARK, SkeletonMap
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, SkeletonMap
 from posekit.safe_io import read_json, refusal
 from posekit.skeleton import JOINTS, POINTS
 from posekit.views.camera import in_pixels, sighting
@@ -50,7 +50,7 @@ STAGED_SCHEMA: Final = "posekit.batch_input/1"
 VIEWS_FORMAT: Final = "views"
 """What inputs are called that say camera and person themselves."""
 MIDDLE_POINTS: Final = {f"mid_{part}s": (f"right_{part}", f"left_{part}") for part in ("shoulder", "hip")}
-NECK_POINTS: Final = (LANDMARK["neck"], LANDMARK["mid_shoulders"])
+NECK_POINTS: Final = (LANDMARK_INDEX["neck"], LANDMARK_INDEX["mid_shoulders"])
 MAX_STAGED_WARNINGS: Final = 20
 """Warnings that are kept of one input."""
 

@@ -15,7 +15,7 @@ from posekit.batch.digests import MAX_INPUT_BYTES
 from posekit.batch.image_rows import ImageRows
 from posekit.safe_io import open_npz, refusal
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
-from posekit.views.person_view import RATE
+from posekit.views.person_view import ASSUMED_VIEW_RATE
 
 
 def is_view_arrays(path: Path) -> bool:
@@ -50,7 +50,7 @@ def read_view_arrays(path: Path, rate: float | None = None) -> tuple[ImageRows, 
         points = np.concatenate([image, optional("head_image", (len(HEAD_POINTS), 2))], axis=1)
         rows = ImageRows(
             frame=frame.astype(np.int64),
-            time=optional("time", ()) if timed else frame / (rate or RATE),
+            time=optional("time", ()) if timed else frame / (rate or ASSUMED_VIEW_RATE),
             points=points,
             confidence=optional("confidence", (len(POINTS),)),
             root=optional("root", (3,)),

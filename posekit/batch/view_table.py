@@ -25,7 +25,7 @@ from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.safe_io import cut, extra, one_line, open_file, refusal, replacing
 from posekit.skeleton import POINTS
-from posekit.views.person_view import RATE
+from posekit.views.person_view import ASSUMED_VIEW_RATE
 
 HEAD_KEY: Final = b"posekit.view"
 UV_COLUMNS: Final = tuple(f"{point}_{axis}" for point in POINTS for axis in "uv")
@@ -260,7 +260,7 @@ def _rows(columns: dict[str, Array], first: int, rate: float | None) -> ImageRow
     points = np.where(np.isnan(points).any(axis=-1, keepdims=True), np.nan, points)
     return ImageRows(
         frame=numbers,
-        time=columns["time"] if timed else numbers / (rate or RATE),
+        time=columns["time"] if timed else numbers / (rate or ASSUMED_VIEW_RATE),
         points=points,
         confidence=np.where(np.isnan(points[..., 0]), np.nan, sure),
         root=np.stack([columns.get(name, unknown) for name in ROOT_COLUMNS], axis=-1),

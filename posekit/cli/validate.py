@@ -273,7 +273,7 @@ def _read(path: Path) -> _Input:
     """Read a file of whatever holds postures or configurations."""
     from posekit.formats.format import Content
     from posekit.formats.held_postures import held_postures, postures_of_result
-    from posekit.formats.motion import UPS as DIRECTIONS
+    from posekit.formats.motion import UP_DIRECTIONS
     from posekit.formats.own import read_configurations, read_result
     from posekit.formats.recognising import recognise
 
@@ -286,7 +286,7 @@ def _read(path: Path) -> _Input:
     held = held_postures(path, found)
     if found.holds is not Content.MOTION:
         return _Input(held.postures)
-    return _Input(held.postures, held.clip, DIRECTIONS[held.up] if held.up else None)
+    return _Input(held.postures, held.clip, UP_DIRECTIONS[held.up] if held.up else None)
 
 
 def _count(postures: Postures | NamedConfigurations) -> int:

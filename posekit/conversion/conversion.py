@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from posekit.conversion.motion_output import (
-    TABLES,
+    TABLE_FORMATS,
     Output,
     by_suffix,
     carries_points,
@@ -20,7 +20,7 @@ from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
 from posekit.formats.format import Content
 from posekit.formats.keypoints import is_format
-from posekit.formats.motion import UPS, motion_formats
+from posekit.formats.motion import UP_DIRECTIONS, motion_formats
 from posekit.formats.own import View
 from posekit.formats.recognising import recognise
 from posekit.safe_io import nearest, refusal, shown
@@ -28,12 +28,12 @@ from posekit.views.opened import Opened
 from posekit.views.opening import open_views
 from posekit.views.source import Source
 
-OWN: Final = ("view", "postures")
+OWN_TARGETS: Final = ("view", "postures")
 """Files of posekit that can be converted to."""
 
-MOTION: Final = ("--format", "--skeleton", "--up", "--input-up", "--clip", "--unit")
-DETECTOR: Final = ("--format", "--skeleton", "--person", "--swap-sides", "--size")
-CAMERA_AND_PERSON: Final = (
+MOTION_OPTIONS: Final = ("--format", "--skeleton", "--up", "--input-up", "--clip", "--unit")
+DETECTOR_OPTIONS: Final = ("--format", "--skeleton", "--person", "--swap-sides", "--size")
+CAMERA_AND_PERSON_OPTIONS: Final = (
     "--camera",
     "--fov",
     "--focal35",
@@ -45,8 +45,8 @@ CAMERA_AND_PERSON: Final = (
     "--calibrate",
     "--proportions",
 )
-TELLING: Final = {
-    Content.MOTION: MOTION,
+OPTIONS_OF: Final = {
+    Content.MOTION: MOTION_OPTIONS,
     Content.RESULT: ("--posture", "--view", "--up", "--input-up"),
     Content.VIEW: ("--skeleton", "--up", "--input-up"),
     Content.POSTURES: ("--up", "--input-up"),
@@ -95,15 +95,15 @@ class Conversion:
     unit: str = ""
 
     def __post_init__(self) -> None:
-        written = (*OWN, *(one.name for one in motion_formats().values() if one.writes))
+        written = (*OWN_TARGETS, *(one.name for one in motion_formats().values() if one.writes))
         if self.to and is_format(self.to):
             got = f"{self.to}, which detectors write and posekit reads"
             raise refusal("--to", "", got, ", ".join(written), "choose one of them")
         if self.to and self.to not in written:
             raise refusal("--to", "", shown(self.to), "a known format", nearest(self.to, written))
         for option, axis in (("--up", self.up), ("--input-up", self.input_up)):
-            if axis not in ("", *UPS):
-                raise refusal(option, "", shown(axis), ", ".join(UPS), "name an axis")
+            if axis not in ("", *UP_DIRECTIONS):
+                raise refusal(option, "", shown(axis), ", ".join(UP_DIRECTIONS), "name an axis")
 
     def check_options(self, kind: Content, telling: tuple[str, ...]) -> None:
         """Refuse options that say nothing about such a file: whoever gave them expects something of them."""
@@ -137,7 +137,7 @@ def convert(job: Conversion) -> list[str]:
     what = recognise(job.given, job.source.format)
     if what.holds is Content.KEY_POINTS:
         return _key_points(job)
-    job.check_options(what.holds, TELLING.get(what.holds, ()))
+    job.check_options(what.holds, OPTIONS_OF.get(what.holds, ()))
     if what.holds is Content.CAMERAS:
         return _cameras(job)
     if job.to == "view":
@@ -147,7 +147,7 @@ def convert(job: Conversion) -> list[str]:
     output = Output(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
     if what.holds is Content.MOTION and carries_points(output.to):
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
-        carried = motion if output.to in TABLES else one_clip(motion)
+        carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
         return write_points(output, carried, job.source.skeleton)
     found = moving(
         job.given,
@@ -174,7 +174,7 @@ def _key_points(job: Conversion) -> list[str]:
         raise refusal(
             job.output, "", "a place among the files that are read", "another folder", "name one beside it"
         )
-    job.check_options(Content.KEY_POINTS, (*DETECTOR, *CAMERA_AND_PERSON))
+    job.check_options(Content.KEY_POINTS, (*DETECTOR_OPTIONS, *CAMERA_AND_PERSON_OPTIONS))
     if to != "view":
         raise refusal(
             job.output,

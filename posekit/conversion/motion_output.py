@@ -29,16 +29,16 @@ from posekit.formats.own import Postures
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import refusal
 
-CUSTOM: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
+CUSTOMARY_UP: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
 """The axis that points up in a format's files by custom; in others it stays as it is."""
 
-FIXED: Final = ("trc", "bvh", "glb")
+ALWAYS_Y_UP: Final = ("trc", "bvh", "glb")
 """Formats in whose files y points up, and nothing else."""
 
-EVEN: Final = ("bvh", "c3d")
+EVENLY_TIMED: Final = ("bvh", "c3d")
 """Formats that have one time from frame to frame."""
 
-TABLES: Final = ("csv", "npz", "parquet")
+TABLE_FORMATS: Final = ("csv", "npz", "parquet")
 """Formats that carry all survivors of a frame, and motion in several clips."""
 
 
@@ -65,12 +65,12 @@ class Output:
     up: str = ""
 
     def __post_init__(self) -> None:
-        if self.to in FIXED and self.up not in ("", "+y"):
+        if self.to in ALWAYS_Y_UP and self.up not in ("", "+y"):
             raise refusal("--up", "", self.up, f"+y, as in every file of {self.to}", "leave it out")
 
     def up_of(self, up: str) -> str:
         """Return the axis that points up in the file, where it is `up` in what is written."""
-        return self.up or CUSTOM.get(self.to, "") or up
+        return self.up or CUSTOMARY_UP.get(self.to, "") or up
 
 
 def by_suffix(path: Path) -> str:
@@ -138,7 +138,7 @@ def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[
         return _write_every(output, found)
     if output.to == "postures":
         return _write_postures(output, found)
-    if found.gaps and output.to in EVEN:
+    if found.gaps and output.to in EVENLY_TIMED:
         raise InputError(
             f"{output.path}: {found.gaps} frames have no posture, and {output.to} has one in every frame; expected "
             "a format with times; choose trc, csv, npz, parquet, mot, glb or urdf"
@@ -146,7 +146,7 @@ def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[
     if carries_points(output.to):
         return write_points(output, found.motion(str(output.path)))
     # In BVH and GLB the writers turn z to y.
-    up = "+z" if output.to in FIXED else output.up_of(found.up)
+    up = "+z" if output.to in ALWAYS_Y_UP else output.up_of(found.up)
     q, off = found.configurations(up)
     if output.to == "urdf":
         write_urdf_folder(output.path, found.figure, q, found.time, up=up)
@@ -167,11 +167,11 @@ def _write_postures(output: Output, found: Moving) -> list[str]:
 
 def _write_every(output: Output, found: Moving) -> list[str]:
     writer: Callable[[Output, Moving], list[str]] | None = (
-        _write_table if output.to in TABLES else _write_bodies if output.to == "glb" else None
+        _write_table if output.to in TABLE_FORMATS else _write_bodies if output.to == "glb" else None
     )
     if writer is None:
         raise InputError(
-            f"--posture: all, but {output.to} carries one posture a frame; expected {', '.join(TABLES)} or glb; "
+            f"--posture: all, but {output.to} carries one posture a frame; expected {', '.join(TABLE_FORMATS)} or glb; "
             "choose one of them, or --posture first"
         )
     return writer(output, found)

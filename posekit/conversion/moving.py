@@ -28,13 +28,13 @@ from posekit.recovery.ranked import probabilities
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validation.validate import recovered_with
 
-EVEN: Final = 0.25
+EVEN_STEP_SHARE: Final = 0.25
 """Share of a step by which the time of a picture may be off its place."""
 
 MOST_GAPS: Final = 4
 """Times as many frames as there are that gaps may make."""
 
-RATE: Final = 30.0
+ASSUMED_RATE: Final = 30.0
 """Frames a second of postures without times."""
 
 CAMERA_UP: Final = "-y"
@@ -115,7 +115,7 @@ class Moving:
     def rate(self) -> float:
         """Frames a second."""
         steps = np.diff(np.unique(self.time))
-        return float(1 / np.median(steps)) if len(steps) else RATE
+        return float(1 / np.median(steps)) if len(steps) else ASSUMED_RATE
 
     def configurations(self, up: str = "+z") -> tuple[Array, float]:
         """Return the figure's configurations (N, nq), `up` up, and how far their joints are from the points at most."""
@@ -210,7 +210,7 @@ def moving(
         head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
         points = np.concatenate([given.joints, head], axis=1)
         up = up or held.up or _guessed(given.joints, str(path))
-        return _recorded(points, np.arange(len(points)) / RATE, up)
+        return _recorded(points, np.arange(len(points)) / ASSUMED_RATE, up)
     remedy = "; convert the result that it is of" if what.holds is Content.SURVIVORS else ""
     raise InputError(
         f"{path}: {what.holds.value}, in which nothing moves; expected a result, postures or motion{remedy}"
@@ -310,7 +310,7 @@ def _evenly(time: Array) -> tuple[Array, NDArray[np.intp]]:
     steps = np.diff(time)
     step = float(np.median(steps)) if len(steps) else 1.0
     places = np.concatenate([[0.0], np.cumsum(np.round(steps / step))])
-    whole = np.abs(time - time[:1] - places * step) <= EVEN * step
+    whole = np.abs(time - time[:1] - places * step) <= EVEN_STEP_SHARE * step
     if not whole.all() or places[-1] > MOST_GAPS * len(time):
         return time, np.arange(len(time))
     place = places.astype(np.intp)

@@ -13,7 +13,7 @@ from posekit.formats.registry import names
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.safe_io import nearest, refusal, shown
 
-WORDS: Final[Mapping[str, Content]] = {
+CONTENT_WORDS: Final[Mapping[str, Content]] = {
     "camera": Content.CAMERAS,
     **{one.word: one for one in Content if one is not Content.OTHER},
 }
@@ -80,10 +80,10 @@ def open(
     >>> postures = posekit.open("trial.trc", "postures")  # doctest: +SKIP
     """
     path = Path(path)
-    if as_ and as_ not in WORDS:
-        raise refusal("as_", "", shown(as_), "what a file can hold", nearest(as_, WORDS))
+    if as_ and as_ not in CONTENT_WORDS:
+        raise refusal("as_", "", shown(as_), "what a file can hold", nearest(as_, CONTENT_WORDS))
     found = recognise(path, format)
-    wanted = WORDS[as_] if as_ else found.holds
+    wanted = CONTENT_WORDS[as_] if as_ else found.holds
     if wanted is Content.POSTURES:
         from posekit.formats.held_postures import held_postures
 
@@ -107,7 +107,11 @@ def open(
     if isinstance(own, OwnFormat) and own.reads:
         return own.read(path)
     raise refusal(
-        path, "", f"{found.title}, which is not opened by itself", ", ".join(WORDS), "see its documentation"
+        path,
+        "",
+        f"{found.title}, which is not opened by itself",
+        ", ".join(CONTENT_WORDS),
+        "see its documentation",
     )
 
 

@@ -21,9 +21,9 @@ from posekit.formats.motion.parquet import opened
 from posekit.inspection.telling import cut_long, histogram_line, judged_line, plural, reason_lines
 from posekit.safe_io import cut, extra, read_json, refusal
 
-FAILURES: Final = 3
+MAX_FAILURES_NAMED: Final = 3
 """Failures that are named."""
-MOST: Final = 100_000_000
+MAX_SURVIVORS_BELIEVED: Final = 100_000_000
 """Survivors that a frame is believed to have."""
 
 
@@ -63,12 +63,12 @@ def run_lines(folder: Path) -> list[str]:
         f"{plural(len(failed), 'failure')}{ended}",
         *found.lines(),
     ]
-    for one in failed[:FAILURES]:
+    for one in failed[:MAX_FAILURES_NAMED]:
         lines.append(
             f"failed: {cut_long(str(one.get('shard') or one.get('input')))}: {cut_long(str(one.get('error')))}"
         )
-    if len(failed) > FAILURES:
-        lines.append(f"and {len(failed) - FAILURES} more failures, in {folder / MANIFEST_FILE}")
+    if len(failed) > MAX_FAILURES_NAMED:
+        lines.append(f"and {len(failed) - MAX_FAILURES_NAMED} more failures, in {folder / MANIFEST_FILE}")
     return [*lines, _settings(asked.hash, asked.settings)]
 
 
@@ -139,7 +139,7 @@ class Tally:
         """
         for rows in _frames(path):
             counts = np.asarray(rows.column("survivors").to_numpy(), dtype=np.float64)
-            if not ((counts >= 0) & (counts < MOST)).all():
+            if not ((counts >= 0) & (counts < MAX_SURVIVORS_BELIEVED)).all():
                 raise _damaged(path, "survivors")
             own = np.bincount(counts.astype(np.int64))
             grown = np.zeros(max(len(own), len(self.histogram)), dtype=np.int64)

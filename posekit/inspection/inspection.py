@@ -18,7 +18,7 @@ from posekit.formats.motion import Motion, guess_up, motion_format, postures_of,
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.own.postures_q import read_configurations
 from posekit.formats.recognising import recognise
-from posekit.formats.skeleton_maps import LANDMARKS, load_skeleton_map
+from posekit.formats.skeleton_maps import LANDMARK_ORDER, load_skeleton_map
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, POINTS
 from posekit.views.opening import read_detections
@@ -105,7 +105,7 @@ def _key_points(found: KeyPoints) -> list[str]:
 
 def _seen(landmarks: Array, sure: Array) -> list[str]:
     rows = []
-    for k, name in enumerate(LANDMARKS):
+    for k, name in enumerate(LANDMARK_ORDER):
         there = np.isfinite(landmarks[:, k, 0])
         known = sure[there, k]
         known = known[np.isfinite(known)]

@@ -10,7 +10,7 @@ from posekit.formats.own.report_table import summary_table
 from posekit.inspection.telling import cut_long, settings_line
 from posekit.safe_io import refusal
 
-MOST: Final = 2**53
+MAX_COUNT_BELIEVED: Final = 2**53
 """Views are fewer."""
 
 
@@ -64,7 +64,7 @@ def evaluation_lines(path: Path, document: Any) -> list[str]:
 
 
 def _count(value: object) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < MOST:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < MAX_COUNT_BELIEVED:
         raise ValueError("no count")
     return value
 

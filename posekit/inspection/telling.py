@@ -15,7 +15,7 @@ from posekit.safe_io import cut
 OF_FRAMES: Final = ("judged", "unrecovered", "noisy", "refined")
 """Settings that say what became of frames, and not what was asked."""
 
-NAMED: Final = 3
+MAX_REASONS_NAMED: Final = 3
 """Reasons that are named."""
 
 
@@ -60,9 +60,12 @@ def reason_lines(reasons: Mapping[str, int]) -> list[str]:
     """Say why nothing was grown in frames, the most frequent reasons first."""
     ranked = sorted(reasons.items(), key=lambda pair: -pair[1])
     lines = [
-        f"not recovered, {plural(count, 'frame')}: {cut_long(reason)}" for reason, count in ranked[:NAMED]
+        f"not recovered, {plural(count, 'frame')}: {cut_long(reason)}"
+        for reason, count in ranked[:MAX_REASONS_NAMED]
     ]
-    return lines + ([f"and {len(ranked) - NAMED} more reasons"] if len(ranked) > NAMED else [])
+    return lines + (
+        [f"and {len(ranked) - MAX_REASONS_NAMED} more reasons"] if len(ranked) > MAX_REASONS_NAMED else []
+    )
 
 
 def cut_long(text: str, most: int = 200) -> str:

@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
-from posekit.formats.motion import UPS, guess_up, postures_of, read_motion
+from posekit.formats.motion import UP_DIRECTIONS, guess_up, postures_of, read_motion
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.safe_io.regular_file import check_file
 from posekit.synthesis.capture import Capture
@@ -56,7 +56,7 @@ def read_capture(
         names=_clip_names(motion.clips, motion.source),
         actions=motion.actions,
         fps=motion.rates.copy(),
-        up=UPS[found].copy(),
+        up=UP_DIRECTIONS[found].copy(),
         source=motion.source,
         derived=postures.derived,
         up_from="stated" if up else "file" if motion.up else "guessed",

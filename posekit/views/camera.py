@@ -18,13 +18,13 @@ from posekit.formats.own import CameraModel, OpenCVModel, ScaledOrthographicMode
 from posekit.safe_io import shown
 from posekit.views.source import Source
 
-SHORTEST, LONGEST = 0.05, 100.0
+SHORTEST_FOCAL, LONGEST_FOCAL = 0.05, 100.0
 """Focal lengths that a picture can have, of its longer side: a view of 170 degrees, and one of half a degree."""
 
-OUTSIDE: Final = 0.5
+OUTSIDE_SHARE: Final = 0.5
 """Of all points, from which on they were not seen in pictures of the size that leaves them outside."""
 
-MOST: Final = 8
+MAX_CAMERAS_LISTED: Final = 8
 """Names of cameras that are listed."""
 
 
@@ -91,7 +91,7 @@ def in_pixels(keypoints: KeyPoints, size: tuple[int, int] | None) -> KeyPoints:
                 f"--size: {size[0]}x{size[1]}, but {keypoints.source} says {width:g}x{height:g} of "
                 f"{keypoints.pictures[int(np.argmax(other))]}; expected the pictures' own; leave it out"
             )
-        if not keypoints.normalised and outside(keypoints, size) > OUTSIDE:
+        if not keypoints.normalised and outside(keypoints, size) > OUTSIDE_SHARE:
             right, below = np.nanmax(keypoints.points, axis=(0, 1))
             raise InputError(
                 f"--size: {size[0]}x{size[1]}, and most points of {keypoints.source} lie outside, as far as "
@@ -134,7 +134,9 @@ def _named(text: str) -> CalibratedCamera:
     path, name = split_camera(text)
     cameras = read_cameras(path)
     if len(cameras) > 1 and name not in cameras:
-        there = ", ".join(list(cameras)[:MOST]) + (", …" if len(cameras) > MOST else "")
+        there = ", ".join(list(cameras)[:MAX_CAMERAS_LISTED]) + (
+            ", …" if len(cameras) > MAX_CAMERAS_LISTED else ""
+        )
         got = f"no camera {shown(name)}, but " if name else ""
         raise InputError(
             f"--camera: {path} has {got}{len(cameras)} cameras ({there}); expected one of them; name it, as "
@@ -158,7 +160,7 @@ def _check_size(camera: CalibratedCamera, keypoints: KeyPoints) -> None:
             f"{calibrated}, and pictures of {keypoints.source} are {width}x{height}; give the calibration of these "
             "pictures"
         )
-    if outside(keypoints, camera.size) > OUTSIDE and not len(known):
+    if outside(keypoints, camera.size) > OUTSIDE_SHARE and not len(known):
         right, below = np.nanmax(keypoints.points, axis=(0, 1))
         raise InputError(
             f"{calibrated}, and most points of {keypoints.source} lie outside, as far as ({right:.0f}, {below:.0f}); "
@@ -178,10 +180,11 @@ def _check_unit(camera: CalibratedCamera, keypoints: KeyPoints) -> None:
     f = float(np.sqrt(camera.K[0, 0] * camera.K[1, 1]))
     sizes = np.array(camera.size, dtype=float) if camera.size is not None else keypoints.size
     side = float(np.nanmax(sizes, initial=0.0)) or float(np.nanmax(np.abs(keypoints.points), initial=0.0))
-    if not SHORTEST * side <= f <= LONGEST * side:
+    if not SHORTEST_FOCAL * side <= f <= LONGEST_FOCAL * side:
         raise InputError(
             f"--camera: {camera.name} has a focal length of {f:.4g} pixels, in pictures about {side:.0f} pixels wide "
-            f"or high; expected {SHORTEST:g} to {LONGEST:g} times that; give K in pixels, not in millimetres or parts"
+            f"or high; expected {SHORTEST_FOCAL:g} to {LONGEST_FOCAL:g} times that; give K in pixels, not in millimetres "
+            "or parts"
         )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people, read_keypoints, swap
-from posekit.formats.keypoints.persons import RULES
+from posekit.formats.keypoints.persons import PERSON_RULES
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import shown
 from posekit.views.camera import in_pixels, sighting
@@ -19,7 +19,7 @@ from posekit.views.person import person
 from posekit.views.person_view import person_view
 from posekit.views.source import Source
 
-MOST: Final = 10
+MAX_PEOPLE_LISTED: Final = 10
 """Numbers of people that are listed."""
 
 
@@ -92,10 +92,10 @@ def choose_person(found: KeyPoints, who: str) -> KeyPoints:
         Where there is no such rule, or nobody has that number.
     """
     numbers = [str(one.person) for one in list_people(found)]
-    if who not in (*RULES, *numbers):
-        there = ", ".join(numbers[:MOST]) + (", …" if len(numbers) > MOST else "")
+    if who not in (*PERSON_RULES, *numbers):
+        there = ", ".join(numbers[:MAX_PEOPLE_LISTED]) + (", …" if len(numbers) > MAX_PEOPLE_LISTED else "")
         raise InputError(
-            f"--person: {shown(who)}; expected {', '.join(RULES)}, all, or a number of {found.source} "
+            f"--person: {shown(who)}; expected {', '.join(PERSON_RULES)}, all, or a number of {found.source} "
             f"({there or 'nobody is in it'}); see who they are with posekit inspect"
         )
     return choose(found, who)
@@ -112,7 +112,7 @@ def _warn_of_sides(one: KeyPoints, source: Source) -> None:
 def _who(one: KeyPoints, rule: str, people: int) -> str:
     """Say who was chosen: of photographs a rule chooses in each."""
     of = f" of {people} people" if people > 1 else ""
-    by_rule = rule in RULES and not one.sequence and len(one) > 1
+    by_rule = rule in PERSON_RULES and not one.sequence and len(one) > 1
     return (
         f"the {rule}{of} in each picture"
         if by_rule

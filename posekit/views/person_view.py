@@ -11,14 +11,14 @@ from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.own import CameraModel, ScaledOrthographicModel, Unit, View
-from posekit.formats.skeleton_maps import LANDMARK
+from posekit.formats.skeleton_maps import LANDMARK_INDEX
 from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINT, JOINTS, POINTS
 
-RATE: Final = 30.0
+ASSUMED_VIEW_RATE: Final = 30.0
 """Frames a second that are assumed where neither the file nor the user says."""
 
-MIDDLES: Final = ("mid_shoulders", "mid_hips")
+MIDDLE_LANDMARKS: Final = ("mid_shoulders", "mid_hips")
 
 
 def person_view(
@@ -111,23 +111,23 @@ def times(keypoints: KeyPoints, rate: float | None) -> Array:
     """Return the time of each picture (F,): the file's own, unless a rate is given or it has none."""
     if rate is None and np.isfinite(keypoints.time).all():
         return keypoints.time
-    return np.arange(len(keypoints.pictures)) / (rate or RATE)
+    return np.arange(len(keypoints.pictures)) / (rate or ASSUMED_VIEW_RATE)
 
 
 def _complete(found: Array, sure: Array, person: Figure) -> tuple[str, ...]:
     """Put neck and pelvis into landmarks (D, 21, 2) that lack them, and their confidence (D, 21); say which."""
     derived = []
-    shoulders, hips = (found[:, LANDMARK[name]] for name in MIDDLES)
+    shoulders, hips = (found[:, LANDMARK_INDEX[name]] for name in MIDDLE_LANDMARKS)
     fraction = pelvis_fraction(person)
     places = {"neck": shoulders, "pelvis": shoulders + fraction * (hips - shoulders)}
-    both = sure[:, [LANDMARK[name] for name in MIDDLES]]
+    both = sure[:, [LANDMARK_INDEX[name] for name in MIDDLE_LANDMARKS]]
     certain = {"neck": both[:, 0], "pelvis": both.mean(axis=1)}
     for name, place in places.items():
-        lacking = np.isnan(found[:, LANDMARK[name], 0])
+        lacking = np.isnan(found[:, LANDMARK_INDEX[name], 0])
         if np.isfinite(place[lacking]).any():
             derived.append(name)
-        found[lacking, LANDMARK[name]] = place[lacking]
-        sure[lacking, LANDMARK[name]] = certain[name][lacking]
+        found[lacking, LANDMARK_INDEX[name]] = place[lacking]
+        sure[lacking, LANDMARK_INDEX[name]] = certain[name][lacking]
     return tuple(derived)
 
 

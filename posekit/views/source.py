@@ -9,7 +9,7 @@ from typing import Final
 
 from posekit.errors import InputError
 
-OPTIONS: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
+OPTION_NAMES: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
 """The options that are called otherwise than what they set."""
 
 OWN_PROPORTIONS: Final = ("figure", "taylor")
@@ -102,7 +102,7 @@ class Source:
         """Which options are given, by name."""
         nothing = Source()
         return {
-            OPTIONS.get(one.name, f"--{one.name.replace('_', '-')}"): getattr(self, one.name)
+            OPTION_NAMES.get(one.name, f"--{one.name.replace('_', '-')}"): getattr(self, one.name)
             != getattr(nothing, one.name)
             for one in fields(self)
         }

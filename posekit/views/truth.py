@@ -14,7 +14,7 @@ from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 
-REFUSED: Final = 0.2
+REFUSED_ERROR_SHARE: Final = 0.2
 """Fraction of the person's height in the image by which a truth may miss the key points before it is another's."""
 
 
@@ -30,7 +30,7 @@ def _turns() -> Array:
     return np.array(found)
 
 
-TURNS: Final = _turns()
+AXIS_TURNS: Final = _turns()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,9 +88,9 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled
             f"--truth: none of its {len(time)} frames is at the time of a picture; expected the same seconds from the "
             "first picture on; say the pictures' rate with --fps"
         )
-    turned = np.einsum("kij,fpj->kfpi", TURNS, true) @ model.R.T + model.t
+    turned = np.einsum("kij,fpj->kfpi", AXIS_TURNS, true) @ model.R.T + model.t
     camera = PinholeCamera(K=model.K, distortion=model.distortion)
-    away = np.linalg.norm(camera.project(turned) - view.image, axis=-1).reshape(len(TURNS), -1)
+    away = np.linalg.norm(camera.project(turned) - view.image, axis=-1).reshape(len(AXIS_TURNS), -1)
     in_front = np.isfinite(away).sum(axis=1)
     errors = [
         float(np.nanmedian(row)) if n == max(in_front) > 0 else np.inf
@@ -99,12 +99,12 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled
     best = int(np.argmin(errors))
     seen = view.image[np.isfinite(view.image[..., 1]).any(axis=1), :, 1]
     height = float(np.median(np.nanmax(seen, axis=1) - np.nanmin(seen, axis=1)))
-    if not errors[best] <= REFUSED * height:
+    if not errors[best] <= REFUSED_ERROR_SHARE * height:
         raise InputError(
             f"--truth: misses the key points by {errors[best]:.3g} px (median) however its axes are turned; expected "
             "the same person, camera and seconds; check --person, --camera and --fps"
         )
-    turn = TURNS[best]
+    turn = AXIS_TURNS[best]
     names = [("" if row[abs(row).argmax()] > 0 else "-") + "xyz"[int(abs(row).argmax())] for row in turn]
     told = Reconciled(turn=f"({', '.join(names)})", error=errors[best], frames=int(matched.sum()))
     return replace(view, truth=turned[best]), told

@@ -20,7 +20,7 @@ from posekit.batch.staging import STAGED_FOLDER, Staged, Staging, stage
 from posekit.batch.view_table import open_view_table, read_rows, write_rows
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.motion.survivors import COORDINATES
+from posekit.formats.motion.survivors import COORDINATE_COLUMNS
 from posekit.formats.motion.survivors_files import read_survivors
 from posekit.formats.own import View, read_view, write_view
 from posekit.recovery import recover
@@ -65,9 +65,9 @@ def table(path: Path, folder: Path, recipe: Recipe) -> pd.DataFrame:
 def assert_same(rows: pd.DataFrame, recovery: Recovery, allowed: float = 0.0) -> None:
     """Compare the rows of frames that have survivors with a recovery's."""
     rows = rows[rows.survivor >= 0]
-    joints = np.concatenate([frame.joints for frame in recovery.frames]).reshape(-1, len(COORDINATES))
+    joints = np.concatenate([frame.joints for frame in recovery.frames]).reshape(-1, len(COORDINATE_COLUMNS))
     assert rows.branches.tolist() == [code for frame in recovery.frames for code in frame.branches]
-    np.testing.assert_allclose(rows[list(COORDINATES)].to_numpy(), joints, rtol=0, atol=allowed)
+    np.testing.assert_allclose(rows[list(COORDINATE_COLUMNS)].to_numpy(), joints, rtol=0, atol=allowed)
     residual = np.concatenate([frame.length_residual for frame in recovery.frames])
     np.testing.assert_allclose(rows.length_residual, residual, rtol=0, atol=allowed)
 
@@ -178,7 +178,7 @@ def test_a_frame_without_survivors_is_a_row_with_its_reason(tmp_path: Path, fold
     assert json.loads(each.rejected[4]) == {"neck/not_seen": 8192}
     empty = found[found.survivor == -1]
     assert empty.frame.tolist() == [2, 4]
-    assert empty[list(COORDINATES)].isna().all(axis=None)
+    assert empty[list(COORDINATE_COLUMNS)].isna().all(axis=None)
     kept = [0, 1, 3, 5]
     alone = recover(rows.part(np.array(kept)).view(view))
     assert_same(found, alone, allowed=1e-12)

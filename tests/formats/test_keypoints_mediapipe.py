@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.keypoints.mediapipe_names import NAMES
+from posekit.formats.keypoints.mediapipe_names import LANDMARK_NAMES
 from posekit.formats.keypoints.reading import read_keypoints
 from posekit.formats.skeleton_maps import load_skeleton_map
 from tests.detector_files import suiting, write_keypoints
@@ -55,9 +55,15 @@ LAYOUTS: dict[str, object] = {
         for k in range(2)
     ],
     "web": {"frames": [{"landmarks": [person(k)], "worldLandmarks": [world()]} for k in range(2)]},
-    "by name": {"pose_data": [{"landmarks": dict(zip(NAMES, person(k), strict=True))} for k in range(2)]},
+    "by name": {
+        "pose_data": [{"landmarks": dict(zip(LANDMARK_NAMES, person(k), strict=True))} for k in range(2)]
+    },
     "NAMES": [
-        {"landmarks": [{"name": n.upper(), **p} for n, p in zip(NAMES, person(k), strict=True)][::-1]}
+        {
+            "landmarks": [{"name": n.upper(), **p} for n, p in zip(LANDMARK_NAMES, person(k), strict=True)][
+                ::-1
+            ]
+        }
         for k in (0, 1)
     ],
     "ids": {
@@ -110,13 +116,13 @@ def wide(name: Callable[[int, str], str], lead: str = "frame,timestamp_ms") -> s
 
 
 TABLES = {
-    "names": wide(lambda k, part: f"{NAMES[k]}_{part}"),
-    "NAMES": wide(lambda k, part: f"{NAMES[k].upper()}_{part}"),
-    "names after": wide(lambda k, part: f"{part}_{NAMES[k]}"),
+    "names": wide(lambda k, part: f"{LANDMARK_NAMES[k]}_{part}"),
+    "NAMES": wide(lambda k, part: f"{LANDMARK_NAMES[k].upper()}_{part}"),
+    "names after": wide(lambda k, part: f"{part}_{LANDMARK_NAMES[k]}"),
     "numbers": wide(lambda k, part: f"{part[0]}{k}"),
     "from one": wide(lambda k, part: f"{part[0]}{k + 1}"),
     "landmarks": wide(lambda k, part: f"landmark_{k}_{part}"),
-    "dots": wide(lambda k, part: f"{NAMES[k]}.{part}", "Frame,Timestamp_ms"),
+    "dots": wide(lambda k, part: f"{LANDMARK_NAMES[k]}.{part}", "Frame,Timestamp_ms"),
 }
 
 
@@ -143,7 +149,7 @@ def test_long_tables(named: bool, tmp_path: Path) -> None:
     for frame in (1, 0):
         for k, (x, y, z, v) in enumerate(PLACES.tolist()):
             writer.writerow(
-                [frame, frame * 33.3, NAMES[k].upper() if named else k, x, y, z, "" if k == 2 else v]
+                [frame, frame * 33.3, LANDMARK_NAMES[k].upper() if named else k, x, y, z, "" if k == 2 else v]
             )
     (tmp_path / "pose.csv").write_text(lines.getvalue())
     found = read_keypoints(tmp_path / "pose.csv")

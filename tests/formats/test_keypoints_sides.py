@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from posekit.body import load_figure
 from posekit.formats.keypoints import KeyPoints, check_sides, swap
 from posekit.formats.keypoints.persons import select
-from posekit.formats.keypoints.side_flips import GROUPS, flips
+from posekit.formats.keypoints.side_flips import LIMB_GROUPS, flips
 from posekit.formats.keypoints.side_gait import gait_evidence
-from posekit.formats.keypoints.sides import SURE
-from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map, skeleton_map_of
+from posekit.formats.keypoints.sides import SURE_EVIDENCE
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, load_skeleton_map, skeleton_map_of
 from posekit.synthesis import SyntheticScene, Walker, random_views, walker_scene
 from posekit.tables.file_model import validated
 from posekit.tables.skeleton_map import SkeletonMapTable
@@ -29,7 +29,7 @@ ARMS, LEGS = slice(5, 11), slice(11, 17)
 
 def seen(scene: SyntheticScene, rng: np.random.Generator, *, head: bool, noise: float = 0.005) -> KeyPoints:
     """Make COCO's key points of a scene: noise in heights of the person; the 1985 camera's are a thousand a metre."""
-    landmarks = np.full((len(scene), len(LANDMARK), 2), np.nan)
+    landmarks = np.full((len(scene), len(LANDMARK_INDEX), 2), np.nan)
     landmarks[:, :19] = np.concatenate([scene.image, scene.head_image], axis=1) * (
         1000 if scene.lee_chen_f else 1
     )
@@ -321,7 +321,7 @@ def test_jumps_are_put_right_before_the_walk_is_judged() -> None:
 def test_a_gap_in_the_pictures_is_no_jump() -> None:
     there = seen(walks(True, 40, 0.06)[3], np.random.default_rng(12), head=False)
     gone = select(there, (there.frame < 13) | (there.frame > 22))
-    for parts in GROUPS.values():
+    for parts in LIMB_GROUPS.values():
         assert not flips(gone.landmarks, gone.frame, parts).any()
 
 
@@ -341,7 +341,7 @@ def test_nobody_and_people_in_one_point_are_unknown(count: int, value: float) ->
     )
     found = check_sides(there)
     assert (found.verdict, found.pictures, found.warnings) == ("unknown", (), ())
-    assert abs(found.strength) < SURE
+    assert abs(found.strength) < SURE_EVIDENCE
 
 
 @given(seed=st.integers(0, 2**32 - 1), share=st.floats(0, 0.95))

@@ -15,9 +15,9 @@ from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints, choose, list_people, track
 from posekit.formats.keypoints.persons import select
 from posekit.formats.keypoints.track_assignment import assign
-from posekit.formats.keypoints.track_similarity import COMPARED, K, area, similarity
+from posekit.formats.keypoints.track_similarity import COMPARED_LANDMARKS, FALLOFF_K, area, similarity
 from posekit.formats.keypoints.tracking import MAX_PEOPLE
-from posekit.formats.skeleton_maps import LANDMARKS, load_skeleton_map
+from posekit.formats.skeleton_maps import LANDMARK_ORDER, load_skeleton_map
 from posekit.geometry import Array
 
 COCO = load_skeleton_map("coco_17")
@@ -88,14 +88,16 @@ def test_similarity_is_cocos_where_nobody_moves(rng: np.random.Generator) -> Non
             strict=True,
         )
     )
-    assert [LANDMARKS[k] for k in COMPARED] != list(COCO.points), "the orders differ, the numbers must not"
-    np.testing.assert_allclose(K, [2 * sigmas[LANDMARKS[k]] for k in COMPARED])
+    assert [LANDMARK_ORDER[k] for k in COMPARED_LANDMARKS] != list(COCO.points), (
+        "the orders differ, the numbers must not"
+    )
+    np.testing.assert_allclose(FALLOFF_K, [2 * sigmas[LANDMARK_ORDER[k]] for k in COMPARED_LANDMARKS])
     a, b = (BODY + rng.normal(0, 5, (17, 2)) for _ in range(2))
     b[3] = np.nan
     k = 2 * np.array(list(sigmas.values()))
     terms = np.exp(-((a - b) ** 2).sum(axis=1) / (2 * 9000.0 * k**2))
     wanted = np.nanmean(terms)
-    order = [COCO.points.index(LANDMARKS[k]) for k in COMPARED]
+    order = [COCO.points.index(LANDMARK_ORDER[k]) for k in COMPARED_LANDMARKS]
     found = similarity(a[None, order], b[None, order], np.full((1, 1), 9000.0), np.zeros(1))
     assert found[0, 0] == pytest.approx(wanted)
 

@@ -19,13 +19,13 @@ from posekit.body import Figure, load_figure
 from posekit.errors import InputError
 from posekit.formats.motion.bvh import BVH_FORMAT, examine_bvh, read_bvh, write_bvh
 from posekit.formats.motion.bvh_angles import continuous, euler_angles, euler_rotation
-from posekit.formats.motion.bvh_size import CMU
-from posekit.formats.motion.bvh_writing import NAMES
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.bvh_size import CMU_UNIT_METRES
+from posekit.formats.motion.bvh_writing import ANIMATION_NAMES
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.formats.motion.postures import layout_of, postures_of
-from posekit.formats.skeleton_maps import LANDMARK, load_skeleton_map
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, load_skeleton_map
 from posekit.geometry import quaternion_from_rotation, rotation_from_quaternion
 from posekit.skeleton import DOFS, JOINTS, POINTS
 from posekit.synthesis.walker import Walker
@@ -63,7 +63,7 @@ def seconds(n: int, rate: float = 30.0) -> np.ndarray:
 
 def figure_points(motion: Motion) -> np.ndarray:
     """Pick the figure's 19 points out of a file that was written of it."""
-    return motion.points[:, [motion.names.index(NAMES[point]) for point in POINTS]]
+    return motion.points[:, [motion.names.index(ANIMATION_NAMES[point]) for point in POINTS]]
 
 
 def expected_points(figure: Figure, q: np.ndarray, up: str = "+z") -> np.ndarray:
@@ -92,14 +92,14 @@ class TestWhatIsWritten:
         channels = channel_table(tmp_path / "walk.bvh")
         assert np.abs(np.diff(channels, axis=0)).max() < 30
 
-    @pytest.mark.parametrize("up", sorted(UPS))
+    @pytest.mark.parametrize("up", sorted(UP_DIRECTIONS))
     def test_any_axis_of_q_may_point_up(self, up: str, rng: np.random.Generator, tmp_path: Path) -> None:
         q = configurations(rng, 5)
         write_bvh(tmp_path / "a.bvh", FIGURE, q, seconds(5), up=up)
         motion = read_bvh(tmp_path / "a.bvh", up="+y")
         assert np.abs(figure_points(motion) - expected_points(FIGURE, q, up)).max() < EXACT
         lifted = q.copy()
-        lifted[:, :3] += UPS[up]
+        lifted[:, :3] += UP_DIRECTIONS[up]
         write_bvh(tmp_path / "b.bvh", FIGURE, lifted, seconds(5), up=up)
         step = read_bvh(tmp_path / "b.bvh").points - motion.points
         assert np.abs(step - [0, 1, 0]).max() < EXACT
@@ -123,7 +123,9 @@ class TestWhatIsWritten:
         own = dict(zip(DOFS, np.degrees(q[0, FIGURE.angle_index] * FIGURE.limits.sign), strict=True))
         for joint in ("neck", "right_shoulder", "left_hip"):
             lift = "bending" if joint == "neck" else "abduction"
-            channels = document.frame_joint_channels(0, NAMES[joint], ["Xrotation", "Zrotation", "Yrotation"])
+            channels = document.frame_joint_channels(
+                0, ANIMATION_NAMES[joint], ["Xrotation", "Zrotation", "Yrotation"]
+            )
             wanted = [own[f"{joint}.{name}"] for name in ("flexion", lift, "rotation")]
             np.testing.assert_allclose(channels, wanted, rtol=0, atol=1e-6)
 
@@ -138,7 +140,7 @@ class TestWhatIsWritten:
         for frame in range(6):
             placed = oracle(document, frame)
             for k, point in enumerate(POINTS):
-                gap = np.abs(0.01 * placed[NAMES[point]] - expected[frame, k]).max()
+                gap = np.abs(0.01 * placed[ANIMATION_NAMES[point]] - expected[frame, k]).max()
                 assert gap < EXACT, point
 
     def test_every_joint_has_the_same_three_turns(self, tmp_path: Path) -> None:
@@ -149,7 +151,7 @@ class TestWhatIsWritten:
         turns = "Xrotation Zrotation Yrotation"
         assert lines == [f"6 Xposition Yposition Zposition {turns}"] + [f"3 {turns}"] * 20
         assert "e-" not in text
-        assert set(NAMES[joint] for joint in JOINTS) <= set(bvh.Bvh(text).get_joints_names())
+        assert set(ANIMATION_NAMES[joint] for joint in JOINTS) <= set(bvh.Bvh(text).get_joints_names())
 
     def test_rest_pose_stands_upright_and_faces_z(self, tmp_path: Path) -> None:
         """Offsets alone: hanging arms, y up, the left to +x, the nose ahead in +z."""
@@ -391,7 +393,8 @@ class TestWhatIsRead:
         assert read_bvh(tmp_path / "a.bvh", "cm").names == ("Hips", "Left Leg", "Chest", "Chest_end")
 
     @pytest.mark.parametrize(
-        ("scale", "name"), [(1, "cm"), (10, "mm"), (0.01, "m"), (1 / 2.54, "in"), (0.01 / CMU, "0.45 in")]
+        ("scale", "name"),
+        [(1, "cm"), (10, "mm"), (0.01, "m"), (1 / 2.54, "in"), (0.01 / CMU_UNIT_METRES, "0.45 in")],
     )
     def test_unit_by_size(self, scale: float, name: str, tmp_path: Path) -> None:
         (tmp_path / "a.bvh").write_text(body_file(scale))
@@ -457,11 +460,11 @@ class TestWhatIsRead:
         values = np.arange(3.0 * len(names)).reshape(len(names), 3)
         marks = found.gather(values, names)
         np.testing.assert_array_equal(
-            marks[LANDMARK["left_shoulder"]], values[names.index(f"{prefix}LeftArm")]
+            marks[LANDMARK_INDEX["left_shoulder"]], values[names.index(f"{prefix}LeftArm")]
         )
         if expected == "bvh_cmu":
-            np.testing.assert_array_equal(marks[LANDMARK["neck"]], values[names.index("Neck1")])
-            np.testing.assert_array_equal(marks[LANDMARK["pelvis"]], values[names.index("LowerBack")])
+            np.testing.assert_array_equal(marks[LANDMARK_INDEX["neck"]], values[names.index("Neck1")])
+            np.testing.assert_array_equal(marks[LANDMARK_INDEX["pelvis"]], values[names.index("LowerBack")])
 
     @pytest.mark.parametrize("name", ["bvh_bandai_namco", "bvh_100style", "bvh_biovision", "bvh_posekit"])
     def test_other_maps_know_their_own_names(self, name: str) -> None:

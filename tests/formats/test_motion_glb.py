@@ -14,12 +14,12 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.motion.bvh_tree import NODES, known_nodes
+from posekit.formats.motion.bvh_tree import BODY_NODES, known_nodes
 from posekit.formats.motion.glb import GLB_FORMAT, write_glb, write_postures_glb
-from posekit.formats.motion.glb_capsule import AROUND, capsule_mesh
-from posekit.formats.motion.glb_file import INDICES, UINT16, GlbFile
+from posekit.formats.motion.glb_capsule import RING_CORNERS, capsule_mesh
+from posekit.formats.motion.glb_file import INDEX_TARGET, UINT16_TYPE, GlbFile
 from posekit.formats.motion.glb_reading import read_glb
-from posekit.formats.motion.motion import UPS
+from posekit.formats.motion.motion import UP_DIRECTIONS
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.skeleton import POINT, POINTS
 from posekit.synthesis.walker import Walker
@@ -161,7 +161,7 @@ class TestMotion:
                 assert (np.einsum("ti,ti->t", values[1:], values[:-1]) > 0.9).all()
                 np.testing.assert_allclose(np.linalg.norm(values, axis=1), 1, rtol=0, atol=1e-6)
 
-    @pytest.mark.parametrize("up", sorted(UPS))
+    @pytest.mark.parametrize("up", sorted(UP_DIRECTIONS))
     def test_y_is_up(self, up: str, rng: np.random.Generator, tmp_path: Path) -> None:
         q = configurations(rng, 1)
         write_glb(tmp_path / "a.glb", FIGURE, q, np.zeros(1), up=up)
@@ -182,7 +182,7 @@ class TestMotion:
         for capsule in FIGURE.capsules:
             mesh = scene.geometry[capsule.link]
             assert mesh.is_watertight
-            node = next(node.name for node in NODES if node.link == capsule.link)
+            node = next(node.name for node in BODY_NODES if node.link == capsule.link)
             points = trimesh.transform_points(mesh.vertices, scene.graph.get(node)[0])
             own = expected[None, list(capsule.points)]
             middle, axis = (row[0] for row in capsule.place(own))
@@ -301,7 +301,7 @@ class TestPostures:
         masked[:, columns] = np.where(hidden, np.nan, q[:, columns])
         other[:, columns] = np.where(hidden, q[:, columns] + 0.3, q[:, columns])
         moved = np.abs(FIGURE.forward_kinematics(other) - FIGURE.forward_kinematics(q)).max(axis=-1) > 1e-9
-        places = [next(k for k, node in enumerate(NODES) if node.name == point) for point in POINTS]
+        places = [next(k for k, node in enumerate(BODY_NODES) if node.name == point) for point in POINTS]
         known = known_nodes(FIGURE, masked)[:, places] > 0
         assert not (moved & known).any()
         assert (moved | known).mean() > 0.9  # and few are called unknown that did not move
@@ -333,9 +333,9 @@ class TestPostures:
 class TestContainer:
     def test_numbers_stand_at_multiples_of_four_bytes(self, tmp_path: Path) -> None:
         file = GlbFile()
-        odd = file.accessor(np.arange(3), UINT16)
+        odd = file.accessor(np.arange(3), UINT16_TYPE)
         after = file.accessor(np.array([[1.0, 2.0, 3.0]]), bounds=True)
-        last = file.accessor(np.arange(5), UINT16, target=INDICES)
+        last = file.accessor(np.arange(5), UINT16_TYPE, target=INDEX_TARGET)
         file.append("nodes", {"name": "я"})
         file.write(tmp_path / "a.glb")
         glb = Glb(tmp_path / "a.glb")
@@ -367,4 +367,4 @@ class TestCapsule:
         assert 0.97 * volume < solid.volume < volume
         assert (np.einsum("fi,fi->f", solid.face_normals, mesh.normals[mesh.faces].mean(axis=1)) > 0.9).all()
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, rtol=0, atol=1e-12)
-        assert 1 - np.cos(np.pi / AROUND) < 0.01
+        assert 1 - np.cos(np.pi / RING_CORNERS) < 0.01

@@ -5,9 +5,17 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.errors import InputError
-from posekit.formats.motion import UPS, Motion, guess_up, postures_of, read_motion, with_up, write_motion
+from posekit.formats.motion import (
+    UP_DIRECTIONS,
+    Motion,
+    guess_up,
+    postures_of,
+    read_motion,
+    with_up,
+    write_motion,
+)
 from posekit.formats.motion.postures import layout_of
-from posekit.formats.skeleton_maps import LANDMARKS, SkeletonMap, load_skeleton_map, skeleton_map_names
+from posekit.formats.skeleton_maps import LANDMARK_ORDER, SkeletonMap, load_skeleton_map, skeleton_map_names
 from posekit.recovery.taylor_figure.completion import Completion
 from posekit.skeleton import JOINT, JOINTS, POINTS
 from posekit.synthesis import mocap_scene, random_postures, read_capture
@@ -25,7 +33,7 @@ def points(n=30, seed=0, upright=True):
 
 
 def landmarks_of(body):
-    found = np.full((len(body), len(LANDMARKS), 3), np.nan)
+    found = np.full((len(body), len(LANDMARK_ORDER), 3), np.nan)
     found[:, : len(POINTS)] = body
     for k, joint in ((-2, "shoulder"), (-1, "hip")):
         found[:, k] = (body[:, JOINT[f"right_{joint}"]] + body[:, JOINT[f"left_{joint}"]]) / 2
@@ -35,7 +43,9 @@ def landmarks_of(body):
 def motion_by(layout, body, **changed):
     """Write postures down under a map's names."""
     names = tuple(parts[0] for parts in layout.landmarks.values() if len(parts) == 1)
-    columns = [LANDMARKS.index(landmark) for landmark, parts in layout.landmarks.items() if len(parts) == 1]
+    columns = [
+        LANDMARK_ORDER.index(landmark) for landmark, parts in layout.landmarks.items() if len(parts) == 1
+    ]
     fields = {"names": names, "points": landmarks_of(body)[:, columns], "time": np.arange(len(body)) / 30}
     return Motion(**{**fields, "rate": 30.0, **changed})
 
@@ -84,7 +94,7 @@ def test_neck_and_pelvis_are_placed_as_the_figures_torso_says():
     layout = load_skeleton_map("joint_centres")
     found = postures_of(motion_by(layout, body), layout, FIGURE)
     names = (*(name for name in JOINTS if name not in ("neck", "pelvis")), "mid_shoulders", "mid_hips")
-    columns = [LANDMARKS.index(name) for name in names]
+    columns = [LANDMARK_ORDER.index(name) for name in names]
     expected = Completion(figure=FIGURE, points=names).complete(landmarks_of(body)[:, columns])
     np.testing.assert_allclose(found.joints, expected, rtol=0, atol=1e-12)
     straight = np.zeros((1, FIGURE.model.nq))
@@ -117,7 +127,7 @@ def test_a_missing_joint_stays_missing_and_so_does_what_hangs_on_it():
     assert [JOINTS[k] for k in np.flatnonzero(unknown[2])] == ["left_elbow"]
 
 
-@pytest.mark.parametrize("up", list(UPS))
+@pytest.mark.parametrize("up", list(UP_DIRECTIONS))
 def test_up_is_where_necks_are_above_ankles(up):
     body = points(40)
     turned = with_up(motion_by(load_skeleton_map("posekit"), body, up="+z"), up)
@@ -166,7 +176,7 @@ def test_a_capture_comes_from_any_format(tmp_path, suffix, name):
     capture = read_capture(path)
     turned = with_up(one, "+y") if suffix == "trc" else one
     np.testing.assert_allclose(capture.points[:, :14], postures_of(turned).joints, rtol=0, atol=1e-6)
-    np.testing.assert_array_equal(capture.up, UPS["+y" if suffix == "trc" else "+z"])
+    np.testing.assert_array_equal(capture.up, UP_DIRECTIONS["+y" if suffix == "trc" else "+z"])
     assert capture.up_from == ("guessed" if suffix == "csv" else "file")
     assert capture.derived == (() if name == "posekit" else ("pelvis", "neck"))
     assert capture.fps == pytest.approx([30.0], rel=1e-9)

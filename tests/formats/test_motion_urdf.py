@@ -14,12 +14,12 @@ from posekit.body import load_figure
 from posekit.errors import FigureError, InputError
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.urdf_folder import (
-    CSV,
-    FIGURE,
-    FILES,
+    CSV_FILE,
+    FIGURE_FILE,
+    FOLDER_FILES,
     LINK_OF,
-    MUJOCO,
-    NPZ,
+    MUJOCO_FILE,
+    NPZ_FILE,
     URDF_FORMAT,
     read_urdf_folder,
     write_urdf_folder,
@@ -69,9 +69,9 @@ def trusting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 class TestOtherProgramsOpenIt:
     def test_pinocchio_alone(self, folder: Path, q: np.ndarray) -> None:
-        model = pin.buildModelFromUrdf(str(folder / FIGURE), pin.JointModelFreeFlyer())
+        model = pin.buildModelFromUrdf(str(folder / FIGURE_FILE), pin.JointModelFreeFlyer())
         data = model.createData()
-        with np.load(folder / NPZ) as archive:
+        with np.load(folder / NPZ_FILE) as archive:
             stored, names = archive["q"], archive["configuration_names"].tolist()
         assert names[7:] == list(model.names)[2:]
         for row, expected in zip(stored, PERSON.forward_kinematics(q), strict=True):
@@ -79,13 +79,13 @@ class TestOtherProgramsOpenIt:
             for k, point in enumerate(POINTS):
                 place = data.oMf[model.getFrameId(LINK_OF[point])].translation
                 np.testing.assert_allclose(place, expected[k], rtol=0, atol=EXACT)
-        geometry = pin.buildGeomFromUrdf(model, str(folder / FIGURE), pin.GeometryType.COLLISION)
+        geometry = pin.buildGeomFromUrdf(model, str(folder / FIGURE_FILE), pin.GeometryType.COLLISION)
         assert len(geometry.geometryObjects) == len(PERSON.capsules)
 
     def test_yourdfpy_and_the_table(self, folder: Path, q: np.ndarray) -> None:
         yourdfpy = pytest.importorskip("yourdfpy")
-        robot = yourdfpy.URDF.load(str(folder / FIGURE), load_meshes=False)
-        table = pandas.read_csv(folder / CSV)
+        robot = yourdfpy.URDF.load(str(folder / FIGURE_FILE), load_meshes=False)
+        table = pandas.read_csv(folder / CSV_FILE)
         assert list(table.columns) == ["time", *PERSON.configuration_names]
         np.testing.assert_array_equal(table["time"], np.arange(15) / 30)
         for (_, row), expected in zip(table.iterrows(), PERSON.forward_kinematics(q), strict=True):
@@ -97,7 +97,7 @@ class TestOtherProgramsOpenIt:
 
     def test_mujoco(self, folder: Path, q: np.ndarray) -> None:
         mujoco = pytest.importorskip("mujoco")
-        model = mujoco.MjModel.from_xml_path(str(folder / MUJOCO))
+        model = mujoco.MjModel.from_xml_path(str(folder / MUJOCO_FILE))
         assert model.njnt == 1 + len(DOFS)
         assert model.ngeom == len(PERSON.capsules)
         data = mujoco.MjData(model)
@@ -111,8 +111,8 @@ class TestOtherProgramsOpenIt:
                 np.testing.assert_allclose(data.body(LINK_OF[point]).xpos, expected[k], rtol=0, atol=EXACT)
 
     def test_the_projects_own_readers(self, folder: Path, q: np.ndarray) -> None:
-        assert load_figure(folder / FIGURE).hash == PERSON.hash
-        stored = read_configurations(folder / NPZ)
+        assert load_figure(folder / FIGURE_FILE).hash == PERSON.hash
+        stored = read_configurations(folder / NPZ_FILE)
         np.testing.assert_array_equal(stored.in_order_of(PERSON.configuration_names), q)
         points = read_urdf_folder(folder).points
         np.testing.assert_allclose(points, PERSON.forward_kinematics(q), rtol=0, atol=EXACT)
@@ -133,7 +133,7 @@ class TestRoundTrip:
         elbow = PERSON.configuration_names.index("left_elbow_flexion")
         q[3, elbow] = np.nan
         write_urdf_folder(tmp_path / "a", PERSON, q, np.arange(15.0), up="-y")
-        assert np.isnan(pandas.read_csv(tmp_path / "a" / CSV)["left_elbow_flexion"][3])
+        assert np.isnan(pandas.read_csv(tmp_path / "a" / CSV_FILE)["left_elbow_flexion"][3])
         motion = read_urdf_folder(tmp_path / "a")
         unknown = np.argwhere(np.isnan(motion.points).all(axis=-1))
         assert unknown.tolist() == [[3, POINTS.index("left_wrist")]]
@@ -145,9 +145,9 @@ class TestRoundTrip:
         assert (len(motion), motion.time[0]) == (1, 2.5)
 
     def test_written_twice_gives_the_same_bytes(self, folder: Path, q: np.ndarray) -> None:
-        before = {name: (folder / name).read_bytes() for name in FILES}
+        before = {name: (folder / name).read_bytes() for name in FOLDER_FILES}
         write_urdf_folder(folder, PERSON, q, np.arange(15) / 30)
-        assert {name: (folder / name).read_bytes() for name in FILES} == before
+        assert {name: (folder / name).read_bytes() for name in FOLDER_FILES} == before
         assert sorted(path.name for path in folder.parent.iterdir()) == ["person"]
 
 
@@ -183,9 +183,9 @@ class TestBadInput:
     @pytest.mark.parametrize(
         ("damage", "says"),
         [
-            (lambda folder: (folder / NPZ).unlink(), "a folder with"),
-            (lambda folder: (folder / FIGURE).unlink(), "a folder with"),
-            (lambda folder: (folder / NPZ).write_bytes(b"PK\x03\x04 no"), "configurations.npz"),
+            (lambda folder: (folder / NPZ_FILE).unlink(), "a folder with"),
+            (lambda folder: (folder / FIGURE_FILE).unlink(), "a folder with"),
+            (lambda folder: (folder / NPZ_FILE).write_bytes(b"PK\x03\x04 no"), "configurations.npz"),
             (lambda folder: change(folder, q=lambda q: q[:, :20]), "20 columns, 29 names"),
             (lambda folder: change(folder, q=lambda q: q * np.inf), "got nan|got -?inf"),
             (lambda folder: change(folder, q=lambda q: q * 2), "quaternion of length 2"),
@@ -196,7 +196,7 @@ class TestBadInput:
             ),
             (lambda folder: change(folder, up=lambda up: np.array("up")), "up: got"),
             (
-                lambda folder: (folder / FIGURE).write_text("<robot name='a'><link name='b'/></robot>"),
+                lambda folder: (folder / FIGURE_FILE).write_text("<robot name='a'><link name='b'/></robot>"),
                 "not a stick figure",
             ),
         ],
@@ -227,8 +227,8 @@ class TestBadInput:
 
 def change(folder: Path, **changes: Callable[[np.ndarray], np.ndarray]) -> None:
     """Write the NPZ again with some arrays changed."""
-    with np.load(folder / NPZ) as archive:
+    with np.load(folder / NPZ_FILE) as archive:
         arrays = {name: archive[name] for name in archive.files}
     for name, alter in changes.items():
         arrays[name] = alter(arrays[name])
-    np.savez(folder / NPZ, **arrays)
+    np.savez(folder / NPZ_FILE, **arrays)

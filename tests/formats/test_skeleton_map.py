@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from posekit.errors import InputError
 from posekit.formats.skeleton_maps import (
-    LANDMARK,
-    LANDMARKS,
+    LANDMARK_INDEX,
+    LANDMARK_ORDER,
     SkeletonMap,
     find_by_names,
     find_by_order,
@@ -141,12 +141,12 @@ def test_no_map_of_a_detector_takes_a_girdle_for_a_joint(name: str) -> None:
 def test_gathering_undoes_scattering(name: str) -> None:
     layout = load_skeleton_map(name)
     rng = np.random.default_rng(1)
-    landmarks = rng.normal(size=(3, len(LANDMARKS), 2))
+    landmarks = rng.normal(size=(3, len(LANDMARK_ORDER), 2))
     for side in ("shoulders", "hips"):
-        ends = [LANDMARK[f"{which}_{side[:-1]}"] for which in ("right", "left")]
-        landmarks[:, LANDMARK[f"mid_{side}"]] = landmarks[:, ends].mean(axis=1)
+        ends = [LANDMARK_INDEX[f"{which}_{side[:-1]}"] for which in ("right", "left")]
+        landmarks[:, LANDMARK_INDEX[f"mid_{side}"]] = landmarks[:, ends].mean(axis=1)
     back = layout.gather(scatter(layout, landmarks))
-    placed = [LANDMARK[landmark] for landmark in layout.landmarks]
+    placed = [LANDMARK_INDEX[landmark] for landmark in layout.landmarks]
     np.testing.assert_allclose(back[:, placed], landmarks[:, placed], atol=1e-15)
     assert np.isnan(np.delete(back, placed, axis=1)).all()
 
@@ -159,8 +159,10 @@ def test_exchanging_sides_twice_is_nothing_and_once_exchanges(name: str) -> None
     np.testing.assert_array_equal(twice, layout.gather(values))
     plain = layout.gather(values)
     for part in SIDED:
-        np.testing.assert_array_equal(once[LANDMARK[f"left_{part}"]], plain[LANDMARK[f"right_{part}"]])
-    np.testing.assert_array_equal(once[LANDMARK["nose"]], plain[LANDMARK["nose"]])
+        np.testing.assert_array_equal(
+            once[LANDMARK_INDEX[f"left_{part}"]], plain[LANDMARK_INDEX[f"right_{part}"]]
+        )
+    np.testing.assert_array_equal(once[LANDMARK_INDEX["nose"]], plain[LANDMARK_INDEX["nose"]])
 
 
 def test_a_mean_of_which_a_point_is_missing_is_missing() -> None:
@@ -168,8 +170,8 @@ def test_a_mean_of_which_a_point_is_missing_is_missing() -> None:
     values = np.arange(34.0).reshape(17, 2)
     values[5] = np.nan
     found = layout.gather(values)
-    assert np.isnan(found[LANDMARK["mid_shoulders"]]).all()
-    np.testing.assert_array_equal(found[LANDMARK["mid_hips"]], (values[11] + values[12]) / 2)
+    assert np.isnan(found[LANDMARK_INDEX["mid_shoulders"]]).all()
+    np.testing.assert_array_equal(found[LANDMARK_INDEX["mid_hips"]], (values[11] + values[12]) / 2)
 
 
 @settings(deadline=None, derandomize=True, max_examples=40)

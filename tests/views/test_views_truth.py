@@ -17,7 +17,7 @@ from posekit.recovery.ranked import ranked
 from posekit.recovery.result import result_of
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
-from posekit.views.truth import TURNS, with_truth
+from posekit.views.truth import AXIS_TURNS, with_truth
 
 FIGURE = posekit.load_figure()
 
@@ -37,15 +37,15 @@ def placed(count: int = 8) -> tuple[View, Array]:
 
 
 def test_the_turns_are_the_24_rotations_of_the_axes() -> None:
-    assert len(TURNS) == 24
-    assert len({turn.tobytes() for turn in TURNS}) == 24
-    np.testing.assert_allclose(np.linalg.det(TURNS), 1.0, rtol=0, atol=1e-12)
+    assert len(AXIS_TURNS) == 24
+    assert len({turn.tobytes() for turn in AXIS_TURNS}) == 24
+    np.testing.assert_allclose(np.linalg.det(AXIS_TURNS), 1.0, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("turn", range(0, 24, 5))
 def test_any_turn_of_the_axes_is_found(turn: int) -> None:
     view, world = placed()
-    given, told = with_truth(view, world @ TURNS[turn], view.time + 7.0)
+    given, told = with_truth(view, world @ AXIS_TURNS[turn], view.time + 7.0)
     true = world @ view.camera.R.T + view.camera.t  # type: ignore[union-attr,operator]
     np.testing.assert_allclose(given.truth, true, rtol=0, atol=1e-9)
     assert told.frames == len(view)

@@ -24,7 +24,7 @@ from posekit.safe_io import cut, nearest, one_line, read_text, refusal, shown
 MAX_BYTES: Final = 200_000_000
 """``images.txt`` lists every point of every picture."""
 
-MODELS: Final[dict[str, tuple[str, ...]]] = {
+MODEL_PARAMETERS: Final[dict[str, tuple[str, ...]]] = {
     "SIMPLE_PINHOLE": ("f", "cx", "cy"),
     "PINHOLE": ("fx", "fy", "cx", "cy"),
     "SIMPLE_RADIAL": ("f", "cx", "cy", "k1"),
@@ -41,8 +41,8 @@ OTHER_MODELS: Final = (
     "THIN_PRISM_FISHEYE",
     "RAD_TAN_THIN_PRISM_FISHEYE",
 )
-FISHEYE: Final = ("k1", "k2", "k3", "k4")
-LENS: Final = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
+FISHEYE_PARAMETERS: Final = ("k1", "k2", "k3", "k4")
+LENS_PARAMETERS: Final = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
 
 
 def read_colmap(path: Path, unit: str | float | None = None) -> dict[str, CalibratedCamera]:
@@ -91,14 +91,16 @@ def _read_cameras(path: Path) -> dict[str, dict[str, Any]]:
                 path, place, f"{len(words)} words", "CAMERA_ID MODEL WIDTH HEIGHT PARAMS", "correct the file"
             )
         name, model = words[0], words[1]
-        if model in OTHER_MODELS or model not in MODELS:
+        if model in OTHER_MODELS or model not in MODEL_PARAMETERS:
             remedy = (
                 "undistort with COLMAP's image_undistorter"
                 if model in OTHER_MODELS
-                else nearest(model, MODELS)
+                else nearest(model, MODEL_PARAMETERS)
             )
-            raise refusal(path, place, f"the model {cut(one_line(model))}", ", ".join(MODELS), remedy)
-        names = MODELS[model]
+            raise refusal(
+                path, place, f"the model {cut(one_line(model))}", ", ".join(MODEL_PARAMETERS), remedy
+            )
+        names = MODEL_PARAMETERS[model]
         width, height, *values = _numbers(words[2:], path, place)
         if len(values) != len(names):
             got, expected = f"{len(values)} parameters", f"{len(names)} for {model}: {', '.join(names)}"
@@ -125,7 +127,7 @@ def _parameters(model: str, given: dict[str, float]) -> dict[str, Any]:
     fx, fy = given.get("fx", given.get("f", np.nan)), given.get("fy", given.get("f", np.nan))
     K = np.array([[fx, 0.0, given["cx"] - 0.5], [0.0, fy, given["cy"] - 0.5], [0.0, 0.0, 1.0]])
     fisheye = model == "OPENCV_FISHEYE"
-    order = FISHEYE if fisheye else LENS
+    order = FISHEYE_PARAMETERS if fisheye else LENS_PARAMETERS
     values = [given.get(name, 0.0) for name in order] if any(name in given for name in order) else []
     if not fisheye and not any(values[5:]):
         values = values[:5]

@@ -13,20 +13,20 @@ from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.safe_io import extra, open_file, refusal
 
 MAX_BYTES: Final = 500_000_000
-FORMATS: Final = ("JPEG", "MPO", "TIFF", "PNG", "WEBP")
+PICTURE_FORMATS: Final = ("JPEG", "MPO", "TIFF", "PNG", "WEBP")
 
-ORIENTATION: Final = 0x0112
-EXIF: Final = 0x8769
+ORIENTATION_TAG: Final = 0x0112
+EXIF_TAG: Final = 0x8769
 FOCAL_LENGTH: Final = 0x920A
 FOCAL_LENGTH_35: Final = 0xA405
 PIXELS_X, PIXELS_Y = 0xA002, 0xA003
 PLANE_X, PLANE_Y, PLANE_UNIT = 0xA20E, 0xA20F, 0xA210
 DIGITAL_ZOOM: Final = 0xA404
-MILLIMETRES: Final = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
+MILLIMETRES_IN_UNIT: Final = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
 """Of the unit of the sensor's resolution: inch, centimetre, and two that cameras use beside the standard."""
-SIDEWAYS: Final = (5, 6, 7, 8)
+QUARTER_TURNS: Final = (5, 6, 7, 8)
 """Orientations that turn a picture by a quarter."""
-CROPPED: Final = 0.2
+CROPPED_DEVIATION: Final = 0.2
 """Deviation of f where the picture is not the one that the camera took."""
 SAME_SHAPE: Final = 0.01
 
@@ -60,11 +60,11 @@ def read_exif(path: str | Path) -> CalibratedCamera:
             "ignore"
         )  # of Pillow's, about tags that are damaged: what is needed is checked here
         try:
-            with image.open(file, formats=FORMATS) as picture:
+            with image.open(file, formats=PICTURE_FORMATS) as picture:
                 width, height = picture.size
                 tags = picture.getexif()
-                orientation = tags.get(ORIENTATION)
-                exif = dict(tags.get_ifd(EXIF))
+                orientation = tags.get(ORIENTATION_TAG)
+                exif = dict(tags.get_ifd(EXIF_TAG))
         except (OSError, ValueError, SyntaxError, TypeError, KeyError, ArithmeticError, EOFError) as error:
             reason = str(error).partition("<")[0].strip() or type(error).__name__
             raise refusal(path, "", reason[:80], "a photograph", "name a JPEG that is not damaged") from None
@@ -80,9 +80,9 @@ def read_exif(path: str | Path) -> CalibratedCamera:
         deviation = max(deviation, 1 - 1 / min(zoom, 2.0))
         doubts = f", digital zoom {zoom:g}"
     if None not in taken and not _same_shape((width, height), taken):  # type: ignore[arg-type]
-        deviation = max(deviation, CROPPED)
+        deviation = max(deviation, CROPPED_DEVIATION)
         doubts += f", cut from {taken[0]:.0f} x {taken[1]:.0f} pixels"
-    size = (height, width) if orientation in SIDEWAYS else (width, height)
+    size = (height, width) if orientation in QUARTER_TURNS else (width, height)
     how = f"a guess from EXIF: {basis}{doubts}, f within {100 * deviation:.0f} %"
     return camera_from_focal35(size, equivalent, name=path.stem, deviation=deviation, how=how)
 
@@ -110,7 +110,7 @@ def _sensor_diagonal(exif: dict[int, Any]) -> float | None:
     """Return the sensor's diagonal, mm, from its resolution and the picture that was taken."""
     x, y = _number(exif, PLANE_X), _number(exif, PLANE_Y)
     width, height = _number(exif, PIXELS_X), _number(exif, PIXELS_Y)
-    unit = MILLIMETRES.get(int(_number(exif, PLANE_UNIT) or 2))
+    unit = MILLIMETRES_IN_UNIT.get(int(_number(exif, PLANE_UNIT) or 2))
     if x is None or width is None or height is None or unit is None:
         return None
     diagonal = unit * math.hypot(width / x, height / (y or x))

@@ -14,7 +14,7 @@ from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
 from posekit.safe_io import cut, one_line, refusal, shown
 
-MATRIX: Final = (
+MATRIX_NAMES: Final = (
     "camera_matrix",
     "intrinsic_matrix",
     "camera_intrinsics",
@@ -24,7 +24,7 @@ MATRIX: Final = (
     "k",
     "m",
 )
-DISTORTION: Final = (
+DISTORTION_NAMES: Final = (
     "distortion_coefficients",
     "distortion_coeffs",
     "distortion",
@@ -36,18 +36,18 @@ DISTORTION: Final = (
     "dist",
     "d",
 )
-ROTATION: Final = ("rotation_matrix", "rotation_vector", "rotation", "rmat", "rot", "rvec", "r")
-TRANSLATION: Final = ("translation_vector", "translation", "tvec", "t")
-SIZE: Final = ("image_size", "img_size", "image_resolution", "resolution", "size")
-WIDTH: Final = ("image_width", "width", "w")
-HEIGHT: Final = ("image_height", "height", "h")
-FISHEYE: Final = ("fisheye_model", "fisheye", "use_fisheye_model")
-MODEL: Final = ("distortion_model", "camera_model", "model")
+ROTATION_NAMES: Final = ("rotation_matrix", "rotation_vector", "rotation", "rmat", "rot", "rvec", "r")
+TRANSLATION_NAMES: Final = ("translation_vector", "translation", "tvec", "t")
+SIZE_NAMES: Final = ("image_size", "img_size", "image_resolution", "resolution", "size")
+WIDTH_NAMES: Final = ("image_width", "width", "w")
+HEIGHT_NAMES: Final = ("image_height", "height", "h")
+FISHEYE_NAMES: Final = ("fisheye_model", "fisheye", "use_fisheye_model")
+MODEL_NAMES: Final = ("distortion_model", "camera_model", "model")
 FISHEYE_MODELS: Final = ("equidistant", "fisheye", "kannala_brandt", "kannalabrandt", "opencv_fisheye")
 PLAIN_MODELS: Final = ("plumb_bob", "rational_polynomial", "opencv", "pinhole", "brown", "radtan", "none", "")
-NAME: Final = ("camera_name", "name", "id")
-METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-FARTHEST: Final = 100.0
+CAMERA_NAMES: Final = ("camera_name", "name", "id")
+METRES_IN_CAMERA_UNIT: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+FARTHEST_CAMERA_METRES: Final = 100.0
 """Metres from the world's origin beyond which a camera is more likely in another unit."""
 MAX_CAMERAS: Final = 100_000
 MAX_SIDE: Final = 10**6
@@ -63,11 +63,15 @@ def metres_of(unit: str | float) -> float:
         Where it is neither.
     """
     if isinstance(unit, str):
-        if unit not in METRES:
+        if unit not in METRES_IN_CAMERA_UNIT:
             raise refusal(
-                "", "unit", shown(unit), f"{', '.join(METRES)}, or metres as a number", "choose one"
+                "",
+                "unit",
+                shown(unit),
+                f"{', '.join(METRES_IN_CAMERA_UNIT)}, or metres as a number",
+                "choose one",
             )
-        return METRES[unit]
+        return METRES_IN_CAMERA_UNIT[unit]
     if not (np.isfinite(unit) and unit > 0):
         raise refusal("", "unit", shown(unit), "a positive number of metres", "correct it")
     return float(unit)
@@ -100,26 +104,26 @@ def cameras_of(
     found: dict[str, CalibratedCamera] = {}
     suffixes = _suffixes(fields)
     if suffixes:
-        plain = str(_value(fields, NAME, "") or name)
+        plain = str(_value(fields, CAMERA_NAMES, "") or name)
         for suffix in suffixes:
             _add(found, camera_of(fields, source, suffix or plain, unit, suffix), source)
         return found
     for key, entry in fields.items():
         if isinstance(entry, Mapping) and _suffixes(entry) == [""]:
-            _add(found, camera_of(entry, source, str(_value(entry, NAME, "") or key), unit), source)
+            _add(found, camera_of(entry, source, str(_value(entry, CAMERA_NAMES, "") or key), unit), source)
         elif isinstance(entry, list) and len(entry) <= MAX_CAMERAS:
             inner = [
                 (k, one) for k, one in enumerate(entry) if isinstance(one, Mapping) and "" in _suffixes(one)
             ]
             for k, one in inner:
-                _add(found, camera_of(one, source, str(_value(one, NAME, "") or k), unit), source)
+                _add(found, camera_of(one, source, str(_value(one, CAMERA_NAMES, "") or k), unit), source)
     if not found:
         there = ", ".join(cut(str(key)) for key in list(fields)[:6]) or "nothing"
         raise refusal(
             source,
             "camera_matrix",
             f"no 3x3 matrix of intrinsics; there is {one_line(there)}",
-            f"one of {', '.join(MATRIX)}",
+            f"one of {', '.join(MATRIX_NAMES)}",
             "check that it is a camera's file",
         )
     return found
@@ -130,8 +134,8 @@ def camera_of(
 ) -> CalibratedCamera:
     """Make one camera of its fields; those of several cameras have its `suffix`."""
     place = f"{cut(name)}."
-    K = numbers(_value(fields, MATRIX, suffix), source, f"{place}K").reshape(3, 3)
-    given = _value(fields, DISTORTION, suffix)
+    K = numbers(_value(fields, MATRIX_NAMES, suffix), source, f"{place}K").reshape(3, 3)
+    given = _value(fields, DISTORTION_NAMES, suffix)
     distortion = np.empty(0) if given is None else numbers(given, source, f"{place}distortion").ravel()
     fisheye = _is_fisheye(fields, source, place, suffix)
     R, t = _pose(fields, source, place, suffix, unit)
@@ -199,12 +203,12 @@ def numbers(value: Any, source: str | Path, field: str) -> Array:
 def translation(t: Array, source: str | Path, field: str, unit: str | float | None) -> Array:
     """Turn a translation into metres, and refuse one that looks like another unit where none was given."""
     metres = t * metres_of("m" if unit is None else unit)
-    if unit is None and not np.abs(metres).max() <= FARTHEST:
+    if unit is None and not np.abs(metres).max() <= FARTHEST_CAMERA_METRES:
         raise refusal(
             source,
             field,
             f"a camera {np.abs(metres).max():,.0f} from the origin",
-            f"metres, at most {FARTHEST:.0f}",
+            f"metres, at most {FARTHEST_CAMERA_METRES:.0f}",
             "say the unit, as mm",
         )
     return metres
@@ -215,7 +219,7 @@ def _suffixes(fields: Mapping[str, Any]) -> list[str]:
     found = []
     for key, value in fields.items():
         low = str(key).casefold()
-        for alias in MATRIX:
+        for alias in MATRIX_NAMES:
             suffix = _suffix(low, alias)
             if suffix is not None and _is_intrinsic(value):
                 found.append(str(key)[len(str(key)) - len(suffix) :] if suffix else "")
@@ -256,12 +260,12 @@ def _is_intrinsic(value: Any) -> bool:
 
 
 def _is_fisheye(fields: Mapping[str, Any], source: str | Path, place: str, suffix: str) -> bool:
-    flag = _value(fields, FISHEYE, suffix)
+    flag = _value(fields, FISHEYE_NAMES, suffix)
     if flag is None:
-        flag = _value(fields, FISHEYE, "")
+        flag = _value(fields, FISHEYE_NAMES, "")
     if flag is not None and str(flag).casefold() not in ("0", "1", "true", "false"):
         raise refusal(source, f"{place}fisheye", shown(flag), "0 or 1", "correct it")
-    model = _value(fields, MODEL, suffix) or _value(fields, MODEL, "")
+    model = _value(fields, MODEL_NAMES, suffix) or _value(fields, MODEL_NAMES, "")
     word = model.casefold() if isinstance(model, str) else ""
     if word not in FISHEYE_MODELS + PLAIN_MODELS:
         known = ", ".join(one for one in FISHEYE_MODELS + PLAIN_MODELS if one)
@@ -273,10 +277,10 @@ def _pose(
     fields: Mapping[str, Any], source: str | Path, place: str, suffix: str, unit: str | float | None
 ) -> tuple[Array | None, Array | None]:
     """Return R and t; neither where the file has not both: ROS calls its rectification R."""
-    given_t = _value(fields, TRANSLATION, suffix)
+    given_t = _value(fields, TRANSLATION_NAMES, suffix)
     rotations = [
         array
-        for alias in ROTATION
+        for alias in ROTATION_NAMES
         if (value := _value(fields, (alias,), suffix)) is not None
         and (array := numbers(value, source, f"{place}R")).size in (3, 9)
     ]
@@ -301,8 +305,8 @@ def _pose(
 def _size(fields: Mapping[str, Any], suffix: str) -> tuple[int, int] | None:
     """Return width and height; None where the file says neither, or what it says is no size."""
     for end in (suffix, ""):
-        pair = [_value(fields, aliases, end) for aliases in (WIDTH, HEIGHT)]
-        given = _value(fields, SIZE, end)
+        pair = [_value(fields, aliases, end) for aliases in (WIDTH_NAMES, HEIGHT_NAMES)]
+        given = _value(fields, SIZE_NAMES, end)
         if given is not None:
             given = given.get("data") if isinstance(given, Mapping) else given
             values = np.ravel(np.asarray(given, dtype=object))

@@ -16,7 +16,7 @@ import numpy as np
 from posekit.cameras.calibrated import CalibratedCamera
 from posekit.errors import InputError
 from posekit.formats.cameras.camera_format import CameraFormat, has_intrinsics
-from posekit.formats.cameras.fields import METRES, cameras_of, made, numbers
+from posekit.formats.cameras.fields import METRES_IN_CAMERA_UNIT, cameras_of, made, numbers
 from posekit.formats.given_file import GivenFile
 from posekit.safe_io import one_line, read_json, read_text, read_xml, refusal, shown, write_text
 from posekit.safe_io.yaml_file import parse_yaml
@@ -80,14 +80,14 @@ def _of_view(fields: dict[str, Any], path: Path) -> dict[str, CalibratedCamera]:
     if not isinstance(camera, dict) or camera.get("model") != "opencv":
         got = shown(camera.get("model") if isinstance(camera, dict) else camera)
         raise refusal(path, "camera.model", got, '"opencv"', "give a view with a calibrated camera")
-    if fields.get("unit") not in METRES:
-        raise refusal(path, "unit", shown(fields.get("unit")), ", ".join(METRES), "name it")
+    if fields.get("unit") not in METRES_IN_CAMERA_UNIT:
+        raise refusal(path, "unit", shown(fields.get("unit")), ", ".join(METRES_IN_CAMERA_UNIT), "name it")
     parameters: dict[str, Any] = {"K": numbers(camera.get("K"), path, "camera.K")}
     for name in ("distortion", "R", "t"):
         if camera.get(name) is not None:
             parameters[name] = numbers(camera[name], path, f"camera.{name}")
     if "t" in parameters:
-        parameters["t"] = parameters["t"] * METRES[fields["unit"]]
+        parameters["t"] = parameters["t"] * METRES_IN_CAMERA_UNIT[fields["unit"]]
     if camera.get("size") is not None:
         sides = numbers(camera["size"], path, "camera.size").ravel()
         parameters["size"] = tuple(int(side) for side in sides)

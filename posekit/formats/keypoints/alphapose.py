@@ -22,7 +22,7 @@ from posekit.formats.keypoints.rows import Rows, number, numbers, whole
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import cut, refusal, shown
 
-BODIES = {"bodies": "joints", "people": "pose_keypoints_2d"}
+POINTS_FIELD_OF_PEOPLE = {"bodies": "joints", "people": "pose_keypoints_2d"}
 """Where the people of a picture are and where their points, by ``--format cmu`` and ``open``."""
 
 
@@ -33,7 +33,9 @@ def looks_like(given: GivenFile) -> bool:
         return bool(document) and _is_row(document[0]) and isinstance(document[0]["image_id"], str)
     if not isinstance(document, dict) or not document:
         return False
-    return _is_picture(document, ("bodies",)) or _is_picture(next(iter(document.values())), tuple(BODIES))
+    return _is_picture(document, ("bodies",)) or _is_picture(
+        next(iter(document.values())), tuple(POINTS_FIELD_OF_PEOPLE)
+    )
 
 
 def _is_row(entry: object) -> bool:
@@ -60,7 +62,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             _read_list(rows, document)
             continue
         by_pictures = True
-        pictures = {path.stem: document} if _is_picture(document, tuple(BODIES)) else document
+        pictures = {path.stem: document} if _is_picture(document, tuple(POINTS_FIELD_OF_PEOPLE)) else document
         if not isinstance(pictures, dict):
             raise refusal(
                 path, "", shown(document), "a list of people, or pictures by name", "check the file"
@@ -91,15 +93,23 @@ def _read_list(rows: Rows, people: list[Any]) -> None:
 
 
 def _read_picture(rows: Rows, label: str, picture: object) -> None:
-    kind = next((kind for kind in BODIES if _is_picture(picture, (kind,))), None)
+    kind = next((kind for kind in POINTS_FIELD_OF_PEOPLE if _is_picture(picture, (kind,))), None)
     if kind is None or not isinstance(picture, dict):
         raise refusal(rows.source, cut(label), shown(picture), "bodies or people", "check the file")
     rows.picture(label)
     for index, person in enumerate(picture[kind]):
         place = f"{cut(label)}.{kind}[{index}]"
         if not isinstance(person, dict):
-            raise refusal(rows.source, place, shown(person), f"{{{BODIES[kind]}}}", "check the file")
-        _add(rows, label, person.get(BODIES[kind]), f"{place}.{BODIES[kind]}", person)
+            raise refusal(
+                rows.source, place, shown(person), f"{{{POINTS_FIELD_OF_PEOPLE[kind]}}}", "check the file"
+            )
+        _add(
+            rows,
+            label,
+            person.get(POINTS_FIELD_OF_PEOPLE[kind]),
+            f"{place}.{POINTS_FIELD_OF_PEOPLE[kind]}",
+            person,
+        )
 
 
 def _add(rows: Rows, label: object, keypoints: object, field: str, person: dict[str, Any]) -> None:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.formats.given_file import GivenFile
-from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of
+from posekit.formats.keypoints.coco_annotations import ANNOTATIONS_FIELD, annotations_of
 from posekit.formats.keypoints.coco_layout import layout_of
 from posekit.formats.keypoints.coco_parts import is_wholebody
 from posekit.formats.keypoints.coco_people import (
@@ -40,11 +40,13 @@ from posekit.safe_io import refusal
 def looks_like(given: GivenFile) -> bool:
     """Tell whether a file has annotations with key points, or categories with names for them."""
     document = None if given.is_folder else given.document
-    if not isinstance(document, dict) or not isinstance(document.get(FIELD), list):
+    if not isinstance(document, dict) or not isinstance(document.get(ANNOTATIONS_FIELD), list):
         return False
-    first = next((one for one in document[FIELD] if isinstance(one, dict) and "keypoints" in one), None)
+    first = next(
+        (one for one in document[ANNOTATIONS_FIELD] if isinstance(one, dict) and "keypoints" in one), None
+    )
     if first is None:
-        return not document[FIELD] and any(_names(document).values())
+        return not document[ANNOTATIONS_FIELD] and any(_names(document).values())
     return not is_wholebody(first)
 
 
@@ -60,11 +62,13 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     people, images = annotations_of(given)
     people, names = _of_one_kind(source, people, _names(given.document), layout)
     values = triples(
-        source, [one["keypoints"] for one in people], lambda k: f"{FIELD}[…].keypoints, person {k}"
+        source,
+        [one["keypoints"] for one in people],
+        lambda k: f"{ANNOTATIONS_FIELD}[…].keypoints, person {k}",
     )
     points, confidence, occluded = _flagged(source, values)
     found = _layout(source, values, names, layout)
-    frame = pictures_of(source, FIELD, people, images)
+    frame = pictures_of(source, ANNOTATIONS_FIELD, people, images)
     rows = by_picture(frame, points)
     return KeyPoints(
         format=COCO_FORMAT.name,
@@ -76,8 +80,8 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         points=points[rows] if points.size else np.empty((0, len(found.points), 2)),
         confidence=confidence[rows],
         occluded=occluded[rows],
-        score=scores_of(source, FIELD, people)[rows],
-        person=tracks_of(source, FIELD, people)[rows],
+        score=scores_of(source, ANNOTATIONS_FIELD, people)[rows],
+        person=tracks_of(source, ANNOTATIONS_FIELD, people)[rows],
         sequence=False,
     )
 

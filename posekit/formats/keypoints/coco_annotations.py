@@ -9,7 +9,7 @@ from posekit.formats.keypoints.coco_images import Images, images_from, images_of
 from posekit.formats.keypoints.coco_people import identities_of
 from posekit.safe_io import refusal, shown
 
-FIELD: Final = "annotations"
+ANNOTATIONS_FIELD: Final = "annotations"
 
 
 def annotations_of(given: GivenFile) -> tuple[list[dict[str, Any]], Images]:
@@ -21,22 +21,28 @@ def annotations_of(given: GivenFile) -> tuple[list[dict[str, Any]], Images]:
         Where it has no list of annotations, or a picture is not told.
     """
     source, document = given.path, None if given.is_folder else given.document
-    listed = document.get(FIELD) if isinstance(document, dict) else None
+    listed = document.get(ANNOTATIONS_FIELD) if isinstance(document, dict) else None
     if not isinstance(document, dict) or not isinstance(listed, list) or not all(map(_is_object, listed)):
         got = shown(document if listed is None else listed)
-        raise refusal(source, FIELD, got, f'{{"images": [...], "{FIELD}": [...]}}', "check that it is COCO's")
+        raise refusal(
+            source,
+            ANNOTATIONS_FIELD,
+            got,
+            f'{{"images": [...], "{ANNOTATIONS_FIELD}": [...]}}',
+            "check that it is COCO's",
+        )
     people = [one for one in listed if "keypoints" in one and not one.get("iscrowd")]
     if listed and not any("keypoints" in one for one in listed):
         raise refusal(
             source,
-            f"{FIELD}[0]",
+            f"{ANNOTATIONS_FIELD}[0]",
             shown(listed[0]),
             'a person with "keypoints"',
             "take the file of key points: person_keypoints_….json, not instances_….json",
         )
     if "images" in document:
         return people, images_of(source, document["images"])
-    return people, images_from(identities_of(source, FIELD, people))
+    return people, images_from(identities_of(source, ANNOTATIONS_FIELD, people))
 
 
 def _is_object(entry: Any) -> bool:

@@ -12,7 +12,7 @@ from posekit.formats.keypoints.coco_triples import triples
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
-PARTS: Final = (
+WHOLEBODY_PARTS: Final = (
     ("keypoints", 17, ""),
     ("foot_kpts", 6, "foot_valid"),
     ("face_kpts", 68, "face_valid"),
@@ -20,16 +20,16 @@ PARTS: Final = (
     ("righthand_kpts", 21, "righthand_valid"),
 )
 """A part's field, its points, and the flag that says whether it was labelled."""
-COUNT: Final = sum(count for _, count, _ in PARTS)
-SEEN: Final = 23
+WHOLEBODY_POINTS: Final = sum(count for _, count, _ in WHOLEBODY_PARTS)
+FLAGGED_POINTS: Final = 23
 """Body and feet come first: of their points it is known whether they are hidden."""
 
 
 def is_wholebody(person: dict[str, Any]) -> bool:
     """Tell whether a person has the parts, or the 133 in one list."""
     points = person.get("keypoints")
-    return any(field in person for field, *_ in PARTS[1:]) or (
-        isinstance(points, list) and len(points) == 3 * COUNT
+    return any(field in person for field, *_ in WHOLEBODY_PARTS[1:]) or (
+        isinstance(points, list) and len(points) == 3 * WHOLEBODY_POINTS
     )
 
 
@@ -42,16 +42,20 @@ def joined(source: Path, field: str, people: Sequence[dict[str, Any]]) -> Array:
         Where a part has another number of points, or something else than numbers.
     """
     if not people:
-        return np.empty((0, COUNT, 3))
+        return np.empty((0, WHOLEBODY_POINTS, 3))
     columns = []
     start = 0
-    for name, count, flag in PARTS:
+    for name, count, flag in WHOLEBODY_PARTS:
         part = slice(3 * start, 3 * (start + count))
         start += count
         lists = []
         for place, one in enumerate(people):
             whole = one.get("keypoints")
-            values = whole[part] if isinstance(whole, list) and len(whole) == 3 * COUNT else one.get(name)
+            values = (
+                whole[part]
+                if isinstance(whole, list) and len(whole) == 3 * WHOLEBODY_POINTS
+                else one.get(name)
+            )
             if values is None or values == [] or (flag and not one.get(flag, True)):
                 values = [0] * (3 * count)
             if not isinstance(values, list) or len(values) != 3 * count:

@@ -13,7 +13,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
-NUMBERS = frozenset((int, float))
+NUMBER_TYPES = frozenset((int, float))
 
 
 def triples(source: str | Path, lists: Sequence[Any], place: Callable[[int], str]) -> Array:
@@ -55,7 +55,7 @@ def triples(source: str | Path, lists: Sequence[Any], place: Callable[[int], str
                 "split the file by the kind of detector",
             )
     kinds = set(map(type, chain.from_iterable(lists)))
-    if not kinds <= NUMBERS | {type(None)}:
+    if not kinds <= NUMBER_TYPES | {type(None)}:
         raise _no_number(source, lists, place)
     if type(None) in kinds:
         flat = np.array([[np.nan if value is None else value for value in values] for values in lists], float)
@@ -69,7 +69,7 @@ def _no_number(source: str | Path, lists: Sequence[Any], place: Callable[[int], 
         (index, column)
         for index, values in enumerate(lists)
         for column, value in enumerate(values)
-        if type(value) not in NUMBERS and value is not None
+        if type(value) not in NUMBER_TYPES and value is not None
     )
     value = lists[index][column]
     got = "a list inside the list" if isinstance(value, list) else shown(value)

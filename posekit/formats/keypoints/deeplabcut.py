@@ -19,19 +19,19 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_names
-from posekit.formats.keypoints.rows import LARGEST, Rows
+from posekit.formats.keypoints.rows import LARGEST_NUMBER, Rows
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-HDF5 = (".h5", ".hdf5", ".hdf")
+HDF5_SUFFIXES = (".h5", ".hdf5", ".hdf")
 MAX_COLUMNS = 100_000
-LEVELS = ("scorer", "individuals", "bodyparts", "coords")
+HEADER_LEVELS = ("scorer", "individuals", "bodyparts", "coords")
 
 
 def looks_like(given: GivenFile) -> bool:
     """Tell whether it is CSV with DeepLabCut's header, or HDF5, which has to be saved as CSV first."""
-    if given.suffix in HDF5:
+    if given.suffix in HDF5_SUFFIXES:
         return True
     return given.suffix == ".csv" and given.text.lstrip().startswith(("scorer,", '"scorer",'))
 
@@ -44,7 +44,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where it is HDF5, no such table, or its names fit no skeleton map.
     """
-    if given.suffix in HDF5:
+    if given.suffix in HDF5_SUFFIXES:
         raise refusal(
             given.path,
             "",
@@ -68,7 +68,7 @@ def _header(path: Path, reader: Iterator[list[str]]) -> tuple[dict[str, list[str
     levels: dict[str, list[str]] = {}
     for fields in reader:
         name = fields[0].strip() if fields else ""
-        if name not in LEVELS or name in levels:
+        if name not in HEADER_LEVELS or name in levels:
             expected = "scorer, (individuals,) bodyparts, coords"
             raise refusal(path, f"line {len(levels) + 1}", shown(name), expected, "save it again")
         levels[name] = [field.strip() for field in fields]
@@ -128,12 +128,12 @@ def _people(
 ) -> KeyPoints:
     """Make a person of each individual; one whose points place no landmarks is none: a project's unique points."""
     table = np.array(values, dtype=np.float64).reshape(len(labels), len(header["coords"]))
-    beyond = np.abs(table) > LARGEST
+    beyond = np.abs(table) > LARGEST_NUMBER
     if beyond.any():
         row, column = (int(k) for k in np.argwhere(beyond)[0])
         got = shown(float(table[row, column]))
         raise refusal(
-            path, f"row {row + 1} after the header", got, f"at most {LARGEST:g} in size", "correct it"
+            path, f"row {row + 1} after the header", got, f"at most {LARGEST_NUMBER:g} in size", "correct it"
         )
     individuals = header.get("individuals") or [""] * len(header["coords"])
     names = {name: _parts(path, header, individuals, name) for name in dict.fromkeys(individuals)}
@@ -212,7 +212,7 @@ def _columns(table: Array, parts: dict[str, dict[str, int]], names: tuple[str, .
 DEEPLABCUT_FORMAT: Final = KeyPointFormat(
     name="deeplabcut",
     title="DeepLabCut's CSV: scorer, (individuals,) bodyparts, coords",
-    suffixes=(".csv", *HDF5),
+    suffixes=(".csv", *HDF5_SUFFIXES),
     looks_like=looks_like,
     read=read,
 )

@@ -13,7 +13,7 @@ from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
-FARTHEST: Final = 1e6
+FARTHEST_PIXEL: Final = 1e6
 """Pixels from the origin: no picture is so large, and a larger number is damage."""
 
 
@@ -60,8 +60,8 @@ class KeyPoints:
     Raises
     ------
     InputError
-        Where shapes do not fit, a coordinate is infinite or beyond `FARTHEST`, a point is known in part, or a size,
-        a time, a confidence or a person's number is impossible.
+        Where shapes do not fit, a coordinate is infinite or beyond `FARTHEST_PIXEL`, a point is known in part, or a
+        size, a time, a confidence or a person's number is impossible.
     """
 
     format: str
@@ -109,14 +109,14 @@ class KeyPoints:
     def _check(self) -> None:
         unknown = np.isnan(self.points)
         with np.errstate(invalid="ignore"):
-            bad = (np.abs(self.points) > FARTHEST) | (unknown ^ unknown.all(axis=-1, keepdims=True))
+            bad = (np.abs(self.points) > FARTHEST_PIXEL) | (unknown ^ unknown.all(axis=-1, keepdims=True))
         if bad.any():
             row, point, _ = (int(k) for k in np.argwhere(bad)[0])
             raise refusal(
                 self.source,
                 f"{self.pictures[int(self.frame[row])]}: {self.layout.points[point]}",
                 str(self.points[row, point].tolist()),
-                f"two numbers up to {FARTHEST:,.0f}, or a missing point",
+                f"two numbers up to {FARTHEST_PIXEL:,.0f}, or a missing point",
                 "correct it",
             )
         if len(self.frame) and (

@@ -24,12 +24,12 @@ from posekit.formats.keypoints.rows import Rows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import refusal
 
-PIXELS = 3.0
+PIXELS_FROM = 3.0
 """Where half of all coordinates are larger, they are pixels: nobody stands three pictures away from the picture."""
-WORLD = 0.02
+WORLD_MIDDLE_WITHIN = 0.02
 """World landmarks have the middle of the hips at the origin, which as a fraction is the picture's corner."""
-HIPS = (23, 24)
-POINTS = 33
+HIP_LANDMARKS = (23, 24)
+POINT_COUNT = 33
 
 
 def looks_like(given: GivenFile) -> bool:
@@ -71,11 +71,11 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             rows.source = str(path)
             add_document(rows, document, path.stem)
     rows.source = str(given.path)
-    if layout is not None and len(layout.points) != POINTS:
+    if layout is not None and len(layout.points) != POINT_COUNT:
         raise refusal(
             given.path,
             "points",
-            f"{POINTS} a person",
+            f"{POINT_COUNT} a person",
             f"{len(layout.points)}, as the skeleton map {layout.name} has",
             "give a map of MediaPipe's points, or none",
         )
@@ -88,11 +88,11 @@ def _in_pixels(found: KeyPoints) -> KeyPoints:
     known = ~np.isnan(found.points[..., 0])
     if not known.any():
         return found
-    if float(np.median(np.abs(found.points[known]))) > PIXELS:
+    if float(np.median(np.abs(found.points[known]))) > PIXELS_FROM:
         return replace(found, normalised=False)
-    hips = found.points[:, HIPS].mean(axis=1)
+    hips = found.points[:, HIP_LANDMARKS].mean(axis=1)
     hips = hips[~np.isnan(hips[:, 0])]
-    if len(hips) and float(np.median(np.abs(hips))) < WORLD:
+    if len(hips) and float(np.median(np.abs(hips))) < WORLD_MIDDLE_WITHIN:
         raise refusal(
             found.source,
             "",

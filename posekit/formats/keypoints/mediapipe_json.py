@@ -7,32 +7,42 @@ from typing import Any
 import numpy as np
 
 from posekit.formats.keypoints.mediapipe_names import (
-    EITHER,
-    LABELS,
-    MICROSECONDS,
-    MILLISECONDS,
-    NAMES,
-    PRESENCE,
-    SECONDS,
-    VISIBILITY,
+    LANDMARK_NAMES,
+    MICROSECONDS_NAMES,
+    MILLISECONDS_NAMES,
+    PICTURE_LABEL_NAMES,
+    PRESENCE_NAMES,
+    SECONDS_NAMES,
+    SECONDS_OR_MILLISECONDS_NAMES,
+    VISIBILITY_NAMES,
     in_seconds,
     landmark,
     one_of,
 )
-from posekit.formats.keypoints.rows import LARGEST, NUMBERS, Rows, number, whole
+from posekit.formats.keypoints.rows import COORDINATE_TYPES, LARGEST_NUMBER, Rows, number, whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-FRAMES = ("frames", "posedata", "framesdata", "framedata", "poses", "results", "data")
-PICTURE = ("poselandmarks", "poselandmark", "landmarks", "landmark", "pose", "keypoints")
+FRAMES_NAMES = ("frames", "posedata", "framesdata", "framedata", "poses", "results", "data")
+PICTURE_LANDMARKS_NAMES = ("poselandmarks", "poselandmark", "landmarks", "landmark", "pose", "keypoints")
 """Where a frame has its landmarks, plain; world landmarks are called otherwise."""
-WORLD = ("poseworldlandmarks", "worldlandmarks")
-PEOPLE = ("people", "persons", "poses")
-HOLDERS = ("metadata", "meta", "videoinfo", "video", "info", "shape", "imagesize", "framesize", "resolution")
-WIDTH = ("imagewidth", "framewidth", "videowidth", "width", "w")
-HEIGHT = ("imageheight", "frameheight", "videoheight", "height", "h")
-TIMES = (*MILLISECONDS, *MICROSECONDS, *SECONDS, *EITHER)
+WORLD_LANDMARKS_NAMES = ("poseworldlandmarks", "worldlandmarks")
+PEOPLE_NAMES = ("people", "persons", "poses")
+SIZE_HOLDER_NAMES = (
+    "metadata",
+    "meta",
+    "videoinfo",
+    "video",
+    "info",
+    "shape",
+    "imagesize",
+    "framesize",
+    "resolution",
+)
+PICTURE_WIDTH_NAMES = ("imagewidth", "framewidth", "videowidth", "width", "w")
+PICTURE_HEIGHT_NAMES = ("imageheight", "frameheight", "videoheight", "height", "h")
+FRAME_TIME_NAMES = (*MILLISECONDS_NAMES, *MICROSECONDS_NAMES, *SECONDS_NAMES, *SECONDS_OR_MILLISECONDS_NAMES)
 
 
 def looks_like_landmarks(document: object) -> bool:
@@ -40,10 +50,12 @@ def looks_like_landmarks(document: object) -> bool:
     frame = next(iter(_frames(document)), None)
     for candidate in (frame, *_first_full(document)):
         if isinstance(candidate, dict):
-            field = one_of(candidate, (*PICTURE, *WORLD))
-            people = one_of(candidate, PEOPLE)
+            field = one_of(candidate, (*PICTURE_LANDMARKS_NAMES, *WORLD_LANDMARKS_NAMES))
+            people = one_of(candidate, PEOPLE_NAMES)
             inner = candidate.get(field) if field else candidate.get(people) if people else None
-            if _holds_landmarks(inner) or (field is not None and plain(field) in WORLD + PICTURE[:2]):
+            if _holds_landmarks(inner) or (
+                field is not None and plain(field) in WORLD_LANDMARKS_NAMES + PICTURE_LANDMARKS_NAMES[:2]
+            ):
                 return True
         elif _holds_landmarks(candidate):
             return True
@@ -54,7 +66,7 @@ def _first_full(document: object) -> list[object]:
     """Return the first frame with somebody in it: the first ones may be empty."""
     for frame in _frames(document):
         if isinstance(frame, dict) and any(
-            frame.get(field) for field in frame if plain(str(field)) in PICTURE + PEOPLE
+            frame.get(field) for field in frame if plain(str(field)) in PICTURE_LANDMARKS_NAMES + PEOPLE_NAMES
         ):
             return [frame]
     return []
@@ -62,10 +74,12 @@ def _first_full(document: object) -> list[object]:
 
 def _holds_landmarks(value: object) -> bool:
     for _ in range(3):
-        if _is_named(value) or (isinstance(value, list) and len(value) == len(NAMES) and _is_point(value[0])):
+        if _is_named(value) or (
+            isinstance(value, list) and len(value) == len(LANDMARK_NAMES) and _is_point(value[0])
+        ):
             return True
         if isinstance(value, dict) and value:
-            inner = one_of(value, PICTURE)
+            inner = one_of(value, PICTURE_LANDMARKS_NAMES)
             value = value[inner] if inner else next(iter(value.values()))
         elif isinstance(value, list) and value:
             value = value[0]
@@ -79,7 +93,7 @@ def _frames(document: object) -> list[Any]:
     if isinstance(document, list):
         return [document] if document and (_is_named(document[0]) or _is_point(document[0])) else document
     if isinstance(document, dict):
-        field = one_of(document, FRAMES)
+        field = one_of(document, FRAMES_NAMES)
         if field is not None and isinstance(document[field], list):
             return list(document[field])
         return [document]
@@ -104,14 +118,17 @@ def add_document(rows: Rows, document: object, name: str) -> None:
         label: object = name if len(frames) == 1 and not isinstance(document, list) else index
         time = np.nan
         if isinstance(frame, dict):
-            field = one_of(frame, LABELS)
+            field = one_of(frame, PICTURE_LABEL_NAMES)
             if field is not None and isinstance(frame[field], str | int | float):
                 label = frame[field]
-            field = one_of(frame, TIMES)
+            field = one_of(frame, FRAME_TIME_NAMES)
             if field is not None:
                 time, unit = number(frame[field]), plain(field)
-            world += one_of(frame, WORLD) is not None and one_of(frame, PICTURE) is None
-            seen += one_of(frame, (*PICTURE, *PEOPLE)) is not None
+            world += (
+                one_of(frame, WORLD_LANDMARKS_NAMES) is not None
+                and one_of(frame, PICTURE_LANDMARKS_NAMES) is None
+            )
+            seen += one_of(frame, (*PICTURE_LANDMARKS_NAMES, *PEOPLE_NAMES)) is not None
         whole_label = whole(label)
         labels.append(rows.picture(label if whole_label is None else whole_label, size=_size(frame, size)))
         times.append(time)
@@ -134,11 +151,11 @@ def _size(holder: object, known: tuple[float, float] = (np.nan, np.nan)) -> tupl
     """Return the width and height that an object names, or one that it holds does."""
     if not isinstance(holder, dict):
         return known
-    fields = one_of(holder, WIDTH), one_of(holder, HEIGHT)
+    fields = one_of(holder, PICTURE_WIDTH_NAMES), one_of(holder, PICTURE_HEIGHT_NAMES)
     if fields[0] and fields[1]:
         size = number(holder[fields[0]]), number(holder[fields[1]])
-        return size if 0 < size[0] < LARGEST and 0 < size[1] < LARGEST else known
-    for field in HOLDERS:
+        return size if 0 < size[0] < LARGEST_NUMBER and 0 < size[1] < LARGEST_NUMBER else known
+    for field in SIZE_HOLDER_NAMES:
         inner = one_of(holder, (field,))
         value = holder[inner] if inner else None
         if isinstance(value, list) and len(value) == 2 and all(number(side) > 0 for side in value):
@@ -150,12 +167,16 @@ def _size(holder: object, known: tuple[float, float] = (np.nan, np.nan)) -> tupl
 
 def _add_frame(rows: Rows, label: str, frame: object, place: str) -> None:
     if isinstance(frame, dict) and not {"x", "y"} & set(frame):
-        people = one_of(frame, PEOPLE)
-        if people is not None and isinstance(frame[people], list) and one_of(frame, PICTURE) is None:
+        people = one_of(frame, PEOPLE_NAMES)
+        if (
+            people is not None
+            and isinstance(frame[people], list)
+            and one_of(frame, PICTURE_LANDMARKS_NAMES) is None
+        ):
             for index, person in enumerate(frame[people]):
                 _add_frame(rows, label, person, f"{place}.{people}[{index}]")
             return
-        field = one_of(frame, PICTURE)
+        field = one_of(frame, PICTURE_LANDMARKS_NAMES)
         if field is not None:
             _add_frame(rows, label, frame[field], f"{place}.{field}")
         elif frame and all(landmark(name) is not None for name in frame):
@@ -167,7 +188,7 @@ def _add_frame(rows: Rows, label: str, frame: object, place: str) -> None:
         for index, person in enumerate(frame):
             _add_frame(rows, label, person, f"{place}[{index}]")
         return
-    if isinstance(frame, list) and isinstance(frame[0], dict) and one_of(frame[0], PICTURE):
+    if isinstance(frame, list) and isinstance(frame[0], dict) and one_of(frame[0], PICTURE_LANDMARKS_NAMES):
         for index, person in enumerate(frame):
             _add_frame(rows, label, person, f"{place}[{index}]")
         return
@@ -176,7 +197,7 @@ def _add_frame(rows: Rows, label: str, frame: object, place: str) -> None:
 
 def _is_point(entry: object) -> bool:
     """Tell whether something is [x, y], [x, y, z] or [x, y, z, visibility], perhaps with presence."""
-    return isinstance(entry, list) and 2 <= len(entry) <= 5 and set(map(type, entry)) <= NUMBERS
+    return isinstance(entry, list) and 2 <= len(entry) <= 5 and set(map(type, entry)) <= COORDINATE_TYPES
 
 
 def _is_named(entry: object) -> bool:
@@ -185,26 +206,26 @@ def _is_named(entry: object) -> bool:
 
 
 def _add_person(rows: Rows, label: str, person: object, place: str) -> None:
-    expected = f"a list of {len(NAMES)} landmarks {{x, y, z, visibility}}"
+    expected = f"a list of {len(LANDMARK_NAMES)} landmarks {{x, y, z, visibility}}"
     if isinstance(person, dict) and all(landmark(name) is not None for name in person):
         person = [{"name": name, **entry} for name, entry in person.items() if isinstance(entry, dict)]
     if not isinstance(person, list):
         raise refusal(rows.source, place, shown(person), expected, "save pose_landmarks")
     numbered = [_index(entry) for entry in person]
-    if len(person) != len(NAMES) and None in numbered:
+    if len(person) != len(LANDMARK_NAMES) and None in numbered:
         raise refusal(
             rows.source,
             place,
             f"{len(person)} landmarks without names",
-            f"{len(NAMES)}, or a name or id each",
+            f"{len(LANDMARK_NAMES)}, or a name or id each",
             "save all landmarks of the full-body model",
         )
     if None in numbered:
-        numbered = list(range(len(NAMES)))
-    points, sure = np.full((len(NAMES), 2), np.nan), np.full(len(NAMES), np.nan)
+        numbered = list(range(len(LANDMARK_NAMES)))
+    points, sure = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
     for index, entry in zip(numbered, person, strict=True):
         if index is not None:
-            points[index], sure[index] = _point(rows, entry, f"{place}: {NAMES[index]}")
+            points[index], sure[index] = _point(rows, entry, f"{place}: {LANDMARK_NAMES[index]}")
     rows.add(label, points, sure)
 
 
@@ -219,7 +240,7 @@ def _point(rows: Rows, entry: object, place: str) -> tuple[Array, float]:
     """Read a landmark, as an object or as [x, y, z, visibility]."""
     if isinstance(entry, dict):
         x, y = entry.get("x"), entry.get("y")
-        field = one_of(entry, VISIBILITY) or one_of(entry, PRESENCE)
+        field = one_of(entry, VISIBILITY_NAMES) or one_of(entry, PRESENCE_NAMES)
         sure = number(entry[field]) if field else np.nan
     elif isinstance(entry, list) and _is_point(entry):
         x, y = entry[:2]
@@ -227,6 +248,6 @@ def _point(rows: Rows, entry: object, place: str) -> tuple[Array, float]:
     else:
         raise refusal(rows.source, place, shown(entry), "{x, y, z, visibility}", "save it again")
     for value in (x, y):
-        if type(value) not in NUMBERS or abs(number(value)) > LARGEST:
+        if type(value) not in COORDINATE_TYPES or abs(number(value)) > LARGEST_NUMBER:
             raise refusal(rows.source, place, shown(value), "a fraction of the picture", "correct it")
     return np.array([number(x), number(y)]), sure

@@ -11,20 +11,20 @@ from posekit.formats.keypoints.rows import whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 
-NAMES: Final = tuple(
+LANDMARK_NAMES: Final = tuple(
     "nose left_eye_inner left_eye left_eye_outer right_eye_inner right_eye right_eye_outer left_ear right_ear "
     "mouth_left mouth_right left_shoulder right_shoulder left_elbow right_elbow left_wrist right_wrist left_pinky "
     "right_pinky left_index right_index left_thumb right_thumb left_hip right_hip left_knee right_knee left_ankle "
     "right_ankle left_heel right_heel left_foot_index right_foot_index".split()
 )
 """mediapipe.solutions.pose.PoseLandmark, in its order."""
-NUMBER: Final = {plain(name): index for index, name in enumerate(NAMES)}
+LANDMARK_NUMBER: Final = {plain(name): index for index, name in enumerate(LANDMARK_NAMES)}
 
-LABELS: Final = tuple(
+PICTURE_LABEL_NAMES: Final = tuple(
     "frame frameid frameindex frameidx framenumber framenum frameno image imageid imagename img filename file".split()
 )
 """What a picture's number or name is called, plain."""
-SECONDS: Final = (
+SECONDS_NAMES: Final = (
     "time",
     "times",
     "timesec",
@@ -34,22 +34,22 @@ SECONDS: Final = (
     "timestamps",
     "timestampsec",
 )
-MILLISECONDS: Final = ("timestampms", "timems", "milliseconds", "ms")
-MICROSECONDS: Final = ("timestampus", "timeus")
-EITHER: Final = ("timestamp",)
+MILLISECONDS_NAMES: Final = ("timestampms", "timems", "milliseconds", "ms")
+MICROSECONDS_NAMES: Final = ("timestampus", "timeus")
+SECONDS_OR_MILLISECONDS_NAMES: Final = ("timestamp",)
 """Seconds or milliseconds: the steps between frames tell."""
-VISIBILITY: Final = ("visibility", "vis", "v", "confidence", "conf", "score", "c")
-PRESENCE: Final = ("presence", "pres", "p")
+VISIBILITY_NAMES: Final = ("visibility", "vis", "v", "confidence", "conf", "score", "c")
+PRESENCE_NAMES: Final = ("presence", "pres", "p")
 
 
 def landmark(name: object) -> int | None:
     """Return a landmark's number, of a name in any spelling or of a number from 0 to 32."""
     index = whole(name)
     if index is not None:
-        return index if index < len(NAMES) else None
+        return index if index < len(LANDMARK_NAMES) else None
     if not isinstance(name, str):
         return None
-    return NUMBER.get(plain(name), NUMBER.get(plain(name.rpartition(".")[2])))
+    return LANDMARK_NUMBER.get(plain(name), LANDMARK_NUMBER.get(plain(name.rpartition(".")[2])))
 
 
 def one_of(names: Iterable[str], wanted: Iterable[str]) -> str | None:
@@ -60,11 +60,11 @@ def one_of(names: Iterable[str], wanted: Iterable[str]) -> str | None:
 
 def in_seconds(times: Array, unit: str) -> Array:
     """Turn times (T,) into seconds; what is called a timestamp is milliseconds where frames are more than 2 apart."""
-    if unit in MILLISECONDS:
+    if unit in MILLISECONDS_NAMES:
         return times * 1e-3
-    if unit in MICROSECONDS:
+    if unit in MICROSECONDS_NAMES:
         return times * 1e-6
-    if unit in EITHER:
+    if unit in SECONDS_OR_MILLISECONDS_NAMES:
         steps = np.diff(np.unique(times[np.isfinite(times)]))
         if len(steps) and float(np.median(steps)) > 2:
             return times * 1e-3

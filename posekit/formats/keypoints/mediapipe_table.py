@@ -9,25 +9,25 @@ from collections.abc import Iterator
 import numpy as np
 
 from posekit.formats.keypoints.mediapipe_names import (
-    EITHER,
-    LABELS,
-    MICROSECONDS,
-    MILLISECONDS,
-    NAMES,
-    PRESENCE,
-    SECONDS,
-    VISIBILITY,
+    LANDMARK_NAMES,
+    MICROSECONDS_NAMES,
+    MILLISECONDS_NAMES,
+    PICTURE_LABEL_NAMES,
+    PRESENCE_NAMES,
+    SECONDS_NAMES,
+    SECONDS_OR_MILLISECONDS_NAMES,
+    VISIBILITY_NAMES,
     in_seconds,
     landmark,
     one_of,
 )
-from posekit.formats.keypoints.rows import LARGEST, Rows, whole
+from posekit.formats.keypoints.rows import LARGEST_NUMBER, Rows, whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-TIMES = (*MILLISECONDS, *MICROSECONDS, *SECONDS, *EITHER)
-LANDMARK = (
+TIME_COLUMN_NAMES = (*MILLISECONDS_NAMES, *MICROSECONDS_NAMES, *SECONDS_NAMES, *SECONDS_OR_MILLISECONDS_NAMES)
+LANDMARK_COLUMN_NAMES = (
     "landmarkname",
     "landmark",
     "name",
@@ -38,11 +38,16 @@ LANDMARK = (
     "joint",
     "id",
 )
-PERSON = ("person", "personid", "pose", "poseid", "posenumber", "trackid")
-FEWEST = 4
+PERSON_COLUMN_NAMES = ("person", "personid", "pose", "poseid", "posenumber", "trackid")
+MIN_NAMED_LANDMARKS = 4
 """Landmarks by name that a wide table must have to be taken for one."""
-PARTS = {"x": "x", "y": "y", **dict.fromkeys(VISIBILITY, "visibility"), **dict.fromkeys(PRESENCE, "presence")}
-_PART = "|".join(sorted(PARTS, key=len, reverse=True))
+VALUE_COLUMN_NAMES = {
+    "x": "x",
+    "y": "y",
+    **dict.fromkeys(VISIBILITY_NAMES, "visibility"),
+    **dict.fromkeys(PRESENCE_NAMES, "presence"),
+}
+_PART = "|".join(sorted(VALUE_COLUMN_NAMES, key=len, reverse=True))
 _BEHIND = re.compile(rf"(?P<name>.+?)[\s._-]+(?P<part>{_PART})\Z", re.IGNORECASE)
 _BEFORE = re.compile(rf"(?P<part>{_PART})[\s._-]*(?P<name>[^\s._-].*)\Z", re.IGNORECASE)
 _COUNTED = re.compile(
@@ -54,7 +59,7 @@ _COUNTED = re.compile(
 def looks_like_table(text: str) -> bool:
     """Tell by the first line whether it is a table of MediaPipe's landmarks."""
     header = _header(text)
-    return _is_long(header) or len(_columns(header)) >= FEWEST
+    return _is_long(header) or len(_columns(header)) >= MIN_NAMED_LANDMARKS
 
 
 def _header(text: str) -> list[str]:
@@ -67,7 +72,11 @@ def _header(text: str) -> list[str]:
 
 def _is_long(header: list[str]) -> bool:
     names = {plain(name) for name in header}
-    return {"x", "y"} <= names and bool(names & set(LANDMARK)) and bool(names & {*LABELS, *TIMES})
+    return (
+        {"x", "y"} <= names
+        and bool(names & set(LANDMARK_COLUMN_NAMES))
+        and bool(names & {*PICTURE_LABEL_NAMES, *TIME_COLUMN_NAMES})
+    )
 
 
 def _columns(header: list[str]) -> dict[int, dict[str, int]]:
@@ -78,16 +87,16 @@ def _columns(header: list[str]) -> dict[int, dict[str, int]]:
         match = _BEHIND.match(name) or _BEFORE.match(name)
         if match is None or "world" in name.casefold():
             continue
-        part = PARTS[match["part"].lower()]
+        part = VALUE_COLUMN_NAMES[match["part"].lower()]
         count = _COUNTED.match(match["name"])
         if count is not None:
             counted.setdefault(int(count[1]), {}).setdefault(part, column)
         elif (index := landmark(match["name"])) is not None:
             named.setdefault(index, {}).setdefault(part, column)
     if not named:
-        first = 1 if 0 not in counted and len(NAMES) in counted else 0
+        first = 1 if 0 not in counted and len(LANDMARK_NAMES) in counted else 0
         named = {index - first: parts for index, parts in counted.items()}
-    return {k: parts for k, parts in named.items() if k < len(NAMES) and {"x", "y"} <= set(parts)}
+    return {k: parts for k, parts in named.items() if k < len(LANDMARK_NAMES) and {"x", "y"} <= set(parts)}
 
 
 def add_table(rows: Rows, text: str) -> None:
@@ -140,7 +149,7 @@ def _value(rows: Rows, line: int, name: str, text: str) -> float:
         value = float(text)
     except ValueError:
         value = np.inf
-    if not abs(value) <= LARGEST:
+    if not abs(value) <= LARGEST_NUMBER:
         raise refusal(
             rows.source, f"line {line}: {cut(name)}", shown(text), "a number, or nothing", "correct it"
         )
@@ -157,7 +166,7 @@ def _time(text: str) -> float:
 
 
 def _described(header: list[str]) -> tuple[int | None, int | None, str]:
-    label, time = one_of(header, LABELS), one_of(header, TIMES)
+    label, time = one_of(header, PICTURE_LABEL_NAMES), one_of(header, TIME_COLUMN_NAMES)
     return (
         header.index(label) if label is not None else None,
         header.index(time) if time is not None else None,
@@ -181,7 +190,7 @@ def _add_wide(rows: Rows, header: list[str], columns: dict[int, dict[str, int]],
     for count, (line, fields) in enumerate(_lines(rows, header, text)):
         labels.append(rows.picture(_label(fields[label]) if label is not None else count))
         times.append(_time(fields[time]) if time is not None else np.nan)
-        points, sure = np.full((len(NAMES), 2), np.nan), np.full(len(NAMES), np.nan)
+        points, sure = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
         for index, parts in columns.items():
             for axis, part in enumerate("xy"):
                 points[index, axis] = _value(rows, line, header[parts[part]], fields[parts[part]])
@@ -195,11 +204,11 @@ def _add_wide(rows: Rows, header: list[str], columns: dict[int, dict[str, int]],
 
 def _add_long(rows: Rows, header: list[str], text: str) -> None:
     label, time, unit = _described(header)
-    which = header.index(one_of(header, LANDMARK) or "")
+    which = header.index(one_of(header, LANDMARK_COLUMN_NAMES) or "")
     x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
-    named = one_of(header, VISIBILITY) or one_of(header, PRESENCE)
+    named = one_of(header, VISIBILITY_NAMES) or one_of(header, PRESENCE_NAMES)
     surest = header.index(named) if named is not None else None
-    person = one_of(header, PERSON)
+    person = one_of(header, PERSON_COLUMN_NAMES)
     who = header.index(person) if person is not None else None
     people: dict[tuple[str, str], tuple[Array, Array]] = {}
     labels: dict[str, float] = {}
@@ -211,14 +220,14 @@ def _add_long(rows: Rows, header: list[str], text: str) -> None:
         if index is None:
             if not fields[which].strip():
                 continue
-            expected = f"a landmark's name, or its number 0 to {len(NAMES) - 1}"
+            expected = f"a landmark's name, or its number 0 to {len(LANDMARK_NAMES) - 1}"
             raise refusal(
                 rows.source, f"line {line}: {header[which]}", shown(fields[which]), expected, "correct it"
             )
-        empty = np.full((len(NAMES), 2), np.nan), np.full(len(NAMES), np.nan)
+        empty = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
         points, sure = people.setdefault((key, fields[who] if who is not None else ""), empty)
         if not np.isnan(points[index]).all():
-            got, expected = f"{NAMES[index]} twice in a picture", "once, or a column person"
+            got, expected = f"{LANDMARK_NAMES[index]} twice in a picture", "once, or a column person"
             raise refusal(rows.source, f"line {line}", got, expected, "number the people")
         points[index] = [_value(rows, line, header[k], fields[k]) for k in (x, y)]
         if surest is not None:

@@ -16,7 +16,7 @@ from posekit.formats.skeleton_maps import (
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.safe_io import refusal, shown
 
-FEWEST = 4
+MIN_FITTING_LANDMARKS = 4
 """Landmarks by name below which it is not said that a map fits in part."""
 
 
@@ -38,7 +38,7 @@ def by_names(names: Sequence[str], layout: SkeletonMap | None, source: str | Pat
     Raises
     ------
     InputError
-        Where names come twice, or no map places at least `FEWEST` landmarks.
+        Where names come twice, or no map places at least `MIN_FITTING_LANDMARKS` landmarks.
     """
     own = {plain(name): name for name in names}
     if len(own) != len(names):
@@ -49,14 +49,14 @@ def by_names(names: Sequence[str], layout: SkeletonMap | None, source: str | Pat
         if [plain(name) for name in candidate.points] == list(own):
             return candidate
         laid = candidate.over(names)
-        if len(laid.landmarks) >= FEWEST:
+        if len(laid.landmarks) >= MIN_FITTING_LANDMARKS:
             return replace(laid, name=f"{len(names)} points by the names of {candidate.name}")
     fitting = layout.name if layout else "any built-in skeleton map"
     raise refusal(
         source,
         "points",
         f"names as {', '.join(shown(name) for name in list(names)[:4])}",
-        f"at least {FEWEST} landmarks by the names of {fitting}",
+        f"at least {MIN_FITTING_LANDMARKS} landmarks by the names of {fitting}",
         "write a skeleton map (TOML) that says which point is what, and give it with --skeleton",
     )
 
@@ -68,7 +68,9 @@ def _in_part(own: dict[str, str]) -> list[SkeletonMap]:
         placed = sum(all(plain(part) in own for part in parts) for parts in candidate.landmarks.values())
         ranked.append((-placed, candidate.name, candidate))
     return [
-        candidate for placed, _, candidate in sorted(ranked, key=lambda one: one[:2]) if -placed >= FEWEST
+        candidate
+        for placed, _, candidate in sorted(ranked, key=lambda one: one[:2])
+        if -placed >= MIN_FITTING_LANDMARKS
     ]
 
 

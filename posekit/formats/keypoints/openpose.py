@@ -27,9 +27,9 @@ from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-POINTS: Final = ("pose_keypoints_2d", "pose_keypoints")
+POINTS_FIELDS: Final = ("pose_keypoints_2d", "pose_keypoints")
 """Where a person's points are; the second in files older than 2018."""
-LAYOUTS: Final = ("body_25", "body_25b", "coco_18")
+OPENPOSE_LAYOUTS: Final = ("body_25", "body_25b", "coco_18")
 
 
 def looks_like(given: GivenFile) -> bool:
@@ -64,20 +64,24 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             values = _points(one)
             if values is None:
                 raise refusal(
-                    given.path, field, shown(one), f'an object with "{POINTS[0]}"', "check how it was written"
+                    given.path,
+                    field,
+                    shown(one),
+                    f'an object with "{POINTS_FIELDS[0]}"',
+                    "check how it was written",
                 )
             people += 1
             if values != []:
                 lists.append(values)
                 frame.append(index)
                 person.append(_identity(given.path, f"{field}.person_id", one))
-                places.append(f"{field}.{POINTS[0]}")
+                places.append(f"{field}.{POINTS_FIELDS[0]}")
     if people and not lists:
         raise refusal(
             given.path,
             "people",
             f"{people} without points of the body",
-            f'points in "{POINTS[0]}"',
+            f'points in "{POINTS_FIELDS[0]}"',
             "run OpenPose with its body detector (not --body 0)",
         )
     values = triples(given.path, lists, places.__getitem__)
@@ -113,7 +117,7 @@ def _people(path: Path, document: Any) -> list[Any]:
 def _points(person: Any) -> Any:
     if not isinstance(person, dict):
         return None
-    return next((person[name] for name in POINTS if name in person), None)
+    return next((person[name] for name in POINTS_FIELDS if name in person), None)
 
 
 def _identity(source: Path, field: str, person: dict[str, Any]) -> int:
@@ -144,7 +148,7 @@ def _known(values: Array) -> tuple[Array, Array, bool]:
 
 def _layout(source: Path, points: Array, layout: SkeletonMap | None) -> SkeletonMap:
     if not len(points):
-        return layout if layout is not None and layout.points else load_skeleton_map(LAYOUTS[0])
+        return layout if layout is not None and layout.points else load_skeleton_map(OPENPOSE_LAYOUTS[0])
     count = points.shape[1]
     if layout is not None:
         if len(layout.points) != count:
@@ -156,7 +160,7 @@ def _layout(source: Path, points: Array, layout: SkeletonMap | None) -> Skeleton
                 "choose the map of the detector's model, with its points in order",
             )
         return layout
-    candidates = [one for one in map(load_skeleton_map, LAYOUTS) if len(one.points) == count]
+    candidates = [one for one in map(load_skeleton_map, OPENPOSE_LAYOUTS) if len(one.points) == count]
     if not candidates:
         raise refusal(
             source,
@@ -185,5 +189,5 @@ OPENPOSE_FORMAT: Final = KeyPointFormat(
     folder=True,
     looks_like=looks_like,
     read=read,
-    skeletons=LAYOUTS,
+    skeletons=OPENPOSE_LAYOUTS,
 )

@@ -2,7 +2,7 @@
 
 Both have a nose first and feet last; between them the orders differ, so that one reading of a body puts the knee where
 the other has the wrist. Read in the right order, the segments of a body are short. In the median over the
-detections, the mean length of `SEGMENTS` in one reading must be `RATIO` times that in the other.
+detections, the mean length of `COMPARED_SEGMENTS` in one reading must be `CLEAR_LENGTH_RATIO` times that in the other.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.keypoints.keypoints import FARTHEST
+from posekit.formats.keypoints.keypoints import FARTHEST_PIXEL
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 
-SEGMENTS: Final = (
+COMPARED_SEGMENTS: Final = (
     *(
         (f"{side}{start}", f"{side}{end}")
         for side in "RL"
@@ -38,9 +38,9 @@ SEGMENTS: Final = (
     ("LHip", "RHip"),
 )
 """Segments of a body by the points' names in both layouts."""
-FEWEST: Final = 6
+MIN_SEGMENTS_KNOWN: Final = 6
 """Segments that a detection must have in both readings to be asked."""
-RATIO: Final = 1.28
+CLEAR_LENGTH_RATIO: Final = 1.28
 """The natural logarithm of it is a quarter. Single detections of 3,000 projected postures of real motion, with 8
 pixels of noise and with up to 60 % of their points left out at random, were then taken for the wrong one in at most
 0.23 %; of 253 detections in photographs and videos, read as either, none was."""
@@ -61,20 +61,20 @@ def tell_apart(points: Array) -> list[SkeletonMap]:
     """
     layouts = [load_skeleton_map(name) for name in ("body_25", "body_25b")]
     with np.errstate(invalid="ignore"):
-        points = np.where(np.abs(points) <= FARTHEST, points, np.nan)
+        points = np.where(np.abs(points) <= FARTHEST_PIXEL, points, np.nan)
     first, second = (_lengths(points, layout) for layout in layouts)
-    asked = np.minimum(_count(first), _count(second)) >= FEWEST
+    asked = np.minimum(_count(first), _count(second)) >= MIN_SEGMENTS_KNOWN
     if not asked.any():
         return layouts
     ratio = float(np.median(np.log(_mean(first[asked]) / _mean(second[asked]))))
-    if ratio < -np.log(RATIO):
+    if ratio < -np.log(CLEAR_LENGTH_RATIO):
         return layouts[:1]
-    return layouts[1:] if ratio > np.log(RATIO) else layouts
+    return layouts[1:] if ratio > np.log(CLEAR_LENGTH_RATIO) else layouts
 
 
 def _lengths(points: Array, layout: SkeletonMap) -> Array:
     """Return the lengths of the segments (D, S) in one reading, pixels; NaN where an end is missing."""
-    ends = np.array([[layout.points.index(name) for name in segment] for segment in SEGMENTS])
+    ends = np.array([[layout.points.index(name) for name in segment] for segment in COMPARED_SEGMENTS])
     lengths: Array = np.linalg.norm(points[:, ends[:, 0]] - points[:, ends[:, 1]], axis=-1)
     return lengths
 

@@ -13,13 +13,13 @@ from typing import Final
 
 from posekit.safe_io import cut, refusal
 
-ENDING: Final = "_keypoints"
+KEYPOINTS_ENDING: Final = "_keypoints"
 _NUMBER = re.compile(r"[0-9]+")
 
 
 def picture_name(path: Path) -> str:
     """Return what a file's picture is called: ``clip_000000000012``."""
-    return path.stem.removesuffix(ENDING)
+    return path.stem.removesuffix(KEYPOINTS_ENDING)
 
 
 def check_one_camera(folder: Path, files: Sequence[Path]) -> None:

@@ -15,7 +15,7 @@ from posekit.formats.keypoints.tracking import track
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
-RULES: Final = ("largest", "first", "surest")
+PERSON_RULES: Final = ("largest", "first", "surest")
 """How somebody can be chosen without a number."""
 
 
@@ -96,9 +96,9 @@ def choose(keypoints: KeyPoints, person: int | str = "largest") -> KeyPoints:
     tracked = track(keypoints)
     people = np.unique(tracked.person)
     number = whole(person)
-    if number is None and person not in RULES:
+    if number is None and person not in PERSON_RULES:
         raise refusal(
-            keypoints.source, "person", shown(person), f"a number, or {', '.join(RULES)}", "correct it"
+            keypoints.source, "person", shown(person), f"a number, or {', '.join(PERSON_RULES)}", "correct it"
         )
     if not len(people):
         return tracked

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from posekit.formats.given_file import counted
-from posekit.formats.keypoints.keypoints import FARTHEST, KeyPoints
+from posekit.formats.keypoints.keypoints import FARTHEST_PIXEL, KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-NUMBERS = frozenset((int, float, type(None)))
+COORDINATE_TYPES = frozenset((int, float, type(None)))
 """What a list of coordinates may hold: numbers, and null for what is not known. A bool is no number."""
-LARGEST = FARTHEST
+LARGEST_NUMBER = FARTHEST_PIXEL
 """Of any number, as of a coordinate."""
 
 
@@ -26,18 +26,18 @@ def numbers(values: object, source: str | Path, field: str, width: int) -> Array
     Raises
     ------
     InputError
-        Where it is no such list, or a number is beyond `LARGEST`.
+        Where it is no such list, or a number is beyond `LARGEST_NUMBER`.
     """
-    if not isinstance(values, list) or not set(map(type, values)) <= NUMBERS:
+    if not isinstance(values, list) or not set(map(type, values)) <= COORDINATE_TYPES:
         raise refusal(source, field, _wrong(values), f"a list of numbers, {width} a point", "correct it")
     if not values or len(values) % width:
         got = f"{len(values)} numbers"
         raise refusal(source, field, got, f"a multiple of {width}: {width} a point", "write it again")
     array = np.array(values, dtype=np.float64).reshape(-1, width)
-    beyond = np.asarray(np.abs(array) > LARGEST)
+    beyond = np.asarray(np.abs(array) > LARGEST_NUMBER)
     if beyond.any():
         worst = float(array[beyond][0])
-        raise refusal(source, field, shown(worst), f"at most {LARGEST:g} in size", "correct it")
+        raise refusal(source, field, shown(worst), f"at most {LARGEST_NUMBER:g} in size", "correct it")
     return array
 
 
@@ -56,7 +56,7 @@ def pairs(values: object, source: str | Path, field: str) -> Array:
 def _wrong(values: object) -> str:
     if not isinstance(values, list):
         return shown(values)
-    index = next(k for k, value in enumerate(values) if type(value) not in NUMBERS)
+    index = next(k for k, value in enumerate(values) if type(value) not in COORDINATE_TYPES)
     return f"{shown(values[index])} at place {index}"
 
 

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from posekit.formats.skeleton_maps import LANDMARK
+from posekit.formats.skeleton_maps import LANDMARK_INDEX
 from posekit.geometry import Array
 from posekit.skeleton import SIDES
 
-LEG: Final = ("hip", "knee", "ankle")
-ARM: Final = ("shoulder", "elbow", "wrist")
-FACE: Final = ("eye", "ear")
-TRUNK: Final = 1.6
+LEG_JOINTS: Final = ("hip", "knee", "ankle")
+ARM_JOINTS: Final = ("shoulder", "elbow", "wrist")
+FACE_SIDES: Final = ("eye", "ear")
+LEG_OVER_TRUNK: Final = 1.6
 """The length of a leg, hip to ankle, against that of the trunk, middle of the shoulders to middle of the hips."""
-AROUND: Final = 7
+PICTURES_AROUND: Final = 7
 """Pictures before and after over which the person's size is taken: limbs point at the camera now and then."""
 
 
 def of(landmarks: Array, name: str) -> Array:
     """Return one landmark (F, 2) of (F, 21, 2)."""
-    return landmarks[:, LANDMARK[name]]
+    return landmarks[:, LANDMARK_INDEX[name]]
 
 
 def pair(landmarks: Array, part: str) -> Array:
@@ -61,14 +61,14 @@ def upright(landmarks: Array) -> NDArray[np.bool_]:
         return np.asarray(-up[:, 1] > np.abs(up[:, 0]))
 
 
-def size(landmarks: Array, around: int = AROUND) -> Array:
+def size(landmarks: Array, around: int = PICTURES_AROUND) -> Array:
     """Return the length of a leg as large as the person is in each picture (F,), in the picture's unit; NaN if unknown.
 
     The largest of both legs and of the trunk's share, for each of them can point at the camera; the median over so many
     pictures before and after, 0 where they have nothing to do with each other.
     """
     lengths = [limb(landmarks, side, ("hip", "knee", "ankle")) for side in SIDES]
-    each = np.fmax(np.fmax(*lengths), TRUNK * trunk(landmarks))
+    each = np.fmax(np.fmax(*lengths), LEG_OVER_TRUNK * trunk(landmarks))
     padded = np.pad(each, around, constant_values=np.nan)
     windows = sliding_window_view(padded, 2 * around + 1)
     found = np.full(len(each), np.nan)

@@ -13,22 +13,22 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.keypoints.side_body import AROUND, of, pair, size, upright
-from posekit.formats.skeleton_maps import LANDMARK, LANDMARKS
+from posekit.formats.keypoints.side_body import PICTURES_AROUND, of, pair, size, upright
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, LANDMARK_ORDER
 from posekit.geometry import Array
 
-SHOULDERS, HIPS, EARS, EYES = 0.2, 0.125, 0.12, 0.05
+SHOULDERS_CLEAR_WIDTH, HIPS_CLEAR_WIDTH, EARS_CLEAR_WIDTH, EYES_CLEAR_WIDTH = 0.2, 0.125, 0.12, 0.05
 """Widths in the picture, leg lengths, from which it is clear which is which: about half of those from the front."""
-SEEN: Final = 0.6
+FACE_SEEN_CONFIDENCE: Final = 0.6
 """Confidence of a face against the body's from which it is seen."""
-HIDDEN: Final = 0.25
+FACE_HIDDEN_CONFIDENCE: Final = 0.25
 """The same, below which it is not."""
-INFORMED: Final = 0.05
+CONFIDENCE_RANGE_INFORMED: Final = 0.05
 """Range of the confidences from which they are a detector's own."""
-FACE: Final = tuple(LANDMARK[name] for name in ("nose", "right_eye", "left_eye"))
-HEARD: Final = tuple(LANDMARK[name] for name in ("right_ear", "left_ear"))
-BODY: Final = tuple(
-    LANDMARK[name] for name in LANDMARKS if name.endswith(("shoulder", "elbow", "hip", "knee"))
+FACE_LANDMARKS: Final = tuple(LANDMARK_INDEX[name] for name in ("nose", "right_eye", "left_eye"))
+EAR_LANDMARKS: Final = tuple(LANDMARK_INDEX[name] for name in ("right_ear", "left_ear"))
+BODY_LANDMARKS: Final = tuple(
+    LANDMARK_INDEX[name] for name in LANDMARK_ORDER if name.endswith(("shoulder", "elbow", "hip", "knee"))
 )
 
 
@@ -57,15 +57,16 @@ class Order:
         return np.asarray((self.shoulders * self.face < 0) & (self.hips * self.face <= 0))
 
 
-def order(landmarks: Array, around: int = AROUND) -> Order:
+def order(landmarks: Array, around: int = PICTURES_AROUND) -> Order:
     """Find which way round shoulders, hips and face are in each picture of landmarks (F, 21, 2); see `size`."""
     unit = size(landmarks, around)
     ears, eyes = (
-        _way(pair(landmarks, part)[:, 0] / unit, least) for part, least in (("ear", EARS), ("eye", EYES))
+        _way(pair(landmarks, part)[:, 0] / unit, least)
+        for part, least in (("ear", EARS_CLEAR_WIDTH), ("eye", EYES_CLEAR_WIDTH))
     )
     return Order(
-        shoulders=_way(pair(landmarks, "shoulder")[:, 0] / unit, SHOULDERS),
-        hips=_way(pair(landmarks, "hip")[:, 0] / unit, HIPS),
+        shoulders=_way(pair(landmarks, "shoulder")[:, 0] / unit, SHOULDERS_CLEAR_WIDTH),
+        hips=_way(pair(landmarks, "hip")[:, 0] / unit, HIPS_CLEAR_WIDTH),
         face=np.where(ears * eyes < 0, 0, np.where(ears != 0, ears, eyes)).astype(np.int8),
     )
 
@@ -78,9 +79,9 @@ def _way(width: Array, least: float) -> NDArray[np.int8]:
 def informed(landmarks: Array, confidence: Array) -> bool:
     """Tell whether what is seen of the face says something: confidences (F, 21) differ, or face points are missing."""
     known = confidence[~np.isnan(confidence)]
-    if len(known) and float(np.ptp(known)) > INFORMED:
+    if len(known) and float(np.ptp(known)) > CONFIDENCE_RANGE_INFORMED:
         return True
-    there = ~np.isnan(landmarks[:, FACE, 0])
+    there = ~np.isnan(landmarks[:, FACE_LANDMARKS, 0])
     return bool(there.any() and not there.all())
 
 
@@ -92,18 +93,20 @@ def facing(landmarks: Array, confidence: Array, occluded: NDArray[np.bool_]) -> 
     """
     there = ~np.isnan(landmarks[..., 0])
     sure = np.where(there, np.where(np.isnan(confidence), 1.0, confidence), 0.0)
-    count = np.maximum(there[:, BODY].sum(axis=1), 1)
-    body = (sure * there)[:, BODY].sum(axis=1) / count
-    face = sure[:, FACE]
+    count = np.maximum(there[:, BODY_LANDMARKS].sum(axis=1), 1)
+    body = (sure * there)[:, BODY_LANDMARKS].sum(axis=1) / count
+    face = sure[:, FACE_LANDMARKS]
     seen = (
-        (face >= SEEN * body[:, None]).all(axis=1)
-        & there[:, FACE].all(axis=1)
-        & ~occluded[:, FACE].any(axis=1)
+        (face >= FACE_SEEN_CONFIDENCE * body[:, None]).all(axis=1)
+        & there[:, FACE_LANDMARKS].all(axis=1)
+        & ~occluded[:, FACE_LANDMARKS].any(axis=1)
     )
     nose, right, left = (of(landmarks, name)[:, 0] for name in ("nose", "right_eye", "left_eye"))
     with np.errstate(invalid="ignore"):
         between = (nose - right) * (nose - left) < 0
-    ear = (sure[:, HEARD] >= HIDDEN * body[:, None]).any(axis=1) & there[:, HEARD].any(axis=1)
-    away = (face < HIDDEN * body[:, None]).all(axis=1) & ear
+    ear = (sure[:, EAR_LANDMARKS] >= FACE_HIDDEN_CONFIDENCE * body[:, None]).any(axis=1) & there[
+        :, EAR_LANDMARKS
+    ].any(axis=1)
+    away = (face < FACE_HIDDEN_CONFIDENCE * body[:, None]).all(axis=1) & ear
     towards = np.where(seen & between, 1, np.where(away, -1, 0))
     return np.where(upright(landmarks), towards, 0).astype(np.int8)

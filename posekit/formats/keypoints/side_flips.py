@@ -16,18 +16,18 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.keypoints.side_body import ARM, LEG, pair, runs, size
+from posekit.formats.keypoints.side_body import ARM_JOINTS, LEG_JOINTS, pair, runs, size
 from posekit.geometry import Array
 
-FEWEST: Final = 5
+MIN_PICTURES_OF_JUMPS: Final = 5
 """Pictures of a sequence: with fewer, a jump is no jump."""
-FACTOR: Final = 4.0
+EXCHANGE_GAIN: Final = 4.0
 """How much less the second differences must be after an exchange back, for it to be suspected."""
-JUMP: Final = 0.25
+JUMP_LEG_LENGTHS: Final = 0.25
 """How large the jump must be, in leg lengths: smaller ones are the detector's noise, and do little harm."""
-APART: Final = 0.5
+APART_LEG_LENGTHS: Final = 0.5
 """Where second differences are larger in the median, leg lengths, the pictures are too far apart, or of no sequence."""
-GROUPS: Final = {"arms": ARM, "legs": LEG}
+LIMB_GROUPS: Final = {"arms": ARM_JOINTS, "legs": LEG_JOINTS}
 
 
 def flips(landmarks: Array, frame: NDArray[np.intp], parts: tuple[str, ...]) -> Array:
@@ -53,7 +53,7 @@ def flips(landmarks: Array, frame: NDArray[np.intp], parts: tuple[str, ...]) -> 
     rows: NDArray[np.intp] = np.flatnonzero(known)
     breaks = np.flatnonzero(np.diff(frame[rows]) > _step(frame[rows])) + 1
     for stretch in np.split(rows, breaks):
-        if len(stretch) >= FEWEST:
+        if len(stretch) >= MIN_PICTURES_OF_JUMPS:
             found[stretch] = _stretch(d[stretch].reshape(len(stretch), -1))
     return found
 
@@ -69,7 +69,7 @@ def _stretch(d: Array) -> Array:
     if (signs < 0).sum() * 2 > len(signs):
         signs = -signs
     found = np.zeros(len(d))
-    if float(np.median(_bends(d * signs[:, None]))) > APART**2:
+    if float(np.median(_bends(d * signs[:, None]))) > APART_LEG_LENGTHS**2:
         return found
     for start, end in runs(np.asarray(signs < 0)):
         kept = signs.copy()
@@ -77,7 +77,7 @@ def _stretch(d: Array) -> Array:
         near = slice(max(start - 2, 0), min(end + 2, len(d)))
         before, after = (_bends(d[near] * s[near, None]) for s in (kept, signs))
         worst, rest = before.max(initial=0.0), after.max(initial=0.0)
-        if worst > JUMP**2 and worst > FACTOR * rest:
+        if worst > JUMP_LEG_LENGTHS**2 and worst > EXCHANGE_GAIN * rest:
             found[start:end] = min(worst / max(rest, 1e-6), 1e3)
     return found
 

@@ -12,25 +12,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.keypoints.keypoints import KeyPoints
-from posekit.formats.keypoints.side_body import AROUND
+from posekit.formats.keypoints.side_body import PICTURES_AROUND
 from posekit.formats.keypoints.side_facing import facing, informed, order
-from posekit.formats.keypoints.side_flips import GROUPS, flips
+from posekit.formats.keypoints.side_flips import LIMB_GROUPS, flips
 from posekit.formats.keypoints.side_gait import gait_evidence
 from posekit.formats.keypoints.tracking import track
-from posekit.formats.skeleton_maps import LANDMARK, SkeletonMap
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import cut
 from posekit.skeleton import other_side
 
-SURE: Final = 1.5
+SURE_EVIDENCE: Final = 1.5
 """Evidence from which something is said. Over the walks of the tests, none that is as labelled reaches it."""
 FACE_SEEN: Final = 3.0
 """What faces that are seen can say."""
-AWAY: Final = 0.7
+FACE_AWAY_EVIDENCE: Final = 0.7
 """What a face that is not seen says, against one that is."""
-SHARE: Final = 0.6
+EXCHANGED_SHARE: Final = 0.6
 """Of the pictures in which it is clear, for a part to count as exchanged in all."""
-MANY: Final = 5
+MAX_PICTURES_LISTED: Final = 5
 """Names of pictures that are listed."""
 
 
@@ -45,7 +45,7 @@ class SideCheck:
     part : str
         What is swapped in all pictures: ``body``, ``arms``, ``legs``, ``arms or legs``, ``body or face``; empty else.
     strength : float
-        Positive where it is swapped, negative where it is as labelled; said from `SURE` on.
+        Positive where it is swapped, negative where it is as labelled; said from `SURE_EVIDENCE` on.
     evidence : mapping
         By kind: what each says, with the same sign.
     arms, legs : bool array (D,)
@@ -82,10 +82,10 @@ class SideCheck:
         if self.pictures:
             both = int((self.arms & self.legs).sum())
             parts = f"{int(self.arms.sum()) - both} arms, {int(self.legs.sum()) - both} legs, {both} both"
-            names = ", ".join(cut(name) for name in self.pictures[:MANY])
+            names = ", ".join(cut(name) for name in self.pictures[:MAX_PICTURES_LISTED])
             lines.append(
                 f"{self.source}: left and right jump in {len(self.pictures)} pictures ({parts}): "
-                f"{names}{', …' if len(self.pictures) > MANY else ''}; leave them out, or look at them"
+                f"{names}{', …' if len(self.pictures) > MAX_PICTURES_LISTED else ''}; leave them out, or look at them"
             )
         return tuple(lines)
 
@@ -111,7 +111,7 @@ def check_sides(keypoints: KeyPoints) -> SideCheck:
     tracked = track(keypoints)
     landmarks, confidence = tracked.landmarks, tracked.landmark_confidence
     occluded = tracked.layout.gather(tracked.occluded[..., None].astype(np.float64))[..., 0] > 0
-    jumps = {group: np.zeros(len(tracked), dtype=np.bool_) for group in GROUPS}
+    jumps = {group: np.zeros(len(tracked), dtype=np.bool_) for group in LIMB_GROUPS}
     total: dict[str, float] = {}
     votes = _Votes(informed(landmarks, confidence))
     if not tracked.sequence:
@@ -121,7 +121,7 @@ def check_sides(keypoints: KeyPoints) -> SideCheck:
         rows = np.flatnonzero(tracked.person == person)
         rows = rows[np.diff(tracked.frame[rows], prepend=-1) > 0]
         body, frame = landmarks[rows].copy(), tracked.frame[rows]
-        for group, parts in GROUPS.items():
+        for group, parts in LIMB_GROUPS.items():
             jumps[group][rows] = flips(body, frame, parts) > 0
             body[jumps[group][rows]] = _exchanged(body[jumps[group][rows]], parts)
         told = gait_evidence(body, frame)
@@ -135,7 +135,7 @@ def check_sides(keypoints: KeyPoints) -> SideCheck:
 
 def _exchanged(landmarks: Array, parts: tuple[str, ...]) -> Array:
     """Exchange left and right of some parts."""
-    ends = [LANDMARK[f"{side}_{part}"] for side in ("right", "left") for part in parts]
+    ends = [LANDMARK_INDEX[f"{side}_{part}"] for side in ("right", "left") for part in parts]
     others = ends[len(parts) :] + ends[: len(parts)]
     exchanged = landmarks.copy()
     exchanged[:, ends] = landmarks[:, others]
@@ -154,7 +154,7 @@ class _Votes:
     shoulders_alone: int = 0
 
     def look(
-        self, landmarks: Array, confidence: Array, occluded: NDArray[np.bool_], around: int = AROUND
+        self, landmarks: Array, confidence: Array, occluded: NDArray[np.bool_], around: int = PICTURES_AROUND
     ) -> float:
         """Count one person's pictures; return what seen faces say, positive where it is as labelled."""
         ways = order(landmarks, around)
@@ -166,7 +166,7 @@ class _Votes:
         if not self.informed:
             return 0.0
         face = facing(landmarks, confidence, occluded).astype(np.float64)
-        face[face < 0] *= AWAY
+        face[face < 0] *= FACE_AWAY_EVIDENCE
         told = -(face * ways.shoulders)[(face != 0) & (ways.shoulders != 0) & ~ways.twisted]
         return FACE_SEEN * float(told.mean()) if len(told) else 0.0
 
@@ -175,14 +175,16 @@ def _judged(
     tracked: KeyPoints, jumps: dict[str, NDArray[np.bool_]], total: dict[str, float], votes: _Votes
 ) -> SideCheck:
     strength, part = sum(total.values()), "body"
-    if votes.twisted > SHARE * votes.clear:
+    if votes.twisted > EXCHANGED_SHARE * votes.clear:
         part = "arms or legs" if not votes.faced else "arms" if votes.shoulders_alone else "legs"
         strength = total["shoulders against hips"] = 3.0 * votes.twisted / votes.clear
-    elif votes.turned > SHARE * votes.faced:
-        part = "body" if strength > SURE else "body or face"
+    elif votes.turned > EXCHANGED_SHARE * votes.faced:
+        part = "body" if strength > SURE_EVIDENCE else "body or face"
         total["face against body"] = 3.0 * votes.turned / votes.faced
         strength = max(strength, total["face against body"])
-    verdict = "swapped" if strength > SURE else "as labelled" if strength < -SURE else "unknown"
+    verdict = (
+        "swapped" if strength > SURE_EVIDENCE else "as labelled" if strength < -SURE_EVIDENCE else "unknown"
+    )
     suspected = np.flatnonzero(jumps["arms"] | jumps["legs"])
     return SideCheck(
         verdict=verdict,

@@ -15,10 +15,10 @@ from typing import Final
 
 import numpy as np
 
-from posekit.formats.skeleton_maps import LANDMARK, LANDMARKS
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, LANDMARK_ORDER
 from posekit.geometry import Array
 
-SIGMA: Final = {
+LANDMARK_SIGMA: Final = {
     "nose": 0.026,
     "eye": 0.025,
     "ear": 0.035,
@@ -30,17 +30,21 @@ SIGMA: Final = {
     "ankle": 0.089,
 }
 """COCO's standard deviation of each landmark, in units of the square root of the person's area."""
-COMPARED: Final = tuple(LANDMARK[name] for name in LANDMARKS if name.rpartition("_")[2] in SIGMA)
+COMPARED_LANDMARKS: Final = tuple(
+    LANDMARK_INDEX[name] for name in LANDMARK_ORDER if name.rpartition("_")[2] in LANDMARK_SIGMA
+)
 """COCO's 17: the necks and pelvises of formats are other points in each."""
-K: Final = np.array([2 * SIGMA[LANDMARKS[k].rpartition("_")[2]] for k in COMPARED])
+FALLOFF_K: Final = np.array(
+    [2 * LANDMARK_SIGMA[LANDMARK_ORDER[k].rpartition("_")[2]] for k in COMPARED_LANDMARKS]
+)
 
-MOTION: Final = 0.12
+MOTION_SIGMA: Final = 0.12
 """Standard deviation of what the expected place is wrong by, a picture, in units of the square root of the area."""
-FILLED: Final = 0.53
+AREA_OVER_BOX: Final = 0.53
 """A person's area as a fraction of the box around the key points: the usual one where there is no outline (MMPose)."""
-SLIM: Final = 0.25
+MIN_WIDTH_OVER_HEIGHT: Final = 0.25
 """Width of a box against its height, at least: somebody who is seen from the side has hardly any."""
-FAR: Final = 1e-3
+UNSEEN_SIMILARITY: Final = 1e-3
 """What is left of the similarity where nothing of both is seen."""
 
 
@@ -52,7 +56,11 @@ def area(points: Array) -> Array:
     several = known.sum(axis=1) > 1
     width, height = np.where(several[:, None], high - low, np.nan).T
     longest = np.maximum(width, height)
-    areas = FILLED * np.maximum(width, SLIM * longest) * np.maximum(height, SLIM * longest)
+    areas = (
+        AREA_OVER_BOX
+        * np.maximum(width, MIN_WIDTH_OVER_HEIGHT * longest)
+        * np.maximum(height, MIN_WIDTH_OVER_HEIGHT * longest)
+    )
     return np.asarray(np.where(areas > 0, areas, np.nan))
 
 
@@ -77,9 +85,9 @@ def similarity(expected: Array, seen: Array, areas: Array, gap: Array) -> Array:
     """
     squared = ((expected[:, None] - seen[None]) ** 2).sum(axis=-1)
     both = ~np.isnan(squared)
-    spread = areas[..., None] * (K**2 + (MOTION * gap[:, None, None]) ** 2)
+    spread = areas[..., None] * (FALLOFF_K**2 + (MOTION_SIGMA * gap[:, None, None]) ** 2)
     with np.errstate(invalid="ignore", under="ignore"):
         alike = np.where(both, np.exp(-np.where(both, squared, 0.0) / (2 * spread)), 0.0)
     count = both.sum(axis=-1)
     mean = alike.sum(axis=-1) / np.maximum(count, 1)
-    return np.asarray(np.where((count > 0) & ~np.isnan(mean), mean, FAR))
+    return np.asarray(np.where((count > 0) & ~np.isnan(mean), mean, UNSEEN_SIMILARITY))

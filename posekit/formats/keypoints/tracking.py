@@ -12,23 +12,25 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.track_assignment import assign
-from posekit.formats.keypoints.track_similarity import COMPARED, area, similarity
+from posekit.formats.keypoints.track_similarity import COMPARED_LANDMARKS, area, similarity
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
-LEAST: Final = 0.15
+MIN_SIMILARITY: Final = 0.15
 """Similarity below which two detections are not one person."""
-PATIENCE: Final = 30
+PATIENCE_PICTURES: Final = 30
 """Pictures through which somebody who is not seen is waited for: a second of video."""
 MAX_PEOPLE: Final = 1000
 """In one picture; the work grows with the square."""
-FRESH: Final = 3.0
+FRESH_MOTION_FACTOR: Final = 3.0
 """How much more motion is allowed somebody who was seen once, whose speed is not known."""
-BEND: Final = 8
+TRUSTED_SPEED_PICTURES: Final = 8
 """Pictures over which a speed is trusted: who is gone for longer may have turned."""
 
 
-def track(keypoints: KeyPoints, *, least: float = LEAST, patience: int = PATIENCE) -> KeyPoints:
+def track(
+    keypoints: KeyPoints, *, least: float = MIN_SIMILARITY, patience: int = PATIENCE_PICTURES
+) -> KeyPoints:
     """Tell people apart along the pictures.
 
     Each detection is compared with where the people of the pictures before are expected (the last place, moved on at
@@ -75,7 +77,7 @@ def track(keypoints: KeyPoints, *, least: float = LEAST, patience: int = PATIENC
             f"at most {MAX_PEOPLE:,} to track",
             "leave out the unsure ones",
         )
-    points = keypoints.landmarks[unknown][:, COMPARED]
+    points = keypoints.landmarks[unknown][:, COMPARED_LANDMARKS]
     areas = area(points)
     person = keypoints.person.copy()
     tracks = _Tracks(int(keypoints.person.max(initial=-1)) + 1)
@@ -93,7 +95,7 @@ class _Tracks:
     next: int
     who: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     last: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
-    points: Array = field(default_factory=lambda: np.empty((0, len(COMPARED), 2)))
+    points: Array = field(default_factory=lambda: np.empty((0, len(COMPARED_LANDMARKS), 2)))
     speed: Array = field(default_factory=lambda: np.empty((0, 2)))
     area: Array = field(default_factory=lambda: np.empty(0))
     fresh: NDArray[np.bool_] = field(default_factory=lambda: np.empty(0, dtype=np.bool_))
@@ -129,11 +131,11 @@ class _Tracks:
     def _pairs(self, frame: int, seen: Array, areas: Array, least: float) -> NDArray[np.intp]:
         """Return pairs (track, detection) with the largest sum of similarities, none below `least`."""
         gap = (frame - self.last).astype(np.float64)
-        ahead = np.minimum(gap, BEND)
+        ahead = np.minimum(gap, TRUSTED_SPEED_PICTURES)
         expected = self.points + (ahead[:, None] * self.speed)[:, None]
         both = np.stack(np.broadcast_arrays(self.area[:, None], areas[None]))
         common = np.where(np.isnan(both).all(axis=0), 1.0, np.fmax(both[0], both[1]))
-        alike = similarity(expected, seen, common, np.where(self.fresh, FRESH * ahead, ahead))
+        alike = similarity(expected, seen, common, np.where(self.fresh, FRESH_MOTION_FACTOR * ahead, ahead))
         alike[alike < least] = 0.0
         turned = alike.shape[0] > alike.shape[1]
         table = alike.T if turned else alike

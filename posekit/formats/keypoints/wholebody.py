@@ -18,9 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.given_file import GivenFile
-from posekit.formats.keypoints.coco_annotations import FIELD, annotations_of
+from posekit.formats.keypoints.coco_annotations import ANNOTATIONS_FIELD, annotations_of
 from posekit.formats.keypoints.coco_images import images_from
-from posekit.formats.keypoints.coco_parts import COUNT, PARTS, SEEN, is_wholebody, joined
+from posekit.formats.keypoints.coco_parts import (
+    FLAGGED_POINTS,
+    WHOLEBODY_PARTS,
+    WHOLEBODY_POINTS,
+    is_wholebody,
+    joined,
+)
 from posekit.formats.keypoints.coco_people import (
     as_confidences,
     by_picture,
@@ -35,13 +41,13 @@ from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-LAYOUT: Final = "coco_wholebody_133"
+WHOLEBODY_LAYOUT: Final = "coco_wholebody_133"
 
 
 def looks_like(given: GivenFile) -> bool:
     """Tell whether the first person with key points has the parts, or 133 points."""
     document = None if given.is_folder else given.document
-    people = document.get(FIELD) if isinstance(document, dict) else document
+    people = document.get(ANNOTATIONS_FIELD) if isinstance(document, dict) else document
     if not isinstance(people, list):
         return False
     first = next((one for one in people if isinstance(one, dict) and is_person(one)), None)
@@ -50,7 +56,7 @@ def looks_like(given: GivenFile) -> bool:
 
 def is_person(entry: dict[str, Any]) -> bool:
     """Tell whether an entry has key points of any part."""
-    return any(name in entry for name, *_ in PARTS)
+    return any(name in entry for name, *_ in WHOLEBODY_PARTS)
 
 
 def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
@@ -62,14 +68,14 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         Where the file is malformed, or the given layout has not 133 points.
     """
     source = given.path
-    found = load_skeleton_map(LAYOUT) if layout is None else layout
-    if len(found.points) != COUNT:
+    found = load_skeleton_map(WHOLEBODY_LAYOUT) if layout is None else layout
+    if len(found.points) != WHOLEBODY_POINTS:
         raise refusal(
             source,
             "points of a person",
-            f"{COUNT}",
+            f"{WHOLEBODY_POINTS}",
             f"{len(found.points)}, as skeleton map {cut(found.name)} has",
-            f"leave the map out, or take {LAYOUT}",
+            f"leave the map out, or take {WHOLEBODY_LAYOUT}",
         )
     document = None if given.is_folder else given.document
     if isinstance(document, list):
@@ -79,7 +85,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
                 raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"', "correct it")
         images = images_from(identities_of(source, field, people))
     else:
-        field = FIELD
+        field = ANNOTATIONS_FIELD
         people, images = annotations_of(given)
     values = joined(source, field, people)
     frame = pictures_of(source, field, people, images)
@@ -112,13 +118,15 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
         odd = float(third[~((third >= 0) & (third <= 2))][0])
         raise refusal(source, "v", f"{odd:g}", "0, 1, 2, or a fraction", "correct it")
     fraction = third % 1 != 0
-    fraction[:, :SEEN] |= fraction[:, :SEEN].any()  # body and feet of a detector, not labelled by hand
+    fraction[:, :FLAGGED_POINTS] |= fraction[
+        :, :FLAGGED_POINTS
+    ].any()  # body and feet of a detector, not labelled by hand
     points = values[..., :2].copy()
     points[(third == 0) & ~fraction] = np.nan
     points[fraction & (points == 0).all(axis=-1)] = np.nan
     confidence = np.where(fraction & ~np.isnan(points[..., 0]), third, np.nan)
     occluded = (third == 1) & ~fraction
-    occluded[:, SEEN:] = False
+    occluded[:, FLAGGED_POINTS:] = False
     return points, confidence, occluded
 
 
@@ -128,5 +136,5 @@ WHOLEBODY_FORMAT: Final = KeyPointFormat(
     suffixes=(".json",),
     looks_like=looks_like,
     read=read,
-    skeletons=(LAYOUT,),
+    skeletons=(WHOLEBODY_LAYOUT,),
 )

@@ -6,7 +6,7 @@ from posekit.formats.motion.reading import motion_format as motion_format
 from posekit.on_demand import on_demand
 
 if TYPE_CHECKING:
-    from posekit.formats.motion.motion import UPS as UPS
+    from posekit.formats.motion.motion import UP_DIRECTIONS as UP_DIRECTIONS
     from posekit.formats.motion.motion import Motion as Motion
     from posekit.formats.motion.motion_axes import with_up as with_up
     from posekit.formats.motion.motion_format import METRES_IN_UNIT as METRES_IN_UNIT
@@ -27,7 +27,7 @@ else:
         __name__,
         {
             "motion": (
-                "UPS",
+                "UP_DIRECTIONS",
                 "Motion",
             ),
             "motion_axes": ("with_up",),

@@ -12,15 +12,15 @@ import numpy as np
 
 from posekit.geometry import Array, coordinate_rotation, other_branch, turned_near
 
-ORDER: Final = (0, 2, 1)
+AXIS_ORDER: Final = (0, 2, 1)
 """The axes of the three angles."""
-LOCKED: Final = 1e-9
+LOCKED_COSINE: Final = 1e-9
 """Cosine of the middle angle below which the first may be any: choosing it turns the rotation by less than that."""
 
 
 def euler_rotation(angles: Array) -> Array:
-    """Return the rotations (..., 3, 3) of angles (..., 3), radians, in the order of `ORDER`."""
-    x, z, y = (coordinate_rotation(axis, angles[..., k]) for k, axis in enumerate(ORDER))
+    """Return the rotations (..., 3, 3) of angles (..., 3), radians, in the order of `AXIS_ORDER`."""
+    x, z, y = (coordinate_rotation(axis, angles[..., k]) for k, axis in enumerate(AXIS_ORDER))
     return x @ z @ y
 
 
@@ -67,7 +67,7 @@ def continuous(angles: Array) -> Array:
 
 def _hold_locked(angles: Array) -> None:
     """Where the first angle may be any, keep that of the frame before; the last makes up for it."""
-    locked = np.abs(np.cos(angles[..., 1])) < LOCKED
+    locked = np.abs(np.cos(angles[..., 1])) < LOCKED_COSINE
     if not locked.any():
         return
     frame = np.where(locked, 0, np.arange(len(angles))[:, None])

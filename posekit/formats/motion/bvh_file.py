@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.formats.motion.bvh_hierarchy import LARGEST, Hierarchy, parse_hierarchy
+from posekit.formats.motion.bvh_hierarchy import LARGEST_VALUE, Hierarchy, parse_hierarchy
 from posekit.geometry import Array
 from posekit.safe_io import cut, read_text, refusal, shown
 
@@ -102,7 +102,7 @@ def _numbers(path: str | Path, text: str, start: int) -> Array:
             parts.append(np.array(piece.split(), dtype=np.float64))
         except ValueError:
             raise _first_bad(path, text, start, end) from None
-        if not (np.abs(parts[-1]) <= LARGEST).all():
+        if not (np.abs(parts[-1]) <= LARGEST_VALUE).all():
             raise _first_bad(path, text, start, end)
         start = end
     return np.concatenate([np.empty(0), *parts])
@@ -111,7 +111,7 @@ def _numbers(path: str | Path, text: str, start: int) -> Array:
 def _first_bad(path: str | Path, text: str, start: int, end: int) -> InputError:
     for word in re.compile(r"\S+").finditer(text, start, end):
         try:
-            good = abs(float(word.group())) <= LARGEST
+            good = abs(float(word.group())) <= LARGEST_VALUE
         except ValueError:
             good = False
         if not good:
@@ -123,7 +123,7 @@ def _no_number(path: str | Path, text: str, at: int) -> InputError:
     head = re.compile(r"\S*$").search(text[max(0, at - 100) : at])
     tail = re.compile(r"\S*").match(text, at, at + 100)
     word = (head.group() if head else "") + (tail.group() if tail else "")
-    expected = f"a finite number of at most {LARGEST:g}"
+    expected = f"a finite number of at most {LARGEST_VALUE:g}"
     return refusal(
         path, f"line {_line(text, at)}", shown(cut(word)), expected, "correct the frame or remove it"
     )

@@ -16,10 +16,10 @@ MAX_HEADER: Final = 4_000_000
 """Characters of a hierarchy: that of a rig with fingers and a face has 50,000."""
 MAX_JOINTS: Final = 2000
 MAX_DEPTH: Final = 250
-LARGEST: Final = 1e9
+LARGEST_VALUE: Final = 1e9
 """No length, position or angle of a body is larger, in any unit."""
 
-CHANNELS: Final = {
+CHANNEL_NAMES: Final = {
     f"{axis}{kind}": (rotates, k)
     for rotates, kind in ((False, "position"), (True, "rotation"))
     for k, axis in enumerate("xyz")
@@ -102,8 +102,8 @@ class _Parser:
     def number(self, what: str) -> float:
         word = self.next(what)
         value = float(word) if _NUMBER.fullmatch(word) else np.nan
-        if not abs(value) <= LARGEST:
-            self.refuse(shown(word), f"{what}, a number of at most {LARGEST:g}", "correct it")
+        if not abs(value) <= LARGEST_VALUE:
+            self.refuse(shown(word), f"{what}, a number of at most {LARGEST_VALUE:g}", "correct it")
         return value
 
     def name(self) -> str:
@@ -149,18 +149,18 @@ class _Parser:
                 "CHANNELS", f"one in the block of a joint, not in {cut(joint.name)} again", "remove it"
             )
         count = self.next("the number of channels")
-        if not (count.isascii() and count.isdigit() and len(count) < 3 and int(count) <= len(CHANNELS)):
+        if not (count.isascii() and count.isdigit() and len(count) < 3 and int(count) <= len(CHANNEL_NAMES)):
             self.refuse(shown(count), "0 to 6 channels", "correct the number")
         joint.channels = []
         for _ in range(int(count)):
             word = self.next("a channel")
-            if word.lower() not in CHANNELS:
+            if word.lower() not in CHANNEL_NAMES:
                 self.refuse(
                     shown(word),
                     "Xposition … Zposition, Xrotation … Zrotation",
-                    nearest(word, map(str.capitalize, CHANNELS)),
+                    nearest(word, map(str.capitalize, CHANNEL_NAMES)),
                 )
-            joint.channels.append(Channel(*CHANNELS[word.lower()]))
+            joint.channels.append(Channel(*CHANNEL_NAMES[word.lower()]))
         if len(set(joint.channels)) != len(joint.channels):
             self.refuse("a channel twice", "each channel once", f"correct the channels of {cut(joint.name)}")
 

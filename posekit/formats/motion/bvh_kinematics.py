@@ -16,7 +16,7 @@ from posekit.geometry import Array, coordinate_rotation
 
 _CHUNK: Final = 2_000_000
 """Numbers in the rotations that are held at a time."""
-SMALL: Final = 1e-3
+SMALL_OFFSET_SHARE: Final = 1e-3
 """Fraction of the largest offset below which an offset says nothing about its position channels."""
 
 
@@ -76,7 +76,7 @@ def positions_are_absolute(file: BvhFile) -> bool:
     elsewhere.
     """
     tree, column = file.hierarchy, 0
-    small = SMALL * float(np.abs(tree.offsets).max(initial=0.0))
+    small = SMALL_OFFSET_SHARE * float(np.abs(tree.offsets).max(initial=0.0))
     votes: dict[bool, list[bool]] = {True: [], False: []}
     for k, channels in enumerate(tree.channels):
         near = []

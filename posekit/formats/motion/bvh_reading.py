@@ -10,7 +10,7 @@ import numpy as np
 from posekit.formats.motion.bvh_file import open_bvh
 from posekit.formats.motion.bvh_kinematics import points_of, positions_are_absolute
 from posekit.formats.motion.bvh_size import Unit, guessed_unit, guessed_up
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.safe_io import refusal, shown
 
@@ -64,7 +64,7 @@ def examine_bvh(
     InputError
         Where the file is no BVH file or damaged (with the line), or its skeleton has a body's size in no unit.
     """
-    for given, valid, what in ((unit, METRES_IN_UNIT, "unit"), (up, UPS, "up")):
+    for given, valid, what in ((unit, METRES_IN_UNIT, "unit"), (up, UP_DIRECTIONS, "up")):
         if given is not None and given not in valid:
             raise refusal(path, what, shown(given), " or ".join(valid), "state one of them")
     file = open_bvh(path)

@@ -8,21 +8,21 @@ import numpy as np
 
 from posekit.formats.motion.bvh_file import BvhFile
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
-from posekit.formats.skeleton_maps import LANDMARK, find_by_names
+from posekit.formats.skeleton_maps import LANDMARK_INDEX, find_by_names
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
-CMU: Final = 0.0254 / 0.45
+CMU_UNIT_METRES: Final = 0.0254 / 0.45
 """Metres in a unit of the CMU database, inches times 0.45 (mocap.cs.cmu.edu, FAQs): also in its BVH conversions."""
-SCALES: Final = {**METRES_IN_UNIT, "0.45 in": CMU}
-BODY: Final = 2.0
+METRES_IN_BVH_UNIT: Final = {**METRES_IN_UNIT, "0.45 in": CMU_UNIT_METRES}
+BODY_METRES: Final = 2.0
 """Metres along the bones from a hand to a foot, or between the two ends of the body that are farthest: what the
 figure of Lee & Chen 1985 has; skeletons of CMU, LaFAN1 and Bandai-Namco have 1.9 to 2.3."""
-SMALLEST, LARGEST = 0.9, 4.5
+SMALLEST_BODY_METRES, LARGEST_BODY_METRES = 0.9, 4.5
 """Metres along the bones of a small child, and of a giant."""
-SAMPLES: Final = 200
+FRAMES_SAMPLED: Final = 200
 """Frames that are looked at."""
-UPRIGHT, LEANING = 0.8, 0.3
+UPRIGHT_COSINE, LEANING_COSINE = 0.8, 0.3
 """Cosines between the body and an axis, as a mean over frames, for it to be up in place of y."""
 
 
@@ -35,8 +35,8 @@ class Unit(NamedTuple):
 
 
 def sampled(points: Array) -> Array:
-    """Return at most `SAMPLES` frames of many, evenly spread."""
-    return points[:: max(1, len(points) // SAMPLES)]
+    """Return at most `FRAMES_SAMPLED` frames of many, evenly spread."""
+    return points[:: max(1, len(points) // FRAMES_SAMPLED)]
 
 
 def guessed_unit(file: BvhFile, points: Array) -> Unit:
@@ -48,18 +48,20 @@ def guessed_unit(file: BvhFile, points: Array) -> Unit:
         Where it is a body's in no unit.
     """
     length = longest_chain(sampled(points), file.hierarchy.parents)
-    ratio = {name: length * scale / BODY for name, scale in SCALES.items()}
-    name = min(SCALES, key=lambda unit: abs(np.log(max(ratio[unit], 1e-300))))
-    metres = length * SCALES[name]
-    if not SMALLEST <= metres <= LARGEST:
+    ratio = {name: length * scale / BODY_METRES for name, scale in METRES_IN_BVH_UNIT.items()}
+    name = min(METRES_IN_BVH_UNIT, key=lambda unit: abs(np.log(max(ratio[unit], 1e-300))))
+    metres = length * METRES_IN_BVH_UNIT[name]
+    if not SMALLEST_BODY_METRES <= metres <= LARGEST_BODY_METRES:
         raise refusal(
             file.path,
             "unit",
             f"a skeleton whose longest chain of bones has {length:.4g} units",
-            f"about {BODY:g} m in {', '.join(SCALES)}",
+            f"about {BODY_METRES:g} m in {', '.join(METRES_IN_BVH_UNIT)}",
             "state the unit",
         )
-    return Unit(name, SCALES[name], f"its longest chain of bones has {length:.4g} units, {metres:.2f} m")
+    return Unit(
+        name, METRES_IN_BVH_UNIT[name], f"its longest chain of bones has {length:.4g} units, {metres:.2f} m"
+    )
 
 
 def longest_chain(points: Array, parents: tuple[int, ...]) -> float:
@@ -104,14 +106,14 @@ def guessed_up(points: Array, names: tuple[str, ...]) -> str:
     if not maps:
         return "+y"
     body = maps[0].gather(sampled(points), names)
-    ankles = (body[:, LANDMARK["right_ankle"]] + body[:, LANDMARK["left_ankle"]]) / 2
-    shoulders = (body[:, LANDMARK["right_shoulder"]] + body[:, LANDMARK["left_shoulder"]]) / 2
+    ankles = (body[:, LANDMARK_INDEX["right_ankle"]] + body[:, LANDMARK_INDEX["left_ankle"]]) / 2
+    shoulders = (body[:, LANDMARK_INDEX["right_shoulder"]] + body[:, LANDMARK_INDEX["left_shoulder"]]) / 2
     way = shoulders - ankles
     length = np.linalg.norm(way, axis=-1)
     if not (length > 0).all():
         return "+y"
     mean = (way / length[:, None]).mean(axis=0)
     axis = int(np.argmax(np.abs(mean)))
-    if abs(mean[axis]) < UPRIGHT or (axis != 1 and abs(mean[1]) > LEANING):
+    if abs(mean[axis]) < UPRIGHT_COSINE or (axis != 1 and abs(mean[1]) > LEANING_COSINE):
         return "+y"
     return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}"

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.formats.motion.bvh_angles import euler_angles, euler_rotation
-from posekit.formats.motion.motion import UPS
+from posekit.formats.motion.motion import UP_DIRECTIONS
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.geometry import Array, rotation_from_quaternion, unit
 from posekit.safe_io import refusal, shown
@@ -28,7 +28,7 @@ from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
 
 TO_Y_UP: Final = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """From the URDF's axes to x left, y up, z forward."""
-FARTHEST: Final = 1e6
+FARTHEST_PERSON_METRES: Final = 1e6
 """Metres from the origin at which a person may stand."""
 
 
@@ -62,11 +62,13 @@ def _nodes() -> tuple[Node, ...]:
     return tuple(nodes)
 
 
-NODES: Final = _nodes()
+BODY_NODES: Final = _nodes()
 """Depth first, as a file lists them."""
-LEAVES: Final = frozenset(range(len(NODES))) - {node.parent for node in NODES}
-POINT_NODES: Final = tuple(next(k for k, node in enumerate(NODES) if node.name == name) for name in POINT)
-"""Where each of `posekit.skeleton.POINTS` stands in `NODES`."""
+LEAF_NODES: Final = frozenset(range(len(BODY_NODES))) - {node.parent for node in BODY_NODES}
+POINT_NODES: Final = tuple(
+    next(k for k, node in enumerate(BODY_NODES) if node.name == name) for name in POINT
+)
+"""Where each of `posekit.skeleton.POINTS` stands in `BODY_NODES`."""
 
 
 class Placed(NamedTuple):
@@ -92,9 +94,10 @@ def neutral_place(figure: Figure, node: Node) -> Array:
 
 def offsets(figure: Figure) -> Array:
     """Return where each node is in its parent's frame (21, 3), metres; the root's is zero."""
-    place = np.stack([neutral_place(figure, node) for node in NODES])
+    place = np.stack([neutral_place(figure, node) for node in BODY_NODES])
     steps = [
-        place[k] - place[node.parent] if node.parent >= 0 else np.zeros(3) for k, node in enumerate(NODES)
+        place[k] - place[node.parent] if node.parent >= 0 else np.zeros(3)
+        for k, node in enumerate(BODY_NODES)
     ]
     return np.asarray(np.stack(steps) @ TO_Y_UP.T)
 
@@ -120,13 +123,13 @@ def checked(path: str | Path, figure: Figure, q: Array, time: Array | None = Non
         raise refusal(
             path, f"q[{frame}].{names[k]}", str(q[frame, k]), "a finite number", "leave that frame out"
         )
-    if not (np.abs(q[:, :3]) <= FARTHEST).all():
+    if not (np.abs(q[:, :3]) <= FARTHEST_PERSON_METRES).all():
         frame = int(np.argmax(np.abs(q[:, :3]).max(axis=1)))
         raise refusal(
             path,
             f"q[{frame}]",
             f"a torso {np.abs(q[frame, :3]).max():g} m away",
-            f"{FARTHEST:g} m at most",
+            f"{FARTHEST_PERSON_METRES:g} m at most",
             "correct it",
         )
     off = np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1)
@@ -134,8 +137,8 @@ def checked(path: str | Path, figure: Figure, q: Array, time: Array | None = Non
         frame = int(np.argmax(off))
         length = f"a quaternion of length {np.linalg.norm(q[frame, 3:7]):g}"
         raise refusal(path, f"q[{frame}]", length, "1", "normalise q[3:7]")
-    if up not in UPS:
-        raise refusal(path, "up", shown(up), " or ".join(UPS), "state which axis of q points up")
+    if up not in UP_DIRECTIONS:
+        raise refusal(path, "up", shown(up), " or ".join(UP_DIRECTIONS), "state which axis of q points up")
     if time is not None:
         check_time(path, np.asarray(time, dtype=np.float64), len(q))
     return q
@@ -168,8 +171,8 @@ def place(figure: Figure, q: Array, up: str = "+z") -> Placed:
     R_torso = W @ rotation_from_quaternion(unit(q[:, 3:7])) @ TO_Y_UP.T
     pelvis = TO_Y_UP @ figure.neutral_points[POINT["pelvis"]]
     own = dict(zip(DOFS, (q[:, figure.angle_index] * figure.limits.sign).T, strict=True))
-    angles = np.zeros((len(q), len(NODES), 3))
-    for k, node in enumerate(NODES):
+    angles = np.zeros((len(q), len(BODY_NODES), 3))
+    for k, node in enumerate(BODY_NODES):
         for dof in (f"{node.name}.{turn}" for turn in ("flexion", "bending", "abduction", "rotation")):
             if dof in own:
                 angles[:, k, _COLUMN[dof.partition(".")[2]]] = own[dof]
@@ -231,9 +234,9 @@ def known_nodes(figure: Figure, q: Array) -> NDArray[np.int8]:
     The torso's place and rotation in the world are in q itself, whether those of the hips are known or not.
     """
     column = dict(zip(figure.configuration_names, q.T, strict=True))
-    known = np.zeros((len(q), len(NODES)), dtype=np.int8)
-    turned = np.ones((len(q), len(NODES)), dtype=bool)
-    for k, node in enumerate(NODES):
+    known = np.zeros((len(q), len(BODY_NODES)), dtype=np.int8)
+    turned = np.ones((len(q), len(BODY_NODES)), dtype=bool)
+    for k, node in enumerate(BODY_NODES):
         angles = np.array([column[name] for name in column if name.rpartition("_")[0] == node.name])
         free = node.name in ("pelvis", "torso")
         above = np.full(len(q), 2) if free else known[:, node.parent]

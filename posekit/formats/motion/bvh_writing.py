@@ -9,13 +9,13 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
-from posekit.formats.motion.bvh_angles import ORDER, continuous
-from posekit.formats.motion.bvh_tree import LEAVES, NODES, checked, filled, offsets, place
+from posekit.formats.motion.bvh_angles import AXIS_ORDER, continuous
+from posekit.formats.motion.bvh_tree import BODY_NODES, LEAF_NODES, checked, filled, offsets, place
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.geometry import Array
 from posekit.safe_io import refusal, replacing, shown
 
-NAMES: Final = {
+ANIMATION_NAMES: Final = {
     "pelvis": "Hips",
     "torso": "Spine",
     "neck": "NeckBase",
@@ -40,9 +40,9 @@ NAMES: Final = {
 
 A file's Neck may lie anywhere between the shoulders and the head; NeckBase is the figure's, and is in no other file.
 """
-STILL: Final = 1 / 30
+STILL_FRAME_SECONDS: Final = 1 / 30
 """Seconds that a file of one frame says."""
-UNEVEN: Final = 0.1
+UNEVEN_STEP_SHARE: Final = 0.1
 """Fraction of a frame by which a frame's time may lie beside its place in an even sequence."""
 _DIGITS: Final = 6
 _ROWS: Final = 2000
@@ -60,8 +60,8 @@ def write_bvh(
 ) -> None:
     """Write configurations as BVH, whole or not at all.
 
-    The joints are those of `posekit.formats.motion.bvh_tree`, named as in `NAMES`; every joint has the channels
-    Xrotation Zrotation Yrotation, which are the figure's flexion, abduction (or bending) and rotation. Angles and
+    The joints are those of `posekit.formats.motion.bvh_tree`, named as in `ANIMATION_NAMES`; every joint has the
+    channels Xrotation Zrotation Yrotation, which are the figure's flexion, abduction (or bending) and rotation. Angles and
     places have 6 decimals, the points are those of forward kinematics within 1e-7 m.
 
     Parameters
@@ -100,10 +100,10 @@ def write_bvh(
 def even_step(path: str | Path, time: Array) -> float:
     """Return the time from frame to frame, seconds; refuse frames that are not evenly spaced."""
     if len(time) == 1:
-        return STILL
+        return STILL_FRAME_SECONDS
     step = float(time[-1] - time[0]) / (len(time) - 1)
     beside = np.abs(time - time[0] - step * np.arange(len(time))) / step
-    if beside.max() > UNEVEN:
+    if beside.max() > UNEVEN_STEP_SHARE:
         frame = int(np.argmax(beside))
         got = f"{time[frame] - time[0]:g} s after the first"
         expected = f"{step * frame:g} s, for a BVH file has one time from frame to frame"
@@ -123,17 +123,17 @@ def _pieces(steps: Array, values: Array, frame_time: float) -> Iterator[str]:
 
 def _block(k: int, steps: Array, depth: int) -> Iterator[str]:
     """Spell a node and what hangs on it; the tree is 6 deep."""
-    tab, node = "\t" * depth, NODES[k]
+    tab, node = "\t" * depth, BODY_NODES[k]
     x, y, z = np.round(steps[k], _DIGITS + 2) + 0.0
-    turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in ORDER)
+    turns = " ".join(f"{'XYZ'[axis]}rotation" for axis in AXIS_ORDER)
     moves = "Xposition Yposition Zposition "
-    yield f"{tab}{'JOINT' if depth else 'ROOT'} {NAMES[node.name]}\n{tab}{{\n"
+    yield f"{tab}{'JOINT' if depth else 'ROOT'} {ANIMATION_NAMES[node.name]}\n{tab}{{\n"
     yield f"{tab}\tOFFSET {x:.8f} {y:.8f} {z:.8f}\n"
     yield f"{tab}\tCHANNELS {3 if depth else 6} {'' if depth else moves}{turns}\n"
-    if k in LEAVES:
+    if k in LEAF_NODES:
         # A reader expects an end; the figure has no hands and no feet, so it has no length.
         yield f"{tab}\tEnd Site\n{tab}\t{{\n{tab}\t\tOFFSET 0.0 0.0 0.0\n{tab}\t}}\n"
-    for child, other in enumerate(NODES):
+    for child, other in enumerate(BODY_NODES):
         if other.parent == k:
             yield from _block(child, steps, depth + 1)
     yield f"{tab}}}\n"

@@ -19,7 +19,7 @@ import numpy as np
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.c3d_content import MAX_VALUES, C3dContent, decode_c3d
 from posekit.formats.motion.c3d_parameters import Parameter
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_checks import the_one_clip
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.safe_io import cut, extra, one_line, read_bytes, refusal, replacing, shown
@@ -181,8 +181,8 @@ def _unit(path: str | Path, parameters: Mapping[str, Parameter]) -> str:
 def _up(parameters: Mapping[str, Parameter]) -> str:
     """Return the axis that points up on the screen, empty where the file does not say."""
     found = next(iter(_texts(parameters, "Y_SCREEN")), "").casefold()
-    found = f"+{found}" if f"+{found}" in UPS else found
-    return found if found in UPS else ""
+    found = f"+{found}" if f"+{found}" in UP_DIRECTIONS else found
+    return found if found in UP_DIRECTIONS else ""
 
 
 def _texts(parameters: Mapping[str, Parameter], name: str) -> list[str]:

@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.motion.c3d_parameters import DAMAGED, Parameter, ParameterSection, Processor
+from posekit.formats.motion.c3d_parameters import DAMAGED_REMEDY, Parameter, ParameterSection, Processor
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
@@ -61,7 +61,7 @@ def decode_c3d(path: str | Path, data: bytes) -> C3dContent:
     section = (data[0] - 1) * _BLOCK
     if section + 4 > len(data) or data[section + 3] not in (84, 85, 86):
         got = f"parameters in block {data[0]} of {len(data) // _BLOCK}"
-        raise refusal(path, "header", got, "a section of parameters of a known processor", DAMAGED)
+        raise refusal(path, "header", got, "a section of parameters of a known processor", DAMAGED_REMEDY)
     processor = Processor(code=data[section + 3])
     points, analogues, first, last, _ = struct.unpack_from(f"{processor.order}5H", data, 2)
     scale, rate = (float(processor.floats(data[place : place + 4])[0]) for place in (12, 20))
@@ -71,13 +71,15 @@ def decode_c3d(path: str | Path, data: bytes) -> C3dContent:
             path, "POINT:USED", "no points", "points in space", "analogue channels alone are no motion"
         )
     if not section < start <= len(data):
-        raise refusal(path, "header", f"frames from byte {start:,}", "frames after the parameters", DAMAGED)
+        raise refusal(
+            path, "header", f"frames from byte {start:,}", "frames after the parameters", DAMAGED_REMEDY
+        )
     parameters = ParameterSection(path, data, section, start, processor).read()
     told = parameters.get("POINT:SCALE")
     if told is not None and told.kind == 4 and len(told.numbers):
         scale = float(told.numbers[0])
     if not np.isfinite(scale) or scale == 0:
-        raise refusal(path, "POINT:SCALE", f"{scale:g}", "a finite number that is not 0", DAMAGED)
+        raise refusal(path, "POINT:SCALE", f"{scale:g}", "a finite number that is not 0", DAMAGED_REMEDY)
     width = (4 * points + analogues) * (4 if scale < 0 else 2)
     frames = _frames(path, parameters, first, last, len(data) - start, width)
     if frames * width > 4 * MAX_VALUES:
@@ -86,7 +88,7 @@ def decode_c3d(path: str | Path, data: bytes) -> C3dContent:
     if len(data) - start < frames * width:
         got = f"{len(data) - start:,} bytes of frames"
         expected = f"{frames * width:,} for {frames:,} frames of {points:,} points"
-        raise refusal(path, "", got, expected, DAMAGED)
+        raise refusal(path, "", got, expected, DAMAGED_REMEDY)
     body = data[start : start + frames * width]
     values: NDArray[Any] = processor.floats(body) if scale < 0 else processor.integers(body, 2)
     values = values.reshape(frames, -1)[:, : 4 * points].reshape(frames, points, 4)
@@ -104,7 +106,9 @@ def _frames(
     """Return the number of frames: a header counts to 65,535, and what is longer says so in one of three other ways."""
     count = last - first + 1
     if count < 1:
-        raise refusal(path, "header", f"frames {first} to {last}", "the last not before the first", DAMAGED)
+        raise refusal(
+            path, "header", f"frames {first} to {last}", "the last not before the first", DAMAGED_REMEDY
+        )
     told = [
         int(parameters[name].numbers[0])
         for name in ("POINT:FRAMES", "POINT:LONG_FRAMES")

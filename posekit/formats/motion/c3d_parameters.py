@@ -135,7 +135,7 @@ class ParameterSection:
 
     def _damaged(self, place: int, got: str) -> InputError:
         expected = f"parameters that end by byte {self.end}"
-        return refusal(self.path, f"parameters, byte {place}", got, expected, DAMAGED)
+        return refusal(self.path, f"parameters, byte {place}", got, expected, DAMAGED_REMEDY)
 
 
-DAMAGED: Final = "the file is cut off or damaged: export it again"
+DAMAGED_REMEDY: Final = "the file is cut off or damaged: export it again"

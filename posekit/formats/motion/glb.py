@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.formats.motion.bvh_angles import euler_rotation
 from posekit.formats.motion.bvh_tree import (
-    NODES,
+    BODY_NODES,
     TO_Y_UP,
     Placed,
     checked,
@@ -32,7 +32,7 @@ from posekit.formats.motion.bvh_tree import (
     place,
 )
 from posekit.formats.motion.glb_capsule import capsule_mesh
-from posekit.formats.motion.glb_file import INDICES, UINT16, VERTICES, GlbFile
+from posekit.formats.motion.glb_file import INDEX_TARGET, UINT16_TYPE, VERTEX_TARGET, GlbFile
 from posekit.formats.motion.glb_reading import read_glb
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array, quaternion_from_rotation
@@ -41,9 +41,9 @@ from posekit.safe_io import refusal, shown
 MAX_BODIES: Final = 1000
 """Postures in one file: each is a body of 22 nodes."""
 MAX_NAME: Final = 200
-SIDES: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
+SIDE_COLOURS: Final = {"right": (0.90, 0.45, 0.13), "left": (0.16, 0.42, 0.78), "": (0.55, 0.57, 0.60)}
 """Colours of one body: right orange, left blue, the trunk grey."""
-GOLDEN: Final = 0.6180339887498949
+GOLDEN_TURN: Final = 0.6180339887498949
 """Turn of the hue from one body to the next, so that neighbours differ however many there are."""
 
 
@@ -75,7 +75,7 @@ def write_glb(
     glb = GlbFile()
     origin = np.round((placed.root.min(axis=0) + placed.root.max(axis=0)) / 2)
     world = _world(glb, origin)
-    colour = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDES.items()}
+    colour = {side: _material(glb, side or "trunk", rgb) for side, rgb in SIDE_COLOURS.items()}
     meshes = {
         link: _mesh(glb, link, shape, colour[link.split("_")[0] if "_" in link else ""])
         for link, shape in _shapes(glb, figure).items()
@@ -159,7 +159,7 @@ def _material(glb: GlbFile, name: str, rgb: tuple[float, ...]) -> int:
 
 def _shapes(glb: GlbFile, figure: Figure) -> dict[str, dict[str, Any]]:
     """Add the capsules' triangles, each in its link's frame, and return what a mesh says of them."""
-    at = {node.link: neutral_place(figure, node) for node in NODES if node.link}
+    at = {node.link: neutral_place(figure, node) for node in BODY_NODES if node.link}
     shapes = {}
     for capsule in figure.capsules:
         own = figure.neutral_points - at[capsule.link]
@@ -168,10 +168,10 @@ def _shapes(glb: GlbFile, figure: Figure) -> dict[str, dict[str, Any]]:
         mesh = capsule_mesh(middle - half, middle + half, capsule.radius)
         shapes[capsule.link] = {
             "attributes": {
-                "POSITION": glb.accessor(mesh.vertices, target=VERTICES, bounds=True),
-                "NORMAL": glb.accessor(mesh.normals, target=VERTICES),
+                "POSITION": glb.accessor(mesh.vertices, target=VERTEX_TARGET, bounds=True),
+                "NORMAL": glb.accessor(mesh.normals, target=VERTEX_TARGET),
             },
-            "indices": glb.accessor(mesh.faces.ravel(), UINT16, target=INDICES),
+            "indices": glb.accessor(mesh.faces.ravel(), UINT16_TYPE, target=INDEX_TARGET),
         }
     return shapes
 
@@ -196,7 +196,7 @@ def _body(
         nodes[world]["children"].append(len(nodes))
         world = glb.append("nodes", {"name": label, "children": []})
     place_in_file: dict[int, int] = {-1: world}
-    for k, node in enumerate(NODES):
+    for k, node in enumerate(BODY_NODES):
         if known is not None and known[k] == 0:
             continue
         where = (root if node.parent < 0 else steps[k]) + 0.0
@@ -213,14 +213,14 @@ def _body(
 
 
 def _animate(glb: GlbFile, path: str | Path, first: int, away: Array, turns: Array, time: Array) -> None:
-    """Add the key frames of a body whose nodes are all there, in the order of `NODES`."""
+    """Add the key frames of a body whose nodes are all there, in the order of `BODY_NODES`."""
     seconds = (time - time[0]).astype(np.float32)
     if not (np.diff(seconds) > 0).all():
         got = f"frames {float(np.diff(time).min()):g} s apart over {time[-1] - time[0]:g} s"
         raise refusal(path, "time", got, "times that differ in float32", "split the motion")
     keys = glb.accessor(seconds, bounds=True)
     tracks = [(0, "translation", away)]
-    tracks += [(k, "rotation", turns[:, k]) for k, node in enumerate(NODES) if node.link]
+    tracks += [(k, "rotation", turns[:, k]) for k, node in enumerate(BODY_NODES) if node.link]
     channels, samplers = [], []
     for k, what, values in tracks:
         samplers.append({"input": keys, "interpolation": "LINEAR", "output": glb.accessor(values)})
@@ -239,7 +239,9 @@ def _labels(path: str | Path, names: Sequence[str] | None, count: int) -> tuple[
 
 def _colours(path: str | Path, colours: Array | None, count: int) -> Array:
     if colours is None:
-        return np.array([colorsys.hsv_to_rgb((0.58 + GOLDEN * k) % 1.0, 0.65, 0.85) for k in range(count)])
+        return np.array(
+            [colorsys.hsv_to_rgb((0.58 + GOLDEN_TURN * k) % 1.0, 0.65, 0.85) for k in range(count)]
+        )
     rgb = np.asarray(colours, dtype=np.float64)
     if rgb.shape != (count, 3) or not ((rgb >= 0) & (rgb <= 1)).all():
         raise refusal(

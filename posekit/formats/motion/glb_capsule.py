@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, cross
 
-AROUND: Final = 24
+RING_CORNERS: Final = 24
 """Corners of a ring."""
-RINGS: Final = 6
+HALF_SPHERE_RINGS: Final = 6
 """Rings of a half sphere, its equator among them, its pole not."""
 
 
@@ -41,26 +41,26 @@ def capsule_mesh(start: Array, end: Array, radius: float) -> Mesh:
     axis = (end - start) / np.linalg.norm(end - start)
     across = cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     across /= np.linalg.norm(across)
-    turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    turn = 2 * np.pi * np.arange(RING_CORNERS) / RING_CORNERS
     ring = np.outer(np.cos(turn), across) + np.outer(np.sin(turn), cross(axis, across))
-    lift = np.pi / 2 * np.arange(RINGS) / RINGS
+    lift = np.pi / 2 * np.arange(HALF_SPHERE_RINGS) / HALF_SPHERE_RINGS
     half = np.cos(lift)[:, None, None] * ring + np.sin(lift)[:, None, None] * axis  # from the equator up
     below = half - 2 * np.sin(lift)[:, None, None] * axis
     normals = np.concatenate([-axis[None], *below[::-1], *half, axis[None]])
     centres = np.where(np.arange(len(normals))[:, None] < len(normals) // 2, start, end)
-    return Mesh(centres + radius * normals, normals, _faces(2 * RINGS))
+    return Mesh(centres + radius * normals, normals, _faces(2 * HALF_SPHERE_RINGS))
 
 
 def _faces(rings: int) -> NDArray[np.intp]:
     """Join a pole, so many rings, and the other pole."""
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
-    last = 1 + rings * AROUND
+    k = np.arange(RING_CORNERS)
+    after = (k + 1) % RING_CORNERS
+    last = 1 + rings * RING_CORNERS
     pieces = [np.stack([np.zeros_like(k), 1 + after, 1 + k], axis=-1)]
     for ring in range(rings - 1):
-        low, high = 1 + ring * AROUND, 1 + (ring + 1) * AROUND
+        low, high = 1 + ring * RING_CORNERS, 1 + (ring + 1) * RING_CORNERS
         pieces.append(np.stack([low + k, low + after, high + after], axis=-1))
         pieces.append(np.stack([low + k, high + after, high + k], axis=-1))
-    top = last - AROUND
+    top = last - RING_CORNERS
     pieces.append(np.stack([top + k, top + after, np.full_like(k, last)], axis=-1))
     return np.concatenate(pieces)

@@ -14,12 +14,12 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.formats.motion.glb_file import FLOAT
+from posekit.formats.motion.glb_file import FLOAT_TYPE
 from posekit.geometry import Array
 from posekit.safe_io import parse_json, read_bytes, refusal, shown
 
 MAX_GLB_BYTES: Final = 500_000_000
-WIDTHS: Final[Mapping[str, int]] = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
+ELEMENT_WIDTHS: Final[Mapping[str, int]] = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 """Numbers in an element, by the type of an accessor."""
 
 
@@ -98,8 +98,8 @@ class GlbContent:
         """
         accessor = self.item("accessors", index, where)
         view = self.item("bufferViews", accessor.get("bufferView"), f"{where}: bufferView")
-        width = WIDTHS.get(str(accessor.get("type")))
-        plain = accessor.get("componentType") == FLOAT and "sparse" not in accessor
+        width = ELEMENT_WIDTHS.get(str(accessor.get("type")))
+        plain = accessor.get("componentType") == FLOAT_TYPE and "sparse" not in accessor
         if width is None or not plain or view.get("byteStride", 4 * width) != 4 * width:
             raise self.damaged(where, "numbers of another kind", "32-bit floats without gaps")
         starts: tuple[Any, ...] = (

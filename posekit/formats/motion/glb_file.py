@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from posekit.safe_io import refusal, replacing
 
-FLOAT, UINT16 = 5126, 5123
+FLOAT_TYPE, UINT16_TYPE = 5126, 5123
 """Component types."""
-VERTICES, INDICES = 34962, 34963
+VERTEX_TARGET, INDEX_TARGET = 34962, 34963
 """What a mesh's buffer views are for."""
 _TYPES: Final = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-_DTYPES: Final = {FLOAT: "<f4", UINT16: "<u2"}
+_DTYPES: Final = {FLOAT_TYPE: "<f4", UINT16_TYPE: "<u2"}
 MAX_BYTES: Final = 2_000_000_000
 """The format's lengths are 32-bit numbers."""
 
@@ -51,7 +51,7 @@ class GlbFile:
         return len(items) - 1
 
     def accessor(
-        self, values: NDArray[Any], kind: int = FLOAT, *, target: int | None = None, bounds: bool = False
+        self, values: NDArray[Any], kind: int = FLOAT_TYPE, *, target: int | None = None, bounds: bool = False
     ) -> int:
         """Add numbers and return their accessor.
 
@@ -59,9 +59,9 @@ class GlbFile:
         ----------
         values : array (N,) or (N, 3) or (N, 4)
         kind : int
-            `FLOAT` or `UINT16`.
+            `FLOAT_TYPE` or `UINT16_TYPE`.
         target : int, optional
-            `VERTICES` or `INDICES`, for a mesh.
+            `VERTEX_TARGET` or `INDEX_TARGET`, for a mesh.
         bounds : bool
             Whether to state the least and the largest: for positions of vertices and times of key frames.
         """

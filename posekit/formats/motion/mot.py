@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from posekit.formats.motion.motion import Motion
 
 MAX_BYTES: Final = 500_000_000
-PLACE: Final = ("torso_tx", "torso_ty", "torso_tz")
-ROTATION: Final = ("torso_rz", "torso_ry", "torso_rx")
+PLACE_COLUMNS: Final = ("torso_tx", "torso_ty", "torso_tz")
+ROTATION_COLUMNS: Final = ("torso_rz", "torso_ry", "torso_rx")
 _CHUNK: Final = 4096
 
 
@@ -57,7 +57,7 @@ def write_mot(path: str | Path, figure: Figure, q: Array, time: Array) -> None:
         file cannot be written.
     """
     q, time = checked_configurations(path, figure, q, time)
-    names = ["time", *PLACE, *ROTATION, *figure.configuration_names[7:]]
+    names = ["time", *PLACE_COLUMNS, *ROTATION_COLUMNS, *figure.configuration_names[7:]]
     values = np.concatenate(
         [time[:, None], q[:, :3], np.degrees(_unwrapped(yaw_pitch_roll(q[:, 3:7]))), np.degrees(q[:, 7:])],
         axis=1,
@@ -80,7 +80,7 @@ def read_mot(path: str | Path, figure: Figure) -> tuple[Array, Array]:
         Where the file is no MOT, is cut off, or has not all of the figure's angles.
     """
     names, values, degrees = _read_table(path)
-    wanted = ["time", *PLACE, *ROTATION, *figure.configuration_names[7:]]
+    wanted = ["time", *PLACE_COLUMNS, *ROTATION_COLUMNS, *figure.configuration_names[7:]]
     missing = [name for name in wanted if name not in names]
     if missing:
         hint = nearest(missing[0], names)[:200]

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal, shown
 
-UPS: Final = {
+UP_DIRECTIONS: Final = {
     f"{sign}{axis}": (1.0 if sign == "+" else -1.0) * np.eye(3)[k]
     for k, axis in enumerate("xyz")
     for sign in "+-"
@@ -159,8 +159,10 @@ class Motion:
                 f"{count} positive rates, one a clip",
                 "correct them",
             )
-        if self.up and self.up not in UPS:
-            raise refusal(self.source, "up", shown(self.up), f"one of {', '.join(UPS)}", "correct it")
+        if self.up and self.up not in UP_DIRECTIONS:
+            raise refusal(
+                self.source, "up", shown(self.up), f"one of {', '.join(UP_DIRECTIONS)}", "correct it"
+            )
 
     def _check_order(self, time: Array, clip: NDArray[np.intp]) -> None:
         """Refuse times that stand still or go back within a clip."""

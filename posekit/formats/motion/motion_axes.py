@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.geometry import Array, cross, cross_matrix
 
 
@@ -15,7 +15,7 @@ def up_rotation(start: str, end: str) -> Array:
 
     Its entries are 0, 1 and -1: coordinates change places and signs and nothing is rounded.
     """
-    a, b = UPS[start], UPS[end]
+    a, b = UP_DIRECTIONS[start], UP_DIRECTIONS[end]
     axis = cross(a, b)
     if not axis.any():
         across = np.roll(a, 1) ** 2  # half a turn about an axis square to both

@@ -9,7 +9,7 @@ import numpy as np
 from posekit.formats.motion.motion import Motion
 from posekit.safe_io import refusal, shown
 
-SMALLEST, WIDEST = 0.1, 20.0
+SMALLEST_SPAN_METRES, WIDEST_SPAN_METRES = 0.1, 20.0
 """Metres that the points of one frame span: a hand is larger, people on one stage are nearer to each other."""
 
 
@@ -27,7 +27,7 @@ def check_size(motion: Motion) -> None:
     Raises
     ------
     InputError
-        Where half of the frames span less than `SMALLEST` or more than `WIDEST`.
+        Where half of the frames span less than `SMALLEST_SPAN_METRES` or more than `WIDEST_SPAN_METRES`.
     """
     known = np.isfinite(motion.points).all(axis=-1)
     rows = known.sum(axis=1) > 1
@@ -35,11 +35,11 @@ def check_size(motion: Motion) -> None:
         return
     points = motion.points[rows]
     extent = float(np.median(np.linalg.norm(np.nanmax(points, axis=1) - np.nanmin(points, axis=1), axis=-1)))
-    if not SMALLEST <= extent <= WIDEST:
+    if not SMALLEST_SPAN_METRES <= extent <= WIDEST_SPAN_METRES:
         raise refusal(
             motion.source,
             "unit",
             f"points that span {extent:.4g} m",
-            f"{SMALLEST:g} to {WIDEST:g} m",
+            f"{SMALLEST_SPAN_METRES:g} to {WIDEST_SPAN_METRES:g} m",
             "state the unit in which the file is: m, cm, mm or in",
         )

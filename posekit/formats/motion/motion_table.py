@@ -18,7 +18,7 @@ from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
-LONG: Final = ("name", "x", "y", "z")
+LONG_COLUMNS: Final = ("name", "x", "y", "z")
 MAX_POINTS: Final = 10_000
 MAX_VALUES: Final = 100_000_000
 _COORDINATE: Final = re.compile(r"(.+)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
@@ -46,7 +46,7 @@ def is_motion(columns: Sequence[str]) -> bool:
     """Tell whether columns are those of a motion, long or wide, and not of sets of survivors."""
     if "survivor" in columns or "time" not in columns:
         return False
-    return set(LONG) <= set(columns) or bool(points_in(columns))
+    return set(LONG_COLUMNS) <= set(columns) or bool(points_in(columns))
 
 
 def motion_of(
@@ -79,7 +79,9 @@ def motion_of(
         raise refusal(source, "columns", _listed(columns), "a column time, seconds", "add it")
     if len(columns["time"]) == 0:
         raise refusal(source, "", "no rows", "a row a frame", "check how it was written")
-    names, points, rows = _long(columns, source) if set(LONG) <= set(columns) else _wide(columns, source)
+    names, points, rows = (
+        _long(columns, source) if set(LONG_COLUMNS) <= set(columns) else _wide(columns, source)
+    )
     time = np.asarray(columns["time"], dtype=np.float64)[rows]
     clips, clip = _clips(columns, rows)
     rates = np.array([rate or rate_of(time[clip == index]) for index in range(len(clips))])

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.formats.cameras.camera_format import is_intrinsics
 from posekit.formats.given_file import GivenFile
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.motion.motion_table import rate_of
 from posekit.geometry import Array
@@ -28,7 +28,7 @@ from posekit.skeleton import HEAD_POINTS, JOINTS
 
 MAX_BYTES: Final = 1_000_000_000
 """What the arrays of one file may take, unpacked."""
-POSTURES: Final = "posekit.postures/1"
+POSTURES_SCHEMA: Final = "posekit.postures/1"
 _POINTS: Final[tuple[str, ...]] = ("joints", "points")
 _NAMES: Final[tuple[str, ...]] = ("joint_names", "names")
 _KEYS: Final[tuple[str, ...]] = (
@@ -56,10 +56,10 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
     with open_npz(path, limit=MAX_BYTES) as archive:
         arrays = {key: archive.array(key, "iufU", None) for key in _KEYS if key in archive.names}
         others = ", ".join(archive.names)[:200]
-    schema = _word(path, arrays, "schema", "", ("", POSTURES))
+    schema = _word(path, arrays, "schema", "", ("", POSTURES_SCHEMA))
     points, names = _points(path, arrays, schema, others)
     scale = METRES_IN_UNIT[unit or _word(path, arrays, "unit", "m", tuple(METRES_IN_UNIT))]
-    up = _word(path, arrays, "up", "+y" if "clip_fps" in arrays else "", ("", *UPS))
+    up = _word(path, arrays, "up", "+y" if "clip_fps" in arrays else "", ("", *UP_DIRECTIONS))
     clip, clips, actions = _clips(path, arrays, len(points))
     time, rates = _time(path, arrays, clip, len(clips), schema)
     return Motion(

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO, Final
 
 import numpy as np
 
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.motion_table import (
     MAX_VALUES,
@@ -28,7 +28,7 @@ from posekit.safe_io import cut, extra, one_line, open_file, refusal, replacing
 
 MAX_BYTES: Final = 100_000_000_000
 """The largest file that is read in pieces."""
-ROWS: Final = 65_536
+ROWS_A_PIECE: Final = 65_536
 """Rows of one piece that is written."""
 
 
@@ -127,7 +127,7 @@ def write_tables(path: str | Path, tables: Iterable[tuple[Mapping[str, Column], 
                     raise refusal(
                         path, "", "pieces of different columns", "the same in all", "write two files"
                     )
-                writer.write_table(table, row_group_size=ROWS)
+                writer.write_table(table, row_group_size=ROWS_A_PIECE)
         except (pa.ArrowException, OverflowError) as error:
             raise refusal(
                 path, "", f"pyarrow: {cut(one_line(str(error)))}", "a table", "choose another format"
@@ -196,7 +196,7 @@ def _arrow(pa: Any, name: str, values: Column) -> Any:
 
 def _up(schema: Any) -> str:
     found = (schema.metadata or {}).get(b"up", b"").decode("utf-8", "replace")
-    return found if found in UPS else ""
+    return found if found in UP_DIRECTIONS else ""
 
 
 def _refuse_survivors(path: str | Path, columns: Mapping[str, Column]) -> None:

@@ -18,19 +18,19 @@ from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import InputError
 from posekit.formats.motion.motion import Motion
 from posekit.formats.skeleton_maps import (
-    LANDMARK,
+    LANDMARK_INDEX,
     SkeletonMap,
     find_by_names,
     load_skeleton_map,
     skeleton_map_names,
 )
-from posekit.formats.skeleton_maps.find import LIMBS
+from posekit.formats.skeleton_maps.find import LIMB_LANDMARKS
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal
 from posekit.skeleton import JOINT, JOINTS, POINTS
 
-DERIVED = ("pelvis", "neck")
+DERIVED_JOINTS = ("pelvis", "neck")
 """What can be placed from shoulders and hips."""
 
 
@@ -97,7 +97,7 @@ def postures_of(
         for name, parts in layout.landmarks.items()
         if {plain(part) for part in parts} <= _plain(motion.names)
     }
-    derived = tuple(name for name in DERIVED if name not in placed)
+    derived = tuple(name for name in DERIVED_JOINTS if name not in placed)
     if derived:
         torso = _Torso.of(figure, landmarks)
         if "pelvis" in derived:
@@ -132,7 +132,7 @@ def layout_of(names: Sequence[str], source: str = "motion") -> SkeletonMap:
 
     def rank(one: SkeletonMap) -> tuple[bool, int, int, bool]:
         same = bool(one.points) and _plain(one.points) == there
-        as_written = sum(set(one.landmarks[limb]) <= verbatim for limb in LIMBS)
+        as_written = sum(set(one.landmarks[limb]) <= verbatim for limb in LIMB_LANDMARKS)
         return same, as_written, len(_sources(one, there)), not one.points
 
     best, *others = sorted(fitting, key=rank, reverse=True)
@@ -155,11 +155,13 @@ def _none_fits(names: Sequence[str], source: str) -> InputError:
     best: tuple[SkeletonMap, list[str]] | None = None
     for one in map(load_skeleton_map, skeleton_map_names()):
         lacking = [
-            name for name in LIMBS if not {plain(part) for part in one.landmarks.get(name, ("\0",))} <= there
+            name
+            for name in LIMB_LANDMARKS
+            if not {plain(part) for part in one.landmarks.get(name, ("\0",))} <= there
         ]
         if best is None or len(lacking) < len(best[1]):
             best = one, lacking
-    if best is None or len(best[1]) == len(LIMBS):
+    if best is None or len(best[1]) == len(LIMB_LANDMARKS):
         maps = ", ".join(skeleton_map_names())
         return refusal(
             source,
@@ -225,7 +227,9 @@ class _Torso:
 def _at(landmarks: Array, name: str) -> Array:
     """Return a landmark (T, 3); a girdle's middle from its two joints, where they are known."""
     if name not in ("mid_shoulders", "mid_hips"):
-        return landmarks[:, LANDMARK[name]]
+        return landmarks[:, LANDMARK_INDEX[name]]
     joint = name.removeprefix("mid_").removesuffix("s")
-    middle = (landmarks[:, LANDMARK[f"right_{joint}"]] + landmarks[:, LANDMARK[f"left_{joint}"]]) / 2
-    return np.where(np.isnan(middle), landmarks[:, LANDMARK[name]], middle)
+    middle = (
+        landmarks[:, LANDMARK_INDEX[f"right_{joint}"]] + landmarks[:, LANDMARK_INDEX[f"left_{joint}"]]
+    ) / 2
+    return np.where(np.isnan(middle), landmarks[:, LANDMARK_INDEX[name]], middle)

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 
 from posekit.errors import InputError
-from posekit.formats.motion.motion import UPS
+from posekit.formats.motion.motion import UP_DIRECTIONS
 from posekit.geometry import Array
 from posekit.skeleton import JOINT
 
-SHARE: Final = 0.7
+CLEAR_UP_SHARE: Final = 0.7
 """What one axis must have of the mean way from ankles to neck: beyond 45 degrees it is nearer to no other axis."""
 
 
@@ -41,9 +41,9 @@ def guess_up(joints: Array, source: str = "motion") -> str:
     length = np.linalg.norm(way, axis=1)
     mean = (way[length > 0] / length[length > 0, None]).mean(axis=0) if (length > 0).any() else np.zeros(3)
     axis = int(np.argmax(np.abs(mean)))
-    if abs(mean[axis]) < SHARE:
+    if abs(mean[axis]) < CLEAR_UP_SHARE:
         raise InputError(
             f"{source}: the file does not say which way is up, and nobody in it stands along an axis (the way from "
-            f"ankles to neck is {mean.round(2).tolist()}); state it: {', '.join(UPS)}"
+            f"ankles to neck is {mean.round(2).tolist()}); state it: {', '.join(UP_DIRECTIONS)}"
         )
     return f"{'+' if mean[axis] > 0 else '-'}{'xyz'[axis]}"

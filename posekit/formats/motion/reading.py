@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from posekit.formats.format import Content
 from posekit.formats.given_file import GivenFile
-from posekit.formats.motion.motion import UPS, Motion
+from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_checks import check_size
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.registry import formats
@@ -47,8 +47,8 @@ def read_motion(
     """
     if unit is not None and unit not in METRES_IN_UNIT:
         raise refusal("--unit", "", shown(unit), "a known unit", nearest(unit, METRES_IN_UNIT))
-    if up is not None and up not in UPS:
-        raise refusal("--up", "", shown(up), "an axis", nearest(up, UPS))
+    if up is not None and up not in UP_DIRECTIONS:
+        raise refusal("--up", "", shown(up), "an axis", nearest(up, UP_DIRECTIONS))
     chosen = motion_format(format) if format is not None else format_of(path)
     if chosen.read is None:
         got = f"{chosen.name}: {chosen.title}"

@@ -20,8 +20,8 @@ from posekit.geometry import Array
 from posekit.safe_io import cut, one_line, refusal, shown
 from posekit.skeleton import JOINTS
 
-COORDINATES: Final = tuple(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")
-KEYS: Final = ("frame", "time", "survivor")
+COORDINATE_COLUMNS: Final = tuple(f"{joint}_{axis}" for joint in JOINTS for axis in "xyz")
+KEY_COLUMNS: Final = ("frame", "time", "survivor")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -79,7 +79,7 @@ class SurvivorTable:
                     self.source, cut(name), "an infinite number", "finite numbers, or NaN", "correct it"
                 )
             array.flags.writeable = False
-        taken = {*KEYS, *COORDINATES, "branches"} & values.keys()
+        taken = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"} & values.keys()
         if taken or not all(name and name.isprintable() for name in values):
             got = shown(min(taken, default="a name that does not print"))
             raise refusal(self.source, "values", got, "names of their own", "rename the value")
@@ -112,8 +112,8 @@ class SurvivorTable:
     def columns(self) -> dict[str, NDArray[Any]]:
         """The table's columns by name, in their order."""
         columns: dict[str, NDArray[Any]] = {"frame": self.frame, "time": self.time, "survivor": self.survivor}
-        flat = self.joints.reshape(len(self), len(COORDINATES))
-        columns |= {name: flat[:, k] for k, name in enumerate(COORDINATES)}
+        flat = self.joints.reshape(len(self), len(COORDINATE_COLUMNS))
+        columns |= {name: flat[:, k] for k, name in enumerate(COORDINATE_COLUMNS)}
         columns |= self.values
         if self.branches:
             columns["branches"] = np.array(self.branches, dtype=np.str_)
@@ -128,21 +128,23 @@ class SurvivorTable:
         InputError
             Where one of the joints' columns is missing, or what they hold is no table of survivors.
         """
-        missing = [name for name in (*KEYS, *COORDINATES) if name not in columns]
+        missing = [name for name in (*KEY_COLUMNS, *COORDINATE_COLUMNS) if name not in columns]
         if missing:
             raise refusal(
                 source,
                 "columns",
                 f"no {missing[0]} among {cut(one_line(', '.join(columns)))}",
-                f"{', '.join(KEYS)} and the joints' coordinates ({COORDINATES[0]}, …)",
+                f"{', '.join(KEY_COLUMNS)} and the joints' coordinates ({COORDINATE_COLUMNS[0]}, …)",
                 "give a table of survivors, in metres",
             )
-        known = {*KEYS, *COORDINATES, "branches"}
+        known = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"}
         return cls(
             frame=columns["frame"],
             time=columns["time"],
             survivor=columns["survivor"],
-            joints=np.stack([columns[name] for name in COORDINATES], axis=-1).reshape(-1, len(JOINTS), 3),
+            joints=np.stack([columns[name] for name in COORDINATE_COLUMNS], axis=-1).reshape(
+                -1, len(JOINTS), 3
+            ),
             values={
                 name: values
                 for name, values in columns.items()

@@ -11,11 +11,11 @@ import numpy as np
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.csv_table import read_columns, write_columns
 from posekit.formats.motion.parquet import check_rows, numpy_columns, opened, write_tables
-from posekit.formats.motion.survivors import COORDINATES, KEYS, SurvivorTable, number_columns
+from posekit.formats.motion.survivors import COORDINATE_COLUMNS, KEY_COLUMNS, SurvivorTable, number_columns
 from posekit.safe_io import open_npz, refusal, replacing, shown
 from posekit.skeleton import JOINTS
 
-SCHEMA: Final = "posekit.survivors/1"
+SURVIVORS_SCHEMA: Final = "posekit.survivors/1"
 MAX_BYTES: Final = 1_000_000_000
 _VALUE: Final = "values/"
 _SUFFIXES: Final = {".csv": "csv", ".parquet": "parquet", ".pq": "parquet", ".npz": "npz"}
@@ -39,7 +39,7 @@ def write_survivors(path: str | Path, table: SurvivorTable) -> None:
         write_survivor_pieces(path, (table,))
     else:
         arrays = {
-            "schema": np.array(SCHEMA),
+            "schema": np.array(SURVIVORS_SCHEMA),
             "joint_names": np.array(JOINTS),
             "frame": table.frame,
             "time": table.time,
@@ -72,8 +72,10 @@ def read_survivors(path: str | Path) -> SurvivorTable:
     with open_npz(path, limit=MAX_BYTES) as archive:
         schema = str(archive.array("schema", "U", ()))
         names = tuple(archive.array("joint_names", "U", (None,)).tolist())
-        if schema != SCHEMA or names != JOINTS:
-            raise refusal(path, "schema", shown(schema), f'"{SCHEMA}" with the 14 joints', "give such a file")
+        if schema != SURVIVORS_SCHEMA or names != JOINTS:
+            raise refusal(
+                path, "schema", shown(schema), f'"{SURVIVORS_SCHEMA}" with the 14 joints', "give such a file"
+            )
         return SurvivorTable(
             frame=archive.array("frame", "iu", (None,)),
             time=archive.array("time", "f", (None,)),
@@ -120,10 +122,10 @@ def is_survivors(given: GivenFile) -> bool:
         A file whose name ends as those of tables do.
     """
     if given.suffix == ".npz":
-        return given.schema == SCHEMA
+        return given.schema == SURVIVORS_SCHEMA
     if given.suffix == ".csv":
-        return {*KEYS, *COORDINATES} <= given.columns
+        return {*KEY_COLUMNS, *COORDINATE_COLUMNS} <= given.columns
     if not given.start.startswith(b"PAR1"):
         return False
     with opened(given.path) as file:
-        return {*KEYS, *COORDINATES} <= set(file.schema_arrow.names)
+        return {*KEY_COLUMNS, *COORDINATE_COLUMNS} <= set(file.schema_arrow.names)

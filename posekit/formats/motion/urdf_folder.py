@@ -33,10 +33,10 @@ from posekit.geometry import Array
 from posekit.safe_io import cut, open_npz, refusal, replacing, shown, write_text
 from posekit.skeleton import POINTS
 
-SCHEMA: Final = "posekit.configurations/1"
-FIGURE, SRDF, MUJOCO = "figure.urdf", "figure.srdf", "figure_mujoco.urdf"
-NPZ, CSV = "configurations.npz", "configurations.csv"
-FILES: Final = (FIGURE, SRDF, MUJOCO, NPZ, CSV)
+FOLDER_SCHEMA: Final = "posekit.configurations/1"
+FIGURE_FILE, SRDF_FILE, MUJOCO_FILE = "figure.urdf", "figure.srdf", "figure_mujoco.urdf"
+NPZ_FILE, CSV_FILE = "configurations.npz", "configurations.csv"
+FOLDER_FILES: Final = (FIGURE_FILE, SRDF_FILE, MUJOCO_FILE, NPZ_FILE, CSV_FILE)
 LINK_OF: Final = {point: FRAMES.get(point, point) for point in POINTS}
 """The URDF link whose origin is each point."""
 
@@ -64,19 +64,19 @@ def write_urdf_folder(path: str | Path, figure: Figure, q: Array, time: Array, *
     q = checked(path, figure, q, time, up)
     seconds = np.asarray(time, dtype=np.float64)
     with _filling(Path(path)) as folder:
-        write_text(folder / FIGURE, [figure.urdf])
-        write_text(folder / SRDF, [figure.srdf])
-        write_text(folder / MUJOCO, [mujoco_text(figure)])
-        with replacing(folder / NPZ) as file:
+        write_text(folder / FIGURE_FILE, [figure.urdf])
+        write_text(folder / SRDF_FILE, [figure.srdf])
+        write_text(folder / MUJOCO_FILE, [mujoco_text(figure)])
+        with replacing(folder / NPZ_FILE) as file:
             np.savez_compressed(
                 file,
-                schema=np.array(SCHEMA),
+                schema=np.array(FOLDER_SCHEMA),
                 configuration_names=np.array(figure.configuration_names),
                 q=q,
                 time=seconds,
                 up=np.array(up),
             )
-        with replacing(folder / CSV) as file:
+        with replacing(folder / CSV_FILE) as file:
             for piece in _table(figure, q, seconds):
                 file.write(piece)
 
@@ -98,16 +98,20 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
         Where the URDF is no stick figure.
     """
     folder = Path(path)
-    if not (folder / FIGURE).is_file() or not (folder / NPZ).is_file():
+    if not (folder / FIGURE_FILE).is_file() or not (folder / NPZ_FILE).is_file():
         raise refusal(
-            path, "", "another folder or file", f"a folder with {FIGURE} and {NPZ}", "name that folder"
+            path,
+            "",
+            "another folder or file",
+            f"a folder with {FIGURE_FILE} and {NPZ_FILE}",
+            "name that folder",
         )
-    with open_npz(folder / NPZ) as archive:
+    with open_npz(folder / NPZ_FILE) as archive:
         q = archive.array("q", "f", (None, None)).astype(np.float64)
         names = archive.array("configuration_names", "U", (None,)).tolist()
         seconds = archive.array("time", "f", (None,)).astype(np.float64)
         up = str(archive.array("up", "U", ())) if "up" in archive.names else ""
-    place, figure = folder / NPZ, load_figure(folder / FIGURE)
+    place, figure = folder / NPZ_FILE, load_figure(folder / FIGURE_FILE)
     if sorted(names) != sorted(figure.configuration_names) or q.shape[1] != len(names):
         got = f"{q.shape[1]} columns, {len(names)} names, among them {shown(names[0] if names else None)}"
         raise refusal(
@@ -151,7 +155,7 @@ def _filling(folder: Path) -> Iterator[Path]:
     if folder.exists() and not folder.is_dir():
         raise refusal(folder, "", "a file", "the name of a folder", "choose another name")
     there = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
-    other = [name for name in there if name not in FILES]
+    other = [name for name in there if name not in FOLDER_FILES]
     if other:
         got = f"a folder that holds {cut(other[0])}"
         raise refusal(folder, "", got, "a new or empty folder", "choose another name")
@@ -160,7 +164,7 @@ def _filling(folder: Path) -> Iterator[Path]:
         beside.mkdir()
         yield beside
         folder.mkdir(exist_ok=True)
-        for name in FILES:
+        for name in FOLDER_FILES:
             (beside / name).replace(folder / name)
     except OSError as error:
         reason = cut(error.strerror or str(error))
@@ -175,7 +179,7 @@ URDF_FORMAT: Final = MotionFormat(
     name="urdf",
     title="a folder with the person's URDF and q, for Pinocchio, yourdfpy and MuJoCo",
     folder=True,
-    looks_like=lambda given: (given.path / FIGURE).is_file() and (given.path / NPZ).is_file(),
+    looks_like=lambda given: (given.path / FIGURE_FILE).is_file() and (given.path / NPZ_FILE).is_file(),
     read=read_urdf_folder,
     write_configurations=write_urdf_folder,
 )

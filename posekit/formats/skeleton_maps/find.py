@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from posekit.formats.skeleton_maps.reading import load_skeleton_map, skeleton_map_names
-from posekit.formats.skeleton_maps.skeleton_map import LANDMARKS, SkeletonMap, plain
+from posekit.formats.skeleton_maps.skeleton_map import LANDMARK_ORDER, SkeletonMap, plain
 
 
 def find_by_names(names: Sequence[str], *, detectors: bool = False) -> list[SkeletonMap]:
@@ -41,7 +41,7 @@ def find_by_names(names: Sequence[str], *, detectors: bool = False) -> list[Skel
             for landmark, parts in candidate.landmarks.items()
             if all(plain(part) in there for part in parts)
         ]
-        if set(LIMBS) <= set(placed):
+        if set(LIMB_LANDMARKS) <= set(placed):
             others = len(there ^ {plain(point) for point in candidate.points})
             ranked.append((others > 0, -len(placed), others, candidate.name, candidate))
     return [candidate for *_, candidate in sorted(ranked, key=lambda one: one[:4])]
@@ -52,6 +52,8 @@ def find_by_order(count: int) -> list[SkeletonMap]:
     return [one for one in map(load_skeleton_map, skeleton_map_names()) if len(one.points) == count]
 
 
-LIMBS = tuple(
-    name for name in LANDMARKS if name.startswith(("right_", "left_")) and not name.endswith(("_eye", "_ear"))
+LIMB_LANDMARKS = tuple(
+    name
+    for name in LANDMARK_ORDER
+    if name.startswith(("right_", "left_")) and not name.endswith(("_eye", "_ear"))
 )

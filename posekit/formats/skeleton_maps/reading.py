@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from posekit.formats.skeleton_maps.skeleton_map import LANDMARKS, SkeletonMap, plain
+from posekit.formats.skeleton_maps.skeleton_map import LANDMARK_ORDER, SkeletonMap, plain
 from posekit.safe_io import nearest, refusal, shown
 from posekit.skeleton import other_side
 
@@ -87,8 +87,10 @@ def skeleton_map_of(table: SkeletonMapTable, name: str) -> SkeletonMap:
     landmarks = {landmark: tuple(parts) for landmark, parts in table.landmarks.items()}
     for landmark, parts in landmarks.items():
         field = f"landmarks.{landmark}"
-        if landmark not in LANDMARKS:
-            raise refusal(name, field, "an unknown landmark", "a known one", nearest(landmark, LANDMARKS))
+        if landmark not in LANDMARK_ORDER:
+            raise refusal(
+                name, field, "an unknown landmark", "a known one", nearest(landmark, LANDMARK_ORDER)
+            )
         if len(set(parts)) != len(parts):
             raise refusal(name, field, shown(parts), "each name once", "remove the repeated one")
         unknown = [part for part in parts if points and part not in points]

@@ -12,13 +12,13 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.skeleton import POINTS, other_side
 
-LANDMARKS: Final = (*POINTS, "mid_shoulders", "mid_hips")
+LANDMARK_ORDER: Final = (*POINTS, "mid_shoulders", "mid_hips")
 """What a map can name: the 14 joints, the head's five points, and the girdles' middles.
 
 Detectors and marker sets often have the middle of the shoulders or of the hips, which are neither the figure's neck
 nor its pelvis (the pelvis joint is some 10 cm above the line of the hips).
 """
-LANDMARK: Final = {name: index for index, name in enumerate(LANDMARKS)}
+LANDMARK_INDEX: Final = {name: index for index, name in enumerate(LANDMARK_ORDER)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class SkeletonMap:
     points : tuple of str
         The format's points by name, in its order; empty where its files name their points themselves, in any order.
     landmarks : mapping
-        Landmark of `LANDMARKS` to the names of the points whose mean it is, mostly one.
+        Landmark of `LANDMARK_ORDER` to the names of the points whose mean it is, mostly one.
     source : str
         Who says so: a citation.
     """
@@ -61,14 +61,14 @@ class SkeletonMap:
         Returns
         -------
         array (..., 21, n)
-            In the order of `LANDMARKS`; NaN where the format has none, or one of the points of a mean is missing.
+            In the order of `LANDMARK_ORDER`; NaN where the format has none, or one of the points of a mean is missing.
         """
         column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
-        found = np.full((*values.shape[:-2], len(LANDMARKS), values.shape[-1]), np.nan)
+        found = np.full((*values.shape[:-2], len(LANDMARK_ORDER), values.shape[-1]), np.nan)
         for landmark, parts in self.landmarks.items():
             columns = [column[plain(part)] for part in parts if plain(part) in column]
             if len(columns) == len(parts):
-                found[..., LANDMARK[landmark], :] = values[..., columns, :].mean(axis=-2)
+                found[..., LANDMARK_INDEX[landmark], :] = values[..., columns, :].mean(axis=-2)
         return found
 
     def over(self, names: Sequence[str]) -> SkeletonMap:
