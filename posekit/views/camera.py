@@ -183,8 +183,8 @@ def _check_unit(camera: CalibratedCamera, keypoints: KeyPoints) -> None:
     if not SHORTEST_FOCAL * side <= f <= LONGEST_FOCAL * side:
         raise InputError(
             f"--camera: {camera.name} has a focal length of {f:.4g} pixels, in pictures about {side:.0f} pixels wide "
-            f"or high; expected {SHORTEST_FOCAL:g} to {LONGEST_FOCAL:g} times that; give K in pixels, not in millimetres "
-            "or parts"
+            f"or high; expected {SHORTEST_FOCAL:g} to {LONGEST_FOCAL:g} times that; give K in pixels, not in "
+            "millimetres or parts"
         )
 
 

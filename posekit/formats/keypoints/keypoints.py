@@ -143,7 +143,7 @@ class KeyPoints:
 
     @property
     def landmarks(self) -> Array:
-        """The landmarks of every detection (D, 21, 2), in the order of `posekit.formats.skeleton_maps.LANDMARKS`."""
+        """The landmarks of every detection (D, 21, 2), ordered as `posekit.formats.skeleton_maps.LANDMARK_ORDER` is."""
         return self.layout.gather(self.points)
 
     @property

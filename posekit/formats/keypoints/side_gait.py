@@ -79,8 +79,8 @@ def gait_evidence(landmarks: Array, frame: NDArray[np.intp]) -> dict[str, float]
     Returns
     -------
     dict
-        By kind, -`MAX_EVIDENCE` to `MAX_EVIDENCE`: positive where left and right are as labelled, negative where they are
-        exchanged; empty where nobody walks.
+        By kind, -`MAX_EVIDENCE` to `MAX_EVIDENCE`: positive where left and right are as labelled, negative where
+        they are exchanged; empty where nobody walks.
     """
     unit = size(landmarks)
     seen = ~np.isnan(unit) & ~np.isnan(pair(landmarks, "ankle") + pair(landmarks, "hip")).any(axis=1)

@@ -61,8 +61,8 @@ def write_bvh(
     """Write configurations as BVH, whole or not at all.
 
     The joints are those of `posekit.formats.motion.bvh_tree`, named as in `ANIMATION_NAMES`; every joint has the
-    channels Xrotation Zrotation Yrotation, which are the figure's flexion, abduction (or bending) and rotation. Angles and
-    places have 6 decimals, the points are those of forward kinematics within 1e-7 m.
+    channels Xrotation Zrotation Yrotation, which are the figure's flexion, abduction (or bending) and rotation. Angles
+    and places have 6 decimals, the points are those of forward kinematics within 1e-7 m.
 
     Parameters
     ----------

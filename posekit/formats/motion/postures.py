@@ -45,7 +45,7 @@ class MotionPostures:
     head : array (T, 5, 3)
         The head's points in the order of `posekit.skeleton.HEAD_POINTS`, metres.
     landmarks : array (T, 21, 3)
-        As the map has them, nothing derived, in the order of `posekit.formats.skeleton_maps.LANDMARKS`, metres.
+        As the map has them, nothing derived, in the order of `posekit.formats.skeleton_maps.LANDMARK_ORDER`, metres.
     derived : tuple of str
         The joints that no point of the file is, placed from shoulders and hips.
     layout : SkeletonMap
