@@ -127,15 +127,13 @@ def make_checks(
     made: list[Check] = []
     for settings in chosen_checks(checks):
         kind = CHECK_KINDS.get(settings.name)
-        if kind is not None:
-            made += kind.make(figure, options.with_parameters(settings.name, settings.parameters))
-        else:
-            up = np.array(options.up)
-            made += [
-                check.oriented(up) if check.scope is Scope.VIEW else check
-                for check in _made(figure, settings)
-            ]
-    return made
+        made += (
+            _made(figure, settings)
+            if kind is None
+            else kind.make(figure, options.with_parameters(settings.name, settings.parameters))
+        )
+    up = np.array(options.up)
+    return [check.oriented(up) if check.scope is Scope.VIEW else check for check in made]
 
 
 def _made(figure: Figure, settings: CheckSettings) -> Sequence[Check]:

@@ -160,6 +160,7 @@ def writing(w: Array, at: int, loose: Any, to: int) -> None:
     loose : float
         The tolerance of the rotation, degrees; infinite where it is not seen.
     to : int
+        Which of the four writings it is.
     """
     most, first, edge = -math.inf, NO_VIOLATION, False
     for place in range(int(w[at + AT_JUDGED])):

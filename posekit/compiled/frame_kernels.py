@@ -74,7 +74,9 @@ def screens(kind: int, points: Array, w: Array, places: Bytes, presumed: Array) 
     Parameters
     ----------
     kind : int
+        Which screen is asked, as `screen` takes it.
     points : array (N, P, 3)
+        The points of each posture that the rule reads, metres.
     w : array
         As `screen` takes it, with the rule's numbers from `NUMBERS_AT` on.
     places : int array (N,)
@@ -138,6 +140,7 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
     Parameters
     ----------
     begin, end : int
+        The first frame, and the one after the last.
     lifts : bool
         Whether joints are to be lifted, with what follows; else they are by now.
     rays, unseen, parents, first, lengths, tolerance, table, states, reach

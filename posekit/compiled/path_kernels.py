@@ -144,21 +144,27 @@ def arrive(  # noqa: PLR0912 -- calls with many arrays cost more than what they 
     floor : array (G,)
         What a path that goes on from a group costs at least, without what is the survivor's.
     fresh : bool array (G,)
+        Which groups are of fresh paths: through a survivor that no better path uses.
     sofar, turns : array (S,)
         What each end costs so far, and the floor of what its turn will.
     alike : bool
         Whether all ends of a group make the same steps to come.
     ends : array (S, C, 7)
+        The channels of each end; see `AT_X` and the others for the columns.
     heading : array (S, K, 5)
+        Where the channels that turn are heading at each end, as `turn` takes it.
     survivors : array (N, C, 6)
+        The channels of each survivor, as `step` takes them.
     own, to_floor, to_turns : array (N,)
         What each costs itself; with the floors of its steps and turns, ascending; and those of its turns alone.
     new : bool array (N,)
+        Which survivors no better path uses.
     joints : int array (K,)
         The channels that turn.
     usual, resting : array (C,)
         One over the square of the scales of speeds; zero where there is none.
     nu, resting_nu, slack : float
+        Degrees of freedom of speeds, and of those of what rests; what a path may cost more than the cheapest.
     cost, came, went : array (2, M)
         Filled: the M cheapest of the paths that are not fresh, and of those that are.
 

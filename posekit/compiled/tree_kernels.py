@@ -41,11 +41,17 @@ def lift(
     begin, end : int
         The frames.
     rays : array (F, J, 3)
+        Unit directions in which the joints are seen.
     unseen : bool array (F, J)
+        Where a joint was not seen.
     parents : array (J,)
+        The joint that each hangs on; -1 for the root.
     lengths : array (J, F)
+        Lengths of the segments to each joint's parent, metres.
     first : int array (J + 1,)
+        The column of each joint's first candidate, and of the first after the last's.
     tolerance : float
+        Metres by which a segment may be too short for its image and count as tangent to its ray.
     table, states, reach
         Of `Candidates`: filled; the root is there.
     """

@@ -43,15 +43,7 @@ def near_pairs(judge: SelfCollision) -> NearPairs:
 def all_asked(judge: SelfCollision, q: np.ndarray) -> Contacts:
     subject = judge.subject
     assert subject.geometry is not None
-    return find_contacts(
-        subject.model,
-        subject.model.createData(),
-        subject.geometry,
-        q,
-        np.arange(len(q)),
-        margins=judge.margins,
-        names=subject.pair_names,
-    )
+    return find_contacts(subject, subject.geometry, q, np.arange(len(q)), margins=judge.margins)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -69,7 +61,7 @@ def test_what_touches_is_near(name: str, away: float) -> None:
 def test_it_is_the_same_in_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     near, q = near_pairs(collider("human")), some_q("human")
     whole = near.of(q)
-    monkeypatch.setattr("posekit.validators.robot.near_pairs.ROWS", 7)
+    monkeypatch.setattr("posekit.validators.robot.near_pairs.ROWS_AT_ONCE", 7)
     assert np.array_equal(near.of(q), whole)
     assert near.of(q[:0]).shape == (0, whole.shape[1])
 

@@ -124,23 +124,16 @@ class SelfCollision:
 
     def contacts(self, q: Array, rows: NDArray[np.intp], *, nearest: bool = False) -> Contacts:
         """List the pairs that collide in some configurations; with `nearest` the nearest pair of the others too."""
-        subject = self.subject
         return find_contacts(
-            subject.model,
-            self._data,
+            self.subject,
             self._bodies,
             q,
             rows,
             margins=self.margins,
-            names=subject.pair_names,
             nearest=nearest,
             meshes=np.asarray(self._meshes.all(axis=1)),
             near=self._near,
         )
-
-    @cached_property
-    def _data(self) -> pin.Data:
-        return self.subject.model.createData()
 
     @cached_property
     def _pool(self) -> pin.GeometryPool:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.validators.robot.near_pairs import NearPairs
+from posekit.validators.robot.subject import Subject
 
 INSIDE_METRES: Final = 1e-6
 """Metres of penetration of two meshes from which their surfaces cross beyond doubt, so that their distance is nil."""
@@ -46,14 +47,12 @@ class Contacts:
 
 
 def find_contacts(
-    model: pin.Model,
-    data: pin.Data,
+    subject: Subject,
     geometry: pin.GeometryModel,
     q: Array,
     rows: NDArray[np.intp],
     *,
     margins: Array,
-    names: tuple[str, ...],
     nearest: bool = False,
     meshes: NDArray[np.bool_] | None = None,
     near: NearPairs | None = None,
@@ -62,14 +61,16 @@ def find_contacts(
 
     Parameters
     ----------
-    model, data : pinocchio.Model, pinocchio.Data
+    subject : Subject
+        The model, and what its pairs are called.
     geometry : pinocchio.GeometryModel
+        Its bodies.
     q : array (N, nq)
+        Configurations in Pinocchio's order.
     rows : int array
         Which configurations are asked about.
     margins : array (P,)
         Metres, of each pair of the geometry: what coal calls the security margin.
-    names : tuple of str (P,)
     nearest : bool
         List the nearest pair of every configuration asked about too, the first of those that are equally near. With
         meshes that takes long: each distance of two meshes is a millisecond, and all of them are asked.
@@ -79,6 +80,7 @@ def find_contacts(
     near : NearPairs, optional
         What tells pairs that need not be asked. It pays where asking is dear: with meshes.
     """
+    model, names, data = subject.model, subject.pair_names, subject.data
     geometry_data = geometry.createData()  # a fresh one: coal starts its search where the one before ended
     for request, margin in zip(geometry_data.collisionRequests, margins.tolist(), strict=True):
         request.security_margin = margin

@@ -34,6 +34,11 @@ class Subject:
     geometry: pin.GeometryModel | None = None
 
     @cached_property
+    def data(self) -> pin.Data:
+        """What Pinocchio writes to while it places the model's bodies."""
+        return self.model.createData()
+
+    @cached_property
     def joints(self) -> tuple[int, ...]:
         """The joints with one variable that has a limit, in Pinocchio's order."""
         model = self.model
