@@ -6,6 +6,7 @@ import math
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Final
 
@@ -40,10 +41,15 @@ class Ragged:
     rows: Sequence[NDArray[Any]]
     fill: Any
 
+    @cached_property
+    def counts(self) -> NDArray[np.intp]:
+        """How long each row is (F,)."""
+        return np.array([len(row) for row in self.rows], dtype=np.intp)
+
     @property
     def shape(self) -> tuple[int, ...]:
         """The shape of the padded array."""
-        return (len(self.rows), max(len(row) for row in self.rows), *self.rows[0].shape[1:])
+        return (len(self.rows), int(self.counts.max()), *self.rows[0].shape[1:])
 
     def padded(self) -> Iterator[NDArray[Any]]:
         """Yield the padded array in blocks of rows: of some megabytes, however much padding there is."""
@@ -53,7 +59,8 @@ class Ragged:
         for start in range(0, len(self.rows), step):
             rows = self.rows[start : start + step]
             block = np.full((len(rows), longest, *tail), self.fill, dtype=dtype)
-            block[np.arange(longest) < np.array([len(row) for row in rows])[:, None]] = np.concatenate(rows)
+            held = np.arange(longest) < self.counts[start : start + step, None]
+            block[held] = np.concatenate(rows)
             yield block
 
 
