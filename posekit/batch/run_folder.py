@@ -35,10 +35,13 @@ class Failure:
     shard : str
         The name of the file that is not there; empty where the input could not be opened.
     input : str
+        The input that it is of.
     person, start, stop : int or None
         Whose frames: rows from `start` to before `stop`.
     error : str
+        Why, in one line.
     attempts : int
+        How often it was tried.
     died : bool
         Whether a process died of it each time: poison.
     """
@@ -94,6 +97,7 @@ class RunFolder:
     Parameters
     ----------
     path : Path
+        Where it is.
     """
 
     path: Path
