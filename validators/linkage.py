@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras.camera import COINCIDENT
+from posekit.cameras.camera import COINCIDENT_METRES
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.linkages import SpanningTree
@@ -54,7 +54,11 @@ def closure(spanned: SpanningTree, *, tolerance: float = 1e-6) -> list[Check]:
 
 
 def nearer(
-    choices: Mapping[str, str], *, joints: Sequence[str], segments: Sequence[str], nothing: float = COINCIDENT
+    choices: Mapping[str, str],
+    *,
+    joints: Sequence[str],
+    segments: Sequence[str],
+    nothing: float = COINCIDENT_METRES,
 ) -> list[Check]:
     """Make the checks of flips that were given by hand: which end of a segment is nearer to the camera.
 
@@ -141,7 +145,7 @@ class MiddleOfEnds(Check):
         middle, a, b = np.moveaxis(points, 1, 0)
         value = np.linalg.norm(middle - (a + b) / 2, axis=-1)[:, None]
         # A half whose two ends coincide counts once where the whole may still be two, about this much apart.
-        upper = 10 * COINCIDENT * max(1.0, self.length)
+        upper = 10 * COINCIDENT_METRES * max(1.0, self.length)
         return Findings(value=value, lower=np.array([-np.inf]), upper=np.array([upper]))
 
 

@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, cross, other_branch, turned_near
 from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
-FREE = 1e-6
+FREE_ANGLE_SINE = 1e-6
 """Sine below which an angle is free: the limb is straight, or points along the abduction axis.
 
 Turning a free angle to its limit moves the limb's end by less than this times its length.
 """
 
-STRAIGHT = 1e-10
+STRAIGHT_LIMB_SINE = 1e-10
 """Sine below which a limb's bend is rounding, and its axial rotation is none."""
 
-LIMB = 4
+N_LIMB_ANGLES = 4
 """Angles of a whole limb: three of its ball joint and one of its hinge."""
 
-WORTH = 1e-5
+NEGLIGIBLE_VIOLATION_RADIANS = 1e-5
 """Radians outside the limits that are not worth turning a free angle for: under the range check's tolerance."""
 
 
@@ -65,7 +65,7 @@ class Limits:
         the limb is almost straight.
         """
         outside = np.maximum(np.maximum(self.lower - angles, angles - self.upper), 0.0)
-        if len(self.sign) == LIMB:
+        if len(self.sign) == N_LIMB_ANGLES:
             outside[..., 2] *= np.abs(np.sin(angles[..., 3]))
         return np.asarray(outside.max(axis=-1))
 
@@ -129,7 +129,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
         candidates += [_hinge_branch(local, alpha, beta, side, limits) for side in (1.0, -1.0)]
     angles = _least_violating(np.stack(candidates, axis=1), limits)
     free = _along_abduction_axis(upper) | _along(upper, lower)
-    free &= limits.violation(angles) > WORTH
+    free &= limits.violation(angles) > NEGLIGIBLE_VIOLATION_RADIANS
     if free.any():
         angles[free] = _turn_free_angles(upper[free], lower[free], angles[free], limits)
     return angles
@@ -138,7 +138,7 @@ def limb_angles(upper: Array, lower: Array, limits: Limits) -> Array:
 def _hinge_branch(local: Array, alpha: Array, beta: Array, side: float, limits: Limits) -> Array:
     """Return the four angles (N, 4) for one sign of the hinge; `local` is the lower segment after two turns."""
     across = np.hypot(local[:, 0], local[:, 1])
-    gamma = np.where(across < STRAIGHT, 0.0, np.arctan2(-side * local[:, 1], -side * local[:, 0]))
+    gamma = np.where(across < STRAIGHT_LIMB_SINE, 0.0, np.arctan2(-side * local[:, 1], -side * local[:, 0]))
     epsilon = side * np.arctan2(across, -local[:, 2])
     return limits.nearest_turn(np.stack([alpha, beta, gamma, epsilon], axis=-1) * limits.sign)
 
@@ -173,12 +173,12 @@ def _turn_free_angles(upper: Array, lower: Array, angles: Array, limits: Limits)
 
 def _along(upper: Array, lower: Array) -> NDArray[np.bool_]:
     """Return where two directions (N, 3) lie on one line: a straight or folded limb."""
-    return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE)
+    return np.asarray(np.linalg.norm(cross(upper, lower), axis=-1) < FREE_ANGLE_SINE)
 
 
 def _along_abduction_axis(upper: Array) -> NDArray[np.bool_]:
     """Return where a direction (N, 3) leaves the first angle free."""
-    return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE)
+    return np.asarray(np.hypot(upper[:, 0], upper[:, 2]) < FREE_ANGLE_SINE)
 
 
 def _direction_branches(upper: Array) -> Array:

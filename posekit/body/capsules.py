@@ -12,7 +12,7 @@ from posekit.errors import FigureError
 from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT
 
-AXES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
+CAPSULE_AXES: dict[str, tuple[tuple[int, ...], tuple[int, ...]]] = {
     "torso": ((JOINT["neck"],), (JOINT["pelvis"],)),
     "head": ((JOINT["neck"],), HEAD),
     "hips": ((JOINT["right_hip"],), (JOINT["left_hip"],)),
@@ -108,8 +108,10 @@ def read_capsules(
     capsules = []
     for body, placement in zip(geometry.geometryObjects, geometry_data.oMg, strict=True):
         link = model.frames[body.parentFrame].name
-        if link not in AXES:
-            raise FigureError(f"link {link!r} has a collision body; expected one on {', '.join(AXES)} only")
+        if link not in CAPSULE_AXES:
+            raise FigureError(
+                f"link {link!r} has a collision body; expected one on {', '.join(CAPSULE_AXES)} only"
+            )
         shape = body.geometry
         if not isinstance(shape, coal.Capsule):
             raise FigureError(
@@ -121,7 +123,7 @@ def read_capsules(
                 f"link {link!r}: its capsule has radius {shape.radius:g} and half length {shape.halfLength:g} m; "
                 "expected both positive"
             )
-        start, end = (neutral[list(points)].mean(axis=0) for points in AXES[link])
+        start, end = (neutral[list(points)].mean(axis=0) for points in CAPSULE_AXES[link])
         axis = (end - start) / np.linalg.norm(end - start)
         middle = placement.translation - start
         center = float(middle @ axis)
@@ -135,17 +137,17 @@ def read_capsules(
         capsules.append(
             Capsule(
                 link=link,
-                start=AXES[link][0],
-                end=AXES[link][1],
+                start=CAPSULE_AXES[link][0],
+                end=CAPSULE_AXES[link][1],
                 center=center,
                 half_length=float(shape.halfLength),
                 radius=float(shape.radius),
             )
         )
-    missing = sorted(set(AXES) - {capsule.link for capsule in capsules})
-    if missing or len(capsules) != len(AXES):
+    missing = sorted(set(CAPSULE_AXES) - {capsule.link for capsule in capsules})
+    if missing or len(capsules) != len(CAPSULE_AXES):
         raise FigureError(
-            f"{len(capsules)} collision bodies were loaded, expected one each on {', '.join(AXES)}; "
+            f"{len(capsules)} collision bodies were loaded, expected one each on {', '.join(CAPSULE_AXES)}; "
             f"missing: {', '.join(missing) or 'none, one is there twice'}"
         )
     return tuple(capsules), tuple((pair.first, pair.second) for pair in geometry.collisionPairs)

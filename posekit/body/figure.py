@@ -40,7 +40,7 @@ from posekit.skeleton import (
     urdf_joint_name,
 )
 
-FRAMES = {
+LINK_OF_POINT = {
     "neck": "torso",
     "pelvis": "hips",
     **{
@@ -371,4 +371,4 @@ def _figure(urdf: str, srdf: str, source: str) -> Figure:
 
 
 def _frame_name(point: str) -> str:
-    return FRAMES.get(point, point)
+    return LINK_OF_POINT.get(point, point)

@@ -11,7 +11,7 @@ from posekit.errors import FigureError
 from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES
 
-FLAT = 1e-9
+FLAT_DEPTH_SQUARED = 1e-9
 """Squared depth (m^2) down to which a torso that cannot quite close counts as flat (rounded lengths)."""
 
 
@@ -64,7 +64,7 @@ def torso_points(lengths: Mapping[str, float]) -> Array:
     middle = (left[1] ** 2 - right[1] ** 2) / across
     y_left, y_right = (middle + across) / 2, (middle - across) / 2
     forward_squared = right[1] ** 2 - y_right**2
-    if forward_squared < -FLAT:
+    if forward_squared < -FLAT_DEPTH_SQUARED:
         reach = right[1] + left[1]
         raise FigureError(
             f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "
@@ -92,7 +92,7 @@ def hips_points(lengths: Mapping[str, float]) -> Array:
     """
     base = lengths["right_hip-left_hip"]
     offset, height = _apex("right_hip", "pelvis", "left_hip", lengths)
-    if height**2 <= FLAT:
+    if height**2 <= FLAT_DEPTH_SQUARED:
         raise FigureError(
             f"figure.lengths: with right_hip-left_hip {base:g} m the pelvis lies on the line between the "
             "hips, which have no plane then; lengthen pelvis-right_hip or pelvis-left_hip"
@@ -107,7 +107,7 @@ def _apex(start: str, apex: str, end: str, lengths: Mapping[str, float]) -> tupl
     far = _length(apex, end, lengths)
     along = (base**2 + near**2 - far**2) / (2 * base)
     squared = near**2 - along**2
-    if squared < -FLAT:
+    if squared < -FLAT_DEPTH_SQUARED:
         raise FigureError(
             f"figure.lengths: the triangle {start}, {apex}, {end} does not close with {base:g}, {near:g} and "
             f"{far:g} m; each must be at most the sum of the other two"

@@ -12,16 +12,16 @@ from posekit.errors import FigureError
 from posekit.skeleton import SEGMENTS, SIDES, segment_name
 
 UPPER_ARM = 0.186
-FOREARM = 0.146
-THIGH = 0.245
-SHANK = 0.246
+FOREARM_OF_STATURE = 0.146
+THIGH_OF_STATURE = 0.245
+SHANK_OF_STATURE = 0.246
 SHOULDER_WIDTH = 0.259
 HIP_WIDTH = 0.191
 SHOULDER_TO_HIP = 0.818 - 0.530
 """Fractions of stature: Drillis & Contini 1966, "Body segment parameters", Technical Report 1166.03, New York
 University, as reprinted in Winter, "Biomechanics and Motor Control of Human Movement" (figure 4.1)."""
 
-SHORTEST, TALLEST = 0.4, 2.8
+MIN_STATURE_METRES, MAX_STATURE_METRES = 0.4, 2.8
 """Metres: beyond the statures ever recorded a number is more likely in another unit."""
 
 
@@ -29,9 +29,9 @@ def stature_from_lengths(lengths: Mapping[str, float]) -> float:
     """Estimate a person's stature (m) from the limbs, by the same fractions: the total length over its share."""
     share = {
         ("shoulder", "elbow"): UPPER_ARM,
-        ("elbow", "wrist"): FOREARM,
-        ("hip", "knee"): THIGH,
-        ("knee", "ankle"): SHANK,
+        ("elbow", "wrist"): FOREARM_OF_STATURE,
+        ("hip", "knee"): THIGH_OF_STATURE,
+        ("knee", "ankle"): SHANK_OF_STATURE,
     }
     total = sum(lengths[f"{side}_{a}-{side}_{b}"] for side in SIDES for a, b in share)
     return total / (2 * sum(share.values()))
@@ -61,9 +61,9 @@ def lengths_from_stature(stature: float, reference: dict[str, float]) -> dict[st
     FigureError
         Where the stature is not a person's in metres.
     """
-    if not (math.isfinite(stature) and SHORTEST <= stature <= TALLEST):
+    if not (math.isfinite(stature) and MIN_STATURE_METRES <= stature <= MAX_STATURE_METRES):
         raise FigureError(
-            f"stature is {stature:g} m; expected {SHORTEST} to {TALLEST} m; is it in another unit?"
+            f"stature is {stature:g} m; expected {MIN_STATURE_METRES} to {MAX_STATURE_METRES} m; is it in another unit?"
         )
     torso, hips = torso_points(reference), hips_points(reference)
     shoulder_scale = SHOULDER_WIDTH * stature / (torso[2, 1] - torso[1, 1])
@@ -80,7 +80,7 @@ def lengths_from_stature(stature: float, reference: dict[str, float]) -> dict[st
     }
     for side in SIDES:
         lengths[f"{side}_shoulder-{side}_elbow"] = UPPER_ARM * stature
-        lengths[f"{side}_elbow-{side}_wrist"] = FOREARM * stature
-        lengths[f"{side}_hip-{side}_knee"] = THIGH * stature
-        lengths[f"{side}_knee-{side}_ankle"] = SHANK * stature
+        lengths[f"{side}_elbow-{side}_wrist"] = FOREARM_OF_STATURE * stature
+        lengths[f"{side}_hip-{side}_knee"] = THIGH_OF_STATURE * stature
+        lengths[f"{side}_knee-{side}_ankle"] = SHANK_OF_STATURE * stature
     return lengths

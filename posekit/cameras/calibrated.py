@@ -15,15 +15,15 @@ from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
 from posekit.safe_io import nearest, refusal, shown
 
-COEFFICIENTS: Final = (0, 4, 5, 8, 12, 14)
+COEFFICIENT_COUNTS: Final = (0, 4, 5, 8, 12, 14)
 """How many coefficients OpenCV's models have: Brown's four or five, the rational model's eight, with thin prism
 twelve, with a tilted sensor fourteen. Its fisheye model has none or four."""
-BROWN: Final = 5
+N_BROWN_COEFFICIENTS: Final = 5
 """Coefficients k1, k2, p1, p2, k3, which `posekit.cameras.PinholeCamera` takes."""
-CALIBRATED: Final = "calibrated"
-LARGEST: Final = 10**6
+SAYS_CALIBRATED: Final = "calibrated"
+MAX_PICTURE_SIDE: Final = 10**6
 """Pixels that a picture may have a side."""
-AXES: Final = ("", "+x", "-x", "+y", "-y", "+z", "-z")
+UP_AXES: Final = ("", "+x", "-x", "+y", "-y", "+z", "-z")
 
 
 def _none() -> Array:
@@ -41,7 +41,7 @@ class CalibratedCamera:
     K : array (3, 3)
         Intrinsics, pixels; the middle of the first pixel is (0, 0), as in OpenCV.
     distortion : array (n,)
-        Coefficients in OpenCV's order, n one of `COEFFICIENTS`: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4,
+        Coefficients in OpenCV's order, n one of `COEFFICIENT_COUNTS`: k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4,
         tau_x, tau_y; where `fisheye`, k1, k2, k3, k4 of its own model.
     fisheye : bool
         Whether it is OpenCV's fisheye model (Kannala & Brandt 2006).
@@ -72,7 +72,7 @@ class CalibratedCamera:
     R: Array | None = None
     t: Array | None = None
     up: str = ""
-    how: str = CALIBRATED
+    how: str = SAYS_CALIBRATED
     deviation: float = 0.0
 
     def __post_init__(self) -> None:
@@ -80,7 +80,7 @@ class CalibratedCamera:
         if K.shape != (3, 3):
             raise CameraError(f"camera {shown(self.name)}: K has shape {K.shape}; expected (3, 3)")
         distortion = np.array(self.distortion, dtype=np.float64).ravel()
-        counts = (0, 4) if self.fisheye else COEFFICIENTS
+        counts = (0, 4) if self.fisheye else COEFFICIENT_COUNTS
         try:
             PinholeCamera(K=K)
             R = None if self.R is None else rotation_from_rounded(self.R)
@@ -98,9 +98,9 @@ class CalibratedCamera:
             raise CameraError(f"camera {shown(self.name)}: t must be three finite numbers; got {t.tolist()}")
         if self.size is not None:
             _check_size(self.name, self.size)
-        if self.up not in AXES:
+        if self.up not in UP_AXES:
             raise CameraError(
-                f"camera {shown(self.name)}: up is {shown(self.up)}; expected {', '.join(AXES[1:])}"
+                f"camera {shown(self.name)}: up is {shown(self.up)}; expected {', '.join(UP_AXES[1:])}"
             )
         if not (math.isfinite(self.deviation) and 0 <= self.deviation < 1):
             raise CameraError(
@@ -123,15 +123,15 @@ class CalibratedCamera:
 
 
 def _check_size(name: str, size: tuple[int, int]) -> None:
-    if len(size) != 2 or not all(isinstance(side, int) and 0 < side <= LARGEST for side in size):
+    if len(size) != 2 or not all(isinstance(side, int) and 0 < side <= MAX_PICTURE_SIDE for side in size):
         raise CameraError(
-            f"camera {shown(name)}: size must be width and height in pixels, 1 to {LARGEST:,}; got {size}"
+            f"camera {shown(name)}: size must be width and height in pixels, 1 to {MAX_PICTURE_SIDE:,}; got {size}"
         )
 
 
 def needs_undistortion(camera: CalibratedCamera) -> bool:
     """Tell whether points must go through `undistorted` first: the model is more than Brown's five coefficients."""
-    return camera.fisheye or bool(np.any(camera.distortion[BROWN:]))
+    return camera.fisheye or bool(np.any(camera.distortion[N_BROWN_COEFFICIENTS:]))
 
 
 def pinhole_of(camera: CalibratedCamera) -> PinholeCamera:
@@ -141,8 +141,8 @@ def pinhole_of(camera: CalibratedCamera) -> PinholeCamera:
     """
     if needs_undistortion(camera) or not camera.distortion.any():
         return PinholeCamera(K=camera.K)
-    brown = np.zeros(BROWN)
-    brown[: len(camera.distortion[:BROWN])] = camera.distortion[:BROWN]
+    brown = np.zeros(N_BROWN_COEFFICIENTS)
+    brown[: len(camera.distortion[:N_BROWN_COEFFICIENTS])] = camera.distortion[:N_BROWN_COEFFICIENTS]
     return PinholeCamera(K=camera.K, distortion=brown)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 
-COINCIDENT = 1e-7
+COINCIDENT_METRES = 1e-7
 """Half the distance (m) between the two candidates below which they count as one.
 
 The candidates are at the foot of the perpendicular on the ray, plus and minus ``sqrt(l^2 - h^2)``. Rounding
@@ -74,7 +74,7 @@ def meet_sphere(origin: Array, direction: Array, start: Array, length: Array, *,
     along = np.einsum("...i,...i->...", offset, direction)
     height = np.linalg.norm(offset - along[..., None] * direction, axis=-1)
     half = np.sqrt(np.maximum((length - height) * (length + height), 0.0))
-    tangent = half <= COINCIDENT
+    tangent = half <= COINCIDENT_METRES
     half = np.where(tangent, 0.0, half)
     depth = along[..., None] + np.stack([-half, half], axis=-1)
     excess = height - length

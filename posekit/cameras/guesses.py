@@ -12,9 +12,9 @@ from posekit.errors import CameraError
 
 Axis = Literal["diagonal", "horizontal", "vertical"]
 
-FILM: Final = math.hypot(36.0, 24.0)
+FILM_DIAGONAL_MM: Final = math.hypot(36.0, 24.0)
 """Diagonal of a 35 mm film's picture, millimetres (43.27)."""
-DEVIATION: Final = 0.05
+FOCAL_DEVIATION: Final = 0.05
 """Of f: angles and equivalents are rounded, taken along one axis or another, and quoted for a lens without
 distortion. Rounding 26 mm to a millimetre costs 2 %; an equivalent by width instead of by diagonal 4 % at 4:3."""
 
@@ -25,7 +25,7 @@ def camera_from_fov(
     axis: Axis = "diagonal",
     *,
     name: str = "camera",
-    deviation: float = DEVIATION,
+    deviation: float = FOCAL_DEVIATION,
 ) -> CalibratedCamera:
     r"""Guess a camera from its angle of view, :math:`f = d / (2 \tan(\alpha / 2))`.
 
@@ -66,7 +66,12 @@ def camera_from_fov(
 
 
 def camera_from_focal35(
-    size: tuple[int, int], mm: float, *, name: str = "camera", deviation: float = DEVIATION, how: str = ""
+    size: tuple[int, int],
+    mm: float,
+    *,
+    name: str = "camera",
+    deviation: float = FOCAL_DEVIATION,
+    how: str = "",
 ) -> CalibratedCamera:
     r"""Guess a camera from its 35 mm equivalent focal length, :math:`f = d\,l / 43.27\,\mathrm{mm}`.
 
@@ -93,7 +98,7 @@ def camera_from_focal35(
         raise CameraError(f"the 35 mm equivalent focal length is {mm:g} mm; expected 0 to 10,000 mm")
     _check(size)
     says = how or f"a guess: {mm:g} mm equivalent to 35 mm film, f within {100 * deviation:.0f} %"
-    return _guess(name, size, math.hypot(*size) * mm / FILM, says, deviation)
+    return _guess(name, size, math.hypot(*size) * mm / FILM_DIAGONAL_MM, says, deviation)
 
 
 def _check(size: tuple[int, int]) -> None:

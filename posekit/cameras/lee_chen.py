@@ -14,7 +14,7 @@ from posekit.cameras.pinhole import PinholeCamera
 from posekit.errors import CameraError
 from posekit.geometry import Array
 
-FLIP: Array = np.array([1.0, -1.0, 1.0])
+UP_FLIP: Array = np.array([1.0, -1.0, 1.0])
 
 
 def pinhole(f: float | Array) -> PinholeCamera:
@@ -30,17 +30,17 @@ def pinhole(f: float | Array) -> PinholeCamera:
 
 def image_from_paper(image: Array) -> Array:
     """Turn the paper's image points (y up) into posekit's (y down), and back: it is its own inverse."""
-    return image * FLIP[:2]
+    return image * UP_FLIP[:2]
 
 
 def points_from_paper(points: Array, f: float | Array) -> Array:
     """Turn points (F, ..., 3) of the paper's camera frame into OpenCV's; f one, or one a frame (F,)."""
-    return points * FLIP + _forward(f, points.ndim)
+    return points * UP_FLIP + _forward(f, points.ndim)
 
 
 def points_to_paper(points: Array, f: float | Array) -> Array:
     """Turn points (F, ..., 3) of OpenCV's camera frame into the paper's; f one, or one a frame (F,)."""
-    return (points - _forward(f, points.ndim)) * FLIP
+    return (points - _forward(f, points.ndim)) * UP_FLIP
 
 
 def rotation_to_paper(R: Array) -> Array:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from posekit.cameras.camera import COINCIDENT, Lift
+from posekit.cameras.camera import COINCIDENT_METRES, Lift
 from posekit.errors import CameraError
 from posekit.geometry import Array
 
-ROUNDING = 1e-15
+BOUND_ROUNDING = 1e-15
 """Of the coordinates: at the bound of s the segment that sets it must not fail, nor split in two, by its last bits."""
 
 
@@ -73,10 +73,10 @@ class ScaledOrthographicCamera:
         """
         place = self.unproject(pixel)
         apart = np.linalg.norm(place - start[..., :2], axis=-1)
-        lost = ROUNDING * (length + np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1))
+        lost = BOUND_ROUNDING * (length + np.abs(place).max(axis=-1) + np.abs(start[..., :2]).max(axis=-1))
         squared = np.maximum((length - apart) * (length + apart), 0.0)
         # Lengths may be relative, hence large: what is coincident grows with them.
-        tangent = squared <= (COINCIDENT * np.maximum(length, 1.0)) ** 2 + 2 * length * lost
+        tangent = squared <= (COINCIDENT_METRES * np.maximum(length, 1.0)) ** 2 + 2 * length * lost
         half = np.where(tangent, 0.0, np.sqrt(squared))
         depth = start[..., 2, None] + np.stack([-half, half], axis=-1)
         excess = apart - length

@@ -10,9 +10,9 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.safe_io import extra
 
-CLOSE: float = 1e-6
+CLOSE_PIXELS: float = 1e-6
 """Pixels by which a point may be off when it is projected back."""
-STEPS = 30
+MAX_STEPS = 30
 _CRITERIA = (
     3,
     100,
@@ -88,7 +88,7 @@ def _start(target: Array, camera: CalibratedCamera) -> Array:
 
 def _newton(start: Array, target: Array, camera: CalibratedCamera) -> Array:
     x = start
-    for _ in range(STEPS):
+    for _ in range(MAX_STEPS):
         error = distort(camera, x) - target
         if np.nanmax(np.abs(error), initial=0.0) < 1e-15:
             break
@@ -105,5 +105,5 @@ def _newton(start: Array, target: Array, camera: CalibratedCamera) -> Array:
 
 def _checked(found: Array, target: Array, camera: CalibratedCamera) -> Array:
     off = np.abs(to_pixels(camera.K, distort(camera, found)) - to_pixels(camera.K, target)).max(axis=-1)
-    good = (off <= CLOSE) & (ray_radius(camera, found) <= fold_radius(camera))
+    good = (off <= CLOSE_PIXELS) & (ray_radius(camera, found) <= fold_radius(camera))
     return np.where(good[:, None], found, np.nan)

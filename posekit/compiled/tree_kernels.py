@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.camera import COINCIDENT
+from posekit.cameras.camera import COINCIDENT_METRES
 from posekit.geometry import Array
 
 IS_OPEN, NO_SOLUTION, COINCIDENT_ENDS, BEHIND_CAMERA, IS_MISSING = range(5)
@@ -67,7 +67,7 @@ def lift(
                 height = np.sqrt(hx * hx + hy * hy + hz * hz)
                 excess = height - length
                 half = np.sqrt(np.maximum((length - height) * (length + height), 0.0))
-                tangent = half <= COINCIDENT
+                tangent = half <= COINCIDENT_METRES
                 if tangent:
                     half = 0.0
                 reachable = excess <= widest or (tangent and excess <= 0.0)

@@ -17,7 +17,7 @@ LEAST_POINTS = 3
 NO_EXTENT = 1e-12
 """Spread of a set, over its distance from the origin, below which all its points are one."""
 
-COLLINEAR = 1e-9
+COLLINEAR_GAP = 1e-9
 """Gap between singular values, over the largest, below which the best rotation is not the only one."""
 
 
@@ -111,5 +111,5 @@ def align(points: ArrayLike, target: ArrayLike, *, scale: bool = True) -> Alignm
         scale=c,
         used=used,
         left_out=known.shape[-1] - used,
-        unique=possible & (values[..., 1] + values[..., 2] > COLLINEAR * values[..., 0]),
+        unique=possible & (values[..., 1] + values[..., 2] > COLLINEAR_GAP * values[..., 0]),
     )

@@ -13,7 +13,7 @@ from posekit.geometry import Array, quaternion_from_rotation
 from posekit.objects.drawn_views import draw_configurations
 from posekit.robots import Robot
 from posekit.robots.descent import KinematicProblem, descend
-from posekit.robots.ik import PULL, InverseKinematics, Reach, Solution
+from posekit.robots.ik import REFERENCE_PULL, InverseKinematics, Reach, Solution
 from posekit.robots.kinematics import Kinematics, body_points
 from posekit.robots.starts import lay
 
@@ -109,7 +109,7 @@ class Certifier:
                 lower=space.lower,
                 upper=space.upper,
                 reference=found,
-                pull=PULL,
+                pull=REFERENCE_PULL,
             )
             found = descend(self.kinematics, problem, found).q
         apart = np.linalg.norm(self.kinematics.positions(found) - goals, axis=2)

@@ -18,17 +18,17 @@ from posekit.geometry import (
     quaternion_rotate,
 )
 
-HINGES = frozenset({"JointModelRX", "JointModelRY", "JointModelRZ", "JointModelRevoluteUnaligned"})
-CONTINUOUS = frozenset(
+HINGE_MODELS = frozenset({"JointModelRX", "JointModelRY", "JointModelRZ", "JointModelRevoluteUnaligned"})
+CONTINUOUS_MODELS = frozenset(
     {"JointModelRUBX", "JointModelRUBY", "JointModelRUBZ", "JointModelRevoluteUnboundedUnaligned"}
 )
-SLIDES = frozenset({"JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned"})
-FREE = "JointModelFreeFlyer"
+SLIDE_MODELS = frozenset({"JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned"})
+FREE_FLYER_MODEL = "JointModelFreeFlyer"
 
-UNIT = 1e-6
+UNIT_LENGTH_ERROR = 1e-6
 """How far a quaternion, or a continuous joint's (cos, sin), may be from unit length."""
 
-SMALL = 1e-2
+SERIES_ANGLE_RADIANS = 1e-2
 """Angle (rad) below which the exponential's and the logarithm's factors are taken from their series."""
 
 
@@ -60,13 +60,13 @@ class ConfigurationSpace:
         kinds: dict[str, list[int]] = {"hinges": [], "slides": [], "turns": [], "free": []}
         for index in range(1, model.njoints):
             kind = model.joints[index].shortname()
-            if kind in HINGES:
+            if kind in HINGE_MODELS:
                 kinds["hinges"].append(index)
-            elif kind in SLIDES:
+            elif kind in SLIDE_MODELS:
                 kinds["slides"].append(index)
-            elif kind in CONTINUOUS:
+            elif kind in CONTINUOUS_MODELS:
                 kinds["turns"].append(index)
-            elif kind == FREE:
+            elif kind == FREE_FLYER_MODEL:
                 kinds["free"].append(index)
             else:
                 raise InputError(
@@ -107,7 +107,7 @@ class ConfigurationSpace:
         ):
             for start in starts:
                 norm = np.linalg.norm(q[:, start + first : start + last], axis=1)
-                wrong = np.abs(norm - 1) > UNIT
+                wrong = np.abs(norm - 1) > UNIT_LENGTH_ERROR
                 if wrong.any():
                     row = int(np.argmax(wrong))
                     raise InputError(
@@ -163,7 +163,7 @@ def _left_jacobian(angular: Array, linear: Array) -> Array:
     """Return V(angular) linear: the translation of the exponential of a twist (Murray, Li & Sastry 1994, eq. 2.36)."""
     squared = dot(angular, angular)[:, None]
     angle = np.sqrt(squared)
-    small = angle < SMALL
+    small = angle < SERIES_ANGLE_RADIANS
     safe = np.where(small, 1.0, angle)
     first = np.where(small, 0.5 - squared / 24 + squared**2 / 720, (1 - np.cos(safe)) / safe**2)
     second = np.where(small, 1 / 6 - squared / 120 + squared**2 / 5040, (safe - np.sin(safe)) / safe**3)
@@ -175,7 +175,7 @@ def _inverse_left_jacobian(angular: Array, linear: Array) -> Array:
     """Return the solution x of V(angular) x = linear."""
     squared = dot(angular, angular)[:, None]
     angle = np.sqrt(squared)
-    small = angle < SMALL
+    small = angle < SERIES_ANGLE_RADIANS
     half = np.where(small, 1.0, angle) / 2
     second = np.where(
         small,

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from posekit.robots.urdf_numbers import numbers
 from posekit.safe_io import refusal, shown
 
-SIZES: Final[dict[str, tuple[str, ...]]] = {
+SIZE_ATTRIBUTES: Final[dict[str, tuple[str, ...]]] = {
     "box": ("size",),
     "sphere": ("radius",),
     "cylinder": ("radius", "length"),
@@ -91,7 +91,9 @@ def _check_body(body: ElementTree.Element, kind: str, place: str, source: str) -
     shapes = body.findall("geometry/*")
     if len(shapes) != 1 or len(body.findall("geometry")) != 1:
         got = f"a {kind} body with {len(shapes)} shapes"
-        raise refusal(source, place, got, f"one of {', '.join(SIZES)}", "make each a body of its own")
+        raise refusal(
+            source, place, got, f"one of {', '.join(SIZE_ATTRIBUTES)}", "make each a body of its own"
+        )
     if len(body.findall("origin")) > 1:
         raise refusal(source, place, "two <origin>", "one", "remove the other")
     if any("name" not in material.attrib for material in body.findall("material")):
@@ -102,17 +104,17 @@ def _check_body(body: ElementTree.Element, kind: str, place: str, source: str) -
 
 def _check_shape(declared: Body, place: str, source: str) -> None:
     element, tag = declared.element, declared.element.tag
-    if tag not in SIZES:
+    if tag not in SIZE_ATTRIBUTES:
         got = f"a collision body <{shown(tag)[1:-1]}>"
-        raise refusal(source, place, got, f"one of {', '.join(SIZES)}", "replace it")
+        raise refusal(source, place, got, f"one of {', '.join(SIZE_ATTRIBUTES)}", "replace it")
     if tag == "mesh":
         if 0.0 in (scale := numbers(element, "scale", "1 1 1")):
             raise refusal(source, place, f"a mesh of scale {scale}", "none of them zero", "correct it")
         return
-    missing = [name for name in SIZES[tag] if name not in element.attrib]
+    missing = [name for name in SIZE_ATTRIBUTES[tag] if name not in element.attrib]
     if missing:
         raise refusal(source, place, f"a {tag} without {' and '.join(missing)}", f"a {tag} with it", "add it")
-    sizes = [(name, size) for name in SIZES[tag] for size in numbers(element, name, "")]
+    sizes = [(name, size) for name in SIZE_ATTRIBUTES[tag] for size in numbers(element, name, "")]
     if min(size for _, size in sizes) <= 0:
         got = f"a {tag} with " + ", ".join(f"{name} {size:g}" for name, size in sizes)
         raise refusal(source, place, got, _ALL[len(sizes)], "correct it")

@@ -17,7 +17,7 @@ from posekit.safe_io.regular_file import check_file
 from posekit.safe_io.xml_file import MAX_BYTES
 
 STICK_FIGURE: Final = "stick_figure"
-PACKAGE: Final = "example-robot-data"
+ROBOT_PACKAGE: Final = "example-robot-data"
 FOLDERS_OF_URDFS: Final = frozenset(("urdf", "urdfs", "robot", "robots"))
 FOLDERS_OF_MESHES: Final = ("meshes", "mesh")
 """A folder of the first kind beside one of the second is one of two in a package."""
@@ -104,13 +104,13 @@ def robots_folder() -> Path | None:
     The distribution has data alone, under the prefix of its own packager; a system package puts it under
     ``share``.
     """
-    places = [Path(sys.prefix) / "share" / PACKAGE / "robots"]
+    places = [Path(sys.prefix) / "share" / ROBOT_PACKAGE / "robots"]
     try:
-        files = importlib.metadata.distribution(PACKAGE)
+        files = importlib.metadata.distribution(ROBOT_PACKAGE)
     except importlib.metadata.PackageNotFoundError:
         pass
     else:
-        places.insert(0, Path(str(files.locate_file(f"cmeel.prefix/share/{PACKAGE}/robots"))))
+        places.insert(0, Path(str(files.locate_file(f"cmeel.prefix/share/{ROBOT_PACKAGE}/robots"))))
     return next((place for place in places if place.is_dir()), None)
 
 
@@ -186,7 +186,7 @@ def _is_file(name: str) -> bool:
 
 def _suggestion(name: str) -> str:
     if robots_folder() is None:
-        return f"install {PACKAGE} for the published robots, or write ./ before a file's name"
+        return f"install {ROBOT_PACKAGE} for the published robots, or write ./ before a file's name"
     near = nearest(name, robot_names())
     some = f"some names are {', '.join((STICK_FIGURE, 'human', 'simple_humanoid', *SHORT_NAMES))}"
     return near if near.startswith("did") else some

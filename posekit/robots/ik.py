@@ -17,22 +17,22 @@ from posekit.robots.search import Found, Search, unlimited
 from posekit.robots.start_tables import make_tables
 from posekit.robots.starts import Starts
 
-TOLERANCE = 1e-3
+IK_TOLERANCE_METRES = 1e-3
 """Metres: a posture is met when none of its known points is farther off."""
 
-PRECISION = 1e-3
+RESTART_METRES = 1e-3
 """Metres: where a point is farther off, other starts are tried."""
 
-PULL = 1e-10
+REFERENCE_PULL = 1e-10
 """m^2/rad^2: strong enough to choose among postures that place the points alike, too weak to move a point."""
 
-JUMP = 2.0
+JUMP_RATIO = 2.0
 """Times the largest distance (or the precision) of the last search beyond which a frame is searched for anew."""
 
-FARTHEST = 1e6
+MAX_TARGET_METRES = 1e6
 """Metres beyond which a target is taken for a mistake."""
 
-SMALLEST = 1e-300
+MIN_TOTAL_WEIGHT = 1e-300
 """Keeps weights that are all zero from being divided by zero."""
 
 AT_LIMIT = 1e-9
@@ -123,8 +123,8 @@ class InverseKinematics:
     kinematics: Kinematics
     lower: ArrayLike | None = None
     upper: ArrayLike | None = None
-    tolerance: float = TOLERANCE
-    precision: float = PRECISION
+    tolerance: float = IK_TOLERANCE_METRES
+    precision: float = RESTART_METRES
 
     def __post_init__(self) -> None:
         for name, value in (("tolerance", self.tolerance), ("precision", self.precision)):
@@ -230,7 +230,7 @@ class InverseKinematics:
                 reference[rows] = before
                 here = here._replace(reference=before)
                 found = self._search.descend(here, before)
-                again = np.flatnonzero(found.worst > JUMP * level)
+                again = np.flatnonzero(found.worst > JUMP_RATIO * level)
                 if again.size:
                     found.improve(again, self._search.everywhere(here.take(again)))
             level = np.minimum(level, found.worst)
@@ -280,9 +280,9 @@ class InverseKinematics:
                 f"targets have shape {goal.shape}; expected (N, {count}, 3), the points "
                 f"{', '.join(self.kinematics.names[:20])}"
             )
-        if (np.abs(goal) > FARTHEST).any():
+        if (np.abs(goal) > MAX_TARGET_METRES).any():
             raise InputError(
-                f"a target is at {np.nanmax(np.abs(goal)):g} m; expected at most {FARTHEST:g}; give metres, "
+                f"a target is at {np.nanmax(np.abs(goal)):g} m; expected at most {MAX_TARGET_METRES:g}; give metres, "
                 "and NaN for what is unknown"
             )
         each = np.ones(count) if weights is None else np.asarray(weights, dtype=np.float64)
@@ -294,11 +294,13 @@ class InverseKinematics:
         rest = np.clip(self.kinematics.neutral, lower, upper)
         return KinematicProblem(
             targets=goal,
-            weights=np.broadcast_to(each / max(float(each.max(initial=0.0)), SMALLEST), goal.shape[:2]),
+            weights=np.broadcast_to(
+                each / max(float(each.max(initial=0.0)), MIN_TOTAL_WEIGHT), goal.shape[:2]
+            ),
             lower=lower,
             upper=upper,
             reference=np.tile(rest, (len(goal), 1)),
-            pull=PULL,
+            pull=REFERENCE_PULL,
         )
 
     def _explain(self, problem: KinematicProblem, found: Found) -> Solution:
@@ -336,7 +338,7 @@ def solve(
     start: ArrayLike | None = None,
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = IK_TOLERANCE_METRES,
 ) -> Solution:
     """Solve once: `InverseKinematics` with these limits, and its `solve`; keep the object to solve often."""
     solver = InverseKinematics(kinematics=kinematics, lower=lower, upper=upper, tolerance=tolerance)
@@ -351,7 +353,7 @@ def solve_sequence(
     weights: ArrayLike | None = None,
     lower: ArrayLike | None = None,
     upper: ArrayLike | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = IK_TOLERANCE_METRES,
 ) -> Solution:
     """Solve sequences once: `InverseKinematics` with these limits, and its `solve_sequence`."""
     solver = InverseKinematics(kinematics=kinematics, lower=lower, upper=upper, tolerance=tolerance)

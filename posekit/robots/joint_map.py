@@ -20,7 +20,7 @@ from posekit.skeleton import JOINTS, POINT, POINTS
 if TYPE_CHECKING:
     from posekit.tables.joint_map import JointMapTable, MeanTable, SiteTable
 
-SCHEMA: Final = "posekit.joint_map/1"
+JOINT_MAP_SCHEMA: Final = "posekit.joint_map/1"
 MAX_BYTES: Final = 100_000
 
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
@@ -154,7 +154,7 @@ def find_joint_map(model: pin.Model) -> JointMap:
         one_line(
             f"model {model.name!r}: no built-in joint map fits; the nearest, {maps[best].name}, needs frames that it "
             f"has not: {', '.join(lost[:4])}{tail}; {nearest(lost[0], list(frame_index(model))[:1000])[:200]}; "
-            f"write a joint map ({SCHEMA}) that names the model's frames"
+            f"write a joint map ({JOINT_MAP_SCHEMA}) that names the model's frames"
         )
     )
 

@@ -18,19 +18,19 @@ from posekit.robots.body_point import BodyPoint, Site, body_points, find_frame, 
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.joint_chain import JointChain
 
-__all__ = ["BodyPoint", "Kinematics", "Placed", "Site", "body_points", "find_frame", "frame_index"]
+__all__ = ["BodyPoint", "Kinematics", "PlacedPoints", "Site", "body_points", "find_frame", "frame_index"]
 
-ROWS = 256
+BLOCK_CONFIGURATIONS = 256
 """Configurations worked on at once: their rotations and Jacobians stay in the processor's cache."""
 
-MOVES = 1e-9
+MOVING_RATE = 1e-9
 """Metres per radian, or per metre, below which a joint does not move a point."""
 
-DRAWS = 4
+N_DRAWS = 4
 """Configurations, away from special ones, at which it is looked what moves."""
 
 
-class Placed(NamedTuple):
+class PlacedPoints(NamedTuple):
     """Where points are and how they move.
 
     Attributes
@@ -99,14 +99,14 @@ class Kinematics:
     @cached_property
     def generic(self) -> Array:
         """A few configurations in no special position (4, nq): what does not move at them never does."""
-        draws = np.random.default_rng(0).uniform(-1.0, 1.0, (DRAWS, self.space.nv))
-        return self.space.integrate(np.tile(self.neutral, (DRAWS, 1)), draws)
+        draws = np.random.default_rng(0).uniform(-1.0, 1.0, (N_DRAWS, self.space.nv))
+        return self.space.integrate(np.tile(self.neutral, (N_DRAWS, 1)), draws)
 
     @cached_property
     def moved_by(self) -> NDArray[np.bool_]:
         """Which entries of v move which points (P, nv): not those whose axis always goes through the point."""
         jacobians = self.place(self.generic, np.arange(self.space.nv)).jacobians
-        return np.asarray((np.abs(jacobians) > MOVES).any(axis=(0, 2)))
+        return np.asarray((np.abs(jacobians) > MOVING_RATE).any(axis=(0, 2)))
 
     def positions(self, q: Array) -> Array:
         """Place the points.
@@ -127,12 +127,12 @@ class Kinematics:
         """
         self.space.check(q)
         out = np.empty((len(q), len(self.points), 3))
-        for start in range(0, len(q), ROWS):
-            rows = slice(start, start + ROWS)
+        for start in range(0, len(q), BLOCK_CONFIGURATIONS):
+            rows = slice(start, start + BLOCK_CONFIGURATIONS)
             out[rows] = self._means(self._place(*self._chain.place(q[rows]))).transpose(2, 0, 1)
         return out
 
-    def placed(self, q: Array) -> Placed:
+    def placed(self, q: Array) -> PlacedPoints:
         r"""Place the points and differentiate them.
 
         A turning joint with world axis a through o moves a point p by :math:`a \times (p - o)`, a sliding one
@@ -154,27 +154,27 @@ class Kinematics:
         self.space.check(q)
         return self.place(q, np.arange(self.space.nv))
 
-    def place(self, q: Array, columns: NDArray[np.intp]) -> Placed:
+    def place(self, q: Array, columns: NDArray[np.intp]) -> PlacedPoints:
         """Do what `placed` does for some entries of v alone, on configurations that are known to be sound."""
         n, width = len(q), len(self.points)
         positions = np.empty((n, width, 3))
         jacobians = np.zeros((n, width * 3 * len(columns)))
         levers = self._levers(columns)
-        for start in range(0, n, ROWS):
-            rows = slice(start, start + ROWS)
+        for start in range(0, n, BLOCK_CONFIGURATIONS):
+            rows = slice(start, start + BLOCK_CONFIGURATIONS)
             rotation, origin = self._chain.place(q[rows])
             sites = self._place(rotation, origin)
             positions[rows] = self._means(sites).transpose(2, 0, 1)
             block = jacobians[rows]
             for index, entries in self._entries(rotation, origin, sites, levers):
                 block[:, index] = entries.T
-        return Placed(positions, jacobians.reshape(n, width, 3, len(columns)))
+        return PlacedPoints(positions, jacobians.reshape(n, width, 3, len(columns)))
 
     def joint_placements(self, q: Array, joint: int) -> tuple[Array, Array]:
         """Return the rotations (N, 3, 3) and origins (N, 3) of a joint that leads to a point; 0 is the world."""
         rotation, origin = np.empty((len(q), 3, 3)), np.empty((len(q), 3))
-        for start in range(0, len(q), ROWS):
-            rows = slice(start, start + ROWS)
+        for start in range(0, len(q), BLOCK_CONFIGURATIONS):
+            rows = slice(start, start + BLOCK_CONFIGURATIONS)
             R, o = self._chain.place(q[rows])
             rotation[rows], origin[rows] = R[joint].transpose(2, 0, 1), o[joint].T
         return rotation, origin

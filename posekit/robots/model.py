@@ -21,7 +21,7 @@ _SUFFIXES: Final = {
     "JointModelRUBZ": ("cos", "sin"),
     "JointModelRevoluteUnboundedUnaligned": ("cos", "sin"),
 }
-ROOTS: Final = ("root_joint", "free_flyer", "posekit_root_joint")
+ROOT_JOINT_NAMES: Final = ("root_joint", "free_flyer", "posekit_root_joint")
 
 
 def build_model(robot: ElementTree.Element, source: str, *, free_flyer: bool) -> pin.Model:
@@ -39,7 +39,7 @@ def build_model(robot: ElementTree.Element, source: str, *, free_flyer: bool) ->
     moving = {
         joint.get("name", ""): joint for joint in robot.findall("joint") if joint.get("type") != "fixed"
     }
-    root = next((name for name in ROOTS if name not in moving), "")
+    root = next((name for name in ROOT_JOINT_NAMES if name not in moving), "")
     try:
         if free_flyer:
             model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer(), root)
@@ -68,7 +68,7 @@ def configuration_names(model: pin.Model) -> tuple[str, ...]:
         suffixes = _SUFFIXES.get(
             kind, ("",) if model.nqs[joint] == 1 else tuple(map(str, range(model.nqs[joint])))
         )
-        is_root = joint == 1 and kind == "JointModelFreeFlyer" and name in ROOTS
+        is_root = joint == 1 and kind == "JointModelFreeFlyer" and name in ROOT_JOINT_NAMES
         for k, suffix in enumerate(suffixes):
             names[model.idx_qs[joint] + k] = suffix if is_root else f"{name}.{suffix}" if suffix else name
     return tuple(names)

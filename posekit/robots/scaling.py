@@ -13,20 +13,20 @@ import pinocchio as pin
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.stretching import EXACT, Stretching, shoulders_are_behind
+from posekit.robots.stretching import EXACT_METRES, Stretching, shoulders_are_behind
 from posekit.safe_io import nearest
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS, segment_name
 
 __all__ = ["Scaled", "model_lengths", "scaled", "segment_lengths", "shoulders_are_behind"]
 
-PASSES = 30
-STUCK = 1e-10
+MAX_PASSES = 30
+STUCK_METRES = 1e-10
 """Metres by which a pass must change the largest miss: where it does not, the lengths cannot be met."""
 
-ALREADY = 1e-9
+SAME_LENGTH = 1e-9
 """Relative difference of a length below which it is left alone."""
 
-BOUNDS = (0.05, 20.0)
+RATIO_BOUNDS = (0.05, 20.0)
 """Ratios of a new length to the model's that are believed; beyond them the unit is wrong."""
 
 
@@ -119,13 +119,13 @@ def scaled(
     wanted = _check(lengths, own)
     work = Stretching(kinematics, behind)
     turned = behind is not None and work.behind() not in (behind, None)
-    if turned or any(abs(length / own[name] - 1) > ALREADY for name, length in wanted.items()):
+    if turned or any(abs(length / own[name] - 1) > SAME_LENGTH for name, length in wanted.items()):
         last = math.inf
-        for _ in range(PASSES):
+        for _ in range(MAX_PASSES):
             work.scale(wanted)
             reached = model_lengths(work.kinematics)
             missed = max((abs(reached[name] - length) for name, length in wanted.items()), default=0.0)
-            if missed < EXACT or abs(last - missed) < STUCK:
+            if missed < EXACT_METRES or abs(last - missed) < STUCK_METRES:
                 break
             last = missed
     new_geometry = None if geometry is None else work.geometry(geometry)
@@ -149,10 +149,10 @@ def _check(lengths: Mapping[str, float], own: Mapping[str, float]) -> dict[str, 
             raise InputError(f"lengths: {name} is {length:g} m; expected positive and finite")
         if name not in own or own[name] <= 0:
             continue
-        if not BOUNDS[0] < length / own[name] < BOUNDS[1]:
+        if not RATIO_BOUNDS[0] < length / own[name] < RATIO_BOUNDS[1]:
             raise InputError(
-                f"lengths: {name} is {length:g} m, the model's is {own[name]:g}; expected {BOUNDS[0]:g} to "
-                f"{BOUNDS[1]:g} times that; give metres"
+                f"lengths: {name} is {length:g} m, the model's is {own[name]:g}; expected {RATIO_BOUNDS[0]:g} to "
+                f"{RATIO_BOUNDS[1]:g} times that; give metres"
             )
         wanted[name] = length
     return wanted

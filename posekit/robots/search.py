@@ -17,21 +17,21 @@ from posekit.robots.kinematics import Kinematics
 from posekit.robots.start_tables import Table
 from posekit.robots.starts import Starts
 
-RETRIES = 6
+N_RETRIES = 6
 """Other shapes of a trunk or a limb that are tried where the first does not meet its own points."""
 
 TRUNK_STEPS, LIMB_STEPS = 15, 25
 
-ROUGHLY = 1e-4
+ROUGH_PRECISION = 1e-4
 """Precision with which trunks and limbs are laid: what cannot be met is then given up early."""
 
-TRUNKS = 16
+N_TRUNKS = 16
 """Trunks among which others are tried where the posture is not met."""
 
-TRIED = 4
+MAX_TRUNKS_TRIED = 4
 """So many of them at most."""
 
-DISTINCT = 0.05
+DISTINCT_TRUNK = 0.05
 """Radians (of a joint, or of the base) or metres by which another trunk must differ."""
 
 
@@ -116,7 +116,7 @@ class Search:
         cannot lead to a better one.
         """
         space = self.kinematics.space
-        starts = self.starts.trunks(problem.targets, TRUNKS)
+        starts = self.starts.trunks(problem.targets, N_TRUNKS)
         trunks, cost = self._descend_each(self._trunk_part, problem, starts, TRUNK_STEPS)
         order = np.argsort(cost, axis=0, kind="stable")
         tried, count = [trunk], np.zeros(len(rows), dtype=np.intp)
@@ -125,9 +125,9 @@ class Search:
             other = trunks[k, each]
             new = (cost[k, each] < found.cost[rows]) & (found.worst[rows] > self.tolerance)
             for before in tried:
-                new &= np.abs(space.difference(before, other)).max(axis=1) > DISTINCT
+                new &= np.abs(space.difference(before, other)).max(axis=1) > DISTINCT_TRUNK
             tried.append(other)
-            some = np.flatnonzero(new & (count < TRIED))
+            some = np.flatnonzero(new & (count < MAX_TRUNKS_TRIED))
             count[some] += 1
             if some.size:
                 few = problem.take(some)
@@ -148,7 +148,7 @@ class Search:
         rows = self._missed(cost)
         if rows.size:
             few = problem.take(rows)
-            others = self.starts.trunks(few.targets, 1 + RETRIES)[1:]
+            others = self.starts.trunks(few.targets, 1 + N_RETRIES)[1:]
             self._improve_part(self._trunk_part, few, others, TRUNK_STEPS, rows, q, cost)
         return q
 
@@ -164,7 +164,7 @@ class Search:
             rows = self._missed(cost)
             if rows.size:
                 few = problem.take(rows)
-                others = self.starts.limb(index, q[rows], few.targets, 1 + RETRIES)[1:]
+                others = self.starts.limb(index, q[rows], few.targets, 1 + N_RETRIES)[1:]
                 self._improve_part(part, few, others, LIMB_STEPS, rows, q, cost)
         return q
 
@@ -213,7 +213,7 @@ class Search:
             pull=problem.pull,
         )
         flat = starts.reshape(count * n, starts.shape[2])
-        descent = descend(part.kinematics, small, flat, steps, part.columns, ROUGHLY)
+        descent = descend(part.kinematics, small, flat, steps, part.columns, ROUGH_PRECISION)
         return descent.q.reshape(starts.shape), descent.cost.reshape(count, n)
 
     @cached_property

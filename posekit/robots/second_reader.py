@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from posekit.safe_io import cut, one_line, refusal
 
-AGREEMENT = 1e-9
+AGREEMENT_METRES = 1e-9
 """Metres by which the two readers' frames may differ, at 1 m from the root; relative beyond."""
 _TURNS = ("JointModelRUBX", "JointModelRUBY", "JointModelRUBZ", "JointModelRevoluteUnboundedUnaligned")
 
@@ -76,7 +76,7 @@ def compare_readers(urdf: str, model: pin.Model, source: str, *, must_read: bool
         T = other.get_transform(link)
         placement = data.oMf[root].actInv(data.oMf[model.getFrameId(link, pin.FrameType.BODY)])
         apart = np.abs(T - placement.homogeneous).max()
-        if not apart <= AGREEMENT * max(1.0, float(np.abs(T[:3, 3]).max())):
+        if not apart <= AGREEMENT_METRES * max(1.0, float(np.abs(T[:3, 3]).max())):
             got = f"two readers place link {link!r} {apart:.3g} m apart"
             raise refusal(source, "", got, "one place", "check the numbers of its joint")
     return True

@@ -12,20 +12,20 @@ from posekit.geometry import Array
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.kinematics import Kinematics
 
-SAMPLES = 4096
+N_SAMPLES = 4096
 """Shapes in a table: a limb of four joints is then met to some 20 degrees."""
 
-PULL = 1e-3
+NEUTRAL_PULL = 1e-3
 """Preference of shapes near the neutral one, m^2/rad^2: it decides between shapes that place the points alike."""
 
-FEW = 3
+MAX_GIRDLE_JOINTS = 3
 """Joints that place a limb's first point: up to so many are sampled with the trunk, where that point is needed to
 tell how the trunk is turned: a clavicle's, not a hip's."""
 
-GIRDLE = 0.5
+GIRDLE_WEIGHT = 0.5
 """Weight of such a point in the trunk's table."""
 
-HELD = 1e-9
+HELD_METRES = 1e-9
 """Metres within which a point keeps its place in a body."""
 
 
@@ -112,12 +112,12 @@ def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> Tables:
         count = moved[:, branch.dofs].sum(axis=1)
         near = [int(p) for p in branch.points if count[p] == count[branch.points].min()]
         roots = [int(v) for v in branch.dofs if moved[near, v].any()]
-        few = len(roots) < len(branch.dofs) and len(roots) <= FEW
+        few = len(roots) < len(branch.dofs) and len(roots) <= MAX_GIRDLE_JOINTS
         if few and len(_held_by(kinematics, carrier)) < 3:
             trunk_dofs += [v for v in roots if v not in trunk_dofs]
             new = [p for p in near if p not in points]
             points += new
-            weights += [GIRDLE] * len(new)
+            weights += [GIRDLE_WEIGHT] * len(new)
         own = branch.points.tolist()
         limbs.append(_sample(kinematics, (lower, upper), rest, branch.dofs, own, [1.0] * len(own), carrier))
     if base >= 0 and len(points) < 3:
@@ -172,7 +172,7 @@ def _held_by(kinematics: Kinematics, joint: int) -> list[int]:
     """List the points that keep their place in a joint's body: three of them tell how it is turned."""
     rotation, origin = kinematics.joint_placements(kinematics.generic, joint)
     local = np.einsum("nji,npj->npi", rotation, kinematics.positions(kinematics.generic) - origin[:, None])
-    return [int(point) for point in np.flatnonzero((np.ptp(local, axis=0) < HELD).all(axis=1))]
+    return [int(point) for point in np.flatnonzero((np.ptp(local, axis=0) < HELD_METRES).all(axis=1))]
 
 
 def _is_chain(sets: list[frozenset[int]]) -> bool:
@@ -202,7 +202,7 @@ def _sample(
     high = np.array([upper[q_of[v]] if v in q_of else np.pi for v in dofs.tolist()])
     low = np.where(np.isfinite(low), np.maximum(low, middle - 2 * np.pi), middle - np.pi)
     high = np.where(np.isfinite(high), np.minimum(high, middle + 2 * np.pi), middle + np.pi)
-    count = SAMPLES if len(dofs) else 1
+    count = N_SAMPLES if len(dofs) else 1
     root = 2.0
     for _ in range(60):  # the root of x^(d+1) = x + 1
         root = (1 + root) ** (1 / (len(dofs) + 1))
@@ -218,6 +218,6 @@ def _sample(
         points=np.array(points, dtype=np.intp),
         weights=np.array(weights),
         positions=np.einsum("nji,npj->npi", rotation, positions - origin[:, None]),
-        penalty=PULL * ((values - middle) ** 2).sum(axis=1),
+        penalty=NEUTRAL_PULL * ((values - middle) ** 2).sum(axis=1),
         carrier=carrier,
     )

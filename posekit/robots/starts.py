@@ -11,10 +11,10 @@ from posekit.geometry import Array, best_rotation, centred_covariance, quaternio
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.start_tables import Table, Tables, write
 
-NEAREST = 96
+N_NEAREST = 96
 """Shapes of a table among which the starts are chosen."""
 
-APART = 0.7
+DISTINCT_RADIANS = 0.7
 """Radians by which two starts differ in at least one joint."""
 
 
@@ -119,7 +119,7 @@ class Starts:
 def choose(table: Table, misfit: Array, count: int) -> NDArray[np.intp]:
     """Choose shapes (N, count) of small misfit (N, M) that are apart from each other, the best first."""
     total = misfit + table.penalty
-    keep = min(NEAREST, total.shape[1])
+    keep = min(N_NEAREST, total.shape[1])
     nearest = np.argpartition(total, keep - 1, axis=1)[:, :keep]
     cost = np.take_along_axis(total, nearest, axis=1)
     order = np.argsort(cost, axis=1, kind="stable")
@@ -132,7 +132,7 @@ def choose(table: Table, misfit: Array, count: int) -> NDArray[np.intp]:
         if k + 1 < count and table.values.shape[1]:
             # Those near a chosen one come after all others, the chosen one itself after these.
             away = np.abs(table.values[nearest] - table.values[chosen[:, k]][:, None]).max(axis=2)
-            cost = cost + np.where(away == 0, 1e12, np.where(away < APART, 1e6, 0.0))
+            cost = cost + np.where(away == 0, 1e12, np.where(away < DISTINCT_RADIANS, 1e6, 0.0))
     return chosen
 
 

@@ -12,16 +12,16 @@ from posekit.geometry import Array, cross
 from posekit.robots.body_point import BodyPoint
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.scaled_shape import scale_object
-from posekit.robots.structure import GIRDLES, HIPS, SHOULDERS, Girdle, Structure
+from posekit.robots.structure import GIRDLE_ANCHORS, HIP_PAIR, SHOULDER_PAIR, Girdle, Structure
 from posekit.skeleton import JOINT, segment_name
 
-EXACT = 1e-12
+EXACT_METRES = 1e-12
 """Metres within which all lengths are met."""
 
-AWAY = 0.02
+NUDGE_METRES = 0.02
 """Metres by which points that lie in one plane with the trunk are helped out of it."""
 
-LONGEST = 0.05
+MAX_STEP_METRES = 0.05
 """Metres that a point moves at most in a step."""
 
 
@@ -43,7 +43,7 @@ class Stretching:
     def scale(self, wanted: Mapping[str, float]) -> None:
         """Bring every length nearer to what is wanted: exactly, where none depends on another."""
         self._scale_spine(wanted)
-        for pair, anchors in GIRDLES.items():
+        for pair, anchors in GIRDLE_ANCHORS.items():
             self._place_pair(pair, anchors, wanted)
         place = self._place()
         for (start, end), bodies in self.structure.limb_bodies.items():
@@ -88,10 +88,10 @@ class Stretching:
             return
         line = place["neck"] - place["pelvis"]
         along = self._ratio("neck", "pelvis", place, wanted)
-        across = self._ratio(*SHOULDERS, place, wanted)
+        across = self._ratio(*SHOULDER_PAIR, place, wanted)
         axis = line / float(np.linalg.norm(line))
         rotation, before = self._rotations(), self._spine_placements()
-        hips = {girdle.carrier for girdle in self.structure.girdles[HIPS] if girdle is not None}
+        hips = {girdle.carrier for girdle in self.structure.girdles[HIP_PAIR] if girdle is not None}
         for body in self.structure.spine.carriers:
             if body not in hips:
                 own = rotation[body].T @ axis
@@ -125,11 +125,11 @@ class Stretching:
             if name in wanted and a in place and b in place:
                 given.append((a, b, wanted[name]))
         new, missed = _fit(pair, place, given)
-        if missed > EXACT and "neck" in place and "pelvis" in place:
+        if missed > EXACT_METRES and "neck" in place and "pelvis" in place:
             # Points in one plane cannot leave it by such steps: shoulders are helped forward, hips down.
             down = place["pelvis"] - place["neck"]
             aside = cross(down, place[pair[1]] - place[pair[0]]) if len(anchors) > 1 else down
-            nudge = AWAY * aside / max(float(np.linalg.norm(aside)), 1e-12)
+            nudge = NUDGE_METRES * aside / max(float(np.linalg.norm(aside)), 1e-12)
             other, still = _fit(pair, {**place, **{name: place[name] + nudge for name in pair}}, given)
             new = other if still < missed else new
         if len(anchors) > 1 and self.wanted_behind is not None and "neck" in place and "pelvis" in place:
@@ -208,7 +208,7 @@ def _fit(
         if last or np.abs(misses).max(initial=0.0) < 1e-15:
             break
         step = np.linalg.lstsq(rows, misses, rcond=1e-6)[0]
-        step *= min(1.0, LONGEST / float(np.abs(step).max()))
+        step *= min(1.0, MAX_STEP_METRES / float(np.abs(step).max()))
         for name, k in at.items():
             points[name] = points[name] + step[k : k + 3]
     return {name: points[name] for name in moving}, float(np.abs(misses).max(initial=0.0))

@@ -13,17 +13,20 @@ from posekit.robots.body_point import BodyPoint, frame_index
 from posekit.robots.kinematics import Kinematics
 from posekit.skeleton import SIDES
 
-LIMBS = tuple(
+LIMB_SEGMENTS = tuple(
     (f"{side}_{start}", f"{side}_{end}")
     for side in SIDES
     for start, end in (("shoulder", "elbow"), ("elbow", "wrist"), ("hip", "knee"), ("knee", "ankle"))
 )
-SHOULDERS = ("right_shoulder", "left_shoulder")
-HIPS = ("right_hip", "left_hip")
-GIRDLES: Mapping[tuple[str, str], tuple[str, ...]] = {SHOULDERS: ("neck", "pelvis"), HIPS: ("pelvis",)}
+SHOULDER_PAIR = ("right_shoulder", "left_shoulder")
+HIP_PAIR = ("right_hip", "left_hip")
+GIRDLE_ANCHORS: Mapping[tuple[str, str], tuple[str, ...]] = {
+    SHOULDER_PAIR: ("neck", "pelvis"),
+    HIP_PAIR: ("pelvis",),
+}
 """Pairs of points, and the points of the trunk from which their place is measured."""
 
-TOGETHER = 1e-6
+SAME_PLACE_METRES = 1e-6
 """Metres within which the origins of joints are one place."""
 
 
@@ -61,7 +64,7 @@ class Structure:
         For each segment of a limb, the bodies that lie between its joints.
     spine : Spine
     girdles : dict
-        For each pair of `GIRDLES`, what carries its two points; none where a point is absent or a mean.
+        For each pair of `GIRDLE_ANCHORS`, what carries its two points; none where a point is absent or a mean.
     """
 
     def __init__(self, model: pin.Model, points: Mapping[str, BodyPoint]) -> None:
@@ -74,7 +77,7 @@ class Structure:
         place = dict(zip(kinematics.names, neutral, strict=True))
         self.girdles = {
             pair: tuple(self._find_girdle(name, anchors, place) for name in pair)
-            for pair, anchors in GIRDLES.items()
+            for pair, anchors in GIRDLE_ANCHORS.items()
         }
 
     def body(self, name: str) -> int | None:
@@ -118,9 +121,9 @@ class Structure:
         movable = [
             joint
             for joint in chain
-            if all(np.linalg.norm(origins[joint] - point) > TOGETHER for point in fixed)
+            if all(np.linalg.norm(origins[joint] - point) > SAME_PLACE_METRES for point in fixed)
         ]
-        near = [joint for joint in chain if np.linalg.norm(origins[joint] - place[name]) <= TOGETHER]
+        near = [joint for joint in chain if np.linalg.norm(origins[joint] - place[name]) <= SAME_PLACE_METRES]
         bodies = [joint for joint in chain if joint not in near]
         if not chain or not movable or (np.any(self._offset(name)) and not near and len(chain) == 1):
             return Girdle(0, body, tuple(bodies))
@@ -140,7 +143,7 @@ class Structure:
         """List, for each segment of a limb, the bodies that lie between its joints."""
         taken: set[int] = set()
         bodies: dict[tuple[str, str], tuple[int, ...]] = {}
-        for start, end in LIMBS:
+        for start, end in LIMB_SEGMENTS:
             first, last = self.body(start), self.body(end)
             found: list[int] = []
             if first is not None and last is not None and first in self._ancestors(last):

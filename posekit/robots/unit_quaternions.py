@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
-UNIT: Final = 1e-6
+SILENT_ERROR: Final = 1e-6
 """How far from 1 the length of a quaternion may be without a word."""
-ROUNDED: Final = 1e-2
+MAX_ROUNDING_ERROR: Final = 1e-2
 """How far it may be for a file that was written with few digits: then it is normalised, with a warning."""
 _ROTATIONS: Final = {
     "JointModelFreeFlyer": (3, 7),
@@ -77,7 +77,7 @@ def check_configurations(model: pin.Model, q: ArrayLike, source: str = "q") -> A
         if end:
             index = model.idx_qs[joint]
             worst = max(worst, _normalise(q[:, index + start : index + end], source, model.names[joint]))
-    if worst > UNIT:
+    if worst > SILENT_ERROR:
         warnings.warn(
             f"{source}: quaternions were up to {worst:.1g} from unit length; they were normalised",
             QuaternionWarning,
@@ -91,11 +91,11 @@ def _normalise(rotations: Array, source: str, joint: str) -> float:
     norm = np.linalg.norm(rotations, axis=1)
     apart = np.abs(norm - 1.0)
     worst = float(apart.max(initial=0.0))
-    if not worst <= ROUNDED:
+    if not worst <= MAX_ROUNDING_ERROR:
         row = int(np.argmax(apart))
         what = "the quaternion" if rotations.shape[1] == 4 else "cosine and sine"
         got = f"{what} of {joint!r} of length {norm[row]:g} in row {row}"
         raise refusal(source, "", got, "length 1", "check the order of q, and normalise it")
-    rounded = apart > UNIT
+    rounded = apart > SILENT_ERROR
     rotations[rounded] /= norm[rounded, None]
     return worst

@@ -19,7 +19,7 @@ from posekit.safe_io.xml_file import MAX_BYTES
 
 MAX_LINKS: Final = 1000
 """The largest published robots have some 150."""
-VERSIONS: Final = ("1.0", "1.1", "1.2")
+URDF_VERSIONS: Final = ("1.0", "1.1", "1.2")
 
 
 def read_urdf(path: str | Path) -> str:
@@ -67,8 +67,8 @@ def check_robot(robot: ElementTree.Element, source: str) -> ElementTree.Element:
     if not robot.get("name"):
         raise refusal(source, "<robot>", "no name", 'a name, as <robot name="mine">', "add it")
     version = robot.get("version", "1.0")
-    if version not in VERSIONS:
-        raise refusal(source, "<robot version=…>", shown(version), " or ".join(VERSIONS), "correct it")
+    if version not in URDF_VERSIONS:
+        raise refusal(source, "<robot version=…>", shown(version), " or ".join(URDF_VERSIONS), "correct it")
     check_tree(robot, source)
     check_numbers(robot, source)
     check_joints(robot, source)

@@ -10,8 +10,8 @@ from posekit.errors import InputError
 from posekit.robots.urdf_numbers import numbers
 from posekit.safe_io import nearest, one_line, refusal, shown
 
-TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-ONCE: Final = ("origin", "axis", "limit", "mimic", "parent", "child")
+JOINT_TYPES: Final = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
+ELEMENTS_ONCE: Final = ("origin", "axis", "limit", "mimic", "parent", "child")
 SHORTEST_AXIS: Final = 1e-6
 UNIT_AXIS: Final = 1e-3
 """How far from 1 the length of a slide's axis may be: readers differ on whether it scales the way."""
@@ -23,11 +23,11 @@ def check_joints(robot: ElementTree.Element, source: str) -> None:
     for name, joint in joints.items():
         place = f"joint {name!r}"
         kind = joint.get("type", "")
-        if kind not in TYPES:
+        if kind not in JOINT_TYPES:
             raise refusal(
-                source, place, f"the type {shown(kind)}", f"one of {', '.join(TYPES)}", "correct it"
+                source, place, f"the type {shown(kind)}", f"one of {', '.join(JOINT_TYPES)}", "correct it"
             )
-        for tag in ONCE:
+        for tag in ELEMENTS_ONCE:
             if len(joint.findall(tag)) > 1:
                 raise refusal(
                     source, place, f"two <{tag}>", "one", "remove the other: readers differ on which"

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 
 from posekit.safe_io import cut, refusal
 
-NUMBERS: Final[dict[str, dict[str, int]]] = {
+NUMBERS_OF_ATTRIBUTE: Final[dict[str, dict[str, int]]] = {
     "origin": {"xyz": 3, "rpy": 3},
     "axis": {"xyz": 3},
     "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
@@ -27,8 +27,8 @@ NUMBERS: Final[dict[str, dict[str, int]]] = {
     "safety_controller": {"soft_lower_limit": 1, "soft_upper_limit": 1, "k_position": 1, "k_velocity": 1},
 }
 """How many numbers each attribute of an element holds."""
-LENGTHS: Final = frozenset(("xyz", "rpy", "size", "radius", "length", "scale"))
-LARGEST: Final = 1e6
+FINITE_ATTRIBUTES: Final = frozenset(("xyz", "rpy", "size", "radius", "length", "scale"))
+MAX_NUMBER: Final = 1e6
 """Lengths (m) and angles beyond this overflow in products."""
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
@@ -46,11 +46,11 @@ def check_numbers(robot: ElementTree.Element, source: str) -> None:
         if "quat_xyzw" in element.attrib:
             got = f"{place} <{element.tag} quat_xyzw=…>"
             raise refusal(source, "", got, "rpy", "write the rotation as rpy: readers differ on quat_xyzw")
-        for attribute, count in NUMBERS[element.tag].items():
+        for attribute, count in NUMBERS_OF_ATTRIBUTE[element.tag].items():
             if attribute in element.attrib:
                 where = f"{place}: <{element.tag} {attribute}=…>"
                 words = element.attrib[attribute].split()
-                _check(words, count, attribute in LENGTHS, where, source)
+                _check(words, count, attribute in FINITE_ATTRIBUTES, where, source)
                 element.set(attribute, " ".join(words))
     for link in robot.findall("link"):
         for inertial in link.findall("inertial"):
@@ -66,7 +66,7 @@ def _elements(robot: ElementTree.Element) -> Iterator[tuple[str, ElementTree.Ele
     for part in robot:
         if part.tag in ("link", "joint"):
             place = f"{part.tag} {part.get('name')!r}"
-            yield from ((place, element) for element in part.iter() if element.tag in NUMBERS)
+            yield from ((place, element) for element in part.iter() if element.tag in NUMBERS_OF_ATTRIBUTE)
 
 
 def _check(words: list[str], count: int, is_length: bool, where: str, source: str) -> None:
@@ -78,8 +78,8 @@ def _check(words: list[str], count: int, is_length: bool, where: str, source: st
     values = [float(word) for word in words]
     if len(values) != count or not all(map(math.isfinite, values)):
         raise refusal(source, where, got, expected, "correct it")
-    if is_length and max(map(abs, values)) > LARGEST:
-        raise refusal(source, where, got, f"at most {LARGEST:,.0f}", "write metres and radians")
+    if is_length and max(map(abs, values)) > MAX_NUMBER:
+        raise refusal(source, where, got, f"at most {MAX_NUMBER:,.0f}", "write metres and radians")
 
 
 def _check_inertial(inertial: ElementTree.Element, place: str, source: str) -> None:
@@ -87,8 +87,8 @@ def _check_inertial(inertial: ElementTree.Element, place: str, source: str) -> N
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or "value" not in mass.attrib:
         raise refusal(source, place, "an inertial without a mass", '<mass value="…"/>', "add it")
-    if inertia is None or any(name not in inertia.attrib for name in NUMBERS["inertia"]):
-        expected = f"<inertia> with {', '.join(NUMBERS['inertia'])}"
+    if inertia is None or any(name not in inertia.attrib for name in NUMBERS_OF_ATTRIBUTE["inertia"]):
+        expected = f"<inertia> with {', '.join(NUMBERS_OF_ATTRIBUTE['inertia'])}"
         raise refusal(source, place, "an inertial without its six moments", expected, "add them")
     if float(mass.attrib["value"]) < 0:
         raise refusal(source, place, f"a mass of {mass.attrib['value']} kg", "none below zero", "correct it")

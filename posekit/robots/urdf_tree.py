@@ -11,7 +11,7 @@ from posekit.safe_io import refusal, shown
 
 MAX_DEPTH: Final = 250
 """Links from the root to a leaf; Pinocchio's reader overflows the stack some 5000 deep."""
-RESERVED: Final = ("universe",)
+RESERVED_NAMES: Final = ("universe",)
 """Joint names that Pinocchio has for itself."""
 
 
@@ -62,6 +62,6 @@ def _check_names(kind: str, names: Iterable[str], source: str) -> None:
     for name, times in Counter(names).items():
         if times > 1:
             raise refusal(source, "", f"{kind} {name!r} {times} times", "each name once", "give each its own")
-        if not (name and name.isprintable()) or (kind == "joint" and name in RESERVED):
-            expected = f"a name that prints, other than {', '.join(RESERVED)}"
+        if not (name and name.isprintable()) or (kind == "joint" and name in RESERVED_NAMES):
+            expected = f"a name that prints, other than {', '.join(RESERVED_NAMES)}"
             raise refusal(source, kind, f"the name {shown(name)}", expected, "rename it")

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Camera, PinholeCamera
-from posekit.cameras.camera import COINCIDENT, Lift
+from posekit.cameras.camera import COINCIDENT_METRES, Lift
 from posekit.geometry import Array
 from posekit.tree.bits import path_of
 
@@ -170,7 +170,7 @@ def _meet(ray: Array, start: Array, length: Array | float, tolerance: float) -> 
     height = np.sqrt(hx * hx + hy * hy + hz * hz)
     excess = height - length
     half = np.sqrt(np.maximum((length - height) * (length + height), 0.0))
-    tangent = half <= COINCIDENT
+    tangent = half <= COINCIDENT_METRES
     half[tangent] = 0.0
     depth = np.empty((*along.shape, 2))
     np.subtract(along, half, out=depth[..., 0])

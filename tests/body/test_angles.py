@@ -8,7 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.body import load_figure
-from posekit.body.angles import FREE, STRAIGHT, WORTH, Limits, ball_angles, direction_angles, limb_angles
+from posekit.body.angles import (
+    FREE_ANGLE_SINE,
+    NEGLIGIBLE_VIOLATION_RADIANS,
+    STRAIGHT_LIMB_SINE,
+    Limits,
+    ball_angles,
+    direction_angles,
+    limb_angles,
+)
 from posekit.skeleton import DOFS, SIDES
 
 FIGURE = load_figure()
@@ -49,16 +57,16 @@ def limb(angles: np.ndarray, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def assert_reproduced(
-    angles: np.ndarray, limits: Limits, *, inside: bool = True, atol: float = 3 * STRAIGHT
+    angles: np.ndarray, limits: Limits, *, inside: bool = True, atol: float = 3 * STRAIGHT_LIMB_SINE
 ) -> np.ndarray:
-    # A bend below STRAIGHT has its axial rotation set to zero: that, and rounding, is all that may differ.
+    # A bend below STRAIGHT_LIMB_SINE has its axial rotation set to zero: that, and rounding, is all that may differ.
     upper, lower = limb(angles, limits.sign)
     found = limb_angles(upper, lower, limits)
     upper_found, lower_found = limb(found, limits.sign)
     np.testing.assert_allclose(upper_found, upper, rtol=0, atol=atol)
     np.testing.assert_allclose(lower_found, lower, rtol=0, atol=atol)
     if inside:
-        assert limits.violation(found).max() <= WORTH
+        assert limits.violation(found).max() <= NEGLIGIBLE_VIOLATION_RADIANS
     return found
 
 
@@ -89,8 +97,8 @@ def test_a_part_inside_its_limits_is_found_exactly(joint: str, at: np.ndarray) -
 @pytest.mark.parametrize("joint", LIMBS)
 @given(angles=st.tuples(*[st.floats(-3.2, 3.2, allow_subnormal=False)] * 4))
 def test_any_limb_is_reproduced(joint: str, angles: tuple[float, ...]) -> None:
-    # Outside the limits a free angle may be turned towards them, and the end moves by less than FREE.
-    assert_reproduced(np.array([angles]), limits_of(joint), inside=False, atol=4 * FREE)
+    # Outside the limits a free angle may be turned towards them, and the end moves by less than FREE_ANGLE_SINE.
+    assert_reproduced(np.array([angles]), limits_of(joint), inside=False, atol=4 * FREE_ANGLE_SINE)
 
 
 @pytest.mark.parametrize("joint", BALLS)
@@ -194,7 +202,10 @@ def test_the_upper_segment_alone_is_never_worse_than_with_the_lower(
     upper, lower = limb(angles, limits.sign)
     two = Limits(sign=limits.sign[:2], lower=limits.lower[:2], upper=limits.upper[:2])
     with_lower = limb_angles(upper, lower, limits)
-    assert (two.violation(direction_angles(upper, limits)) <= limits.violation(with_lower) + WORTH).all()
+    assert (
+        two.violation(direction_angles(upper, limits))
+        <= limits.violation(with_lower) + NEGLIGIBLE_VIOLATION_RADIANS
+    ).all()
 
 
 @pytest.mark.parametrize("joint", LIMBS)
@@ -216,8 +227,8 @@ def test_a_mirrored_limb_has_the_same_angles(joint: str, angles: tuple[float, ..
     np.testing.assert_allclose(right.violation(ours), left.violation(theirs), rtol=0, atol=1e-9)
     # Two equally good answers may be chosen differently; each must be right.
     mirrored = limb(theirs, left.sign)
-    np.testing.assert_allclose(mirrored[0] * mirror, upper, rtol=0, atol=4 * FREE)
-    np.testing.assert_allclose(mirrored[1] * mirror, lower, rtol=0, atol=4 * FREE)
+    np.testing.assert_allclose(mirrored[0] * mirror, upper, rtol=0, atol=4 * FREE_ANGLE_SINE)
+    np.testing.assert_allclose(mirrored[1] * mirror, lower, rtol=0, atol=4 * FREE_ANGLE_SINE)
 
 
 def test_a_mirrored_figure_has_mirrored_angles(rng: np.random.Generator) -> None:

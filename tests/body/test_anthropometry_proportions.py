@@ -18,14 +18,14 @@ from posekit.body.anthropometry import (
     read_lengths,
     write_lengths,
 )
-from posekit.body.anthropometry.body import DIMENSIONS, TRUNK, dimensions_of, lengths_of
+from posekit.body.anthropometry.body import BODY_DIMENSIONS, TRUNK_LENGTH, dimensions_of, lengths_of
 from posekit.body.lengths import hips_points, torso_points
 from posekit.body.stature import lengths_from_stature
 from posekit.errors import FigureError, InputError
 from posekit.skeleton import SEGMENT_NAMES
 from posekit.tables.lengths import BOTH_SIDES
 
-FACTORS = st.lists(st.floats(0.7, 1.3), min_size=len(DIMENSIONS), max_size=len(DIMENSIONS))
+FACTORS = st.lists(st.floats(0.7, 1.3), min_size=len(BODY_DIMENSIONS), max_size=len(BODY_DIMENSIONS))
 
 
 @pytest.mark.parametrize("name", proportion_names())
@@ -107,7 +107,9 @@ def test_deviations_of_the_torso_follow_from_the_dimensions() -> None:
     for _ in range(2000):
         factors = np.exp(draw.normal(size=2) * [0.12, 0.05])
         changed = base | {"right_shoulder-left_shoulder": base["right_shoulder-left_shoulder"] * factors[0]}
-        samples.append(lengths_of(changed | {TRUNK: base[TRUNK] * factors[1]}, reference)["neck-pelvis"])
+        samples.append(
+            lengths_of(changed | {TRUNK_LENGTH: base[TRUNK_LENGTH] * factors[1]}, reference)["neck-pelvis"]
+        )
     assert whole.deviation["neck-pelvis"] == pytest.approx(np.std(samples), rel=0.1)
 
 

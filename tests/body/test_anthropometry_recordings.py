@@ -8,15 +8,22 @@ from scipy import integrate
 
 from posekit.body import Figure, load_figure
 from posekit.body.anthropometry import lengths_from_postures, lengths_from_proportions, lengths_from_views
-from posekit.body.anthropometry.body import DIMENSIONS, LIMBS, TRUNK, dimensions_of, lengths_of, limb
-from posekit.body.anthropometry.foreshortening import OUTLIERS, cosine_variance, log_density
+from posekit.body.anthropometry.body import (
+    BODY_DIMENSIONS,
+    LIMB_PARTS,
+    TRUNK_LENGTH,
+    dimensions_of,
+    lengths_of,
+    limb,
+)
+from posekit.body.anthropometry.foreshortening import OUTLIER_SHARE, cosine_variance, log_density
 from posekit.body.anthropometry.independent import independent_frames, unlike_neighbours
 from posekit.errors import FigureError, InputError
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SIDES
 from posekit.synthesis.random_postures import random_views
 from posekit.synthesis.walker import Walker
 
-LIMB_NAMES = tuple(limb(side, part) for part in LIMBS for side in SIDES)
+LIMB_NAMES = tuple(limb(side, part) for part in LIMB_PARTS for side in SIDES)
 INSIDE = [JOINT["neck"], JOINT["pelvis"]]
 
 
@@ -24,12 +31,12 @@ def somebody(seed: int, *, alike: bool = True) -> tuple[Figure, float]:
     """Make a person of other proportions than the tables', and their stature."""
     draw = np.random.default_rng(seed)
     dimensions = dimensions_of(lengths_from_proportions("drillis-contini", 1.75).lengths)
-    for part in LIMBS:
+    for part in LIMB_PARTS:
         factors = np.exp(0.06 * draw.normal(size=2))
         for side, factor in zip(SIDES, factors[[0, 0]] if alike else factors, strict=True):
             dimensions[limb(side, part)] *= factor
     stack = sum(dimensions[limb(side, part)] for side in SIDES for part in ("thigh", "shank")) / 2
-    stature = (stack + dimensions[TRUNK]) / (0.245 + 0.246 + 0.288)
+    stature = (stack + dimensions[TRUNK_LENGTH]) / (0.245 + 0.246 + 0.288)
     return load_figure().scaled(lengths_of(dimensions, dict(load_figure().lengths))), stature
 
 
@@ -120,7 +127,7 @@ def test_recordings_of_nobody_are_refused(joints: np.ndarray, says: str) -> None
 def test_the_density_is_one(concentration: float, noise: float) -> None:
     x = np.linspace(0, 4, 40_001)
     density = np.exp(log_density(x, np.full_like(x, noise), concentration))
-    tail = OUTLIERS * 2 / np.pi * (np.pi / 2 - np.arctan(4.0))
+    tail = OUTLIER_SHARE * 2 / np.pi * (np.pi / 2 - np.arctan(4.0))
     assert np.trapezoid(density, x) + tail == pytest.approx(1, abs=0.004)
 
 
@@ -132,8 +139,8 @@ def test_the_density_is_that_of_isotropic_directions(noise: float, rng: np.rando
     middles = (edges[1:] + edges[:-1]) / 2
     fine = np.stack([middles - 0.0167, middles, middles + 0.0167])
     expected = np.exp(log_density(fine, np.full_like(fine, noise))).mean(axis=0)
-    expected -= OUTLIERS * 2 / np.pi / (1 + middles**2)
-    observed = (1 - OUTLIERS) * counts / len(c) / 0.05
+    expected -= OUTLIER_SHARE * 2 / np.pi / (1 + middles**2)
+    observed = (1 - OUTLIER_SHARE) * counts / len(c) / 0.05
     np.testing.assert_allclose(expected, observed, atol=0.06)
 
 
@@ -222,7 +229,7 @@ def test_a_figure_can_be_made_of_what_is_found() -> None:
     assert all(0 <= share <= 1 for share in views.learned.values())
     made = load_figure().scaled(views.lengths.lengths)
     assert dict(made.lengths) == pytest.approx(dict(views.lengths.lengths), abs=1e-9)
-    for part in LIMBS:  # left and right are equal unless told otherwise
+    for part in LIMB_PARTS:  # left and right are equal unless told otherwise
         assert views.lengths.lengths[limb("left", part)] == views.lengths.lengths[limb("right", part)]
 
 
@@ -358,4 +365,4 @@ def test_random_points_do_no_harm() -> None:
 
 
 def test_dimensions_are_named_after_segments() -> None:
-    assert set(DIMENSIONS) - {TRUNK} < set(SEGMENT_NAMES)
+    assert set(BODY_DIMENSIONS) - {TRUNK_LENGTH} < set(SEGMENT_NAMES)

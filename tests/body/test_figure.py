@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.body import Figure, load_figure, with_head
-from posekit.body.figure import FRAMES
+from posekit.body.figure import LINK_OF_POINT
 from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import FigureError
 from posekit.geometry import quaternion_from_rotation
@@ -223,7 +223,7 @@ class TestForwardKinematics:
         for row, expected in zip(q, points, strict=True):
             angles = row[FIGURE.angle_index]
             robot.update_cfg({urdf_joint_name(dof): a for dof, a in zip(DOFS, angles, strict=True)})
-            links = [FRAMES.get(name, name) for name in POINTS]
+            links = [LINK_OF_POINT.get(name, name) for name in POINTS]
             local = np.array([robot.get_transform(link, "torso")[:3, 3] for link in links])
             R = pin.Quaternion(row[3:7]).toRotationMatrix()
             np.testing.assert_allclose(local @ R.T + row[:3], expected, rtol=0, atol=1e-12)
@@ -244,7 +244,7 @@ class TestForwardKinematics:
                 data.qpos[model.joint(urdf_joint_name(dof)).qposadr[0]] = angle
             mujoco.mj_kinematics(model, data)
             for k, name in enumerate(POINTS[1:], start=1):
-                place = data.body(FRAMES.get(name, name)).xpos
+                place = data.body(LINK_OF_POINT.get(name, name)).xpos
                 np.testing.assert_allclose(place, expected[k], rtol=0, atol=1e-12)
 
     def test_mujoco_refuses_bodies_without_mass(self) -> None:

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import Figure, load_figure
-from posekit.body.figure import FRAMES
+from posekit.body.figure import LINK_OF_POINT
 from posekit.skeleton import POINTS
 
 FIGURES = {
@@ -17,7 +17,7 @@ FIGURES = {
 
 def by_pinocchio(figure: Figure, q: np.ndarray) -> np.ndarray:
     data = figure.model.createData()
-    frames = [figure.model.getFrameId(FRAMES.get(name, name)) for name in POINTS]
+    frames = [figure.model.getFrameId(LINK_OF_POINT.get(name, name)) for name in POINTS]
     points = np.empty((len(q), len(POINTS), 3))
     for k, row in enumerate(q):
         pin.framesForwardKinematics(figure.model, data, row)

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.cameras import Lift, PinholeCamera
-from posekit.cameras.camera import COINCIDENT, meet_sphere
+from posekit.cameras.camera import COINCIDENT_METRES, meet_sphere
 
 CAMERA = PinholeCamera(K=np.array([[1500.0, 0, 960], [0, 1500, 540], [0, 0, 1]]))
 AHEAD = np.array([[0.0, 0.0, 1.0]])
@@ -50,7 +50,7 @@ def test_the_true_end_is_among_the_two(rng: np.random.Generator) -> None:
     gap = np.linalg.norm(lifted.points - end[:, None], axis=-1)
     gap[~lifted.valid] = np.inf
     # Near a tangent ray the depth is only known to the root of the rounding.
-    assert gap.min(axis=1).max() < 2 * COINCIDENT
+    assert gap.min(axis=1).max() < 2 * COINCIDENT_METRES
 
 
 def test_the_ends_are_the_roots_of_the_papers_quadratic(rng: np.random.Generator) -> None:
@@ -76,7 +76,7 @@ def test_a_ray_that_touches_the_sphere_has_one_end() -> None:
     assert abs(lifted.excess[0]) < 1e-12
 
 
-@pytest.mark.parametrize(("half", "solutions"), [(0.5 * COINCIDENT, 1), (2 * COINCIDENT, 2)])
+@pytest.mark.parametrize(("half", "solutions"), [(0.5 * COINCIDENT_METRES, 1), (2 * COINCIDENT_METRES, 2)])
 def test_ends_too_near_to_tell_apart_count_as_one(half: float, solutions: int) -> None:
     start = np.array([[0.0, 0.25, 0.0]])
     length = np.array([np.hypot(0.25, half)])

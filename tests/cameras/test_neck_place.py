@@ -11,8 +11,8 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck import NeckPlacement, place
 from posekit.cameras.neck.cover import cover, meet
-from posekit.cameras.neck.place import MOST, REACH
-from posekit.cameras.neck.suggestion import SUFFICES
+from posekit.cameras.neck.place import MAX_NECKS, REACH_METRES
+from posekit.cameras.neck.suggestion import SUFFICIENT_DEVIATION_METRES
 from posekit.errors import InputError
 from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, SyntheticScene, random_views, seq1, seq2
@@ -69,7 +69,7 @@ def test_auto_takes_the_head_where_it_suffices_then_the_torso_then_the_search() 
     assert {found.method for found in search} >= {"search"}
     for found in by_head + torso + search:
         if found.method in ("head", "torso"):
-            assert found.deviation <= SUFFICES[found.method]
+            assert found.deviation <= SUFFICIENT_DEVIATION_METRES[found.method]
         before = {"head": 0, "torso": 1, "search": 2}[found.method]
         assert len(found.notes) == before
         assert all("does not suffice" in note or "is not used" in note for note in found.notes)
@@ -85,7 +85,7 @@ def test_with_noise_some_neck_is_within_a_step_of_the_truth(noise: float) -> Non
     near = np.mean([chosen_near(one, depth) for one, depth in zip(found, depths, strict=True)])
     assert retained > 0.94
     assert near > 0.92
-    assert max(len(one.necks) for one in found) <= MOST
+    assert max(len(one.necks) for one in found) <= MAX_NECKS
 
 
 def test_every_neck_is_on_its_ray_and_in_an_interval_and_as_far_off_as_told() -> None:
@@ -99,7 +99,7 @@ def test_every_neck_is_on_its_ray_and_in_an_interval_and_as_far_off_as_told() ->
         low, high = found.intervals.T
         for depth in np.concatenate([np.linspace(a, b, 50) for a, b in zip(low, high, strict=True)]):
             assert np.abs(found.depths - depth).min() <= found.step + 1e-9
-        assert found.step <= REACH or len(found.necks) >= MOST - 2
+        assert found.step <= REACH_METRES or len(found.necks) >= MAX_NECKS - 2
         curve = found.curve[np.isfinite(found.curve[:, 1])]
         assert found.minima[0, 1] <= curve[:, 1].min() + 1e-12
         assert found.residual == found.minima[0, 1]

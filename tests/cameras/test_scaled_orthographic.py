@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from posekit.cameras import Lift, ScaledOrthographicCamera
-from posekit.cameras.camera import COINCIDENT
+from posekit.cameras.camera import COINCIDENT_METRES
 from posekit.errors import CameraError
 
 CAMERA = ScaledOrthographicCamera(scale=200.0)
@@ -69,7 +69,7 @@ def test_the_true_end_is_among_the_two(rng: np.random.Generator) -> None:
     lifted = CAMERA.lift(start, CAMERA.project(end), length, tolerance=0.0)
     gap = np.linalg.norm(lifted.points - end[:, None], axis=-1)
     gap[~lifted.valid] = np.inf
-    assert gap.min(axis=1).max() < 2 * COINCIDENT
+    assert gap.min(axis=1).max() < 2 * COINCIDENT_METRES
 
 
 def test_near_and_far_are_mirror_images_in_the_plane_of_the_start(rng: np.random.Generator) -> None:
@@ -98,7 +98,7 @@ def test_a_segment_that_shows_its_length_has_one_end() -> None:
 
 
 @pytest.mark.parametrize("length", [0.25, 20.0])
-@pytest.mark.parametrize(("half", "solutions"), [(0.5 * COINCIDENT, 1), (2 * COINCIDENT, 2)])
+@pytest.mark.parametrize(("half", "solutions"), [(0.5 * COINCIDENT_METRES, 1), (2 * COINCIDENT_METRES, 2)])
 def test_ends_too_near_to_tell_apart_count_as_one(length: float, half: float, solutions: int) -> None:
     # Relative lengths may be large, and so is then what rounding leaves of the depth.
     half *= max(1.0, length)

@@ -86,7 +86,7 @@ def test_heads_in_blocks_are_placed_as_all_at_once(threads: int, monkeypatch: py
     image = camera.project(head_points_cam(R, t, TABLE_A2)) + generator.normal(0.0, 0.1, (23, 6, 2))
     image[4, 2], image[11] = np.nan, 0.0
     whole = solve_pose(TABLE_A2, image, camera)
-    monkeypatch.setattr(blocks, "BLOCK", 5)
+    monkeypatch.setattr(blocks, "BLOCK_HEADS", 5)
     parts = solve_pose(TABLE_A2, image, camera, threads=threads)
     assert parts.reasons == whole.reasons
     assert parts.misfit == whole.misfit

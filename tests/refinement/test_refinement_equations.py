@@ -174,12 +174,12 @@ def pinocchio_jacobian(q: np.ndarray) -> np.ndarray:
     data = model.createData()
     pin.computeJointJacobians(model, data, q)
     pin.framesForwardKinematics(model, data, q)
-    from posekit.body.figure import FRAMES
+    from posekit.body.figure import LINK_OF_POINT
 
     return np.array(
         [
             pin.getFrameJacobian(
-                model, data, model.getFrameId(FRAMES.get(name, name)), pin.LOCAL_WORLD_ALIGNED
+                model, data, model.getFrameId(LINK_OF_POINT.get(name, name)), pin.LOCAL_WORLD_ALIGNED
             )[:3]
             for name in JOINTS
         ]

@@ -19,12 +19,12 @@ from posekit.robots.joint_map import load_joint_map, postures_of, targets_of
 from posekit.robots.kinematics import BodyPoint, Kinematics, Site
 from posekit.robots.scaling import model_lengths, scaled, segment_lengths
 from posekit.robots.stretching import shoulders_are_behind
-from posekit.robots.structure import LIMBS
+from posekit.robots.structure import LIMB_SEGMENTS
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, segment_name
 from posekit.synthesis import random_postures
 
 MODELS = ("stick_figure", "human", "simple_humanoid", "g1", "talos")
-LIMB_NAMES = tuple(segment_name((JOINT[a], JOINT[b])) for a, b in LIMBS)
+LIMB_NAMES = tuple(segment_name((JOINT[a], JOINT[b])) for a, b in LIMB_SEGMENTS)
 PERSON = {  # a plausible one, the two sides a little different
     "neck-right_shoulder": 0.19,
     "neck-left_shoulder": 0.195,
@@ -91,7 +91,7 @@ def test_a_limb_keeps_its_ratio_in_every_configuration(name: str, rng: np.random
     )
     places = [dict(zip(k.names, k.positions(q).transpose(1, 0, 2), strict=True)) for k in (before, after)]
     old = model_lengths(before)
-    for start, end in LIMBS:
+    for start, end in LIMB_SEGMENTS:
         first, second = (np.linalg.norm(place[start] - place[end], axis=1) for place in places)
         limb = segment_name((JOINT[start], JOINT[end]))
         np.testing.assert_allclose(second / first, PERSON[limb] / old[limb], rtol=1e-9)

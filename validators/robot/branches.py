@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.robots.configuration_space import HINGES
+from posekit.robots.configuration_space import HINGE_MODELS
 from posekit.validators.robot.subject import Subject
 
 SAME_METRES = 1e-9
@@ -76,7 +76,7 @@ class Branches:
         return tuple(found)
 
     def _is_hinge(self, joint: int) -> bool:
-        return self.subject.model.joints[joint].shortname() in HINGES
+        return self.subject.model.joints[joint].shortname() in HINGE_MODELS
 
     def _second_solution(self, chain: tuple[int, int, int]) -> BallRotations | None:
         model = self.subject.model

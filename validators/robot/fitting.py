@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.robots.descent import MAX_STEPS, KinematicProblem, descend
-from posekit.robots.ik import PULL, InverseKinematics
+from posekit.robots.ik import REFERENCE_PULL, InverseKinematics
 from posekit.robots.kinematics import Kinematics
 from posekit.validators.robot.branches import Branches
 from posekit.validators.robot.flips import Flip, find_flips
@@ -224,7 +224,7 @@ class Fitter:
             lower=lower,
             upper=upper,
             reference=reference,
-            pull=PULL,
+            pull=REFERENCE_PULL,
         )
 
     def _residual(self, q: Array, targets: Array) -> Array:

@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.robots.configuration_space import HINGES
+from posekit.robots.configuration_space import HINGE_MODELS
 from posekit.robots.kinematics import Kinematics
 
 GRID_ANGLES: Final = 720
@@ -47,7 +47,7 @@ def find_flips(kinematics: Kinematics) -> tuple[Flip, ...]:
     flips = []
     for joint in range(2, model.njoints):
         above = model.parents[joint]
-        hinges = all(model.joints[k].shortname() in HINGES for k in (above, joint))
+        hinges = all(model.joints[k].shortname() in HINGE_MODELS for k in (above, joint))
         moved = kinematics.moved_by[:, model.idx_vs[joint]] if hinges else np.zeros(0, dtype=np.bool_)
         if not moved.any():
             continue

@@ -15,7 +15,7 @@ from posekit.robots import Robot
 from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.pairs import set_pairs
-from posekit.robots.scaling import BOUNDS, model_lengths, scaled
+from posekit.robots.scaling import RATIO_BOUNDS, model_lengths, scaled
 from posekit.validators.robot.balance import Balance
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.feet import find_soles
@@ -139,7 +139,7 @@ class Models:
         """Tell whether the model can be scaled to such lengths: what has no size, or a giant's, is no body."""
         own = model_lengths(self.kinematics)
         ratios = [lengths.get(name, length) / length for name, length in own.items() if length > 0]
-        return all(BOUNDS[0] < ratio < BOUNDS[1] for ratio in ratios)
+        return all(RATIO_BOUNDS[0] < ratio < RATIO_BOUNDS[1] for ratio in ratios)
 
     @cached_property
     def _rigid_segments(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from posekit.body.capsules import AXES
+from posekit.body.capsules import CAPSULE_AXES
 from posekit.skeleton import HIPS, JOINT, TORSO
 
 RIGID_JOINTS = {"torso": TORSO, "hips": HIPS}
@@ -42,8 +42,8 @@ def culprit(reason: str) -> Culprit:
     if words[-1] in ("knees", "standing_leg"):
         return Culprit(joints=KNEE_JOINTS)
     parts = [part for word in words for part in word.split("-")]
-    links = tuple(part for part in parts if part in AXES)
-    joints = [name for part in parts if part not in AXES for name in _joints(part)]
+    links = tuple(part for part in parts if part in CAPSULE_AXES)
+    joints = [name for part in parts if part not in CAPSULE_AXES for name in _joints(part)]
     return Culprit(links=links, joints=tuple(dict.fromkeys(joints)))
 
 

@@ -11,31 +11,36 @@ import numpy as np
 
 from posekit.body import load_figure
 from posekit.body.lengths import check_lengths, hips_points, torso_points
-from posekit.body.stature import SHORTEST, TALLEST
+from posekit.body.stature import MAX_STATURE_METRES, MIN_STATURE_METRES
 from posekit.errors import FigureError, InputError
 from posekit.geometry import Array
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS, SIDES, segment_name
 
-LIMBS: Final = {
+LIMB_PARTS: Final = {
     "upper_arm": ("shoulder", "elbow"),
     "forearm": ("elbow", "wrist"),
     "thigh": ("hip", "knee"),
     "shank": ("knee", "ankle"),
 }
 """The joints at the ends of each part of a limb."""
-SHOULDERS: Final = "right_shoulder-left_shoulder"
-HIPS: Final = "right_hip-left_hip"
-TRUNK: Final = "trunk"
+SHOULDER_WIDTH: Final = "right_shoulder-left_shoulder"
+HIP_WIDTH: Final = "right_hip-left_hip"
+TRUNK_LENGTH: Final = "trunk"
 """From the middle of the shoulders to the middle of the hips; the figure has no such segment."""
 
 
 def limb(side: str, part: str) -> str:
     """Name the segment of a part of a limb: ``limb("right", "forearm")`` is ``right_elbow-right_wrist``."""
-    upper, lower = LIMBS[part]
+    upper, lower = LIMB_PARTS[part]
     return f"{side}_{upper}-{side}_{lower}"
 
 
-DIMENSIONS: Final = (*(limb(side, part) for part in LIMBS for side in SIDES), SHOULDERS, HIPS, TRUNK)
+BODY_DIMENSIONS: Final = (
+    *(limb(side, part) for part in LIMB_PARTS for side in SIDES),
+    SHOULDER_WIDTH,
+    HIP_WIDTH,
+    TRUNK_LENGTH,
+)
 """What is enough for the 17 lengths: eight limbs, two widths and the trunk."""
 
 
@@ -83,9 +88,9 @@ class SegmentLengths:
 
 def check_stature(stature: float) -> None:
     """Refuse a stature that is no person's in metres."""
-    if not (np.isfinite(stature) and SHORTEST <= stature <= TALLEST):
+    if not (np.isfinite(stature) and MIN_STATURE_METRES <= stature <= MAX_STATURE_METRES):
         raise FigureError(
-            f"stature is {stature:g} m; expected {SHORTEST} to {TALLEST} m; is it in another unit?"
+            f"stature is {stature:g} m; expected {MIN_STATURE_METRES} to {MAX_STATURE_METRES} m; is it in another unit?"
         )
 
 
@@ -102,7 +107,9 @@ def dimensions_of(lengths: Mapping[str, float]) -> dict[str, float]:
     """Return the dimensions of a body of 17 lengths; the trunk as it is at the neutral posture."""
     torso, hips = torso_points(lengths), hips_points(lengths)
     middle = (torso[1] + torso[2]) / 2 - (torso[3] + (hips[1] + hips[2]) / 2)
-    return {name: lengths[name] for name in DIMENSIONS[:-1]} | {TRUNK: float(np.linalg.norm(middle))}
+    return {name: lengths[name] for name in BODY_DIMENSIONS[:-1]} | {
+        TRUNK_LENGTH: float(np.linalg.norm(middle))
+    }
 
 
 def lengths_of(dimensions: Mapping[str, float], reference: Mapping[str, float]) -> dict[str, float]:
@@ -114,7 +121,7 @@ def lengths_of(dimensions: Mapping[str, float], reference: Mapping[str, float]) 
     Parameters
     ----------
     dimensions : mapping
-        Metres, by `DIMENSIONS`.
+        Metres, by `BODY_DIMENSIONS`.
     reference : mapping
         The 17 lengths of the body whose torso gives the shape, metres.
 
@@ -124,11 +131,11 @@ def lengths_of(dimensions: Mapping[str, float], reference: Mapping[str, float]) 
         Metres, by segment name.
     """
     torso, hips = torso_points(reference), hips_points(reference)
-    across = dimensions[SHOULDERS] / (torso[2, 1] - torso[1, 1])
+    across = dimensions[SHOULDER_WIDTH] / (torso[2, 1] - torso[1, 1])
     torso *= [across, across, 1.0]
-    hips *= [1.0, dimensions[HIPS] / (hips[2, 1] - hips[1, 1]), 1.0]
+    hips *= [1.0, dimensions[HIP_WIDTH] / (hips[2, 1] - hips[1, 1]), 1.0]
     middle = (torso[1] + torso[2]) / 2 - (torso[3] + (hips[1] + hips[2]) / 2)
-    height = np.sqrt(max(dimensions[TRUNK] ** 2 - middle[0] ** 2 - middle[1] ** 2, 0.0))
+    height = np.sqrt(max(dimensions[TRUNK_LENGTH] ** 2 - middle[0] ** 2 - middle[1] ** 2, 0.0))
     along = height / middle[2]
     torso[:, 2] *= along
     hips[:, 2] *= along
@@ -154,7 +161,7 @@ def completed(
     Parameters
     ----------
     dimensions : mapping
-        Metres, by `DIMENSIONS`.
+        Metres, by `BODY_DIMENSIONS`.
     covariance : array (11, 11)
         Of the logarithms of the dimensions.
     reference : mapping
@@ -170,8 +177,8 @@ def completed(
     lengths = lengths_of(dimensions, reference)
     step = 1e-5
     values = np.array([lengths[name] for name in SEGMENT_NAMES])
-    slopes = np.empty((len(SEGMENT_NAMES), len(DIMENSIONS)))
-    for column, name in enumerate(DIMENSIONS):
+    slopes = np.empty((len(SEGMENT_NAMES), len(BODY_DIMENSIONS)))
+    for column, name in enumerate(BODY_DIMENSIONS):
         moved = lengths_of({**dimensions, name: dimensions[name] * (1 + step)}, reference)
         slopes[:, column] = (np.array([moved[one] for one in SEGMENT_NAMES]) - values) / step
     variance = np.einsum("ij,jk,ik->i", slopes, covariance, slopes)

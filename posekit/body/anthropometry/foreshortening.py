@@ -15,15 +15,15 @@ import numpy as np
 
 from posekit.geometry import Array
 
-OUTLIERS: Final = 0.02
+OUTLIER_SHARE: Final = 0.02
 """Share of lengths that have nothing to do with the segment: swapped sides, another person's limb."""
-NOISE: Final = np.geomspace(0.01, 0.8, 32)
+NOISE_GRID: Final = np.geomspace(0.01, 0.8, 32)
 """Relative noise at which the density is tabulated."""
-STEP: Final = 0.004
-LONGEST: Final = 4.0
-NODES: Final = 240
+DENSITY_STEP: Final = 0.004
+MAX_RATIO: Final = 4.0
+N_NODES: Final = 240
 
-_LOG_NOISE = np.log(NOISE)
+_LOG_NOISE = np.log(NOISE_GRID)
 _NOISE_STEP = float(_LOG_NOISE[1] - _LOG_NOISE[0])
 
 
@@ -46,11 +46,11 @@ def log_density(seen: Array, noise: Array, concentration: float = 0.0) -> Array:
         NaN where `seen` is.
     """
     table = _table(float(concentration))
-    column = np.clip(seen, 0.0, LONGEST - STEP) / STEP
-    row = (np.log(np.clip(noise, NOISE[0], NOISE[-1])) - _LOG_NOISE[0]) / _NOISE_STEP
+    column = np.clip(seen, 0.0, MAX_RATIO - DENSITY_STEP) / DENSITY_STEP
+    row = (np.log(np.clip(noise, NOISE_GRID[0], NOISE_GRID[-1])) - _LOG_NOISE[0]) / _NOISE_STEP
     known = np.isfinite(column)
     left = np.where(known, column, 0.0).astype(np.intp)
-    above = np.minimum(row, len(NOISE) - 1 - 1e-9).astype(np.intp)
+    above = np.minimum(row, len(NOISE_GRID) - 1 - 1e-9).astype(np.intp)
     u, v = column - left, row - above
     width = table.shape[1]
     flat = table.ravel()
@@ -69,7 +69,7 @@ def cosine_variance(concentration: float) -> float:
 
 def _directions(concentration: float) -> tuple[Array, Array]:
     """Return cosines from 0 to 1, and the share of directions that has each."""
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    nodes, weights = np.polynomial.legendre.leggauss(N_NODES)
     c = (nodes + 1) / 2
     # The largest exponent is taken out: a strong concentration would overflow.
     exponent = -concentration * c * c
@@ -82,13 +82,13 @@ def _table(concentration: float) -> Array:
     """Tabulate the logarithm (32, 1001) over noise and x."""
     c, share = _directions(concentration)
     full = np.sqrt(1 - c * c)
-    x = np.arange(0.0, LONGEST + STEP / 2, STEP)
-    table = np.empty((len(NOISE), len(x)))
-    for row, noise in enumerate(NOISE):
+    x = np.arange(0.0, MAX_RATIO + DENSITY_STEP / 2, DENSITY_STEP)
+    table = np.empty((len(NOISE_GRID), len(x)))
+    for row, noise in enumerate(NOISE_GRID):
         # Lengths are not negative: what noise pushes below zero comes back.
         bells = np.exp(-0.5 * ((x[:, None] - full) / noise) ** 2)
         bells += np.exp(-0.5 * ((x[:, None] + full) / noise) ** 2)
         density = bells @ share / (noise * np.sqrt(2 * np.pi))
-        table[row] = np.log((1 - OUTLIERS) * density + OUTLIERS * 2 / (np.pi * (1 + x * x)))
+        table[row] = np.log((1 - OUTLIER_SHARE) * density + OUTLIER_SHARE * 2 / (np.pi * (1 + x * x)))
     table.flags.writeable = False
     return table

@@ -8,12 +8,12 @@ import numpy as np
 
 from posekit.geometry import Array
 
-FADED: Final = 0.05
+STRANGER_CORRELATION: Final = 0.05
 """Correlation at which neighbours count as strangers."""
-ALIKE: Final = 0.15
+ALIKE_DIFFERENCE: Final = 0.15
 """Root mean square of the differences of squared cosines at which two frames show the same; among isotropic ones it is
 0.42."""
-ENOUGH: Final = 0.5
+ENOUGH_VARIANCE: Final = 0.5
 """Share of the usual variance at which a segment has turned enough: samples scatter, and so does the noise."""
 
 
@@ -45,13 +45,13 @@ def independent_frames(squared_cosine: Array, noise: Array, usual: Array) -> Arr
     blur = np.where(known, noise, 0.0).sum(axis=0) / np.maximum(count, 1)
     neighbours, variance = unlike_neighbours(squared_cosine, blur)
     neighbours = np.minimum(neighbours, unlike_frames(squared_cosine))
-    shared = np.clip(1 - variance / (ENOUGH * usual), 0.0, 1.0)
+    shared = np.clip(1 - variance / (ENOUGH_VARIANCE * usual), 0.0, 1.0)
     more = np.maximum(neighbours, 1.0) - 1
     return np.where(count > 0, np.maximum(neighbours / (1 + more * shared), 1.0), 0.0)
 
 
 def unlike_frames(squared_cosine: Array) -> int:
-    """Count frames less those that repeat any earlier one: their squared cosines (T, M) are within `ALIKE` of it."""
+    """Count frames less those that repeat an earlier one, their squared cosines (T, M) within `ALIKE_DIFFERENCE`."""
     known = np.isfinite(squared_cosine)
     values = np.where(known, squared_cosine, 0.0)
     left = known.any(axis=1)
@@ -61,7 +61,7 @@ def unlike_frames(squared_cosine: Array) -> int:
         both = known & known[one]
         off = np.where(both, values - values[one], 0.0)
         # A frame that shares no segment with this one repeats nothing of it.
-        apart = (off * off).sum(axis=1) > ALIKE**2 * both.sum(axis=1)
+        apart = (off * off).sum(axis=1) > ALIKE_DIFFERENCE**2 * both.sum(axis=1)
         left &= apart | ~both.any(axis=1)
         left[one] = False
         count += 1
@@ -101,7 +101,7 @@ def unlike_neighbours(values: Array, noise: Array) -> tuple[Array, Array]:
         pairs = (known[lag:] & known[:-lag]).sum(axis=0)
         covariance = (off[lag:] * off[:-lag]).sum(axis=0) / np.maximum(pairs, 1)
         correlation = np.divide(covariance, variance, out=np.zeros_like(variance), where=some)
-        alike = alike & (correlation >= FADED) & (pairs > 0)
+        alike = alike & (correlation >= STRANGER_CORRELATION) & (pairs > 0)
         if not alike.any():
             break
         total += 2 * np.where(alike, np.minimum(correlation, 1.0), 0.0)

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from posekit.body.anthropometry.body import (
-    DIMENSIONS,
-    TRUNK,
+    BODY_DIMENSIONS,
+    TRUNK_LENGTH,
     SegmentLengths,
     completed,
     dimensions_of,
@@ -23,9 +23,9 @@ from posekit.errors import FigureError, InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS, SIDES
 
-NORMAL: Final = 1.4826
+DEVIATION_OF_MAD: Final = 1.4826
 """Standard deviation of a normal distribution over its median absolute deviation."""
-MEDIAN: Final = float(np.sqrt(np.pi / 2))
+DEVIATION_OF_MEDIAN: Final = float(np.sqrt(np.pi / 2))
 """Standard deviation of a median over that of a mean."""
 USUAL_STATURE: Final = 1.70
 SHORTEST_SEGMENT, LONGEST_SEGMENT = 0.01, 2.0
@@ -99,7 +99,7 @@ def lengths_from_postures(
         raise InputError("joints: got an infinite coordinate; expected finite numbers, NaN where missing")
     starts, ends = np.array(SEGMENTS).T
     distance = np.linalg.norm(points[:, starts] - points[:, ends], axis=-1)
-    names = (*SEGMENT_NAMES, TRUNK)
+    names = (*SEGMENT_NAMES, TRUNK_LENGTH)
     shoulders, hips = (
         points[:, [JOINT[f"{side}_{joint}"] for side in SIDES]].mean(axis=1) for joint in ("shoulder", "hip")
     )
@@ -116,7 +116,7 @@ def lengths_from_postures(
             )
     lengths = _completed(seen, found, deviation, stature, proportions, reference)
     count = np.isfinite(distance).sum(axis=0)
-    segments = {name: k for name, k in seen.items() if name != TRUNK}
+    segments = {name: k for name, k in seen.items() if name != TRUNK_LENGTH}
     return PostureLengths(
         lengths=lengths,
         spread={name: float(scatter[k]) for name, k in segments.items()},
@@ -133,10 +133,10 @@ def _robust(distance: Array) -> tuple[Array, Array, Array]:
         if len(values) == 0:
             continue
         middle = float(np.median(values))
-        tau = NORMAL * float(np.median(np.abs(values - middle)))
+        tau = DEVIATION_OF_MAD * float(np.median(np.abs(values - middle)))
         found[k] = (middle + np.sqrt(max(middle**2 - 4 * tau**2, 0.0))) / 2
         scatter[k] = tau
-        deviation[k] = MEDIAN * tau / np.sqrt(max(count[k], 1.0))
+        deviation[k] = DEVIATION_OF_MEDIAN * tau / np.sqrt(max(count[k], 1.0))
     return found, deviation, scatter
 
 
@@ -155,11 +155,11 @@ def _completed(
     )
     dimensions = dimensions_of(prior.lengths)
     relative = spread(proportions)
-    inside = [name for name in DIMENSIONS if name in seen]
+    inside = [name for name in BODY_DIMENSIONS if name in seen]
     if stature is None and inside:
         size = float(np.median([found[seen[name]] / dimensions[name] for name in inside]))
         dimensions = {name: size * length for name, length in dimensions.items()}
-    for k, name in enumerate(DIMENSIONS):
+    for k, name in enumerate(BODY_DIMENSIONS):
         if name in seen:
             dimensions[name] = float(found[seen[name]])
             relative[k] = deviation[seen[name]] / dimensions[name]
@@ -171,7 +171,7 @@ def _completed(
         lengths = exact
         off |= {name: float(deviation[seen[name]]) for name in measured}
     else:
-        measured = tuple(name for name in measured if name in DIMENSIONS)
+        measured = tuple(name for name in measured if name in BODY_DIMENSIONS)
     missing = [name for name in SEGMENT_NAMES if name not in measured]
     says = "a recording in space" + (
         f"; {len(missing)} of 17 from proportions ({prior.source})" if missing else ""

@@ -9,11 +9,11 @@ from typing import Final, Literal
 import numpy as np
 
 from posekit.body.anthropometry.body import (
-    DIMENSIONS,
-    HIPS,
-    LIMBS,
-    SHOULDERS,
-    TRUNK,
+    BODY_DIMENSIONS,
+    HIP_WIDTH,
+    LIMB_PARTS,
+    SHOULDER_WIDTH,
+    TRUNK_LENGTH,
     SegmentLengths,
     check_stature,
     completed,
@@ -28,14 +28,14 @@ from posekit.skeleton import SIDES
 
 Sex = Literal["female", "male"]
 
-SPREAD: Final = {
+PROPORTION_DEVIATION: Final = {
     "upper_arm": 0.08,
     "forearm": 0.058,
     "thigh": 0.08,
     "shank": 0.059,
-    SHOULDERS: 0.12,
-    HIPS: 0.25,
-    TRUNK: 0.05,
+    SHOULDER_WIDTH: 0.12,
+    HIP_WIDTH: 0.25,
+    TRUNK_LENGTH: 0.05,
 }
 """Standard deviation of a person's dimension, as a fraction of what a proportion says.
 
@@ -49,7 +49,7 @@ widths over the bones and key points are at the joints: the heads of the femurs 
 against 0.19 for the hips' width.
 """
 
-CENTRES: Final = {SHOULDERS: 0.08, HIPS: 0.1}
+JOINT_CENTRE_DEVIATION: Final = {SHOULDER_WIDTH: 0.08, HIP_WIDTH: 0.1}
 """The same where the widths are those of joint centres: biacromial breadth's 4.6 %, the femoral heads' 6.6 %, and room
 for where a detector sees the joints."""
 
@@ -63,7 +63,7 @@ DE_LEVA: Final[dict[Sex, dict[str, float]]] = {
 
 
 FEMORAL_HEADS: Final[dict[Sex, float]] = {"female": 2 * 91.54 / 1629.0, "male": 2 * 95.02 / 1756.2}
-BIACROMIAL: Final = 415.7 / 1756.2
+BIACROMIAL_OF_STATURE: Final = 415.7 / 1756.2
 """Widths that go with joint centres, of stature. The heads of the femurs are 91.5 and 95.0 mm from the pelvis's middle
 ("The distance of the centre of femoral head relative to the midline of the pelvis: a prospective X-ray study of 500
 adults"), the statures and the breadth over the acromia (men's, for both) are Gordon et al. 2014's."""
@@ -78,7 +78,7 @@ class Proportions:
     sexes: bool = False
 
 
-SOURCES: Final[Mapping[str, Proportions]] = {
+PROPORTION_SOURCES: Final[Mapping[str, Proportions]] = {
     one.name: one
     for one in (
         Proportions(
@@ -104,7 +104,7 @@ SOURCES: Final[Mapping[str, Proportions]] = {
 
 def proportion_names() -> tuple[str, ...]:
     """Return the names that `lengths_from_proportions` takes."""
-    return tuple(SOURCES)
+    return tuple(PROPORTION_SOURCES)
 
 
 def lengths_from_proportions(
@@ -157,16 +157,16 @@ def lengths_from_proportions(
 
 def source_of(name: str) -> Proportions:
     """Return a source by name, and refuse one that is not known."""
-    if name not in SOURCES:
-        raise refusal("", "proportions", shown(name), "a known source", nearest(name, SOURCES))
-    return SOURCES[name]
+    if name not in PROPORTION_SOURCES:
+        raise refusal("", "proportions", shown(name), "a known source", nearest(name, PROPORTION_SOURCES))
+    return PROPORTION_SOURCES[name]
 
 
 def spread(name: str) -> Array:
-    """Return the relative standard deviation (11,) of each of `DIMENSIONS` about a source's proportions."""
-    given = SPREAD | (CENTRES if name == "de-leva" else {})
-    parts = {limb(side, part): given[part] for part in LIMBS for side in SIDES}
-    return np.array([parts.get(one, given.get(one, np.nan)) for one in DIMENSIONS])
+    """Return the relative standard deviation (11,) of each of `BODY_DIMENSIONS` about a source's proportions."""
+    given = PROPORTION_DEVIATION | (JOINT_CENTRE_DEVIATION if name == "de-leva" else {})
+    parts = {limb(side, part): given[part] for part in LIMB_PARTS for side in SIDES}
+    return np.array([parts.get(one, given.get(one, np.nan)) for one in BODY_DIMENSIONS])
 
 
 def _dimensions(name: str, stature: float, sex: Sex | None, base: dict[str, float]) -> dict[str, float]:
@@ -176,9 +176,9 @@ def _dimensions(name: str, stature: float, sex: Sex | None, base: dict[str, floa
     dimensions = dimensions_of(lengths_from_stature(stature, base))
     if name == "de-leva":
         chosen = tuple(DE_LEVA) if sex is None else (sex,)
-        for part in LIMBS:
+        for part in LIMB_PARTS:
             fraction = sum(DE_LEVA[one][part] / DE_LEVA_STATURE[one] for one in chosen) / len(chosen)
             dimensions |= {limb(side, part): fraction * stature for side in SIDES}
-        dimensions[HIPS] = stature * sum(FEMORAL_HEADS[one] for one in chosen) / len(chosen)
-        dimensions[SHOULDERS] = stature * BIACROMIAL
+        dimensions[HIP_WIDTH] = stature * sum(FEMORAL_HEADS[one] for one in chosen) / len(chosen)
+        dimensions[SHOULDER_WIDTH] = stature * BIACROMIAL_OF_STATURE
     return dimensions

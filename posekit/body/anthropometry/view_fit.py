@@ -12,11 +12,11 @@ from posekit.body.anthropometry.independent import independent_frames
 from posekit.body.anthropometry.view_likelihood import ViewLikelihood
 from posekit.geometry import Array
 
-PASSES: Final = 2
-STEPS: Final = 40
-SHARE: Final = 0.5
+N_PASSES: Final = 2
+MAX_STEPS: Final = 40
+STEP_SHARE: Final = 0.5
 """Of a step that is taken: the information is that of a sample, and whole steps overshoot."""
-CONVERGED: Final = 0.01
+CONVERGED_STEP: Final = 0.01
 """Squared length of a step, in standard deviations, at which it is no use to go on."""
 
 
@@ -49,21 +49,21 @@ def maximise(likelihood: ViewLikelihood, middle: Array, covariance: Array) -> Di
     independent = np.ones(count)
     information = precision
     usual_variance = np.array([cosine_variance(float(one)) for one in likelihood.concentration])
-    for _ in range(PASSES):
+    for _ in range(N_PASSES):
         # What the frames are worth depends on their scales, which are better known afterwards.
         independent = independent_frames(*likelihood.squared_cosines(y), usual_variance)
         usual = float(np.median(independent[independent > 0]))
         weight = np.concatenate([independent, np.full(2, usual)]) / frames
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             slopes = likelihood.slopes(y)
             slope = weight * slopes.sum(axis=0) - precision @ (y - start)
             weighted = np.sqrt(weight) * slopes
             information = weighted.T @ weighted + precision
             step = np.linalg.solve(information, slope)
             left = float(slope @ step)
-            if left < CONVERGED:
+            if left < CONVERGED_STEP:
                 break
-            y = y + SHARE * np.clip(step, -0.2, 0.2)
+            y = y + STEP_SHARE * np.clip(step, -0.2, 0.2)
     return DimensionFit(
         y=y,
         covariance=np.asarray(np.linalg.inv(information), dtype=np.float64),

@@ -15,14 +15,14 @@ import numpy as np
 from posekit.body.anthropometry.foreshortening import log_density
 from posekit.geometry import Array
 
-GRID: Final = np.arange(-0.4, 0.6, 0.02)
+SCALE_GRID: Final = np.arange(-0.4, 0.6, 0.02)
 """Logarithms of a picture's scale about its first guess, over which it is integrated."""
-DISTANCE: Final = 4.5
+USUAL_DISTANCE_METRES: Final = 4.5
 """Metres to the camera, where the focal length does not say."""
 JOINT_NOISE: Final = 0.015
 """Metres by which detectors are off a joint, a coordinate: their errors grow with a person's size in the picture."""
-LONGEST: Final = 0.95
-SHIFT: Final = 0.01
+MAX_COSINE: Final = 0.95
+DIFFERENCE_STEP: Final = 0.01
 """Step of the differences that give slopes: the tables are exact to less, and the likelihood is wider."""
 
 
@@ -72,7 +72,7 @@ class ViewLikelihood:
     shorter : array (M,)
         How much shorter than the dimension a length is on average, in logarithms: the trunk of a bent back.
     focal : float, optional
-        Focal length, pixels, which gives the distance; without it `DISTANCE` is assumed.
+        Focal length, pixels, which gives the distance; without it `USUAL_DISTANCE_METRES` is assumed.
     noise : float, optional
         Standard deviation of a key point's coordinate, pixels; without it `JOINT_NOISE` at the body's scale.
     concentration : array (M,)
@@ -92,7 +92,7 @@ class ViewLikelihood:
     @cached_property
     def scales(self) -> Array:
         """Logarithms of the scales to integrate over (T, S)."""
-        return self.first[:, None] + (np.zeros(1) if self.scale_known else GRID)
+        return self.first[:, None] + (np.zeros(1) if self.scale_known else SCALE_GRID)
 
     # Noise and distance come of the first guess of the scale, not of the scale that is integrated over: what is known
     # of them in metres would otherwise say something of the size.
@@ -101,7 +101,7 @@ class ViewLikelihood:
     def _nearness(self) -> Array:
         """One over the distance (T, 1), 1/m."""
         if self.focal is None:
-            return np.full((len(self.first), 1), 1 / DISTANCE)
+            return np.full((len(self.first), 1), 1 / USUAL_DISTANCE_METRES)
         return np.asarray(np.exp(self.first[:, None]) / self.focal)
 
     @cached_property
@@ -150,15 +150,15 @@ class ViewLikelihood:
             rest = lengths - terms[k] + scale
             sides = [
                 _integrated(rest + self.of_length(k, float(p.dimensions[k]) + step))
-                for step in (SHIFT, -SHIFT)
+                for step in (DIFFERENCE_STEP, -DIFFERENCE_STEP)
             ]
-            slopes[:, k] = (sides[0] - sides[1]) / (2 * SHIFT)
-        for column, (middle, width) in ((-2, (SHIFT, 0.0)), (-1, (0.0, SHIFT))):
+            slopes[:, k] = (sides[0] - sides[1]) / (2 * DIFFERENCE_STEP)
+        for column, (middle, width) in ((-2, (DIFFERENCE_STEP, 0.0)), (-1, (0.0, DIFFERENCE_STEP))):
             sides = [
                 _integrated(lengths + self.of_scale(p.middle + sign * middle, p.width + sign * width))
                 for sign in (1, -1)
             ]
-            slopes[:, column] = (sides[0] - sides[1]) / (2 * SHIFT)
+            slopes[:, column] = (sides[0] - sides[1]) / (2 * DIFFERENCE_STEP)
         return slopes
 
     def squared_cosines(self, y: Array) -> tuple[Array, Array]:
@@ -172,7 +172,7 @@ class ViewLikelihood:
         known = np.isfinite(metres)
         full = np.array(
             [
-                np.quantile(one[k], LONGEST) if k.any() else 1.0
+                np.quantile(one[k], MAX_COSINE) if k.any() else 1.0
                 for one, k in zip(metres.T, known.T, strict=True)
             ]
         )

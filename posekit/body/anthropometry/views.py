@@ -9,11 +9,11 @@ from typing import Final
 import numpy as np
 
 from posekit.body.anthropometry.body import (
-    DIMENSIONS,
-    HIPS,
-    LIMBS,
-    SHOULDERS,
-    TRUNK,
+    BODY_DIMENSIONS,
+    HIP_WIDTH,
+    LIMB_PARTS,
+    SHOULDER_WIDTH,
+    TRUNK_LENGTH,
     SegmentLengths,
     completed,
     dimensions_of,
@@ -34,34 +34,34 @@ MOST_FRAMES: Final = 400
 FEWEST_PIXELS: Final = 2.0
 """Median length seen, pixels, below which it is no person."""
 UNKNOWN_STATURE: Final = 1.70
-RELIEF: Final = {
+DEPTH_RELIEF_METRES: Final = {
     "upper_arm": 0.15,
     "forearm": 0.22,
     "thigh": 0.15,
     "shank": 0.25,
-    SHOULDERS: 0.12,
-    HIPS: 0.1,
-    TRUNK: 0.05,
+    SHOULDER_WIDTH: 0.12,
+    HIP_WIDTH: 0.1,
+    TRUNK_LENGTH: 0.05,
 }
 """Metres in depth by which the middle of each is off the body's, standard deviation: a little less than among random
 legal postures."""
-UPRIGHT: Final = {
+UPRIGHT_CONCENTRATION: Final = {
     "upper_arm": 2.5,
     "forearm": 0.2,
     "thigh": 6.0,
     "shank": 4.0,
-    SHOULDERS: -1.5,
-    HIPS: -1.5,
-    TRUNK: 12.0,
+    SHOULDER_WIDTH: -1.5,
+    HIP_WIDTH: -1.5,
+    TRUNK_LENGTH: 12.0,
 }
 """Concentration of each about the picture's plane, where upright people are seen by level cameras from all around.
 
 From the mean squared cosines of 4060 frames of walking, running, jumping and signalling (CMU Graphics Lab Motion
 Capture Database): 0.17, 0.32, 0.06, 0.11, 0.50, 0.50, 0.02; somewhat less for thigh and trunk, as others bend more.
 """
-LOOSE: Final = {SHOULDERS: 0.03, HIPS: 0.02, TRUNK: 0.05}
+TRUNK_LOOSENESS: Final = {SHOULDER_WIDTH: 0.03, HIP_WIDTH: 0.02, TRUNK_LENGTH: 0.05}
 """How much widths and trunk change with posture, as a fraction: the girdle moves, the back bends."""
-BENT: Final = 0.042
+BENT_TRUNK_SHARE: Final = 0.042
 """How much the trunk is shorter than when straight, among random legal postures; while people walk it is not."""
 LIMB_JOINTS: Final = tuple(name for name in JOINTS if name not in ("neck", "pelvis"))
 LEAST_NOISE: Final = 0.05
@@ -163,7 +163,7 @@ def lengths_from_views(
         proportions, UNKNOWN_STATURE if stature is None else stature, sex=sex, reference=base
     )
     dimensions = dimensions_of(prior.lengths)
-    middle = np.log([dimensions[name] for name in DIMENSIONS])
+    middle = np.log([dimensions[name] for name in BODY_DIMENSIONS])
     covariance = prior_covariance(spread(proportions), both_sides)
     middle, covariance = conditioned(middle, covariance, known or {}, stature, scale is not None)
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_FRAMES)).round().astype(int))
@@ -180,14 +180,18 @@ def lengths_from_views(
             f"{FEWEST_PIXELS:g} or more",
             "give pixels, not fractions of the picture",
         )
-    relief = {limb(side, part): RELIEF[part] for part in LIMBS for side in SIDES}
+    relief = {limb(side, part): DEPTH_RELIEF_METRES[part] for part in LIMB_PARTS for side in SIDES}
     likelihood = ViewLikelihood(
         seen=seen[usable],
         first=np.log(given[usable]) if scale is not None else _first_scale(seen[usable], middle),
         scale_known=scale is not None,
-        relief=np.array([relief.get(name, RELIEF.get(name, np.nan)) for name in DIMENSIONS]),
-        loose=np.array([LOOSE.get(name, 0.0) for name in DIMENSIONS]),
-        shorter=np.array([0.0 if upright or name != TRUNK else BENT for name in DIMENSIONS]),
+        relief=np.array(
+            [relief.get(name, DEPTH_RELIEF_METRES.get(name, np.nan)) for name in BODY_DIMENSIONS]
+        ),
+        loose=np.array([TRUNK_LOOSENESS.get(name, 0.0) for name in BODY_DIMENSIONS]),
+        shorter=np.array(
+            [0.0 if upright or name != TRUNK_LENGTH else BENT_TRUNK_SHARE for name in BODY_DIMENSIONS]
+        ),
         focal=None if focal is None else positive("focal", focal),
         noise=None
         if noise is None
@@ -198,28 +202,28 @@ def lengths_from_views(
     independent = float(np.median(fit.independent[fit.independent > 0]))
     scales = np.full(len(points), np.nan)
     scales[usable] = np.exp(likelihood.posterior_scales(fit.y))
-    count = len(DIMENSIONS)
+    count = len(BODY_DIMENSIONS)
     if both_sides:
         fit.y[:count] = sides_averaged(fit.y[:count])
     learned = 1 - np.diag(fit.covariance)[:count] / np.diag(covariance)
     source = f"key points of {len(usable)} frames ({independent:.0f} independent), prior: {prior.source}"
     return ViewLengths(
         lengths=completed(
-            dict(zip(DIMENSIONS, np.exp(fit.y[:count]).tolist(), strict=True)),
+            dict(zip(BODY_DIMENSIONS, np.exp(fit.y[:count]).tolist(), strict=True)),
             fit.covariance[:count, :count],
             base,
             source,
             tuple(
                 name
-                for k, name in enumerate(DIMENSIONS)
-                if name != TRUNK and np.isfinite(likelihood.seen[:, k]).any()
+                for k, name in enumerate(BODY_DIMENSIONS)
+                if name != TRUNK_LENGTH and np.isfinite(likelihood.seen[:, k]).any()
             ),
             stature,
         ),
         scale=scales,
         frames=len(usable),
         independent=independent,
-        learned=dict(zip(DIMENSIONS, np.maximum(learned, 0.0).tolist(), strict=True)),
+        learned=dict(zip(BODY_DIMENSIONS, np.maximum(learned, 0.0).tolist(), strict=True)),
     )
 
 
@@ -238,8 +242,8 @@ def _points(image: Array) -> Array:
 
 
 def _seen(points: Array) -> Array:
-    """Return the lengths of `DIMENSIONS` in the picture (T, 11), pixels."""
-    ends = [name.split("-") for name in DIMENSIONS if name != TRUNK]
+    """Return the lengths of `BODY_DIMENSIONS` in the picture (T, 11), pixels."""
+    ends = [name.split("-") for name in BODY_DIMENSIONS if name != TRUNK_LENGTH]
     starts, stops = ([JOINT[pair[k]] for pair in ends] for k in (0, 1))
     apart = points[:, starts] - points[:, stops]
     shoulders = points[:, [JOINT[f"{side}_shoulder"] for side in SIDES]].mean(axis=1)
@@ -270,7 +274,7 @@ def _given_scale(scale: Array | None, count: int) -> Array:
 
 
 def _concentrations(upright: bool) -> Array:
-    """Return the concentration (11,) of each of `DIMENSIONS`."""
-    given = {limb(side, part): UPRIGHT[part] for part in LIMBS for side in SIDES}
-    values = [given.get(name, UPRIGHT.get(name, 0.0)) for name in DIMENSIONS]
-    return np.array(values) if upright else np.zeros(len(DIMENSIONS))
+    """Return the concentration (11,) of each of `BODY_DIMENSIONS`."""
+    given = {limb(side, part): UPRIGHT_CONCENTRATION[part] for part in LIMB_PARTS for side in SIDES}
+    values = [given.get(name, UPRIGHT_CONCENTRATION.get(name, 0.0)) for name in BODY_DIMENSIONS]
+    return np.array(values) if upright else np.zeros(len(BODY_DIMENSIONS))

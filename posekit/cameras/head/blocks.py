@@ -13,23 +13,23 @@ import numpy as np
 from posekit.cameras import PinholeCamera
 from posekit.cameras.head.estimate import HeadEstimate, estimate
 from posekit.cameras.head.points import HeadPoints
-from posekit.cameras.head.sighting import Sighting
+from posekit.cameras.head.sighting import HeadSighting
 from posekit.geometry import Array
 
-BLOCK = 1000
+BLOCK_HEADS = 1000
 """Heads a block. From 500 to 2,000 a head costs the same; with fewer, calls cost more than what they do."""
 
 
 def estimate_blocks(
-    head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None, threads: int = 1
+    head: HeadPoints, sighting: HeadSighting, known: tuple[PinholeCamera, Array] | None, threads: int = 1
 ) -> HeadEstimate:
     """Place the head in every frame, as `posekit.cameras.head.estimate.estimate` does, on some threads."""
-    frames = [slice(k, k + BLOCK) for k in range(0, len(sighting.reasons), BLOCK)]
+    frames = [slice(k, k + BLOCK_HEADS) for k in range(0, len(sighting.reasons), BLOCK_HEADS)]
     if len(frames) < 2:
         return estimate(head, sighting, known)
 
     def one(part: slice) -> HeadEstimate:
-        seen = Sighting(sighting.image[part], sighting.seen[part], sighting.reasons[part])
+        seen = HeadSighting(sighting.image[part], sighting.seen[part], sighting.reasons[part])
         return estimate(head, seen, None if known is None else _known(*known, part))
 
     if threads > 1:

@@ -18,14 +18,14 @@ from posekit.cameras.head.sighting import sight
 from posekit.errors import HeadError
 from posekit.geometry import Array
 
-RANK = 1e-10
+RANK_RATIO = 1e-10
 """Second smallest singular value, as a fraction of the largest, below which a second solution exists.
 
 Six points and the camera can lie so (all but two in a plane, and these two in line with the camera, for one).
 Rounding leaves 1e-15, measured points 1e-4 and more.
 """
 
-BEHIND = (
+BEHIND_CAMERA = (
     "the points fit only a head behind the camera, as those of a mirrored image do: y must point down in the "
     "image, and left and right must be the person's own"
 )
@@ -120,7 +120,7 @@ def dlt(head: HeadPoints, image: ArrayLike) -> Projection:
                 "and these two in line with the camera); use calibrate, or add a head point"
             )
         elif not in_front:
-            reasons[frame] = BEHIND
+            reasons[frame] = BEHIND_CAMERA
     found = np.array([not reason for reason in reasons], dtype=np.bool_)
     full = [np.full((len(found), *array.shape[1:]), np.nan) for array in direct[:4]]
     for target, array in zip(full, direct[:4], strict=True):
@@ -147,7 +147,7 @@ def solve(points: Array, image: Array, seen: NDArray[np.bool_]) -> Direct:
         [np.concatenate([space, zero, -u * space], -1), np.concatenate([zero, space, -v * space], -1)], axis=1
     )
     _, values, vectors = np.linalg.svd(rows, full_matrices=False)
-    determined = values[:, 10] > RANK * values[:, 0]
+    determined = values[:, 10] > RANK_RATIO * values[:, 0]
     P = np.linalg.inv(to_plane) @ vectors[:, -1].reshape(-1, 3, 4) @ to_space
     P /= np.linalg.norm(P[:, 2:, :3], axis=-1, keepdims=True)
     P *= np.where(np.linalg.det(P[:, :, :3]) < 0, -1.0, 1.0)[:, None, None]

@@ -8,30 +8,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
-from posekit.cameras.head.dlt import BEHIND
+from posekit.cameras.head.dlt import BEHIND_CAMERA
 from posekit.cameras.head.fit import HeadFit, fit
 from posekit.cameras.head.misfit import misfits, spread
 from posekit.cameras.head.perspective import HeadPlacement, Heads, look
 from posekit.cameras.head.points import HeadPoints
-from posekit.cameras.head.sighting import Sighting
+from posekit.cameras.head.sighting import HeadSighting
 from posekit.cameras.head.starts import affine_start, direct_start, reversed_start
 from posekit.geometry import Array
 from posekit.least_squares import scaled_equations
 
-CLEARLY = 5.0
+CLEARLY_SIGMAS = 5.0
 """Standard deviations by which the perspective must be reversed to be called so, not merely unseen."""
 
 BETTER_BEHIND = 1e-4
 """Chance below which a head behind the camera fits better for a reason."""
 
-COARSE = 0.2
+COARSE_ERROR = 0.2
 """Error, as a fraction of the head's size in the image, from which the reversed head is tried.
 
 Of 2,000 heads of 20 to 150 pixels each, the two starts missed the best minimum known in none at 1 pixel of
 noise, in one at 2 and in 13 at 5, all with an error above this; with the third start in none, none and 2.
 """
 
-DETERMINED = 1e-12
+DETERMINED_EIGENVALUE = 1e-12
 """Smallest eigenvalue of the normal equations, scaled to a unit diagonal, that determines all unknowns."""
 
 
@@ -50,7 +50,9 @@ class HeadEstimate(NamedTuple):
     chance: Array
 
 
-def estimate(head: HeadPoints, sighting: Sighting, known: tuple[PinholeCamera, Array] | None) -> HeadEstimate:
+def estimate(
+    head: HeadPoints, sighting: HeadSighting, known: tuple[PinholeCamera, Array] | None
+) -> HeadEstimate:
     """Place the head in every frame.
 
     Parameters
@@ -137,7 +139,7 @@ def _best(heads: Heads, plane: Array) -> tuple[HeadFit, list[str]]:
     second = both.cost[len(plane) :] < both.cost[: len(plane)]
     choice = np.where(second, number + len(plane), number)
     best = both.take(choice)
-    coarse = np.flatnonzero(np.isfinite(best.cost) & (best.cost > COARSE**2 * spread(heads)))
+    coarse = np.flatnonzero(np.isfinite(best.cost) & (best.cost > COARSE_ERROR**2 * spread(heads)))
     if coarse.size:
         some = heads.take(coarse)
         turned = fit(some, reversed_start(some.points, best.placement.take(coarse)))
@@ -156,7 +158,7 @@ def _best(heads: Heads, plane: Array) -> tuple[HeadFit, list[str]]:
         freedom = 2 * back.seen.sum(axis=-1) - back.unknowns
         chance = (mirrored.cost / best.cost[frames]) ** (freedom / 2)
         for frame in frames[chance < BETTER_BEHIND]:
-            reasons[frame] = BEHIND
+            reasons[frame] = BEHIND_CAMERA
     return best, reasons
 
 
@@ -177,10 +179,10 @@ def _focal_length(heads: Heads, fitted: HeadFit) -> tuple[Array, Array, list[str
     for settled, least, d, sigma in zip(fitted.settled, values[:, 0], slope, deviation, strict=True):
         if not settled:
             reasons.append("")  # there is a better reason
-        elif least <= DETERMINED:
+        elif least <= DETERMINED_EIGENVALUE:
             reasons.append("the image does not determine f: other cameras give the same; give f")
-        elif d <= -CLEARLY * sigma:
-            reasons.append(BEHIND)
+        elif d <= -CLEARLY_SIGMAS * sigma:
+            reasons.append(BEHIND_CAMERA)
         elif d <= 0:
             reasons.append("the perspective is too weak to determine f (the head is far away); give f")
         else:

@@ -24,7 +24,7 @@ MAX_STEPS = 60
 
 HEAD_DAMPING = Damping(initial=1e-4, smallest=1e-13, largest=1e8, growth=10.0, decay=0.03, light=1e-4)
 
-PRECISE = 1e-10
+FIT_PRECISION = 1e-10
 """Predicted decrease of the squared error, as a fraction of it, that ends the search.
 
 The unknowns are then within about 1e-5 of their standard deviation.
@@ -59,7 +59,7 @@ class HeadFit(NamedTuple):
         return HeadFit(self.placement.take(index), self.cost[index], self.settled[index])
 
 
-def fit(heads: Heads, start: HeadPlacement, precision: float = PRECISE) -> HeadFit:
+def fit(heads: Heads, start: HeadPlacement, precision: float = FIT_PRECISION) -> HeadFit:
     """Minimise the sum of squared residuals from a start.
 
     A start with NaN, or with points on the wrong side of the camera, gives no fit.

@@ -24,10 +24,10 @@ from posekit.geometry import Array
 FALSE_ALARMS = 5e-3
 """The chance that a head of sound points with normal errors has one of them named."""
 
-ROUNDING = 1e-10
+ROUNDING_ERROR = 1e-10
 """Error, as a fraction of the head's size in the image, that is taken for rounding and never looked into."""
 
-PRECISION = 1e-3
+MISFIT_PRECISION = 1e-3
 """Fraction to which the squared error without a point is found: enough to judge it."""
 
 
@@ -52,13 +52,13 @@ def misfits(heads: Heads, plane: Array, fitted: HeadFit) -> tuple[NDArray[np.int
         The chance of so good a fit without one point, were all sound; 1 at most.
     """
     total, count = heads.seen.shape
-    floor = ROUNDING**2 * spread(heads)
+    floor = ROUNDING_ERROR**2 * spread(heads)
     frames, points = np.nonzero((heads.seen > 0) & (fitted.cost > floor)[:, None])
     without = heads.take(frames)
     seen = without.seen.copy()
     seen[np.arange(len(points)), points] = 0.0
     without = without._replace(seen=seen)
-    again = fit(without, _start(without, plane[frames], fitted.placement.take(frames)), PRECISION)
+    again = fit(without, _start(without, plane[frames], fitted.placement.take(frames)), MISFIT_PRECISION)
     left = np.full((total, count), np.inf)
     left[frames, points] = np.maximum(again.cost, floor[frames])
     point = left.argmin(axis=-1)

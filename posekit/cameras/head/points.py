@@ -13,12 +13,12 @@ from posekit.errors import HeadError
 from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS
 
-NAMES = ("neck", *HEAD_POINTS)
+POINT_NAMES = ("neck", *HEAD_POINTS)
 
-MINIMUM = 6
+MIN_POINTS = 6
 """Points that a camera's eleven unknowns need (Lee & Chen 1985, §2.1)."""
 
-DEGENERATE = 1e-3
+DEGENERATE_EXTENT = 1e-3
 """Fraction of the head's size below which two points count as one, and a set of points as a plane."""
 
 
@@ -109,21 +109,21 @@ class HeadPoints:
 def degeneracy(names: tuple[str, ...], points: Array, seen: NDArray[np.bool_]) -> str:
     """Say why those points (P, 3) that are `seen` (P,) cannot determine a camera; empty if they can."""
     count = int(seen.sum())
-    if count < MINIMUM:
+    if count < MIN_POINTS:
         missing = [name for name, visible in zip(names, seen, strict=True) if not visible]
         listed = f"; missing: {', '.join(missing)}" if missing else ""
-        return f"{count} of {len(names)} head points are known, at least {MINIMUM} are needed{listed}"
+        return f"{count} of {len(names)} head points are known, at least {MIN_POINTS} are needed{listed}"
     known = points[seen]
     size, _, thickness = np.linalg.svd(known - known.mean(axis=0), compute_uv=False) / np.sqrt(count)
     gaps = np.linalg.norm(known[:, None] - known, axis=-1)
     gaps[np.diag_indices(count)] = np.inf
-    if gaps.min() <= DEGENERATE * size:
+    if gaps.min() <= DEGENERATE_EXTENT * size:
         first, second = np.flatnonzero(seen)[np.array(np.unravel_index(gaps.argmin(), gaps.shape))]
         return (
             f"head points {names[first]} and {names[second]} coincide ({gaps.min():.3g} m apart): "
             "they are one point; correct them or leave one out"
         )
-    if thickness <= DEGENERATE * size:
+    if thickness <= DEGENERATE_EXTENT * size:
         return (
             f"the {count} head points lie in one plane (off it {thickness:.3g} m, along it {size:.3g} m): "
             "a plane does not determine a camera; add a point off it, the nose or the neck"
@@ -154,7 +154,7 @@ def head_points_cam(R: Array, t: Array, points: ArrayLike | HeadPoints) -> Array
 
 
 TABLE_A2 = HeadPoints(
-    names=NAMES,
+    names=POINT_NAMES,
     points=np.array(
         [
             [-0.34168, 0.52103, 0.0],

@@ -13,7 +13,7 @@ from posekit.cameras.head.blocks import estimate_blocks
 from posekit.cameras.head.dlt import require
 from posekit.cameras.head.misfit import beyond_chance
 from posekit.cameras.head.points import HeadPoints, head_points_cam
-from posekit.cameras.head.sighting import Sighting, sight
+from posekit.cameras.head.sighting import HeadSighting, sight
 from posekit.cameras.lee_chen import pinhole
 from posekit.errors import HeadError
 from posekit.geometry import Array
@@ -194,7 +194,7 @@ def _place(head: HeadPoints, image: ArrayLike, camera: PinholeCamera | None, thr
     return pose
 
 
-def _normalize(head: HeadPoints, sighting: Sighting, camera: PinholeCamera) -> tuple[Sighting, Array]:
+def _normalize(head: HeadPoints, sighting: HeadSighting, camera: PinholeCamera) -> tuple[HeadSighting, Array]:
     """Return the normalised image points (F, P, 2), and the sighting without pixels that no ray reaches."""
     frames = len(sighting.image)
     if camera.K.ndim == 3 and len(camera.K) != frames:

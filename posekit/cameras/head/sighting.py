@@ -7,15 +7,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.cameras.head.points import DEGENERATE, HeadPoints, degeneracy
+from posekit.cameras.head.points import DEGENERATE_EXTENT, HeadPoints, degeneracy
 from posekit.errors import HeadError
 from posekit.geometry import Array
 
-VANISHING = 1e-100
+VANISHING_SPREAD = 1e-100
 """Spread of image points below which their squares underflow."""
 
 
-class Sighting(NamedTuple):
+class HeadSighting(NamedTuple):
     """Image points of F heads of P points.
 
     Attributes
@@ -33,7 +33,7 @@ class Sighting(NamedTuple):
     reasons: list[str]
 
 
-def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
+def sight(head: HeadPoints, image: ArrayLike) -> HeadSighting:
     """Check image points (P, 2) or (F, P, 2), NaN where a point is not seen.
 
     Raises
@@ -66,7 +66,7 @@ def sight(head: HeadPoints, image: ArrayLike) -> Sighting:
             f"the image points lie on one line or in one point (spread {spread[0]:.3g} by {spread[1]:.3g}): "
             "a head never looks so; check them"
         )
-    return Sighting(points, seen, reasons)
+    return HeadSighting(points, seen, reasons)
 
 
 def _flat(image: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Array]:
@@ -74,5 +74,5 @@ def _flat(image: Array, seen: NDArray[np.bool_]) -> tuple[NDArray[np.intp], Arra
     weight = seen[..., None] / np.maximum(seen.sum(axis=-1), 1)[:, None, None]
     offset = (image - (weight * image).sum(axis=1, keepdims=True)) * np.sqrt(weight)
     spread = np.linalg.svd(offset, compute_uv=False)
-    flat = np.flatnonzero(spread[:, 1] <= np.maximum(DEGENERATE * spread[:, 0], VANISHING))
+    flat = np.flatnonzero(spread[:, 1] <= np.maximum(DEGENERATE_EXTENT * spread[:, 0], VANISHING_SPREAD))
     return flat, spread[flat]

@@ -9,7 +9,7 @@ from posekit.cameras.head.dlt import solve
 from posekit.cameras.head.perspective import HeadPlacement
 from posekit.geometry import Array, cross
 
-FLAT = 1e-12
+FLAT_EXTENT = 1e-12
 """Added to the squared extent of points of size 1, so that the rest of a head, if flat, has a start too."""
 
 
@@ -32,7 +32,7 @@ def affine_start(points: Array, image: Array, seen: NDArray[np.bool_], known: bo
     space = np.where(seen[..., None], points - centre[:, None], 0.0)
     offset = np.where(seen[..., None], image - middle[:, None], 0.0)
     transposed = np.swapaxes(space, -1, -2)
-    normal = transposed @ space + FLAT * np.eye(3)
+    normal = transposed @ space + FLAT_EXTENT * np.eye(3)
     affine = np.swapaxes(np.linalg.solve(normal, transposed @ offset), -1, -2)
     left, values, right = np.linalg.svd(affine, full_matrices=False)
     axes = left @ right

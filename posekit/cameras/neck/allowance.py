@@ -13,7 +13,7 @@ from posekit.cameras.neck.given import Given
 from posekit.geometry import Array
 from posekit.skeleton import HIPS, JOINT, TORSO
 
-RIGID, TANGENT = 3.0, 4.0
+RIGID_SIGMAS, TANGENT_SIGMAS = 3.0, 4.0
 r"""Standard deviations of an image point, in metres at the body, by which a rigid distance and a segment may be off.
 
 A segment is too short for its image by the errors of its two ends, and one of thirteen is the worst. A rigid distance
@@ -48,12 +48,12 @@ def allowances(camera: PinholeCamera, figure: Figure, given: Given) -> Allowance
         return Allowance(rigid, tangent)
     first = _sigma(camera, figure, given, np.zeros(frames))
     # The image as it is, with its errors, leaves too little room, with their allowance too much: between the two.
-    sigma = (first + _sigma(camera, figure, given, TANGENT * first)) / 2
+    sigma = (first + _sigma(camera, figure, given, TANGENT_SIGMAS * first)) / 2
     if given.tolerance is None:
         shoulder = (figure.lengths["neck-right_shoulder"] + figure.lengths["neck-left_shoulder"]) / 2
-        rigid = np.maximum(RIGID * sigma + np.sqrt(2 * shoulder * sigma), EXACT_RIGID)
+        rigid = np.maximum(RIGID_SIGMAS * sigma + np.sqrt(2 * shoulder * sigma), EXACT_RIGID)
     if given.tangent is None:
-        tangent = np.maximum(TANGENT * sigma, EXACT_TANGENT)
+        tangent = np.maximum(TANGENT_SIGMAS * sigma, EXACT_TANGENT)
     return Allowance(rigid, tangent)
 
 

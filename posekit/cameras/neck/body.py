@@ -21,10 +21,10 @@ from posekit.cameras import PinholeCamera
 from posekit.geometry import Array, cross
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
-NEAREST = 0.25
+NEAREST_DEPTH = 0.25
 """Distance of the neck from the camera, in neck-pelvis lengths, below which the body would be at the camera."""
 
-LENGTH = {frozenset(pair): segment_name(pair) for pair in (*TREE_SEGMENTS, *RIGID_SEGMENTS)}
+SEGMENT_OF_PAIR = {frozenset(pair): segment_name(pair) for pair in (*TREE_SEGMENTS, *RIGID_SEGMENTS)}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,12 +58,12 @@ class Sight:
 
     def length(self, a: int, b: int) -> float:
         """Return the distance between two joints of one segment, metres."""
-        return self.lengths[LENGTH[frozenset((a, b))]]
+        return self.lengths[SEGMENT_OF_PAIR[frozenset((a, b))]]
 
     @property
     def nearest(self) -> float:
         """The least distance of the neck, metres."""
-        return NEAREST * self.lengths["neck-pelvis"]
+        return NEAREST_DEPTH * self.lengths["neck-pelvis"]
 
     def segment(self, frame: int) -> str:
         """Name the segment that bounds the neck of a frame; empty where none does."""
@@ -91,7 +91,7 @@ def sight(camera: PinholeCamera, figure: Figure, image: Array, tangent: Array) -
     for child in range(len(JOINTS) - 1, 0, -1):
         parent = PARENTS[child]
         cosine, sine = _angle(rays[:, parent], rays[:, child])
-        length = lengths[LENGTH[frozenset((parent, child))]]
+        length = lengths[SEGMENT_OF_PAIR[frozenset((parent, child))]]
         bound, own = _bound(farthest[:, child], cosine, sine, length, tangent)
         source = np.where(own, child, bounding[:, child])
         nearer = bound < farthest[:, parent]  # False where either is NaN: not seen

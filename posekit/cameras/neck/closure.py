@@ -11,10 +11,10 @@ from posekit.cameras.neck.body import Sight
 from posekit.geometry import Array
 from posekit.skeleton import JOINT
 
-BRANCHES = 32
+N_BRANCHES = 32
 """Near or far of both shoulders, the pelvis and both hips: the bits of a branch, the right shoulder's the highest."""
 
-SLACK = 1e-12
+TANGENT_ROUNDING = 1e-12
 """Rounding of a distance, relative to it, at which a tangent ray still touches."""
 
 JOINTS_LIFTED = ("right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip")
@@ -44,10 +44,10 @@ class _Segment(NamedTuple):
         height = start * sine
         foot = start * cosine
         half = np.sqrt(np.maximum((self.length - height) * (self.length + height), 0.0))
-        reach = height <= self.length + tangent + SLACK * start
+        reach = height <= self.length + tangent + TANGENT_ROUNDING * start
         both = []
         for end in (foot - half, foot + half):
-            possible = reach & (end > 0) & (end <= farthest * (1 + SLACK))
+            possible = reach & (end > 0) & (end <= farthest * (1 + TANGENT_ROUNDING))
             both.append(np.where(possible, end, np.nan))
         # A joint that was not seen excludes nothing: it has one end, at the start, and no distance reads it.
         return np.where(seen, both[0], start), np.where(seen, both[1], np.nan)
@@ -145,7 +145,7 @@ class Closure:
         torso = np.maximum(
             girdle[..., :, :, None], np.maximum(to_right[..., :, None, :], to_left[..., None, :, :])
         )
-        total = np.maximum(torso[..., None], hips[..., None, None, :, :]).reshape(*neck.shape, BRANCHES)
+        total = np.maximum(torso[..., None], hips[..., None, None, :, :]).reshape(*neck.shape, N_BRANCHES)
         return np.where(np.isnan(total) | (neck < self.nearest)[..., None], np.inf, total)
 
     def least(self, rows: Rows, neck: Array) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 
 from posekit.geometry import Array
 
-WIDER = 1.05
+WIDENING_FACTOR = 1.05
 
 
 def cover(intervals: Array, reach: float, most: int) -> tuple[Array, float]:
@@ -36,7 +36,7 @@ def cover(intervals: Array, reach: float, most: int) -> tuple[Array, float]:
         intervals, width = intervals[kept], width[kept]
     count = _count(width, reach)
     while count.sum() > most:
-        reach *= WIDER
+        reach *= WIDENING_FACTOR
         count = _count(width, reach)
     samples = [
         low + (np.arange(n) + 0.5) / n * wide

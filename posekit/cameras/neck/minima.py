@@ -9,23 +9,23 @@ import numpy as np
 from posekit.cameras.neck.closure import Closure, Rows
 from posekit.geometry import Array
 
-WORTH = 0.6
+WORTH_REFINING = 0.6
 """Misfit, in neck-pelvis lengths, above which a sampled minimum is not refined."""
 
-STEEP = 3.0
+STEEP_SLOPE = 3.0
 """Neck-pelvis lengths a radian by which a misfit may fall inside a cell: there it is looked at closer."""
 
-FINER = 12
+N_FINER_CELLS = 12
 """Into how many cells such a cell is cut, twice."""
 
-GOLDEN = (np.sqrt(5.0) - 1) / 2
-STEPS = 52
+GOLDEN_SECTION = (np.sqrt(5.0) - 1) / 2
+GOLDEN_STEPS = 52
 """Golden sections: a cell to 1e-12 of a radian."""
 
-ASIDE = 1e-7
+ASIDE_RADIANS = 1e-7
 """Radians to both sides of a minimum at which the misfit must not be less."""
 
-ROUNDING = 1e-13
+ROUNDING_METRES = 1e-13
 """Metres that rounding leaves of a misfit a few metres away."""
 
 
@@ -43,17 +43,19 @@ def minima_of(closure: Closure, frames: Rows, upper: Array, psi: Array, misfit: 
     They come frame by frame, best first.
     """
     known = (closure.known[frames] > 0)[:, None, None]
-    found = [_brackets(psi, np.where(known & (misfit <= WORTH * closure.unit), misfit, np.inf))]
+    found = [_brackets(psi, np.where(known & (misfit <= WORTH_REFINING * closure.unit), misfit, np.inf))]
     step = np.diff(psi, axis=1)[..., None]
-    hidden = known & (np.minimum(misfit[:, 1:], misfit[:, :-1]) <= STEEP * closure.unit * step)
+    hidden = known & (np.minimum(misfit[:, 1:], misfit[:, :-1]) <= STEEP_SLOPE * closure.unit * step)
     row, cell, branch = np.nonzero(hidden)
     low, high = psi[row, cell], psi[row, cell + 1]
     for _ in range(2):
-        nodes = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, FINER + 1)
+        nodes = low[:, None] + (high - low)[:, None] * np.linspace(0, 1, N_FINER_CELLS + 1)
         values = closure.one(frames[row, None], branch[:, None], upper[row, None] * np.cos(nodes))
         inside = _brackets(nodes, values[..., None])
         found.append(_Brackets(row[inside.row], branch[inside.row], *inside[2:]))
-        again = np.minimum(values[:, 1:], values[:, :-1]) <= STEEP * closure.unit * np.diff(nodes, axis=1)
+        again = np.minimum(values[:, 1:], values[:, :-1]) <= STEEP_SLOPE * closure.unit * np.diff(
+            nodes, axis=1
+        )
         k, cell = np.nonzero(again)
         row, branch, low, high = row[k], branch[k], nodes[k, cell], nodes[k, cell + 1]
     row, branch, low, high, middle, value = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -61,9 +63,9 @@ def minima_of(closure: Closure, frames: Rows, upper: Array, psi: Array, misfit: 
     best, least = _golden(closure, frames[row], upper[row], brackets)
     distance = upper[row] * np.cos(best)
     # What falls on beyond its bracket, or below which another branch runs, is no minimum of the envelope.
-    true = least <= closure.least(frames[row], distance) + ROUNDING
-    for angle in (best - ASIDE, best + ASIDE):
-        true &= least <= closure.one(frames[row], branch, upper[row] * np.cos(angle)) + ROUNDING
+    true = least <= closure.least(frames[row], distance) + ROUNDING_METRES
+    for angle in (best - ASIDE_RADIANS, best + ASIDE_RADIANS):
+        true &= least <= closure.one(frames[row], branch, upper[row] * np.cos(angle)) + ROUNDING_METRES
     order = np.flatnonzero(true)[np.lexsort((least[true], row[true]))]
     return Samples(row[order], distance[order], least[order])
 
@@ -102,13 +104,13 @@ def _golden(closure: Closure, frame: Rows, upper: Array, brackets: _Brackets) ->
     def value(angle: Array) -> Array:
         return closure.one(frame, branch, upper * np.cos(angle))
 
-    inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    inner, outer = high - GOLDEN_SECTION * (high - low), low + GOLDEN_SECTION * (high - low)
     f_inner, f_outer = value(inner), value(outer)
-    for _ in range(STEPS):
+    for _ in range(GOLDEN_STEPS):
         # Where a branch ends inside the bracket both may be infinite: keep the side of the best that is known.
         left = np.where(np.isinf(f_inner) & np.isinf(f_outer), best < inner, f_inner < f_outer)
         high, low = np.where(left, outer, high), np.where(left, low, inner)
-        probe = np.where(left, high - GOLDEN * (high - low), low + GOLDEN * (high - low))
+        probe = np.where(left, high - GOLDEN_SECTION * (high - low), low + GOLDEN_SECTION * (high - low))
         f_probe = value(probe)
         inner, outer = np.where(left, probe, outer), np.where(left, inner, probe)
         f_inner, f_outer = np.where(left, f_probe, f_outer), np.where(left, f_inner, f_probe)

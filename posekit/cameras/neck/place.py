@@ -18,20 +18,20 @@ from posekit.cameras.neck.given import Given
 from posekit.cameras.neck.head import head_suggestion
 from posekit.cameras.neck.placement import NeckPlacement
 from posekit.cameras.neck.search import Depths, search
-from posekit.cameras.neck.suggestion import SIGMAS, Suggestion
+from posekit.cameras.neck.suggestion import KEPT_SIGMAS, Suggestion
 from posekit.cameras.neck.torso import torso_suggestion
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINTS
 
-CLOSED = 1e-8
+CLOSED_METRES = 1e-8
 """Misfit (m) of a minimum at which the image points are exact, so that the depth is too."""
 
-REACH = 0.05
+REACH_METRES = 0.05
 """Metres within which some neck is of any depth that is possible."""
 
-MOST = 12
+MAX_NECKS = 12
 """The most necks a frame."""
 
 
@@ -47,8 +47,8 @@ def place(
     offset: ArrayLike = 0.0,
     tolerance: float | None = None,
     tangent: float | None = None,
-    reach: float = REACH,
-    most: int = MOST,
+    reach: float = REACH_METRES,
+    most: int = MAX_NECKS,
 ) -> list[NeckPlacement]:
     """Find where the neck is in F frames.
 
@@ -185,9 +185,9 @@ def _necks(
 ) -> dict[str, Any]:
     """Choose exact minima in what is left of the intervals, or samples that cover it."""
     ray = seen.rays[frame, 0]
-    closed = depths.minima[depths.residual <= CLOSED]
+    closed = depths.minima[depths.residual <= CLOSED_METRES]
     beside = np.maximum(left[:, 0] - closed[:, None], closed[:, None] - left[:, 1])
-    closed = np.sort(closed[(beside <= CLOSED).any(axis=1)])
+    closed = np.sort(closed[(beside <= CLOSED_METRES).any(axis=1)])
     # One distance alone closes at some depth however wrong the image is: that does not say that it is exact.
     trusted = depths.known > 1 or (given.deviation[frame] == 0).all()
     if len(closed) and trusted:
@@ -215,7 +215,11 @@ def _as_given(
     at = float(seen.rays[frame, 0] @ root)
     misfit = closure.least(np.array([frame]), np.array([at])) if depths.known else np.array([np.nan])
     beside = np.maximum(depths.intervals[:, 0] - at, at - depths.intervals[:, 1]).min(initial=np.inf)
-    notes = () if beside <= CLOSED else (f"the given neck, {root[2]:.4g} m away, is {_feasible(depths, z)}",)
+    notes = (
+        ()
+        if beside <= CLOSED_METRES
+        else (f"the given neck, {root[2]:.4g} m away, is {_feasible(depths, z)}",)
+    )
     return replace(
         _searched(depths, z, allowed, frame),
         method="given",
@@ -247,7 +251,7 @@ def _outside(part: Suggestion, depths: Depths, frame: int, z: float) -> str:
     """Say that a part's depth is none that the search leaves."""
     at, deviation = float(part.distance[frame, 0]) * z, float(part.deviation[frame, 0]) * z
     return (
-        f"the {part.part} is not used: it puts the neck at {at:.4g} m, {SIGMAS:g} standard deviations of "
+        f"the {part.part} is not used: it puts the neck at {at:.4g} m, {KEPT_SIGMAS:g} standard deviations of "
         f"{deviation:.2g} m and more {_feasible(depths, z)}"
     )
 

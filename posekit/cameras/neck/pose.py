@@ -14,7 +14,7 @@ from posekit.cameras.head.starts import affine_start, reversed_start
 from posekit.geometry import Array, coordinate_rotation, cross
 from posekit.least_squares import Damping, Stopping, scaled_equations
 
-LEAST = 4
+MIN_POINTS = 4
 """Points below which a pose is not determined: three leave up to four, none of which can be told from the others."""
 
 POSE_DAMPING = Damping(initial=1e-3, largest=1e10, growth=8.0, decay=0.2, light=np.inf, gradual=False)
@@ -22,19 +22,19 @@ POSE_DAMPING = Damping(initial=1e-3, largest=1e10, growth=8.0, decay=0.2, light=
 POSE_STOPPING = Stopping(steps=50, precision=1e-10, full_cost=1.0)
 """The search ends by the promised decrease of the squared error, in squared deviations or as a fraction of it."""
 
-FLOOR = 1e-12
+MIN_DEVIATION_PIXELS = 1e-12
 """Pixels: a deviation of zero is taken as this where residuals are weighed."""
 
-SIDEWAYS, SPREAD = 1e3, 1e-9
+MAX_NORMALIZED, MIN_SPREAD = 1e3, 1e-9
 """Normalised image coordinates beyond which a point is not in a picture, and spread below which points are one."""
 
-TINY = 1e-12
+TINY_EXTENT = 1e-12
 """Added to the squares of a flat part of size 1, and the least scale: points in one line have a start too."""
 
-TILT = 0.35
+TILT_RADIANS = 0.35
 """Radians by which the best pose is tilted to look for another beside it."""
 
-APART = 1e-2
+POSES_APART = 1e-2
 """Difference between two rotation matrices, and relative one in depth, above which two poses are two minima."""
 
 
@@ -102,7 +102,7 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     Returns
     -------
     Poses
-        None in frames with fewer than `LEAST` points.
+        None in frames with fewer than `MIN_POINTS` points.
     """
     with np.errstate(all="ignore"):
         normalized = camera.normalize(image)
@@ -125,7 +125,7 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     first = affine_start(heads.points, plane, seen, known=True)
     depth = size / first.scale
     sigma = np.hypot(deviation[number], offset * (K[:, 0, 0] / depth)[:, None])
-    weights = np.where(seen, 1.0 / np.maximum(sigma, FLOOR), 0.0)
+    weights = np.where(seen, 1.0 / np.maximum(sigma, MIN_DEVIATION_PIXELS), 0.0)
     starts = _starts(heads.points, plane - weight[:, None] @ plane, first)
     fits = [_fit(heads, weights, start) for start in starts]
     # Seen nearly face on, a flat part has its minima side by side, and all of these may lead to the same one.
@@ -172,10 +172,12 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
 
 def _usable(normalized: Array) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Return the frames that have enough points, in more than one place, and which points these see (n, P)."""
-    seen = np.asarray(np.isfinite(normalized).all(axis=-1) & (np.abs(normalized) < SIDEWAYS).all(axis=-1))
+    seen = np.asarray(
+        np.isfinite(normalized).all(axis=-1) & (np.abs(normalized) < MAX_NORMALIZED).all(axis=-1)
+    )
     low = np.where(seen[..., None], normalized, np.inf).min(axis=1)
     high = np.where(seen[..., None], normalized, -np.inf).max(axis=1)
-    usable = (seen.sum(axis=1) >= LEAST) & ((high - low).max(axis=1) > SPREAD)
+    usable = (seen.sum(axis=1) >= MIN_POINTS) & ((high - low).max(axis=1) > MIN_SPREAD)
     return np.flatnonzero(usable), seen[usable]
 
 
@@ -190,9 +192,9 @@ def _starts(points: Array, image: Array, first: HeadPlacement) -> list[HeadPlace
     v[..., 2] = cross(v[..., 0], v[..., 1])
     flat = points @ v[..., :2]
     transposed = np.swapaxes(flat, -1, -2)
-    affine = np.linalg.solve(transposed @ flat + TINY * np.eye(2), transposed @ image)
+    affine = np.linalg.solve(transposed @ flat + TINY_EXTENT * np.eye(2), transposed @ image)
     U, values, W = np.linalg.svd(np.swapaxes(affine, -1, -2))
-    scale = np.maximum(values[:, 0], TINY)
+    scale = np.maximum(values[:, 0], TINY_EXTENT)
     cosine = values[:, 1] / scale
     starts = [first, reversed_start(points, first)]
     for side in (1.0, -1.0):
@@ -207,8 +209,12 @@ def _starts(points: Array, image: Array, first: HeadPlacement) -> list[HeadPlace
 
 
 def _tilted(placement: HeadPlacement) -> list[HeadPlacement]:
-    """Tilt bodies by `TILT` to four sides, about axes across the line of sight."""
-    turns = (coordinate_rotation(axis, np.asarray(tilt)) for tilt in (TILT, -TILT) for axis in (0, 1))
+    """Tilt bodies by `TILT_RADIANS` to four sides, about axes across the line of sight."""
+    turns = (
+        coordinate_rotation(axis, np.asarray(tilt))
+        for tilt in (TILT_RADIANS, -TILT_RADIANS)
+        for axis in (0, 1)
+    )
     return [placement._replace(R=turn @ placement.R) for turn in turns]
 
 
@@ -247,6 +253,6 @@ def _new(R: Array, origin: Array, cost: Array) -> NDArray[np.bool_]:
         for k in range(1, cost.shape[1]):
             turned = np.abs(R[:, :k] - R[:, k, None]).max(axis=(-1, -2))
             moved = np.linalg.norm(origin[:, :k] - origin[:, k, None], axis=-1)
-            same = (turned < APART) & (moved < APART * origin[:, k, None, 2])
+            same = (turned < POSES_APART) & (moved < POSES_APART * origin[:, k, None, 2])
             new[:, k] &= ~(same & new[:, :k]).any(axis=1)
     return new

@@ -17,15 +17,15 @@ from posekit.cameras.neck.closure import Closure, Rows
 from posekit.cameras.neck.minima import Samples, minima_of
 from posekit.geometry import Array
 
-CELLS = 96
+N_CELLS = 96
 """Cells of the grid over the angle whose cosine is the distance over its bound."""
 
-PART = 64
+BLOCK_FRAMES = 64
 """Frames that are sampled at once."""
 
-HALVINGS = 48
+N_HALVINGS = 48
 
-SAME = 1e-9
+SAME_DISTANCE = 1e-9
 """Relative difference in distance between two minima that are one."""
 
 
@@ -91,8 +91,10 @@ def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[
     """
     closure = Closure(sight)
     found: list[Depths] = []
-    for start in range(0, len(frames), PART):
-        found += _search(closure, sight, frames[start : start + PART], tolerance[start : start + PART])
+    for start in range(0, len(frames), BLOCK_FRAMES):
+        found += _search(
+            closure, sight, frames[start : start + BLOCK_FRAMES], tolerance[start : start + BLOCK_FRAMES]
+        )
     return closure, found
 
 
@@ -131,7 +133,7 @@ def _search(closure: Closure, sight: Sight, frames: Rows, tolerance: Array) -> l
 def _angles(closure: Closure, frames: Rows, upper: Array) -> Array:
     """Lay the grid (n, G) over the angle, ascending: even, and finer where branches begin and end close together."""
     last = np.arccos(np.minimum(closure.nearest / upper, 1.0))[:, None]
-    even = last * np.linspace(0, 1, CELLS + 1)
+    even = last * np.linspace(0, 1, N_CELLS + 1)
     breaks = closure.breaks(frames)
     with np.errstate(invalid="ignore"):
         possible = (breaks > closure.nearest) & (breaks < upper[:, None])
@@ -147,7 +149,7 @@ def _distinct(distance: Array, misfit: Array) -> tuple[Array, Array]:
     """Drop minima that another, better one is at: they are sorted by misfit."""
     kept: list[int] = []
     for k, at in enumerate(distance):
-        if all(abs(at - distance[other]) > SAME * at for other in kept):
+        if all(abs(at - distance[other]) > SAME_DISTANCE * at for other in kept):
             kept.append(k)
     return distance[kept], misfit[kept]
 
@@ -166,7 +168,7 @@ def _gaps(
     ends = []
     for start, other, branches in ((far, near, within[row, cell]), (near, far, within[row, cell + 1])):
         good, bad = start, other
-        for _ in range(HALVINGS):
+        for _ in range(N_HALVINGS):
             middle = (good + bad) / 2
             still = ((closure.all(frames[row], middle[:, None])[:, 0] <= limit[:, None]) & branches).any(
                 axis=-1
@@ -208,7 +210,7 @@ def _intervals(
     owner = np.searchsorted(start, crossing, side="right") - 1
     good = np.where(inside[crossing], flat[crossing], flat[crossing + 1])
     bad = np.where(inside[crossing], flat[crossing + 1], flat[crossing])
-    for _ in range(HALVINGS):
+    for _ in range(N_HALVINGS):
         middle = (good + bad) / 2
         still = closure.least(frames[owner], middle) <= tolerance[owner]
         good, bad = np.where(still, middle, good), np.where(still, bad, middle)
@@ -230,7 +232,7 @@ def _joined(intervals: Array) -> Array:
     if len(intervals) < 2:
         return intervals
     new = np.ones(len(intervals), dtype=np.bool_)
-    new[1:] = intervals[1:, 0] > intervals[:-1, 1] * (1 + SAME)
+    new[1:] = intervals[1:, 0] > intervals[:-1, 1] * (1 + SAME_DISTANCE)
     last = np.append(np.flatnonzero(new)[1:] - 1, len(intervals) - 1)
     joined: NDArray[np.float64] = np.stack([intervals[new, 0], intervals[last, 1]], axis=-1)
     return joined

@@ -8,24 +8,24 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.neck.pose import LEAST, Poses
+from posekit.cameras.neck.pose import MIN_POINTS, Poses
 from posekit.geometry import Array
 
 Part = Literal["head", "torso"]
 
-SUFFICES: Final[dict[Part, float]] = {"head": 0.10, "torso": 0.20}
+SUFFICIENT_DEVIATION_METRES: Final[dict[Part, float]] = {"head": 0.10, "torso": 0.20}
 """Standard deviation (m) of the neck's distance up to which a rigid part tells it well enough.
 
 The torso comes after the head, and tells it better than the search does at any noise: it may be less sure.
 """
 
-SIGMAS = 2.5
+KEPT_SIGMAS = 2.5
 """Standard deviations to both sides of a distance that are kept."""
 
-PLAUSIBLE = 9.0
+PLAUSIBLE_COST = 9.0
 """Squared deviations by which a pose may fit worse than the best and still be the true one (3 standard deviations)."""
 
-EXPLAINED = {2: 13.82, 4: 18.47, 6: 22.46}
+EXPLAINED_COST = {2: 13.82, 4: 18.47, 6: 22.46}
 """Squared deviations of a cost that one sound frame in a thousand exceeds, by degrees of freedom (chi-square)."""
 
 
@@ -58,7 +58,7 @@ class Suggestion:
         """Tell whether a frame has any pose."""
         return bool(np.isfinite(self.distance[frame]).any())
 
-    def intervals(self, frame: int, sigmas: float = SIGMAS) -> Array:
+    def intervals(self, frame: int, sigmas: float = KEPT_SIGMAS) -> Array:
         """Return the distances (I, 2) within so many deviations of the plausible poses of a frame."""
         known = np.isfinite(self.distance[frame])
         middle, half = self.distance[frame][known], sigmas * self.deviation[frame][known]
@@ -82,7 +82,7 @@ def suggest(part: Part, poses: Poses, ray: Array, seen: NDArray[np.intp], bent: 
     bent : float
         Metres by which the neck may lie elsewhere than rigidly with the part: added to the deviation.
     """
-    plausible = poses.found & (poses.cost <= poses.cost[:, :1] + PLAUSIBLE)
+    plausible = poses.found & (poses.cost <= poses.cost[:, :1] + PLAUSIBLE_COST)
     along = np.einsum("fki,fi->fk", poses.origin, ray)
     plausible &= along > 0  # False where the neck is not seen
     deviation = np.hypot(poses.deviation(ray), bent)
@@ -90,17 +90,17 @@ def suggest(part: Part, poses: Poses, ray: Array, seen: NDArray[np.intp], bent: 
     deviation = np.where(plausible, deviation, np.nan)
     reasons = []
     for k, count in enumerate(seen):
-        explained = EXPLAINED.get(int(poses.freedom[k]), np.inf)
-        if count < LEAST:
-            why = f"{count} of its points are seen, expected at least {LEAST}"
+        explained = EXPLAINED_COST.get(int(poses.freedom[k]), np.inf)
+        if count < MIN_POINTS:
+            why = f"{count} of its points are seen, expected at least {MIN_POINTS}"
         elif not plausible[k].any():
             why = "no pose fits its image"
         elif poses.cost[k, 0] > explained:
             why = (
                 f"its points miss their image by {poses.rms[k, 0]:.3g} px, more than their deviation explains"
             )
-        elif not (worst := float(np.nanmax(deviation[k]))) <= SUFFICES[part]:
-            why = f"it tells the neck's depth to {worst:.2g} m, expected {SUFFICES[part]:g} m"
+        elif not (worst := float(np.nanmax(deviation[k]))) <= SUFFICIENT_DEVIATION_METRES[part]:
+            why = f"it tells the neck's depth to {worst:.2g} m, expected {SUFFICIENT_DEVIATION_METRES[part]:g} m"
         else:
             why = ""
         reasons.append(f"the {part} does not suffice: {why}" if why else "")

@@ -16,7 +16,7 @@ from posekit.cameras.neck.suggestion import Suggestion, suggest
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, TORSO
 
-POINTS = [JOINT[name] for name in TORSO]
+TORSO_POINTS = [JOINT[name] for name in TORSO]
 
 
 def torso_suggestion(
@@ -35,8 +35,8 @@ def torso_suggestion(
     offset : array (14,)
         Metres by which the joints may be elsewhere than on the figure.
     """
-    torso = image[:, POINTS]
+    torso = image[:, TORSO_POINTS]
     body = torso_points(figure.lengths)
-    placed = poses(camera, body, torso, deviation[:, POINTS], offset[POINTS])
+    placed = poses(camera, body, torso, deviation[:, TORSO_POINTS], offset[TORSO_POINTS])
     seen = np.isfinite(torso).all(axis=-1).sum(axis=1)
     return suggest("torso", placed, ray, seen, 0.0)

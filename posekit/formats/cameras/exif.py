@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.cameras.calibrated import CalibratedCamera
-from posekit.cameras.guesses import DEVIATION, FILM, camera_from_focal35
+from posekit.cameras.guesses import FILM_DIAGONAL_MM, FOCAL_DEVIATION, camera_from_focal35
 from posekit.formats.cameras.camera_format import CameraFormat
 from posekit.safe_io import extra, open_file, refusal
 
@@ -75,7 +75,7 @@ def read_exif(path: str | Path) -> CalibratedCamera:
     equivalent, basis = _equivalent(exif, path)
     zoom = _number(exif, DIGITAL_ZOOM)
     taken = (_number(exif, PIXELS_X), _number(exif, PIXELS_Y))
-    deviation, doubts = DEVIATION, ""
+    deviation, doubts = FOCAL_DEVIATION, ""
     if zoom is not None and zoom > 1:
         deviation = max(deviation, 1 - 1 / min(zoom, 2.0))
         doubts = f", digital zoom {zoom:g}"
@@ -94,8 +94,8 @@ def _equivalent(exif: dict[int, Any], path: Path) -> tuple[float, str]:
         return equivalent, f"{equivalent:g} mm equivalent to 35 mm film"
     focal = _number(exif, FOCAL_LENGTH)
     sensor = _sensor_diagonal(exif)
-    if focal is not None and sensor is not None and 1 <= FILM * focal / sensor <= 5000:
-        return FILM * focal / sensor, f"{focal:g} mm on a sensor of {sensor:.1f} mm"
+    if focal is not None and sensor is not None and 1 <= FILM_DIAGONAL_MM * focal / sensor <= 5000:
+        return FILM_DIAGONAL_MM * focal / sensor, f"{focal:g} mm on a sensor of {sensor:.1f} mm"
     there = "a focal length but no sensor size" if focal is not None else "none"
     raise refusal(
         path,

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.calibrated import BROWN, CalibratedCamera
+from posekit.cameras.calibrated import N_BROWN_COEFFICIENTS, CalibratedCamera
 from posekit.cameras.rotation import rotation_from_given_vector, rotation_from_rounded
 from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
@@ -162,7 +162,7 @@ def made(source: str | Path, name: str, **parameters: Any) -> CalibratedCamera:
 def fitted(distortion: Array, fisheye: bool) -> Array:
     """Fill up coefficients to the next number that OpenCV has: MATLAB writes two, some files one."""
     count = len(distortion)
-    if fisheye or count == 0 or count > BROWN:
+    if fisheye or count == 0 or count > N_BROWN_COEFFICIENTS:
         return distortion
     return np.pad(distortion, (0, 4 - count)) if count < 4 else distortion
 

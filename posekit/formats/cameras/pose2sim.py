@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.cameras.calibrated import AXES, CALIBRATED, CalibratedCamera
+from posekit.cameras.calibrated import SAYS_CALIBRATED, UP_AXES, CalibratedCamera
 from posekit.cameras.rotation import rotation_from_given_vector
 from posekit.errors import CameraError, InputError
 from posekit.formats.cameras.camera_format import CameraFormat
@@ -45,7 +45,7 @@ def read_pose2sim(path: Path, unit: str | float | None = None) -> dict[str, Cali
             path, "", f"no camera; there is {one_line(there)}", "tables with a matrix", "name a calibration"
         )
     up = ""
-    if isinstance(metadata, dict) and metadata.get("up") in AXES:
+    if isinstance(metadata, dict) and metadata.get("up") in UP_AXES:
         up = metadata["up"]
     elif all("fisheye" in table for table in cameras.values()):
         up = "+z"
@@ -77,7 +77,7 @@ def _camera(
     if (R is None) != (t is None):
         lost = "rotation" if R is None else "translation"
         raise refusal(path, f"{place}.{lost}", "nothing", "three numbers", "give both, or neither")
-    how, deviation = table.get("how", CALIBRATED), table.get("deviation", 0.0)
+    how, deviation = table.get("how", SAYS_CALIBRATED), table.get("deviation", 0.0)
     if not isinstance(how, str) or isinstance(deviation, bool) or not isinstance(deviation, int | float):
         raise refusal(path, f"{place}.how", shown([how, deviation]), "a text and a number", "correct it")
     return made(

@@ -23,7 +23,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from posekit.body import Figure, load_figure
-from posekit.body.figure import FRAMES
+from posekit.body.figure import LINK_OF_POINT
 from posekit.body.urdf import parse
 from posekit.formats.motion.bvh_tree import checked
 from posekit.formats.motion.figure_motion import figure_motion
@@ -37,7 +37,7 @@ FOLDER_SCHEMA: Final = "posekit.configurations/1"
 FIGURE_FILE, SRDF_FILE, MUJOCO_FILE = "figure.urdf", "figure.srdf", "figure_mujoco.urdf"
 NPZ_FILE, CSV_FILE = "configurations.npz", "configurations.csv"
 FOLDER_FILES: Final = (FIGURE_FILE, SRDF_FILE, MUJOCO_FILE, NPZ_FILE, CSV_FILE)
-LINK_OF: Final = {point: FRAMES.get(point, point) for point in POINTS}
+LINK_OF: Final = {point: LINK_OF_POINT.get(point, point) for point in POINTS}
 """The URDF link whose origin is each point."""
 
 

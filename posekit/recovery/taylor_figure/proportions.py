@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.body import Figure, load_figure
 from posekit.body.lengths import hips_points, torso_points
-from posekit.body.stature import SHORTEST, TALLEST
+from posekit.body.stature import MAX_STATURE_METRES, MIN_STATURE_METRES
 from posekit.errors import FigureError
 from posekit.skeleton import HEAD_POINTS, SEGMENTS, SIDES, segment_name
 
@@ -44,9 +44,9 @@ def figure_of(stature: float, figure: Figure | None = None) -> Figure:
     FigureError
         Where the stature is not a person's in metres.
     """
-    if not (math.isfinite(stature) and SHORTEST <= stature <= TALLEST):
+    if not (math.isfinite(stature) and MIN_STATURE_METRES <= stature <= MAX_STATURE_METRES):
         raise FigureError(
-            f"stature is {stature:g} m; expected {SHORTEST} to {TALLEST} m; is it in another unit?"
+            f"stature is {stature:g} m; expected {MIN_STATURE_METRES} to {MAX_STATURE_METRES} m; is it in another unit?"
         )
     base = figure or load_figure()
     unit = stature / TABLE_1["height"]
