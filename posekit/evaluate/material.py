@@ -70,7 +70,7 @@ class _Shots:
 
 
 def of_capture(capture: Capture, sampling: FrameSampling, sweep: Sweep, method: Method) -> Material:
-    """See motion through virtual cameras.
+    """View motion through virtual cameras.
 
     Each clip's lengths are its medians over all its frames; the head is not seen. A frame's noise is one draw, as
     large as the level says: the levels differ in nothing else.

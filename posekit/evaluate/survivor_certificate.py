@@ -103,6 +103,7 @@ def _lengths(joints: Array, figure: Figure, tolerance: Tolerance) -> Array:
     ends = np.array(SEGMENTS)
     away = np.linalg.norm(joints[:, ends[:, 0]] - joints[:, ends[:, 1]], axis=-1)
     expected = np.array([figure.lengths[segment_name(segment)] for segment in SEGMENTS])
+    # The first segments lift joints and may be too short for their image; the rest are distances inside rigid parts.
     allowed = np.where(np.arange(len(SEGMENTS)) < len(TREE_SEGMENTS), tolerance.tangent, tolerance.rigid)
     return np.asarray(np.fmax.reduce(np.abs(away - expected) - allowed, axis=1))
 
@@ -121,6 +122,7 @@ def _witnessed(joints: Array, figure: Figure, tolerance: float) -> tuple[Array, 
         for joint, hinge in (("shoulder", "elbow"), ("hip", "knee")):
             bend = np.abs(np.sin(np.radians(angles[:, DOFS.index(f"{side}_{hinge}.flexion")])))
             rotation = DOFS.index(f"{side}_{joint}.rotation")
+            # A limb that is almost straight hardly shows its axial rotation: the tolerance grows as 1 / sin(bend).
             allowed[:, rotation] /= np.maximum(bend, 1e-12)
     beyond = np.maximum(lower - angles, angles - upper) - allowed
     beyond[allowed > UNSEEN_DEGREES] = np.nan
@@ -132,6 +134,7 @@ def _witnessed(joints: Array, figure: Figure, tolerance: float) -> tuple[Array, 
             unit(each[:, LIMB_SEGMENTS[:, 1]] - each[:, LIMB_SEGMENTS[:, 0]])
             for each in (shown, joints[placed])
         )
+        # By the chord: the arc cosine of two unit vectors has no digits where the angle is small.
         chord = np.linalg.norm(a - b, axis=-1) / 2
         turned[placed] = np.degrees(2 * np.arcsin(np.minimum(chord, 1.0))).max(axis=1)
     return np.asarray(np.fmax.reduce(beyond, axis=1)), turned

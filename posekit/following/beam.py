@@ -72,6 +72,7 @@ class Beam:
             The cheapest cost that was not kept; infinite if all were.
         """
         kept, dropped = [], np.inf
+        # Fresh paths are compared among themselves: they are dearer than the best path, and would be crowded out.
         for kind in (False, True):
             rows = np.flatnonzero(fresh == kind)
             if not len(rows):
@@ -81,6 +82,7 @@ class Beam:
             rows = rows[near & np.isfinite(cost[rows])]
             width = max(self.width, least)
             if len(rows) > width:
+                # The element at `width` is in its sorted place: the cheapest of those that are dropped.
                 order = np.argpartition(cost[rows], width)
                 dropped = min(dropped, float(cost[rows[order[width]]]))
                 rows = rows[order[:width]]

@@ -90,6 +90,7 @@ def best_paths(
             break
         cost, path, dropped = found
         if number == 0:
+            # Nothing that was dropped could have become cheaper, as no cost is negative.
             exact = dropped >= cost and _markov(frames)
         costs.append(cost)
         chosen.append(path)

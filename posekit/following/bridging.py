@@ -50,6 +50,7 @@ def bridge(time: Array, joints: Array) -> Array:
         if len(known):
             along = _turning(time, unit[:, segment], length[:, segment], known, rows)
             filled[rows, end] = filled[rows, start] + along
+        # Where that gives nothing (the start is not known, or the direction never is), the end is followed by itself.
         lost = rows[np.isnan(filled[rows, end, 0])]
         filled[lost, end] = _moving(time, joints[:, end])[lost]
     return filled
@@ -78,6 +79,7 @@ def _moving(time: Array, points: Array) -> Array:
     before, after, part = _between(time, known, rows)
     filled = points.copy()
     filled[rows] = points[before] + part[:, None] * (points[after] - points[before])
+    # Before the first and after the last known point the mean velocity of the nearest ones is kept for a while.
     for edge, outside in ((known[0], rows < known[0]), (known[-1], rows > known[-1])):
         near = known[np.abs(time[known] - time[edge]) <= COASTING_SECONDS]
         if len(near) > 1 and outside.any():

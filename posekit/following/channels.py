@@ -91,6 +91,7 @@ def channels_of(joints: Array, deviation: Array) -> Channels:
     unit, length = directions(joints)
     variance = deviation**2
     with np.errstate(divide="ignore", invalid="ignore"):
+        # Small errors of both ends, across the segment, turn it by their difference over its length.
         turned = (variance[:, SEGMENT_STARTS] + variance[:, SEGMENT_ENDS]) / length**2
     value = np.concatenate([joints, unit], axis=1).transpose(1, 0, 2)
     known = np.isfinite(value).all(axis=-1)

@@ -186,6 +186,7 @@ class Follower:
             step = self._steps[k]
             taken = step.survivor[at]
             survivors[k] = taken[best]
+            # How much dearer the cheapest path is that went through another survivor of this frame.
             leads[k] = cost[taken != taken[best]].min(initial=np.inf) - cost[best]
             at = step.parent[at]
         return survivors, leads

@@ -60,6 +60,7 @@ class ScaleChoice:
         if not 0 < at < len(self.scales) - 1:
             gap = np.abs(np.delete(self.scales, at) - self.scale).min(initial=np.inf)
             return self.scale, float(gap)
+        # The cost is minus a log-likelihood: near its minimum c (x - m)^2 with c = 1 / (2 deviation^2).
         x, y = self.scales[at - 1 : at + 2] - self.scales[at], self.cost[at - 1 : at + 2]
         curvature, slope, _ = np.polyfit(x, y, 2)
         if not curvature > 0:

@@ -97,6 +97,8 @@ class States:
         return Heading(
             known=known,
             place=self.position[:N_JOINTS] + self.velocity * after[..., None],
+            # The acceleration of `MotionModel` is 2 / (D1 + D2) times the change of velocity, and a metre away at the
+            # later place changes the velocity by 1 / D2.
             weight=np.where(known, 2 / (after * (before + after)), 0.0) ** 2,
             variance=(1 + ratio) ** 2 * self.variance[:N_JOINTS] + ratio**2 * self.earlier_variance,
         )

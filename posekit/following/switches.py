@@ -58,7 +58,7 @@ def elevations(joints: Array, *, perspective: bool = True) -> Array:
         Radians: positive away from the camera, far, and negative towards it, near. NaN where not known.
     """
     unit, _ = directions(joints)
-    if not perspective:
+    if not perspective:  # all rays go along z
         return np.asarray(np.arcsin(np.clip(unit[..., 2], -1, 1)))
     end = joints[..., SEGMENT_ENDS, :]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -114,6 +114,7 @@ def _possible(
         limit = limit + model.spread * (
             np.sqrt(variance[pick])[:, :, None] + np.sqrt(target.channels.variance[pick])[:, None]
         )
+    # The squares come from differences of large numbers: at the wall itself rounding must not decide.
     inside = squared <= limit * limit * (1 + 1e-12) + 1e-12
     inside |= ~target.channels.known[pick][:, None]
     return np.asarray(inside.all(axis=0))

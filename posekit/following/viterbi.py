@@ -78,6 +78,7 @@ def advance(
     usable, dropped = beam.cheapest(np.where(channels.known.any(axis=0), own, np.inf))
     dropped += float(states.cost.min())
     if not len(usable):
+        # No survivor can be taken: every path passes the frame over.
         least = 0 if np.isfinite(states.interval).any() else len(frame) + 1
         rows, lost = beam.keep(skipped, states.fresh, least=least)
         passed = replace(states, cost=skipped).take(rows)
@@ -99,6 +100,7 @@ def advance(
     moved, stayed = rows[rows < len(cost)], rows[rows >= len(cost)] - len(cost)
     came, went = came[moved], went[moved]
     after = _move(states.take(came), channels.take(went), cost[moved], frame.time, new[went])
+    # Paths that end in the same survivor make the same steps from there on; fresh ones are kept apart.
     after = replace(after, group=states.group.max() + 1 + 2 * went + after.fresh)
     if len(stayed):
         after = States.join(after, replace(states, cost=skipped).take(stayed))

@@ -76,6 +76,7 @@ class LimbPlacer:
 
     def per_trunk(self) -> tuple[int, int]:
         """How many positions of a hidden middle, and of a hidden end about each middle, are tried on a trunk."""
+        # Where a core has several trunks, they share the samples: the effort of a survivor stays about the same.
         crowd = int(np.bincount(self.trunks.core, minlength=1).max(initial=1))
         share = max(self.sampling.sphere // crowd, 16)
         if self.both_hidden:

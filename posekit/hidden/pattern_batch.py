@@ -112,6 +112,7 @@ class PatternBatch:
         frame: Index,
     ) -> PatternBatch:
         """Find the cores of survivors and place their trunks."""
+        # Survivors of a frame that agree in all joints that the hidden ones depend on are placed once.
         key = np.concatenate([frame[:, None], points[:, list(pattern.core)].reshape(len(points), -1)], axis=1)
         _, first, core = np.unique(key, axis=0, return_index=True, return_inverse=True)
         core_frame = frame[first]

@@ -77,6 +77,7 @@ def find_rays(camera: Camera, root: Array, image: Array, reach: float) -> Rays:
         middle = points.mean(axis=-2)
         direction = points[..., 1, :] - points[..., 0, :]
         direction = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
+        # Bisect for where the ray begins: what is before it is behind the camera and has no image.
         low, high = np.full(image.shape[:2], -RAY_START_BEHIND_METRES), np.full(image.shape[:2], 4.0 * reach)
         endless = _in_front(camera, middle + low[..., None] * direction)
         for _ in range(N_RAY_BISECTIONS):

@@ -42,6 +42,7 @@ def subdivided(pattern: OcclusionPattern, trunks: TrunkPlacements, placer: MakeP
     np.minimum.at(least, trunks.core, miss)
     if trunks.turn is None:
         return replace(trunks.take(miss == 0.0), miss=least)
+    # That no place is left is proven only where every sample excludes the whole arc around it.
     proven = np.ones(cores, dtype=bool)
     proven[trunks.core[~_proven(pattern, trunks, placer)]] = False
     spacing = trunks.spacing[trunks.core]
@@ -101,6 +102,7 @@ def thinned(trunks: TrunkPlacements, most: int) -> TrunkPlacements:
     step = (many <= most) | ((rank + 1) * most // many > rank * most // many)
     # Each then stands for so much more of the circle or of the rotations.
     fewer = np.maximum(count / most, 1.0)
+    # On a circle spacing grows with what each sample stands for, among rotations with its cube root.
     power = 1.0 if trunks.turn is not None and trunks.turn.about is not None else 1.0 / 3.0
     kept = trunks.take(np.asarray(step | ~trunks.even))
     return replace(kept, tried=kept.tried / fewer, spacing=kept.spacing * fewer**power)

@@ -114,6 +114,7 @@ def put_together(
     if family.minimum_scale == 0:
         raise InputError(f"{where}: all its segments are seen end on, at one pixel; the image fixes no scale")
     given = read_nearer(linkage, nearer or {})
+    # Lengths count in mean segments, so that residuals and their thresholds do not depend on the object's size.
     unit = float(linkage.lengths.mean())
     minimum = family.minimum_scale * unit  # pixels a mean segment
     found: list[tuple[float, NDArray[np.intp], Residual]] = []

@@ -152,6 +152,7 @@ class LinkageFamily:
                 f"scale s = {low:.9g} is below the bound: {name} (length {length:g}) is "
                 f"{self.extent[self.bounding]:.6g} pixels long in the image and needs s >= {bound:.9g}"
             )
+        # l^2 - e^2 as (l - e) (l + e): near the bound the difference of squares would lose half the digits.
         apart = self.extent / scale[..., None]
         lengths = self.linkage.lengths
         return np.sqrt(np.maximum((lengths - apart) * (lengths + apart), 0.0))

@@ -55,6 +55,7 @@ def find_roots(function: Function, a: Array, b: Array) -> Array:
         x1, x2, x3, f1, f2, f3, smallest, width = (
             values[active] for values in (x1, x2, x3, f1, f2, f3, smallest, width)
         )
+        # Every fourth step bisects, which bounds how many are needed whatever the function does.
         t = _next(x1, x2, x3, f1, f2, f3) if step % 4 < 3 else np.full(len(rows), 0.5)
         least = np.minimum(0.5 * smallest / width, 0.5)
         t = np.clip(t, least, 1 - least)

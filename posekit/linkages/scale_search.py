@@ -138,6 +138,7 @@ def _at_bound(constraints: Constraints, first: float, flat: Codes) -> tuple[Code
         level = np.abs(slope) <= ZERO_DERIVATIVE
         grows[part] = (slope > ZERO_DERIVATIVE) | (level & (later_slope > 0) & (later > value))
     grows[flat] = False
+    # Flips of what has vanished are one posture at the bound: if one of them falls from there, it is no minimum.
     for mask in {flips.masks[column] for column in constraints.bounding}:
         grows &= grows[codes ^ mask]
     # All that differ only in what has vanished are one.
@@ -166,6 +167,7 @@ def _refine_loop(
     parts = [(touching.code, _roots(constraints, loop, touching, 0))]
     turn = _roots(constraints, loop, turning, 1)
     start, middle = (_gap(constraints, loop, turning.code, psi, 0) for psi in (turning.low, turn))
+    # The gap's extreme is on the other side of zero: it crosses zero before and after it.
     beyond = start * middle < 0
     for low, high in ((turning.low, turn), (turn, turning.high)):
         halves = Brackets(turning.code[beyond], low[beyond], high[beyond])

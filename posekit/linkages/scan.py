@@ -107,6 +107,7 @@ def _any(constraints: Constraints, psi: Array) -> Iterator[Scan]:
 def _suspicious(value: Array, slope: Array, psi: Array) -> NDArray[np.bool_]:
     """Return the cells (K, G - 1) with slopes of one sign whose cubic turns back in between."""
     d0, d1 = slope[:, :-1], slope[:, 1:]
+    # The derivative of the cubic through both ends' values and slopes is d0 + b t + a t^2, t from 0 to 1.
     secant = np.diff(value, axis=1) / np.diff(psi)
     b, a = 2 * (3 * secant - 2 * d0 - d1), 3 * (d0 + d1 - 2 * secant)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -135,6 +136,7 @@ def _single_loop(constraints: Constraints, loop: Array, psi: Array) -> Iterator[
     terms, term_slopes = (loop * values for values in (dZ, slope))  # (G, k)
     free = list(flips.free)
     fixed = [segment for segment in range(len(loop)) if segment not in free]
+    # Meet in the middle: 2^(k/2) sums of each half make all 2^k gaps by one addition each.
     low_bits = free[: len(free) // 2]
     high_bits = free[len(free) // 2 :]
     low, low_slope = (_sums(values, low_bits) for values in (terms, term_slopes))

@@ -122,6 +122,7 @@ def span(linkage: Linkage, root: str | None = None) -> SpanningTree:
     parents, segments, lengths = [-1], [-1], [0.0]
     lifted: list[tuple[int, float]] = []
     for joint, node in enumerate(nodes):  # grows while it is walked
+        # Breadth first: the nearer a joint is to the root, the fewer segments its depth's error sums over.
         for other, number, share in neighbours.get(node, []):
             if other not in nodes:
                 nodes.append(other)

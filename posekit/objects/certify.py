@@ -86,7 +86,8 @@ class Certifier:
             rows = np.flatnonzero(distance > tolerance)
             if rows.size:
                 self._descend(points, q, distance, rows, q[rows][:, None])
-            rows = np.flatnonzero(distance > tolerance)[:MAX_UNDECIDED_RETRIED]
+            # Those still off start anew, from random shapes whose points are about as far apart, laid on them.
+        rows = np.flatnonzero(distance > tolerance)[:MAX_UNDECIDED_RETRIED]
             if rows.size:
                 self._descend(points, q, distance, rows, self._starts(points[rows]))
             reasons[:MAX_POSTURES_CERTIFIED] = [self._reason(solution, k) for k in range(len(solution.q))]
@@ -126,6 +127,7 @@ class Certifier:
         gap = np.linalg.norm(points[:, first] - points[:, second], axis=2)
         known = np.isfinite(gap).astype(np.float64)
         gap = np.nan_to_num(gap)
+        # Sum of squared differences of the known distances, less what is the same for all shapes: d^2 - 2 g d.
         misfit = known @ (lengths**2).T - 2 * gap @ lengths.T
         near = np.argpartition(misfit, N_SHAPES_ALIGNED, axis=1)[:, :N_SHAPES_ALIGNED].reshape(-1)
         weights = np.isfinite(points[..., 0]).astype(np.float64).repeat(N_SHAPES_ALIGNED, axis=0)

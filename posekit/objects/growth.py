@@ -174,6 +174,7 @@ def grow(
     spanned = plan.spanned
     place = spanned.place_image(image[list(plan.columns)][None])
     exact = judged == "exact"
+    # Exact images have the same checks at all scales, which are grown together; what noise does depends on the scale.
     step = max(1, AT_ONCE // plan.hypotheses) if exact else 1
     checks: list[Check] = plan.checks(tolerance) if exact else []
     parts: list[tuple[Leaves, int]] = []

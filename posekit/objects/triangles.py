@@ -23,11 +23,16 @@ from posekit.linkages.linkage_family import LinkageFamily
 
 NEAREST_TO_RIGHT_ANGLE = 1e-3
 """How near (rad) the search goes to the right angle: a thousand times the bound."""
+
 N_GRID_POINTS = 4000
+"""Angles at which the residual is sampled for brackets."""
+
 N_GOLDEN_SECTIONS = 80
 """Golden sections of a bracket: more than its last digits."""
+
 OWN_SCALE_RATIO = 1e-4
 """Of the scale: a minimum is moved to a triangle's own scale that is so near and fits better."""
+
 GOLDEN_RATIO = (np.sqrt(5) - 1) / 2
 
 

@@ -70,7 +70,7 @@ class StudyPictures:
 
 
 def exact_views(human: Human, scenes: Iterable[SyntheticScene]) -> list[StudyPictures]:
-    """See every frame by a scaled orthographic camera, with its own lengths and the true s.
+    """View every frame by a scaled orthographic camera, with its own lengths and the true s.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def photographs(
     proportions: Proportions = "figure",
     scale: Scale = "stature",
 ) -> list[StudyPictures]:
-    """See every frame by its scene's perspective camera, with noise, and find s as Taylor does.
+    """View every frame by its scene's perspective camera, with noise, and find s as Taylor does.
 
     Parameters
     ----------

@@ -46,5 +46,6 @@ def standing(joints: Array, up: Array) -> tuple[Array, Array]:
     )
     centre = perpendicular(centre_of_mass(joints) - lower, up, axis=-2)
     along = dot(centre, support, axis=-2) / np.maximum(dot(support, support, axis=-2), 1e-12)
+    # The support is a line from the lower foot: the nearest point of it to the centre of mass.
     beside = centre - np.clip(along, 0.0, 1.0) * support
     return np.sqrt(dot(beside, beside, axis=-2)), apart

@@ -50,6 +50,7 @@ def _log_terms_of(
         yield "image", misfit(joints, evidence.lengths, residual, deviation)
     if "posture" in wanted or "gravity" in wanted:
         posture, gravity = prior.judge(directions(joints, upward if "gravity" in wanted else None), sine)
+        # A survivor that is far off is no draw from a sharp distribution: its log-density counts the less.
         coolness = 1.0 / (1.0 + deviation / prior.temperature)
         for name, values in (("posture", posture), ("gravity", gravity)):
             if name in wanted:

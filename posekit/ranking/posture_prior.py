@@ -171,6 +171,7 @@ class Prior:
                 student = block.student
                 if sine > 0:
                     student = student.widened(np.where(np.arange(len(block.rows)) < alone, 0.0, sine**2))
+                # log p(posture, up) - log p(posture) is the log-density of up given the posture.
                 one, both = student.excess(flat[block.rows], (alone, len(block.rows)))
                 posture += one
                 gravity += both - one

@@ -82,6 +82,7 @@ def rank(
     left_out = _left_out(without, added)
     prior = prior or load_prior()
     terms = log_terms(evidence, [name for name in TERM_NAMES if name not in left_out], prior)
+    # After a refinement chi2 says how well the image fits; it has a weight of its own.
     refined = evidence.chi2 is not None
     if refined and "image" in terms:
         terms["image"] = _least_where_unknown(terms["image"], evidence.frame)

@@ -80,6 +80,7 @@ def softmax(score: Array, frame: NDArray[np.intp]) -> Array:
     starts = np.flatnonzero(np.diff(frame[order], prepend=-1))
     counts = np.diff(starts, append=len(order))
     sorted_score = score[order]
+    # The highest score of each frame is taken off, so that no exponential overflows.
     highest = np.repeat(np.maximum.reduceat(sorted_score, starts), counts)
     weight = np.exp(
         np.where(np.isfinite(highest), sorted_score - np.where(np.isfinite(highest), highest, 0.0), 0.0)

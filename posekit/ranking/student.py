@@ -108,6 +108,7 @@ def excess(squared: Array, count: int, dof: float) -> Array:
 
 def digamma(x: float) -> float:
     """Return the logarithmic derivative of the gamma function at x > 0 (Abramowitz & Stegun 1964, 6.3.5 and 6.3.18)."""
+    # The series is for large x: digamma(x) = digamma(x + 1) - 1 / x leads there.
     below = 0.0
     while x < 12.0:
         below -= 1.0 / x

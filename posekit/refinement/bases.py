@@ -145,6 +145,7 @@ def _step_together(
         value, _ = evaluate(part.take(rows), trial)
         better = value <= chi2
         off = value - (chi2 - gain)
+        # Of the promise g the quadratic missed e: the next step would gain about e^2 / g, less than is worth it.
         agrees = off * off <= LAST_STEP_GAIN_RATIO * settings.precision * np.maximum(gain, settings.precision)
         found.settled[rows] = better & agrees & settled[rows]
         good = np.flatnonzero(better)

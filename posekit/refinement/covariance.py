@@ -106,6 +106,7 @@ def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTer
             for k in range(2)
         )
         size = np.maximum(np.sqrt(c * c + s * s), MIN_LENGTH)
+        # Information on the turn along the ray's own tangent alone: across it the image shows the turn to first order.
         known = (
             MAX_TURN_INFORMATION * state.limbs[:, segment] * np.sqrt(dot(seen, seen, axis=-2)) / (size * size)
         )

@@ -43,6 +43,7 @@ def factor_postures(frames: Rows, postures: Array) -> Factors:
     trunks, and each trunk at most four of each limb.
     """
     n = len(postures)
+    # Joints are compared to the last bit: leaves of one tree that share a trunk share its very numbers.
     key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, 18)], axis=1)
     trunk, trunk_of = distinct(key)
     limb, limb_of = [], np.empty((4, n), dtype=np.intp)

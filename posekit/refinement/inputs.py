@@ -97,6 +97,7 @@ def length_weights(deviation: Mapping[str, float] | float) -> tuple[Array | None
             for limb in LIMB_JOINTS
         ]
     )
+    # Where some lengths vary all are unknowns: those that are exact get a small deviation, so that steps stay finite.
     return (
         1.0 / np.maximum(trunk, EXACT_DISTANCE_DEVIATION) if trunk.any() else None,
         1.0 / np.maximum(limbs, EXACT_LENGTH_DEVIATION) if limbs.any() else None,

@@ -86,6 +86,7 @@ class RootPrior:
             ray = mean / np.linalg.norm(mean, axis=1, keepdims=True)
         else:
             ray = np.broadcast_to(np.array([0.0, 0.0, 1.0]), mean.shape)
+        # Covariance along the ray r: lateral^2 (I - r r') + depth^2 r r'.
         outer = ray[:, :, None] * ray[:, None, :]
         across_squared, along_squared = across[:, None, None] ** 2, along[:, None, None] ** 2
         covariance = across_squared * (np.eye(3) - outer) + along_squared * outer

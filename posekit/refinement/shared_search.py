@@ -71,6 +71,7 @@ def search(
         origin,
         settings,
     )
+    # What trunk and limbs shared may have ended higher than a survivor began: it goes on by itself from its start.
     worse = ~(found.chi2 <= first)
     if worse.any():
         back = np.flatnonzero(worse)

@@ -113,6 +113,7 @@ def _lifted(optics: Optics, image: Array, start: Array, length: Array, far: NDAr
     """Return the directions (4, 3, N) from starts (4, 3, N) to where rays meet the segments' spheres."""
     ray, foot = optics.rays(image, start)
     apart = foot - start
+    # Half the chord that the ray cuts from the sphere; zero where the ray passes it by.
     half = np.sqrt(np.maximum(length * length - dot(apart, apart, axis=-2), 0.0))
     along = apart + np.where(far, half, -half)[:, None] * ray
     return np.asarray(along / np.sqrt(dot(along, along, axis=-2))[:, None])

@@ -137,6 +137,7 @@ def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array)
     along = np.einsum("stln,lstin->lsin", turn, tangents)
     along += directions
     if len(step) > 4:
+        # The logarithm of a length is varied: no step makes it negative.
         lengths = lengths * np.exp(step[4:]).transpose(1, 0, 2)
     return unit(along, axis=-2), lengths
 

@@ -155,6 +155,7 @@ def _joint_jacobian(problem: RefinementProblem, state: PostureState, offsets: Ar
     jacobian = np.zeros((6, 3, problem.trunk_width, state.root.shape[1]))
     for i in range(3):
         jacobian[:, i, i] = 1.0
+    # The torso turns about the neck and carries the pelvis, from which the hips hang; the hips turn about the pelvis.
     _turning(offsets[1:4], jacobian[1:4, :, 3:6])
     _turning(offsets[[3, 3]], jacobian[4:, :, 3:6])
     _turning(offsets[4:] - offsets[3], jacobian[4:, :, 6:9])

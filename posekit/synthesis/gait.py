@@ -102,6 +102,7 @@ class Gait:
         """Evaluate the gait at phases (...); whole numbers are whole cycles."""
         t = np.asarray(phase, dtype=np.float64)
         v = self.velocity
+        # The coefficients are the paper's; angles in degrees, translations in leg lengths.
         early = 0.625 - self.support_duration / self.cycle_duration
         sides = np.stack([t, t + 0.5], axis=-1)
         tilt = -2 + 2 * _wave(2 * t - 0.1)
@@ -119,7 +120,7 @@ class Gait:
 
     @cached_property
     def _elbow(self) -> PeriodicMonotoneCubic:
-        u = (self.velocity - 0.5) / 0.8
+        u = (self.velocity - 0.5) / 0.8  # 0 at the slowest, 1 at the fastest of mid gait
         return PeriodicMonotoneCubic(x=[0.05, 0.5 + 0.01 * u, 0.9], y=[6 + 8 * u, 20 + 24 * u, 8 + 9 * u])
 
 

@@ -43,7 +43,7 @@ def mocap_scene(
     sphere: CameraSphere | None = None,
     figure: Figure | None = None,
 ) -> SyntheticScene:
-    """See one clip with one camera that stands still.
+    """View one clip with one camera that stands still.
 
     Parameters
     ----------

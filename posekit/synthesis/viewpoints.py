@@ -36,6 +36,7 @@ def look_at(position: Array, target: Array, up: Array) -> Array:
     if np.isnan(forward).any():
         raise InputError("the camera stands where it shall look at; move it, or name another target")
     up = np.broadcast_to(up, forward.shape)
+    # Looking along `up`, no roll is upright: any axis across the line of sight will do, the farthest one is safest.
     spare = np.eye(3)[np.argmin(np.abs(forward), axis=-1)]
     right = cross(forward, unit(up))
     upright = np.linalg.norm(right, axis=-1, keepdims=True) > MIN_SINE_TO_UP

@@ -92,6 +92,7 @@ class Walker:
         if phases.ndim != 1 or not np.isfinite(phases).all():
             raise InputError(f"phases must be finite, of shape (N,); got shape {phases.shape}")
         gait = self.gait.angles(phases)
+        # The torso turns against the hips, so that shoulders and hips swing in opposition.
         R_torso = R_HEAD_REP103 @ _turned(-COUNTER_TORSION * gait.torsion, gait.lean)
         R_hips = R_HEAD_REP103 @ _turned(gait.torsion, np.zeros_like(gait.torsion))
         neck = np.broadcast_to(NECK_HEAD_CENTRED, (len(phases), 3))

@@ -47,7 +47,7 @@ def walker_scene(
     phase0: float = 0.0,
     carried: bool = True,
 ) -> SyntheticScene:
-    """See a walker with the camera of the 1985 paper.
+    """View a walker with the camera of the 1985 paper.
 
     Parameters
     ----------
