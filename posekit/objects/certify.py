@@ -87,7 +87,7 @@ class Certifier:
             if rows.size:
                 self._descend(points, q, distance, rows, q[rows][:, None])
             # Those still off start anew, from random shapes whose points are about as far apart, laid on them.
-        rows = np.flatnonzero(distance > tolerance)[:MAX_UNDECIDED_RETRIED]
+            rows = np.flatnonzero(distance > tolerance)[:MAX_UNDECIDED_RETRIED]
             if rows.size:
                 self._descend(points, q, distance, rows, self._starts(points[rows]))
             reasons[:MAX_POSTURES_CERTIFIED] = [self._reason(solution, k) for k in range(len(solution.q))]
