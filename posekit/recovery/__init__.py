@@ -1,4 +1,22 @@
-"""The conductor: a view to certified postures, in the order in which a view passes."""
+"""Recovery: from a view to certified postures. The files in the order in which a view passes.
+
+`conductor` is `posekit.recover`, and calls the others one after the other:
+
+1. Root: `person` (whose body it is), `body` (what is lifted, and the checks that settings ask for), `observed` (which
+   frames show enough), `fit_camera` and `fit_scale` (where the camera sees the root), `rooting` (where the neck is put
+   that nobody gives).
+2. Tree: `grower` grows and prunes the trees of some hypotheses, `trees` is what comes of them.
+3. Refine, where the noise is known: `noise`, `hypotheses` (what was observed, and how far it may be off), `refiner`
+   (trees on trunks), `limb_walls` (limits of limbs), `survival` (what became of each leaf), `refined` (the likeliest
+   postures).
+4. Certify: `certified`, the checks that every refined posture passes; `judged`, what a result says of that.
+5. Rank: `ranked`, the probability of every survivor; `grouping`, those that are alike.
+6. Answer: `recovery` (what is returned), `camera_record`, `result` (what is written), `summary` and `advice` (what is
+   printed), `least_violation` and `length_diagnosis` (what is wrong where no posture was found).
+
+`sequences` and `scaled_sequences` follow a person through what was recovered. `taylor_figure` is another body: the
+twelve points of Taylor (2000).
+"""
 
 from typing import TYPE_CHECKING
 

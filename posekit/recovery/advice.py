@@ -43,7 +43,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
         if not len(frame) and (not frame.reason or frame.placement is not None)
     ]
     if len(lost) > len(recovery.frames) / 2:
-        from posekit.recovery.length_diagnosis import doubt_lines
+        from posekit.recovery.length_diagnosis import length_diagnosis_lines
 
-        lines += doubt_lines(recovery, grower, lost)
+        lines += length_diagnosis_lines(recovery, grower, lost)
     return lines

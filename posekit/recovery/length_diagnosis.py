@@ -40,7 +40,7 @@ LIMB_SEGMENTS: Final = frozenset(segment_name(pair) for pair in SEGMENTS if max(
 """Segments of arms and legs: shoulders, pelvis and hips tell the depth without them."""
 
 
-def doubt_lines(recovery: Recovery, grower: Grower, lost: list[int]) -> list[str]:
+def length_diagnosis_lines(recovery: Recovery, grower: Grower, lost: list[int]) -> list[str]:
     """Name lengths that cannot be right, where the camera is known.
 
     Where necks are given, all lengths are looked at. Where they had to be placed, the depth hangs on the very lengths:

@@ -179,8 +179,19 @@ class Refiner:
         camera = _pinhole(fit.cameras(chosen))
         seen = ObservedHypotheses.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
         trunks = find_trunks(seen.sight)
-        leaves, tolerance = self._leaves(trunks, chosen, camera, seen)
         own = chosen[trunks.frame]
+        tree, tolerance, pruning = self._limb_tree(trunks, chosen, camera, seen)
+        with np.errstate(over="ignore"):
+            leaves = tree.grow(
+                fit.cameras(own),
+                trunks.root,
+                trunks.image,
+                pruning,
+                # Six noisy points tell a head's turn to some ten degrees: refinement weighs them, the tree asks none.
+                given=np.full((len(trunks), len(HEAD), 3), np.nan),
+                tolerance=tolerance.tangent,
+            )
+        leaves = _without_twins(leaves, trunks)
         if self.grower.nearer is not None:
             leaves = self.grower.nearer.prune(leaves, fit.frame[own])
         physical = leaves.counts()
@@ -250,10 +261,10 @@ class Refiner:
             for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
         }
 
-    def _leaves(
+    def _limb_tree(
         self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: ObservedHypotheses
-    ) -> tuple[Leaves, Tolerance]:
-        """Grow limbs on trunks, with every angle's own allowance."""
+    ) -> tuple[InterpretationTree, Tolerance, list[Check]]:
+        """Return the tree of the limbs on trunks, its tolerance, and its checks with every angle's own allowance."""
         fit, body = self.fit, self.grower.body
         focal = float(np.min(camera.K[..., [0, 1], [0, 1]]))
         allowed = tolerance_of(
@@ -273,18 +284,7 @@ class Refiner:
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )
-        # Six noisy points tell a head's turn to some ten degrees: refinement weighs them, the tree does not ask.
-        given = np.full((len(trunks), len(HEAD), 3), np.nan)
-        with np.errstate(over="ignore"):
-            leaves = tree.grow(
-                fit.cameras(chosen[trunks.frame]),
-                trunks.root,
-                trunks.image,
-                [check for check in suite if check.scope is not Scope.MOTION],
-                given=given,
-                tolerance=tolerance.tangent,
-            )
-        return _without_twins(leaves, trunks), tolerance
+        return tree, tolerance, [check for check in suite if check.scope is not Scope.MOTION]
 
 
 def _pinhole(camera: Camera) -> PinholeCamera:

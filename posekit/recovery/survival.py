@@ -50,16 +50,16 @@ class LeafOutcomes:
     survivors: RefinedSurvivors
 
     @staticmethod
-    def of(refined: Refined, known: NDArray[np.bool_], checks: Sequence[Check]) -> LeafOutcomes:
-        """Reject what noise cannot explain, then what checks contradict, and merge what became one.
+    def of(
+        refined: Refined,
+        known: NDArray[np.bool_],
+        explained: NDArray[np.bool_],
+        contradicted: Sequence[Contradiction],
+    ) -> LeafOutcomes:
+        """Reject leaves that noise has not `explained`, then what checks contradict, and merge what became one.
 
-        Joints that are not `known` become NaN.
+        Joints that are not `known` (N, 14) become NaN.
         """
-        explained = refined.explained()
-        likely = np.flatnonzero(explained)
-        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
-        points = np.concatenate([joints, refined.head[likely]], axis=1)
-        contradicted = contradictions(checks, points, likely)
         legal = explained.copy()
         for one in contradicted:
             legal[one.row] = False
@@ -130,7 +130,12 @@ def refine_leaves(
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=hopeless)
         refined = replace(refined, frame=frame[rows])
-        parts.append(LeafOutcomes.of(refined, np.asarray(np.isfinite(start).all(axis=2)), checks))
+        known = np.asarray(np.isfinite(start).all(axis=2))
+        explained = refined.explained()
+        likely = np.flatnonzero(explained)
+        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
+        found = contradictions(checks, np.concatenate([joints, refined.head[likely]], axis=1), likely)
+        parts.append(LeafOutcomes.of(refined, known, explained, found))
     return LeafOutcomes.joined(parts)
 
 
