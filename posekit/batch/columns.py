@@ -200,7 +200,7 @@ def schema_of(recipe: Recipe) -> Any:
 def table_of(frames: ShardFrames, input: str, person: int, schema: Any) -> Any:
     """Lay frames out as rows of a pyarrow table."""
     pa = extra("pyarrow", "parquet", "writing Parquet")
-    repeated = np.maximum(frames.count, 1)
+    repeated = np.maximum(frames.count, 1)  # a frame without survivors has one row, to say that it has none
     of_row = np.repeat(np.arange(len(frames.frame)), repeated)
     filled = frames.count[of_row] > 0
     starts = np.cumsum(repeated) - repeated

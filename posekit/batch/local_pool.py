@@ -182,11 +182,13 @@ def _start() -> _Worker:
     context = get_context("spawn")  # a fork after OpenMP was used hangs the child
     ours, theirs = context.Pipe()
     process = context.Process(target=serve, args=(theirs,), daemon=True)
+    # Libraries read these when they are loaded, which in the child is before any line of ours runs.
     kept = {name: os.environ.get(name) for name in (*THREAD_VARIABLES, *MALLOC_VARIABLES)}
     os.environ.update(
         {**MALLOC_VARIABLES, **{name: value for name, value in kept.items() if value is not None}}
     )
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    # The child inherits the mask: Ctrl-C cannot end it before `serve` ignores it.
     blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         process.start()
@@ -196,7 +198,7 @@ def _start() -> _Worker:
             os.environ.pop(name, None)
             if value is not None:
                 os.environ[name] = value
-    theirs.close()
+    theirs.close()  # held open here, it would hide that the child has died
     return _Worker(process=process, pipe=ours)
 
 
@@ -219,7 +221,7 @@ def _follow_parent() -> None:
     parent = parent_process()
     if parent is not None:
         connection.wait([parent.sentinel])
-        os._exit(1)
+        os._exit(1)  # from a thread, sys.exit would end no more than the thread
 
 
 def _end_of(process: Any) -> str:

@@ -109,6 +109,7 @@ class Run:
             for one in listed
         ]
         self._stage(jobs)
+        # Tables are removed when a run is done. One that goes on needs those of inputs with shards that are missing.
         again = []
         for k, one in enumerate(self.staged):
             lacking = any(not Path(table.path).is_file() for table in one.tables)

@@ -167,6 +167,7 @@ def run_shard(shard: Shard) -> Finished:
                 for piece in _pieces(shard, head):
                     table = table_of(piece, shard.input, shard.table.person, schema)
                     with writing(shard.path):
+                        # A row group a piece: what reads the shard later need not hold more of it than this.
                         writer.write_table(table, row_group_size=max(table.num_rows, 1))
                     frames += len(piece.frame)
                     survivors += int(piece.count.sum())
@@ -240,6 +241,7 @@ def _recovered(rows: ImageRows, head: View, shard: Shard) -> ShardFrames:
     except PosekitError as error:
         if len(rows) == 1:
             return unrecovered(rows, re.sub(r"^frames\[0\]: ", "", str(error)))
+    # One frame that cannot be recovered is found in as many steps as halves can be halved.
     half = len(rows) // 2
     return _recovered(rows.part(slice(0, half)), head, shard).followed_by(
         _recovered(rows.part(slice(half, None)), head, shard)

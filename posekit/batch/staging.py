@@ -150,6 +150,7 @@ def stage(job: Staging) -> Staged:
     key = digests.of_values(job.name, str(job.path.resolve()), digest, job.reading)
     base = job.folder / STAGED_FOLDER / f"{stem_of(job.name)}.{key}"
     index = base.with_name(f"{base.name}.json")
+    # The key has the content in it: an input that was changed is opened anew, under another name.
     known = None if job.again else _known(index, digest)
     if known is not None:
         return known
@@ -166,6 +167,7 @@ def stage(job: Staging) -> Staged:
         tables=tuple(tables),
         warnings=tuple(dict.fromkeys(says))[:MAX_STAGED_WARNINGS],
     )
+    # Written last: where it is there, the tables that it names are whole.
     write_document(index, {"schema": STAGED_SCHEMA, **asdict(staged)}, job.folder / PARTS_FOLDER)
     return staged
 

@@ -202,6 +202,7 @@ def _opened(path: Path) -> Iterator[Any]:
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
     with open_file(path, limit=MAX_INPUT_BYTES) as file:
         try:
+            # Without these two a whole row group is read at once, which may be the whole recording.
             yield pq.ParquetFile(file, pre_buffer=False, buffer_size=BUFFER_BYTES)
         except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
             reason = cut(one_line(str(error)) or type(error).__name__)

@@ -71,6 +71,7 @@ def write_npz(file: BinaryIO, arrays: Mapping[str, NDArray[Any] | Ragged]) -> No
             member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
             member.compress_type = zipfile.ZIP_DEFLATED
             member._compresslevel = COMPRESSION_LEVEL  # type: ignore[attr-defined]  # no argument of open() says it
+            # The size is not known beforehand, and padding may take it past 4 GB.
             with archive.open(member, "w", force_zip64=True) as out:
                 _write(out, array)
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.own.survivor_json import nullable
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.safe_io.refusal import refusal
 from posekit.skeleton import JOINTS
@@ -61,16 +62,7 @@ class FollowedPaths:
 
     def __post_init__(self) -> None:
         K, T = np.shape(self.survivor) if np.ndim(self.survivor) == 2 else (0, 0)
-        shapes = {
-            "survivor": (K, T),
-            "joints": (K, T, len(JOINTS), 3),
-            "smoothed": (K, T, len(JOINTS), 3),
-            "interpolated": (K, T, len(JOINTS)),
-            "deviation": (K, T, len(JOINTS)),
-            "cost": (K,),
-            "share": (K,),
-            "scale": (K, T),
-        }
+        shapes = path_shapes(K, T)
         kinds: dict[str, type[np.generic]] = {"survivor": np.int64, "interpolated": np.bool_}
         for name, shape in shapes.items():
             values: NDArray[Any] = np.array(getattr(self, name), dtype=kinds.get(name, np.float64))
@@ -125,7 +117,7 @@ class FollowedPaths:
 
     def fields(self, unit: Unit) -> dict[str, Any]:
         """Return what a JSON file says, in its unit: null for what is not known."""
-        values = {name: _nullable(each) for name, each in self.in_unit(unit).items()}
+        values = {name: nullable(each) for name, each in self.in_unit(unit).items()}
         return {
             **self.told(unit),
             "paths": [{name: values[name][k] for name in values} for k in range(len(self))],
@@ -152,14 +144,19 @@ class FollowedPaths:
         )
 
 
+def path_shapes(K: int, T: int) -> dict[str, tuple[int, ...]]:
+    """Return the shape of each array of K paths through T frames."""
+    return {
+        "survivor": (K, T),
+        "joints": (K, T, len(JOINTS), 3),
+        "smoothed": (K, T, len(JOINTS), 3),
+        "interpolated": (K, T, len(JOINTS)),
+        "deviation": (K, T, len(JOINTS)),
+        "cost": (K,),
+        "share": (K,),
+        "scale": (K, T),
+    }
+
+
 SINGLE_VALUES: Final = ("lead", "exact", "apart")
 """What is said once of all paths."""
-
-
-def _nullable(values: NDArray[Any]) -> list[Any]:
-    """Turn an array into lists, with None for NaN."""
-    if values.dtype.kind != "f" or not np.isnan(values).any():
-        return list(values.tolist())
-    boxed = values.astype(object)
-    boxed[np.isnan(values)] = None
-    return list(boxed.tolist())

@@ -139,6 +139,7 @@ def _frame(
     frame: ResultFrameFields, unit: Unit, extents: Mapping[str, Any], in_file: set[str]
 ) -> ResultFrame:
     camera = frame.camera
+    # Of these two frames decide one by one; of all other columns the whole file has them, or none of it.
     carried = in_file - {"scales", "refined"}
     if frame.family is not None:  # scales are of uncalibrated frames, even where none is known
         carried.add("scales")

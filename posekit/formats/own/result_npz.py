@@ -27,7 +27,7 @@ from pydantic import ValidationError
 from posekit.formats.own.family import Family
 from posekit.formats.own.inferred import Inferred
 from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
-from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.paths import FollowedPaths, path_shapes
 from posekit.formats.own.reading import parse_json
 from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, RESULT_SCHEMA, Result, ResultFrame
 from posekit.formats.own.result_schema import ResultDetails, ResultPathsTold
@@ -90,6 +90,7 @@ def read_result_npz(path: str | Path) -> Result:
 def result_in(archive: Archive) -> Result:
     """Make a result of an open archive."""
     path = archive.path
+    # Padding is passed over in pieces: what it declares may be large, what else is there may not.
     archive.check_held(MAX_ARRAYS, but=PADDED_PREFIXES)
     _expect(archive, "schema", (RESULT_SCHEMA,))
     unit: Unit = _expect(archive, "unit", UNIT_NAMES)  # type: ignore[assignment]
@@ -107,6 +108,7 @@ def result_in(archive: Archive) -> Result:
     if (count < 0).any() or held > MAX_ARRAYS:
         most = f"counts from 0, at most {MAX_ARRAYS / 1e6:,.0f} MB of survivors"
         raise refusal(path, "count", f"counts that need {held / 1e6:,.0f} MB", most, "split the result")
+    # From here on sizes are bounded by `count`, whatever the headers of the arrays say.
     survivors: dict[str, Any] = survivors_in(
         archive, SurvivorColumns, count, unit, extents={"q": nq, "margins": margins}
     )
@@ -159,17 +161,13 @@ def _followed(archive: Archive, frames: int, unit: Unit) -> FollowedPaths | None
     if _PATHS + "survivor" not in archive.names:
         return None
     survivor = archive.array(_PATHS + "survivor", "iu", (None, frames))
-    K, joints = len(survivor), len(JOINTS)
-    shapes = {
-        "joints": (K, frames, joints, 3),
-        "smoothed": (K, frames, joints, 3),
-        "deviation": (K, frames, joints),
-        "cost": (K,),
-        "share": (K,),
-        "scale": (K, frames),
+    shapes = path_shapes(len(survivor), frames)
+    arrays: dict[str, Any] = {
+        name: _floats(archive, _PATHS + name, shapes[name])
+        for name in shapes
+        if name not in ("survivor", "interpolated")
     }
-    arrays: dict[str, Any] = {name: _floats(archive, _PATHS + name, shape) for name, shape in shapes.items()}
-    arrays["interpolated"] = archive.array(_PATHS + "interpolated", "b", (K, frames, joints))
+    arrays["interpolated"] = archive.array(_PATHS + "interpolated", "b", shapes["interpolated"])
     try:
         told = ResultPathsTold.model_validate(_json(archive, _PATHS + "told"))
     except ValidationError:
@@ -260,6 +258,7 @@ def _camera_arrays(frames: Sequence[ResultFrame], unit: Unit) -> dict[str, Array
         )
         for name in CAMERA_FIELDS
     }
+    # A camera with an f in metres has its image in metres, and so the residual; else it is in pixels.
     plane = ~np.isnan(stacked["f"])
     residual = np.where(plane, from_metres(stacked["residual"], unit), stacked["residual"])
     return {

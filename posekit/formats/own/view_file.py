@@ -124,6 +124,7 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
         head_of_file["deviation"] = view.deviation
     if view.derived:
         head_of_file["derived"] = list(view.derived)
+    # What is written must be read again: a view made in Python may say what its schema does not allow.
     validated(ViewFile, {**head_of_file, "frames": frames}, path)
     write_text(path, json_pieces(head_of_file, "frames", frames))
 
