@@ -62,6 +62,7 @@ class Conversion:
     Parameters
     ----------
     given, output : Path
+        The file that is read, and the one that is written.
     to : str
         The format to write: ``view``, ``postures``, or one of motion; by the output's name if empty.
     source : Source

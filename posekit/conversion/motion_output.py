@@ -49,6 +49,7 @@ class Output:
     Parameters
     ----------
     path : Path
+        The file that is written.
     to : str
         ``postures``, or a format of motion.
     up : str

@@ -178,6 +178,7 @@ def moving(
     Parameters
     ----------
     path : path
+        The file that is read.
     what : Recognised
         What the file is.
     posture : str

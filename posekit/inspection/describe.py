@@ -31,6 +31,7 @@ def describe(path: Path, source: Source, *, unit: str = "") -> list[str]:
     Parameters
     ----------
     path : Path
+        The file or folder to describe.
     source : Source
         How key points are to be read.
     unit : str

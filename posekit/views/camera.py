@@ -28,7 +28,7 @@ MAX_CAMERAS_LISTED: Final = 8
 """Names of cameras that are listed."""
 
 
-class Sighting(NamedTuple):
+class SightedKeyPoints(NamedTuple):
     """Key points, and the camera that saw them.
 
     Attributes
@@ -36,6 +36,7 @@ class Sighting(NamedTuple):
     keypoints : KeyPoints
         In pixels of `camera`: undistorted where the lens needs it.
     camera : OpenCVModel or ScaledOrthographicModel
+        The camera that saw them.
     says : str
         What camera it is, in a line.
     """
@@ -45,7 +46,7 @@ class Sighting(NamedTuple):
     says: str
 
 
-def sighting(keypoints: KeyPoints, source: Source) -> Sighting:
+def sighting(keypoints: KeyPoints, source: Source) -> SightedKeyPoints:
     """Find the camera, and bring the key points into its pixels.
 
     Raises
@@ -68,10 +69,10 @@ def sighting(keypoints: KeyPoints, source: Source) -> Sighting:
         camera = camera_from_focal35(_size(keypoints, source, "--focal35"), source.focal35)
     else:
         model = ScaledOrthographicModel(scale=None)
-        return Sighting(keypoints, model, "no camera: scaled orthographic, the scale is not known")
+        return SightedKeyPoints(keypoints, model, "no camera: scaled orthographic, the scale is not known")
     _check_size(camera, keypoints)
     _check_unit(camera, keypoints)
-    return Sighting(_ideal(keypoints, camera), _model(camera), _says(camera))
+    return SightedKeyPoints(_ideal(keypoints, camera), _model(camera), _says(camera))
 
 
 def in_pixels(keypoints: KeyPoints, size: tuple[int, int] | None) -> KeyPoints:

@@ -27,6 +27,7 @@ def given_views(path: Path, source: Source, truth: Path | None = None) -> list[O
     Parameters
     ----------
     path : Path
+        A view file, or a file or folder of key points.
     source : Source
         How key points are to be read; a view says all of that itself.
     truth : Path, optional

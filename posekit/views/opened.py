@@ -16,6 +16,7 @@ class Opened:
     person : int
         The number to choose them by.
     view : View
+        The person's view.
     says : tuple of str
         What it was made of, a line each: format, person, camera, lengths.
     """

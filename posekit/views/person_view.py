@@ -42,6 +42,7 @@ def person_view(
     keypoints : KeyPoints
         At most one detection a picture, in pixels.
     camera : OpenCVModel or ScaledOrthographicModel
+        The camera that saw them.
     person : Figure
         With the person's lengths.
     rate : float, optional

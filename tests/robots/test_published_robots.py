@@ -11,9 +11,9 @@ import pytest
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.robots import (
-    find,
     load_robot,
 )
+from posekit.robots.find import find
 from posekit.robots.pairs import neutral_inside_limits
 from posekit.robots.second_reader import compare_readers
 

@@ -32,6 +32,7 @@ class BvhFile:
     path : str
         Where it came from.
     hierarchy : Hierarchy
+        The joints of the file, and their channels.
     frame_time : float
         Seconds from frame to frame.
     values : array (T, C)

@@ -221,6 +221,7 @@ def parse_hierarchy(path: object, text: str) -> Hierarchy:
     path : path
         What to call it in errors.
     text : str
+        The file, up to its motion or whole.
 
     Raises
     ------

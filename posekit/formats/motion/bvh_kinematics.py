@@ -26,6 +26,7 @@ def points_of(file: BvhFile, *, absolute: bool) -> Array:
     Parameters
     ----------
     file : BvhFile
+        The joints and the frames of a BVH file.
     absolute : bool
         Whether position channels stand in place of the offset, or are added to it: see `positions_are_absolute`.
 

@@ -21,7 +21,9 @@ class BvhReading(NamedTuple):
     Attributes
     ----------
     motion : Motion
+        The points of the joints over time.
     unit : Unit
+        What lengths in the file are in, and how that is known.
     absolute : bool
         Whether position channels were taken in place of the offsets.
     """
@@ -46,6 +48,7 @@ def examine_bvh(
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         The file's, one of `posekit.formats.motion.motion_format.METRES_IN_UNIT`; told by the size of the body if not
         given.

@@ -95,7 +95,9 @@ def guessed_up(points: Array, names: tuple[str, ...]) -> str:
     Parameters
     ----------
     points : array (T, P, 3)
+        The joints over time, in any unit.
     names : tuple of str (P,)
+        The names of the joints.
 
     Returns
     -------

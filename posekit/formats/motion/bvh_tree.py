@@ -71,7 +71,7 @@ POINT_NODES: Final = tuple(
 """Where each of `posekit.skeleton.POINTS` stands in `BODY_NODES`."""
 
 
-class Placed(NamedTuple):
+class PlacedBody(NamedTuple):
     """Configurations in the tree.
 
     Attributes
@@ -156,12 +156,13 @@ def check_time(path: str | Path, time: Array, frames: int) -> None:
         raise refusal(path, f"time[{frame}]", f"{time[frame]:g} s", expected, "put the frames in order")
 
 
-def place(figure: Figure, q: Array, up: str = "+z") -> Placed:
+def place(figure: Figure, q: Array, up: str = "+z") -> PlacedBody:
     """Put configurations (T, nq) into the tree.
 
     Parameters
     ----------
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         Finite but for angles, see `checked`.
     up : str
@@ -180,7 +181,7 @@ def place(figure: Figure, q: Array, up: str = "+z") -> Placed:
     R_hips = euler_rotation(angles[:, 0])
     angles[:, 1] = euler_angles(R_hips.transpose(0, 2, 1))
     angles[:, 0] = euler_angles(R_torso @ R_hips)
-    return Placed(q[:, :3] @ W.T + R_torso @ pelvis, angles)
+    return PlacedBody(q[:, :3] @ W.T + R_torso @ pelvis, angles)
 
 
 _COLUMN: Final = {"flexion": 0, "bending": 1, "abduction": 1, "rotation": 2}
@@ -194,6 +195,7 @@ def filled(path: str | Path, figure: Figure, q: Array, unknown: str) -> Array:
     path : path
         What to call it in errors.
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         NaN in angles that are not known.
     unknown : str

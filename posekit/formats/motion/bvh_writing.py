@@ -67,7 +67,9 @@ def write_bvh(
     Parameters
     ----------
     path : path
+        The file to write, whole or not at all.
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         In Pinocchio's order, free-flyer first: metres, unit quaternion, radians.
     time : array (T,)

@@ -37,6 +37,7 @@ def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         Instead of ``POINT:UNITS``.
 

@@ -41,6 +41,7 @@ def read_csv_motion(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         Of the coordinates; metres if not given.
 

@@ -23,7 +23,7 @@ from posekit.formats.motion.bvh_angles import euler_rotation
 from posekit.formats.motion.bvh_tree import (
     BODY_NODES,
     TO_Y_UP,
-    Placed,
+    PlacedBody,
     checked,
     filled,
     known_nodes,
@@ -55,7 +55,9 @@ def write_glb(
     Parameters
     ----------
     path : path
+        The file to write, whole or not at all.
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         In Pinocchio's order, free-flyer first: metres, unit quaternion, radians.
     time : array (T,)
@@ -101,7 +103,9 @@ def write_postures_glb(
     Parameters
     ----------
     path : path
+        The file to write, whole or not at all.
     figure : Figure
+        The figure whose configurations they are.
     q : array (N, nq)
         See `write_glb`; at most 1000. Where an angle is NaN, what hangs on its joint is left out of that body; an
         axial rotation alone that is not known is left at zero.
@@ -137,7 +141,7 @@ def write_postures_glb(
     glb.write(path)
 
 
-def quaternions_along_time(placed: Placed) -> Array:
+def quaternions_along_time(placed: PlacedBody) -> Array:
     """Return each node's rotation as a quaternion (T, 21, 4), x, y, z, w, with no change of sign along time."""
     R = euler_rotation(placed.angles)
     turns = quaternion_from_rotation(R)

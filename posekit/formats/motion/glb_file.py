@@ -58,6 +58,7 @@ class GlbFile:
         Parameters
         ----------
         values : array (N,) or (N, 3) or (N, 4)
+            The numbers, a row an element.
         kind : int
             `FLOAT_TYPE` or `UINT16_TYPE`.
         target : int, optional

@@ -44,7 +44,9 @@ def write_mot(path: str | Path, figure: Figure, q: Array, time: Array) -> None:
     Parameters
     ----------
     path : path
+        The file to write, whole or not at all.
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         In Pinocchio's order, metres, unit quaternions, radians; NaN where an angle is not known.
     time : array (T,)
@@ -71,6 +73,7 @@ def read_mot(path: str | Path, figure: Figure) -> tuple[Array, Array]:
     Parameters
     ----------
     path : path
+        The file to read.
     figure : Figure
         Whose joints they are.
 

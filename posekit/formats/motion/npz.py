@@ -45,6 +45,7 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         Instead of the file's; metres where neither says.
 

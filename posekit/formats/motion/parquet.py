@@ -38,6 +38,7 @@ def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         Of the coordinates; metres if not given.
 

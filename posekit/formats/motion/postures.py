@@ -71,6 +71,7 @@ def postures_of(
     Parameters
     ----------
     motion : Motion
+        Named points over time.
     layout : SkeletonMap, optional
         What the points are; by their names if not given, see `layout_of`.
     figure : Figure, optional

@@ -32,6 +32,7 @@ def read_motion(
     Parameters
     ----------
     path : path
+        The file to read.
     format : str, optional
         One of `motion_formats`; by the end of the file's name, or its content, if not given.
     unit : str, optional

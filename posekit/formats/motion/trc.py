@@ -46,6 +46,7 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The file to read.
     unit : str, optional
         Instead of the one in the header.
 

@@ -49,6 +49,7 @@ def write_urdf_folder(path: str | Path, figure: Figure, q: Array, time: Array, *
     path : path
         A folder that is not there yet, is empty, or was written so before.
     figure : Figure
+        The figure whose configurations they are.
     q : array (T, nq)
         In Pinocchio's order; NaN in angles that are not known is kept.
     time : array (T,)
@@ -87,6 +88,7 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
     Parameters
     ----------
     path : path
+        The folder to read.
     unit : str, optional
         URDF has metres: any other is refused.
 
