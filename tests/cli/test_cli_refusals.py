@@ -364,7 +364,7 @@ def test_an_interrupt_leaves_nothing_behind(
     def interrupted(*_: Any, **__: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(importlib.import_module("posekit.recovery"), "recover", interrupted)
+    monkeypatch.setattr(importlib.import_module("posekit.recovery.conductor"), "recover", interrupted)
     outcome = run("recover", view, "-o", "r.json")
     assert (outcome.code, outcome.out) == (130, "")
     assert outcome.err in ("", "posekit: error: interrupted\n")
