@@ -41,6 +41,7 @@ class Work:
     view : View
         What is seen, with noise, and the truth.
     clip : int
+        The number of the clip that they are of.
     noise : float
         Standard deviation, pixels.
     frame : int array (F,)
@@ -74,6 +75,7 @@ class Measured:
     Parameters
     ----------
     survivors : int array (F,)
+        How many postures were found.
     errors : mapping of str to array (F, 5)
         By `ROLES`: `posekit.evaluate.joint_errors.ERROR_NAMES`, metres.
     branch : array (F,)

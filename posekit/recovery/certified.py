@@ -58,6 +58,7 @@ class Contradiction:
     Parameters
     ----------
     check : str
+        The name of the check.
     where, unit : tuple of str (K,)
         Its places.
     row : int array (M,)

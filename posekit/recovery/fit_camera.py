@@ -91,6 +91,7 @@ def fit_camera(
     Parameters
     ----------
     view : View
+        Of a calibrated camera, or of one that the head tells.
     figure : Figure
         The person's.
     rooting : Rooting, optional

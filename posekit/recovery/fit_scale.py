@@ -28,6 +28,7 @@ def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tole
     view : View
         Of a scaled orthographic camera.
     body : Body
+        What the points are lifted into: its lengths bound the scale.
     scale : Scale or None
         How to find s; None takes the view's own, or else the least.
     tolerance : Tolerance or None

@@ -41,8 +41,11 @@ class Grower:
     Parameters
     ----------
     view : View
+        What was seen.
     fit : CameraFit
+        The hypotheses: where the camera sees the root in each.
     body : Body
+        What the points are lifted into.
     settings : RecoverSettings
         What is asked
     nearer : NearerEnds, optional

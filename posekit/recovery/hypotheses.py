@@ -99,6 +99,7 @@ def neck_priors(
     Parameters
     ----------
     fit : CameraFit
+        Where the necks are.
     chosen : int array (H,)
         Hypotheses.
     camera : Camera

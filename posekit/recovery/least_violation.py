@@ -81,6 +81,7 @@ def least_violation(grower: Grower, frame: int, tolerance: Tolerance | None = No
     grower : Grower
         Of the view.
     frame : int
+        Its number in the view, counted from 0.
     tolerance : Tolerance, optional
         Beyond which something is a violation; that of measured points if not given.
 

@@ -51,6 +51,7 @@ def length_diagnosis_lines(recovery: Recovery, grower: Grower, lost: list[int]) 
     Parameters
     ----------
     recovery : Recovery
+        In most of whose frames there is no posture.
     grower : Grower
         Of its view.
     lost : list of int

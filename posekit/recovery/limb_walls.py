@@ -32,6 +32,7 @@ class LimbWalls:
     Parameters
     ----------
     figure : Figure
+        The person's, whose neutral posture limbs are put onto.
     checks : mapping
         Those that judge each limb, with the same tolerance; of those that judge an angle again, the last counts.
     balls : mapping

@@ -103,7 +103,9 @@ class Noise:
         Parameters
         ----------
         view : View
+            Whose confidences count.
         frames : int array (F,)
+            Which of its frames.
         depth : array (F,)
             Of the neck, metres.
         focal : array (F,)

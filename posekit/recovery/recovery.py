@@ -311,7 +311,9 @@ class Recovery:
     figure : Figure
         The person's figure.
     fit : CameraFit
+        The camera, and where it sees the root.
     frames : list of FrameRecovery
+        In the view's order.
     settings : mapping
         Everything that decided the result.
     grower : Grower, optional
@@ -340,5 +342,5 @@ class Recovery:
 
     @cached_property
     def probability(self) -> list[Array]:
-        """The same, by frame."""
+        """The probability of the survivors of each frame."""
         return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])

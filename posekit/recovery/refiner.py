@@ -56,6 +56,7 @@ class Lifted:
     frames : int array (F,)
         The view's frames.
     seen : ObservedHypotheses
+        What these hypotheses observed.
     trunks : Trunks
         Of those hypotheses.
     leaves : Leaves
@@ -100,7 +101,9 @@ class Refiner:
     Parameters
     ----------
     grower : Grower
+        What grows the trees of the view.
     noise : Noise
+        How far image points and lengths may be off.
     """
 
     grower: Grower

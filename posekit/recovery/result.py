@@ -27,6 +27,7 @@ def result_of(
     Parameters
     ----------
     recovery : Recovery
+        What `posekit.recover` returned.
     unit : {"m", "cm", "mm"}
         Of lengths in the file.
     explain : bool

@@ -59,6 +59,7 @@ class ScaledFollowing:
     recovery : Recovery
         With lengths of that scale.
     following : Following
+        The paths of a person so large.
     """
 
     scale: float

@@ -50,12 +50,14 @@ def follow(
     Parameters
     ----------
     recovery : Recovery
+        Of a sequence.
     k : int
         How many paths: two or more tell how sure the first is. Fewer come back where there are not so many.
     log_probability : sequence of array (N,), optional
         Of the survivors of each frame, natural logarithm, -inf for impossible ones; that of `Recovery.probability` if
         not given.
     model : MotionModel, optional
+        What motion costs; that of a person who walks if not given.
     beam : Beam, optional
         Which paths are followed while searching.
     apart : float
@@ -141,6 +143,7 @@ def survivor_frames(
     Parameters
     ----------
     frames : sequence of FrameRecovery
+        In the order of time.
     log_probability : sequence of array (N,), optional
         By frame; survivors cost nothing if not given.
 

@@ -67,7 +67,9 @@ def validate(
     Parameters
     ----------
     validator : Validator
+        What judges, with its settings.
     postures : Postures or Configurations
+        What is judged.
     settings : dict, optional
         What else is to be written of what decided the verdicts: the settings of the validator are.
     every : bool

@@ -27,6 +27,7 @@ def columns_of(
     Parameters
     ----------
     verdicts : posekit.validators.Report
+        What the validator said of some postures.
     contacts : Contacts, optional
         The pairs of bodies, where the check of collisions names none.
     places : dict

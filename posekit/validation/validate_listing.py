@@ -33,6 +33,7 @@ def list_postures(
     Parameters
     ----------
     verdicts : posekit.validators.Report
+        What the validator said of them.
     contacts : Contacts, optional
         The pairs of bodies, where the check of collisions names none.
     columns : VerdictColumns

@@ -38,6 +38,7 @@ class Completion:
     Parameters
     ----------
     figure : Figure
+        Of Taylor's proportions.
     points : tuple of str (P,)
         The names of the tree's points: the twelve joints and the girdles' middles.
 
@@ -118,6 +119,7 @@ class Completed(Check):
     check : Check
         Reads `posekit.skeleton.JOINTS`; of the head it knows nothing here.
     completion : Completion
+        Places neck and pelvis before the check is asked.
     """
 
     check: Check
@@ -169,9 +171,11 @@ def joint_checks(
     Parameters
     ----------
     figure : Figure
+        Of Taylor's proportions.
     names : iterable of str, Check or CheckSettings
         Some of ``rigid-parts``, ``joint-range``, ``collision``, and others that do not judge motion.
     ranges : Ranges
+        The joint ranges.
     tolerance : Tolerance
         Its `rigid` and `angle` count.
     contact_margin : float
@@ -214,6 +218,7 @@ def taylor_checks(
     Parameters
     ----------
     figure : Figure
+        Of Taylor's proportions.
     points : sequence of str
         The names of the tree's points, in its order.
     names, ranges, tolerance, contact_margin

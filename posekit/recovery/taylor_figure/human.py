@@ -116,9 +116,11 @@ class Human:
         Parameters
         ----------
         image : array (F, 12, 2)
+            His twelve points, pixels.
         lengths : array (S,) or (F, S)
             Metres.
         scale : array (F,)
+            Pixels a unit of length, a frame each.
         checks : sequence of Check
             Asked beside those that hold the middles.
         """
