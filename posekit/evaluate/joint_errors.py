@@ -75,6 +75,7 @@ def best_rows(error: Array, offsets: NDArray[np.intp]) -> NDArray[np.intp]:
     """
     counts = np.diff(offsets)
     frame = np.repeat(np.arange(len(counts)), counts)
+    # Sorted by frame and then by error, the first of each frame is its best.
     known = np.flatnonzero(np.isfinite(error))
     order = known[np.lexsort((error[known], frame[known]))]
     frames, first = np.unique(frame[order], return_index=True)

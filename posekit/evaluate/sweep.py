@@ -128,6 +128,7 @@ class Sweep:
         InputError
             Where a height is farther from the body's middle than the distance.
         """
+        # A camera's height takes from its level distance, so that all stand equally far from the middle.
         yaw, height = np.radians(self.poses[:, 0]), self.poses[:, 1]
         above = height[:, None] - (middle @ up - ground)
         if not (np.abs(above) < 0.99 * self.distance).all():

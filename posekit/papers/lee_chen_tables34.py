@@ -22,7 +22,11 @@ PAPER_TOLERANCE = Tolerance(rigid=0.01, tangent=0.001, placement=False)
 """The paper compares distances and gives no number; 1 cm lets near-frontal torsos stay ambiguous, as its do."""
 
 GROUPING_METRES = 0.05
+"""Postures are one group where no joint is farther from that of the group's representative."""
+
 N_PHASES = 100
+"""Phases of frame 1 that are searched, evenly over the cycle: the paper does not print which it took."""
+
 SAME_POSTURE_METRES = 1e-6
 """Metres within which all joints of a survivor must lie to be the input."""
 
@@ -61,6 +65,7 @@ class Sequence1985:
     @property
     def distance(self) -> float:
         """How far the counts are from the print: the sum over all cells of how many octaves they are apart."""
+        # A count of zero is taken for half a survivor: its logarithm must be finite.
         ours = np.maximum(np.stack([self.physical, self.motion]), 0.5)
         print_ = np.array(
             [printed.PRINTED_PHYSICAL[self.name], printed.PRINTED_MOTION[self.name]], dtype=np.float64
@@ -84,6 +89,7 @@ def sequences(name: str, velocity: float, phase0: float = 0.0, count: int = N_PH
     """
     walker = Walker(velocity=velocity)
     cycle = walker.gait.cycle_duration
+    # One scene for each printed frame holds all phases: frame k of it is that frame of the k-th sequence.
     by_frame = []
     for frame in printed.PRINTED_FRAMES:
         phase = phase0 + (frame - 1) * FRAME_TIME / cycle

@@ -30,9 +30,12 @@ from posekit.safe_io.zip_directory import directory_size
 MAX_ARRAYS: Final = 1_000_000_000
 """Bytes of memory that the arrays of one archive may take."""
 MAX_MEMBERS: Final = 10_000
+"""Arrays of one archive: far more than any file of posekit has."""
+
 MAX_DIRECTORY: Final = 10_000_000
 """Bytes of an archive's directory: that of 10,000 members with names of ordinary length is 1 MB."""
 _CHUNK: Final = 1 << 22
+"""Bytes of padding that are read, and dropped, at a time."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -119,6 +122,7 @@ class Archive:
                     _KINDS[kinds],
                     "save it again as such; pickles are not read",
                 )
+            # The header must declare just what the member holds, else `_read` would allocate what is not there.
             if length != member.file_size - file.tell() or min(found, default=0) < 0:
                 raise refusal(
                     self.path,
@@ -205,6 +209,7 @@ def _check_directory(path: str | Path, archive: zipfile.ZipFile, limit: int) -> 
                 "arrays (.npy) alone",
                 "save it with numpy.savez",
             )
+    # `zipfile` gives the last of two members of one name, other readers the first: a file must not mean two things.
     if len({member.filename for member in members}) != len(members):
         raise refusal(path, "", "two arrays of one name", "each name once", "save it with numpy.savez")
     declared = sum(member.file_size for member in members)

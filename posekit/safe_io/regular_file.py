@@ -52,6 +52,7 @@ def open_file(path: str | Path, *, limit: int, too_large: str = "split it") -> I
     except (OSError, ValueError) as error:
         raise unreadable(path, error) from None
     with os.fdopen(handle, "rb") as file:
+        # Asked again of the open file: another one may have taken the name since the first look.
         _check_status(path, os.fstat(handle), limit, too_large)
         yield file
 

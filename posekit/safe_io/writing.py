@@ -49,6 +49,7 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
             file.flush()
             if sync:
                 os.fsync(file.fileno())
+        # The new file takes the old one's permissions: a rename would set those of a file just made.
         if target.exists():
             shutil.copymode(target, beside)
         beside.replace(target)

@@ -41,6 +41,7 @@ def fitted_eye(
     """
     axes = _axes(world, azimuth, elevation)
     across, tall = _half_angles(fov, aspect)
+    # In the eye's own axes: how far to the right, how high, how near.
     extent = points[np.isfinite(points).all(axis=1)] @ axes.T
     centre = (extent.min(axis=0) + extent.max(axis=0)) / 2
     distance = _distance(extent - centre, across, tall)
@@ -64,6 +65,7 @@ def orbit(
 ) -> list[Eye]:
     """Go once around the points in `count` steps, at a distance from which all are always in the picture."""
     known = points[np.isfinite(points).all(axis=1)]
+    # One distance for all steps: one that followed the body's outline would pump.
     target = (known.min(axis=0) + known.max(axis=0)) / 2
     across, tall = _half_angles(fov, aspect)
     turns = [_axes(world, azimuth + 360 * k / count, elevation) for k in range(count)]
@@ -95,6 +97,7 @@ def view_eye(sight: ImageSight | None, world: World, size: tuple[int, int]) -> C
     corners = sight.frame()
     low, high = corners.min(axis=0), corners.max(axis=0)
     scale = float((np.array(size) / (high - low)).min())
+    # The middle of the image goes to the picture's, whose first pixel is centred on (0, 0).
     shift = np.array(size) / 2 - 0.5 - scale * (low + high) / 2
     camera = sight.camera
     if isinstance(camera, ScaledOrthographicCamera):

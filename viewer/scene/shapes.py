@@ -82,6 +82,7 @@ def tubes(starts: Array, ends: Array, radius: float) -> tuple[Array, Array]:
     """Return vertices (N * 2 * N_TUBE_SIDES, 3) and faces (N * 2 * N_TUBE_SIDES, 3) of open tubes."""
     axis = ends - starts
     axis = axis / np.linalg.norm(axis, axis=1, keepdims=True)
+    # The axis farthest from the tube's own gives a cross product that is well away from zero.
     least = np.eye(3)[np.argmin(np.abs(axis), axis=1)]
     across = cross(axis, least)
     across = across / np.linalg.norm(across, axis=1, keepdims=True)
@@ -113,6 +114,7 @@ def smooth(geometry: Json, half_length: float) -> None:
         return
     vertices = _unpacked(attributes["position"], "<f4")
     normals = vertices.copy()
+    # A capsule's surface is a radius away from its middle line: the normal points from the nearest place on that.
     normals[:, 2] -= np.clip(vertices[:, 2], -half_length, half_length)
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     attributes["normal"] = _packed(attributes["position"], normals)

@@ -67,6 +67,7 @@ def _parts(figure: Figure) -> Sequence[tuple[str, tuple[int, ...]]]:
 
 def _first(points: Array) -> NDArray[np.intp]:
     """Return for each posture's points (N, K, 3) the first posture that has them in the same place (N,)."""
+    # NaN is not equal to itself: unknown points are put at infinity, where all are one.
     steps = np.where(np.isnan(points), np.inf, np.round(points / SAME_POINT_METRES)).reshape(len(points), -1)
     _, first, inverse = np.unique(steps, axis=0, return_index=True, return_inverse=True)
     return np.asarray(first[inverse.reshape(-1)])
