@@ -10,13 +10,7 @@ import pytest
 
 from posekit.body import load_figure
 from posekit.errors import InputError
-<<<<<<< HEAD
-from posekit.robots import (
-    load_robot,
-)
-=======
 from posekit.robots import load_robot
->>>>>>> 55ca1b3 (Tests follow names that moved)
 from posekit.robots.find import find
 from posekit.robots.pairs import neutral_inside_limits
 from posekit.robots.second_reader import compare_readers
