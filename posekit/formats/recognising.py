@@ -28,15 +28,20 @@ class Recognised:
         known.
     schema : str
         The schema that it names, as ``posekit.view/1``; empty where it names none.
+    said : str
+        The name of the format, as the user said it, perhaps with a layout; empty where it was recognised.
     """
 
     holds: Content
     formats: tuple[Format, ...] = ()
     schema: str = ""
+    said: str = ""
 
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the formats that other programs' files may be in; none for posekit's own."""
+        if self.said:
+            return (self.said,)
         return tuple(dict.fromkeys(one.name for one in self.formats if one not in OWN_FORMATS))
 
     @property
@@ -84,7 +89,7 @@ def recognise(path: str | Path, format: str = "") -> Recognised:
     is_folder = _is_folder(path)
     if format:
         one = _of_name(path, format)
-        return Recognised(holds=one.holds, formats=(one,))
+        return Recognised(holds=one.holds, formats=(one,), said=format)
     given = GivenFile(path)
     for own in OWN_FORMATS:
         if (own.folder if is_folder else given.suffix in own.suffixes) and own.looks_like(given):

@@ -255,6 +255,7 @@ def test_pictures_with_different_numbers_of_people_are_read(command: Run, tmp_pa
         beside = [rows[k] * [0.3, 0.3, 0.5] + [200 * n, 0, 0] for n in range(others)]
         (folder / f"cam_{k:04d}_keypoints.json").write_text(picture([rows[k], *beside]))
     told = command("inspect", folder, "--format", "openpose-body_25b")
+    assert "key points (openpose-body_25b)" in told.out
     assert told.code == 0, told.err
     assert "4 pictures of unknown size, 9 detections, 1 to 4 a picture" in told.out
     done = command("convert", folder, tmp_path / "v.json", "--format", "openpose-body_25b")
