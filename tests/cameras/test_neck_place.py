@@ -11,7 +11,7 @@ from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck import NeckPlacement, place
 from posekit.cameras.neck.cover import cover, meet
-from posekit.cameras.neck.place import MAX_NECKS, REACH_METRES
+from posekit.cameras.neck.given import MAX_NECKS, REACH_METRES
 from posekit.cameras.neck.suggestion import SUFFICIENT_DEVIATION_METRES
 from posekit.errors import InputError
 from posekit.skeleton import JOINT, JOINTS, PARENTS, TREE_SEGMENTS, segment_name

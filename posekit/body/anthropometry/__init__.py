@@ -12,5 +12,6 @@ from posekit.body.anthropometry.postures import PostureLengths as PostureLengths
 from posekit.body.anthropometry.postures import lengths_from_postures as lengths_from_postures
 from posekit.body.anthropometry.proportions import lengths_from_proportions as lengths_from_proportions
 from posekit.body.anthropometry.proportions import proportion_names as proportion_names
+from posekit.body.anthropometry.views import LengthEvidence as LengthEvidence
 from posekit.body.anthropometry.views import ViewLengths as ViewLengths
 from posekit.body.anthropometry.views import lengths_from_views as lengths_from_views

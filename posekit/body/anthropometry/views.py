@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field, replace
+from typing import Any, Final
 
 import numpy as np
 
@@ -93,36 +93,12 @@ class ViewLengths:
     learned: Mapping[str, float]
 
 
-def lengths_from_views(
-    image: Array,
-    *,
-    stature: float | None = None,
-    known: Mapping[str, float] | None = None,
-    proportions: str = "de-leva",
-    sex: Sex | None = None,
-    both_sides: bool = True,
-    scale: Array | None = None,
-    noise: float | None = None,
-    focal: float | None = None,
-    upright: bool = True,
-    reference: Mapping[str, float] | None = None,
-) -> ViewLengths:
-    r"""Estimate a person's lengths from the key points of one camera over some frames.
-
-    A segment of length l, seen in a frame of scale s (pixels a metre at the body, scaled orthographic), has the image
-    :math:`r = s\,l \sin\theta` with noise; its direction is isotropic, or where `upright` rather in the picture. The
-    frames' scales are unknown and integrated out over a normal distribution of their logarithm, whose mean and width
-    are found too. Pictures alone tell ratios of lengths; the size of the whole comes from the stature or a given one.
-    Proportions with their spread among people are the prior: a segment that never turns across the view stays near
-    them. Frames that show the same posture again count once (`posekit.body.anthropometry.independent`).
-
-    The neck and the pelvis joint are not used: no detector sees them. The torso inside is the reference's, scaled to
-    the widths and the trunk (`posekit.body.anthropometry.body.lengths_of`).
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LengthEvidence:
+    """What is known of a person and of the pictures, beside the key points.
 
     Parameters
     ----------
-    image : array (T, 14, 2) or (T, 12, 2)
-        Key points, pixels, in the order of `posekit.skeleton.JOINTS`, with or without neck and pelvis; NaN is missing.
     stature : float, optional
         Standing height, metres.
     known : mapping, optional
@@ -145,6 +121,41 @@ def lengths_from_views(
         picture than along the line of sight. False where every direction is as likely.
     reference : mapping, optional
         The 17 lengths of the body whose torso gives the shape, metres.
+    """
+
+    stature: float | None = None
+    known: Mapping[str, float] = field(default_factory=dict)
+    proportions: str = "de-leva"
+    sex: Sex | None = None
+    both_sides: bool = True
+    scale: Array | None = None
+    noise: float | None = None
+    focal: float | None = None
+    upright: bool = True
+    reference: Mapping[str, float] | None = None
+
+
+def lengths_from_views(image: Array, evidence: LengthEvidence | None = None, **changes: Any) -> ViewLengths:
+    r"""Estimate a person's lengths from the key points of one camera over some frames.
+
+    A segment of length l, seen in a frame of scale s (pixels a metre at the body, scaled orthographic), has the image
+    :math:`r = s\,l \sin\theta` with noise; its direction is isotropic, or where `upright` rather in the picture. The
+    frames' scales are unknown and integrated out over a normal distribution of their logarithm, whose mean and width
+    are found too. Pictures alone tell ratios of lengths; the size of the whole comes from the stature or a given one.
+    Proportions with their spread among people are the prior: a segment that never turns across the view stays near
+    them. Frames that show the same posture again count once (`posekit.body.anthropometry.independent`).
+
+    The neck and the pelvis joint are not used: no detector sees them. The torso inside is the reference's, scaled to
+    the widths and the trunk (`posekit.body.anthropometry.body.lengths_of`).
+
+    Parameters
+    ----------
+    image : array (T, 14, 2) or (T, 12, 2)
+        Key points, pixels, in the order of `posekit.skeleton.JOINTS`, with or without neck and pelvis; NaN is missing.
+    evidence : LengthEvidence, optional
+        What is known beside these.
+    changes
+        Fields of the evidence that are to differ: ``lengths_from_views(image, stature=1.8)``.
 
     Returns
     -------
@@ -157,15 +168,23 @@ def lengths_from_views(
     FigureError
         Where the stature is no person's.
     """
+    asked = replace(evidence or LengthEvidence(), **changes)
+    stature, scale, upright, noise, focal = (
+        asked.stature,
+        asked.scale,
+        asked.upright,
+        asked.noise,
+        asked.focal,
+    )
     points = _points(image)
-    base = reference_lengths(reference)
+    base = reference_lengths(asked.reference)
     prior = lengths_from_proportions(
-        proportions, UNKNOWN_STATURE if stature is None else stature, sex=sex, reference=base
+        asked.proportions, UNKNOWN_STATURE if stature is None else stature, sex=asked.sex, reference=base
     )
     dimensions = dimensions_of(prior.lengths)
     middle = np.log([dimensions[name] for name in BODY_DIMENSIONS])
-    covariance = prior_covariance(spread(proportions), both_sides)
-    middle, covariance = conditioned(middle, covariance, known or {}, stature, scale is not None)
+    covariance = prior_covariance(spread(asked.proportions), asked.both_sides)
+    middle, covariance = conditioned(middle, covariance, asked.known, stature, scale is not None)
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_FRAMES)).round().astype(int))
     seen = _seen(points)
     given = _given_scale(scale, len(points))
@@ -203,7 +222,7 @@ def lengths_from_views(
     scales = np.full(len(points), np.nan)
     scales[usable] = np.exp(likelihood.posterior_scales(fit.y))
     count = len(BODY_DIMENSIONS)
-    if both_sides:
+    if asked.both_sides:
         fit.y[:count] = sides_averaged(fit.y[:count])
     learned = 1 - np.diag(fit.covariance)[:count] / np.diag(covariance)
     source = f"key points of {len(usable)} frames ({independent:.0f} independent), prior: {prior.source}"

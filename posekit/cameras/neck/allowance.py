@@ -9,7 +9,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.body import sight
-from posekit.cameras.neck.given import Given
+from posekit.cameras.neck.given import PlacementInput
 from posekit.geometry import Array
 from posekit.skeleton import HIPS, JOINT, TORSO
 
@@ -35,29 +35,30 @@ class Allowance(NamedTuple):
     tangent: Array
 
 
-def allowances(camera: PinholeCamera, figure: Figure, given: Given) -> Allowance:
+def allowances(camera: PinholeCamera, figure: Figure, given: PlacementInput) -> Allowance:
     """Take the tolerances that are given, and derive those that are not.
 
     The deviation of an image point is taken to metres at the farthest depth that the image leaves the neck.
     """
     frames = len(given.image)
     rigid, tangent = (
-        np.full(frames, np.nan if value is None else value) for value in (given.tolerance, given.tangent)
+        np.full(frames, np.nan if value is None else value)
+        for value in (given.settings.tolerance, given.settings.tangent)
     )
-    if given.tolerance is not None and given.tangent is not None:
+    if given.settings.tolerance is not None and given.settings.tangent is not None:
         return Allowance(rigid, tangent)
     first = _sigma(camera, figure, given, np.zeros(frames))
     # The image as it is, with its errors, leaves too little room, with their allowance too much: between the two.
     sigma = (first + _sigma(camera, figure, given, TANGENT_SIGMAS * first)) / 2
-    if given.tolerance is None:
+    if given.settings.tolerance is None:
         shoulder = (figure.lengths["neck-right_shoulder"] + figure.lengths["neck-left_shoulder"]) / 2
         rigid = np.maximum(RIGID_SIGMAS * sigma + np.sqrt(2 * shoulder * sigma), EXACT_RIGID)
-    if given.tangent is None:
+    if given.settings.tangent is None:
         tangent = np.maximum(TANGENT_SIGMAS * sigma, EXACT_TANGENT)
     return Allowance(rigid, tangent)
 
 
-def _sigma(camera: PinholeCamera, figure: Figure, given: Given, tangent: Array) -> Array:
+def _sigma(camera: PinholeCamera, figure: Figure, given: PlacementInput, tangent: Array) -> Array:
     """Return the deviation of the rigid parts' image points in metres, at the farthest depth of the neck (F,)."""
     seen = sight(camera, figure, given.image, tangent)
     depth = seen.farthest[:, 0] * seen.rays[:, 0, 2]

@@ -10,22 +10,77 @@ from numpy.typing import ArrayLike
 from posekit.cameras import PinholeCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.settings.rooting import RootMethod
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
+
+REACH_METRES = 0.05
+"""Metres within which some neck is of any depth that is possible."""
+
+MAX_NECKS = 12
+"""The most necks a frame."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Given:
-    """What `posekit.cameras.neck.place` was given, shapes as there; unseen points are NaN in both coordinates."""
+class NeckSettings:
+    """How `posekit.cameras.neck.place` looks for the neck.
+
+    Parameters
+    ----------
+    method : {"auto", "head", "torso", "search"}
+        From head points, from torso and hips, or by a search along the neck's ray. ``auto`` takes the head where it
+        tells the depth well enough, else the torso, else the search.
+    deviation : float, array (19,) or (F, 19)
+        Standard deviation of each coordinate of each image point, joints then head points, pixels; for a detector's
+        `posekit.settings.rooting.DETECTED_DEVIATION`.
+    offset : float or array (19,)
+        Standard deviation, in metres, of what a point's image shows from the figure's own point: of a neck that is
+        really the middle of the shoulders. The neck's own also stands for a head that nods. For detections of a person
+        `posekit.settings.rooting.DETECTED_OFFSET`.
+    tolerance, tangent : float, optional
+        Metres by which the distances inside torso and hips may be off, and a segment too short for its image; by
+        default what the deviations lead to (`posekit.cameras.neck.allowance`). A tree that grows from these necks wants
+        the same.
+    reach : float
+        Metres within which some neck shall be of any depth that is possible.
+    most : int
+        The most necks a frame; where they do not suffice, they are wider apart (`NeckPlacement.step`).
+    """
+
+    method: RootMethod = "auto"
+    deviation: ArrayLike = 2.0
+    offset: ArrayLike = 0.0
+    tolerance: float | None = None
+    tangent: float | None = None
+    reach: float = REACH_METRES
+    most: int = MAX_NECKS
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacementInput:
+    """What `posekit.cameras.neck.place` was given, shapes as there; unseen points are NaN in both coordinates.
+
+    Parameters
+    ----------
+    image : array (F, 14, 2)
+        Joints, pixels.
+    head_image : array (F, 5, 2)
+        Head points, pixels.
+    root : array (F, 3)
+        Necks that are known, metres.
+    deviation : array (F, 19)
+        Of image points, pixels.
+    offset : array (19,)
+        Of what they show, metres.
+    settings : NeckSettings
+        What else was asked.
+    """
 
     image: Array
     head_image: Array
     root: Array
     deviation: Array
     offset: Array
-    tolerance: float | None
-    tangent: float | None
-    reach: float
-    most: int
+    settings: NeckSettings
 
     @classmethod
     def checked(
@@ -34,13 +89,8 @@ class Given:
         image: ArrayLike,
         head_image: ArrayLike | None,
         root: ArrayLike | None,
-        deviation: ArrayLike,
-        offset: ArrayLike,
-        tolerance: float | None,
-        tangent: float | None,
-        reach: float,
-        most: int,
-    ) -> Given:
+        settings: NeckSettings,
+    ) -> PlacementInput:
         """Check all of it.
 
         Raises
@@ -65,22 +115,19 @@ class Given:
                 raise InputError(
                     f"root of frame {behind[0]} is {roots[behind[0]].tolist()} m, behind the camera; expected z > 0"
                 )
-        numbers = (("tolerance", tolerance, 0.0), ("tangent", tangent, 0.0), ("reach", reach, 1e-6))
-        for name, value, least in numbers:
+        for name, least in (("tolerance", 0.0), ("tangent", 0.0), ("reach", 1e-6)):
+            value = getattr(settings, name)
             if value is not None and not (np.isfinite(value) and value >= least):
                 raise InputError(f"{name} is {value!r} m; expected a finite length of at least {least:g} m")
-        if most < 1:
-            raise InputError(f"most is {most}; expected at least one neck a frame")
+        if settings.most < 1:
+            raise InputError(f"most is {settings.most}; expected at least one neck a frame")
         return cls(
             image=joints,
             head_image=head,
             root=roots,
-            deviation=_spread("deviation", deviation, (frames, len(POINTS)), "px"),
-            offset=_spread("offset", offset, (len(POINTS),), "m"),
-            tolerance=tolerance,
-            tangent=tangent,
-            reach=reach,
-            most=int(most),
+            deviation=_spread("deviation", settings.deviation, (frames, len(POINTS)), "px"),
+            offset=_spread("offset", settings.offset, (len(POINTS),), "m"),
+            settings=settings,
         )
 
 

@@ -14,7 +14,7 @@ from posekit.cameras.neck.allowance import Allowance, allowances
 from posekit.cameras.neck.body import Sight, sight
 from posekit.cameras.neck.closure import Closure
 from posekit.cameras.neck.cover import cover, meet
-from posekit.cameras.neck.given import Given
+from posekit.cameras.neck.given import NeckSettings, PlacementInput
 from posekit.cameras.neck.head import head_suggestion
 from posekit.cameras.neck.placement import NeckPlacement
 from posekit.cameras.neck.search import Depths, search
@@ -25,14 +25,10 @@ from posekit.geometry import Array
 from posekit.settings.rooting import RootMethod
 from posekit.skeleton import JOINTS
 
+DEFAULT_NECK_SETTINGS = NeckSettings()
+
 CLOSED_METRES = 1e-8
 """Misfit (m) of a minimum at which the image points are exact, so that the depth is too."""
-
-REACH_METRES = 0.05
-"""Metres within which some neck is of any depth that is possible."""
-
-MAX_NECKS = 12
-"""The most necks a frame."""
 
 
 def place(
@@ -42,18 +38,12 @@ def place(
     head_image: ArrayLike | None = None,
     *,
     root: ArrayLike | None = None,
-    method: RootMethod = "auto",
-    deviation: ArrayLike = 2.0,
-    offset: ArrayLike = 0.0,
-    tolerance: float | None = None,
-    tangent: float | None = None,
-    reach: float = REACH_METRES,
-    most: int = MAX_NECKS,
+    settings: NeckSettings = DEFAULT_NECK_SETTINGS,
+    **changes: Any,
 ) -> list[NeckPlacement]:
     """Find where the neck is in F frames.
 
-    ``auto`` takes the head where it tells the depth well enough, else the torso, else the search; always within the
-    depths that the search leaves.
+    Always within the depths that a search along the neck's ray leaves.
 
     Parameters
     ----------
@@ -67,22 +57,10 @@ def place(
         Nose, eyes and ears, likewise.
     root : array (F, 3), optional
         The neck where it is known, camera frame, metres; NaN elsewhere.
-    method : {"auto", "head", "torso", "search"}
-    deviation : float, array (19,) or (F, 19)
-        Standard deviation of each coordinate of each image point, joints then head points, pixels; for a detector's
-        `posekit.settings.rooting.DETECTED_DEVIATION`.
-    offset : float or array (19,)
-        Standard deviation, in metres, of what a point's image shows from the figure's own point: of a neck that is
-        really the middle of the shoulders. The neck's own also stands for a head that nods. For detections of a person
-        `posekit.settings.rooting.DETECTED_OFFSET`.
-    tolerance, tangent : float, optional
-        Metres by which the distances inside torso and hips may be off, and a segment too short for its image; by
-        default what the deviations lead to (`posekit.cameras.neck.allowance`). A tree that grows from these necks wants
-        the same.
-    reach : float
-        Metres within which some neck shall be of any depth that is possible.
-    most : int
-        The most necks a frame; where they do not suffice, they are wider apart (`NeckPlacement.step`).
+    settings : NeckSettings
+        How it is looked for.
+    changes
+        Fields of the settings that are to differ: ``place(camera, figure, image, method="head")``.
 
     Returns
     -------
@@ -94,7 +72,9 @@ def place(
     InputError
         Where a shape or a number is impossible.
     """
-    given = Given.checked(camera, image, head_image, root, deviation, offset, tolerance, tangent, reach, most)
+    settings = replace(settings, **changes)
+    given = PlacementInput.checked(camera, image, head_image, root, settings)
+    method = settings.method
     if method not in get_args(RootMethod):
         raise InputError(
             f"method {method!r} places no neck; expected one of {', '.join(get_args(RootMethod))}"
@@ -118,7 +98,7 @@ def place(
 
 
 def _suggestions(
-    camera: PinholeCamera, figure: Figure, given: Given, ray: Array, method: RootMethod
+    camera: PinholeCamera, figure: Figure, given: PlacementInput, ray: Array, method: RootMethod
 ) -> list[Suggestion]:
     """Ask the rigid parts that the method allows, in the order in which they are believed."""
     n, parts = len(JOINTS), []
@@ -132,7 +112,7 @@ def _suggestions(
 
 
 def _choose(
-    given: Given,
+    given: PlacementInput,
     seen: Sight,
     closure: Closure,
     depths: Depths,
@@ -181,7 +161,7 @@ def _choose(
 
 
 def _necks(
-    given: Given, seen: Sight, closure: Closure, depths: Depths, left: Array, frame: int
+    given: PlacementInput, seen: Sight, closure: Closure, depths: Depths, left: Array, frame: int
 ) -> dict[str, Any]:
     """Choose exact minima in what is left of the intervals, or samples that cover it."""
     ray = seen.rays[frame, 0]
@@ -193,7 +173,7 @@ def _necks(
     if len(closed) and trusted:
         samples, step = closed, 0.0
     else:
-        samples, step = cover(left, given.reach, given.most)
+        samples, step = cover(left, given.settings.reach, given.settings.most)
     misfit = (
         closure.least(np.full(len(samples), frame), samples)
         if depths.known
@@ -203,7 +183,12 @@ def _necks(
 
 
 def _as_given(
-    given: Given, seen: Sight, closure: Closure, depths: Depths | None, frame: int, allowed: Allowance
+    given: PlacementInput,
+    seen: Sight,
+    closure: Closure,
+    depths: Depths | None,
+    frame: int,
+    allowed: Allowance,
 ) -> NeckPlacement:
     """Keep a root that is given, and say where it stands to the search's depths."""
     root = given.root[frame]
