@@ -202,7 +202,9 @@ def grow(  # noqa: PLR0912, PLR0915 - one loop: what was called from it would ha
                     nodes[node + PATH_COLUMNS + k] = nodes[node + PATH_COLUMNS + parents[k]] << 1 | (
                         code >> (span[0] - k) & 1
                     )
-        for level in range(span[0], span[2] + 1):
+        # At the level to begin with nodes are only asked about, and mostly there is nothing to ask.
+        skips = 1 if span[2] > span[0] and span[1] == levels[span[0] + 1] else 0
+        for level in range(span[0] + skips, span[2] + 1):
             begins = level == span[0]
             fork = 0 if begins else 1
             first_check = span[1] if begins else levels[level]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import Field, dataclass, fields, is_dataclass
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -215,7 +216,7 @@ class Check:
         rule = None
         rigid = pulls = slow = of_configuration = needs_head = False
 
-    @property
+    @cached_property
     def where(self) -> tuple[str, ...]:
         """The K places as files and reports name them: ``("right_elbow.flexion",)``."""
         return tuple(map(str, self.places))

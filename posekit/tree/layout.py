@@ -29,17 +29,15 @@ class PointTables(NamedTuple):
         Joints whose paths, of each so many last branches, decide.
     joints, first : int array (P,)
         Each point's joint, and the column of its first candidate.
+    choices : int
+        How many choices of branches there are.
     """
 
     tips: Table
     bits: Table
     joints: Table
     first: Table
-
-    @property
-    def choices(self) -> int:
-        """How many choices of branches there are."""
-        return 1 << int(self.bits.sum())
+    choices: int
 
 
 class Stretch(NamedTuple):
@@ -112,9 +110,13 @@ def point_tables(
     found = [
         (p, first[p]) if p < joints else (joints, min(first[-1] + p - joints, columns - 1)) for p in points
     ]
+    choice, place = (np.array(pairs, dtype=np.int64).reshape(-1, 2).T.copy() for pairs in (tips, found))
     return PointTables(
-        *(np.array([pair[k] for pair in tips], dtype=np.int64) for k in (0, 1)),
-        *(np.array([pair[k] for pair in found], dtype=np.int64) for k in (0, 1)),
+        tips=choice[0],
+        bits=choice[1],
+        joints=place[0],
+        first=place[1],
+        choices=1 << sum(bits for _, bits in tips),
     )
 
 

@@ -206,16 +206,17 @@ class Leaves:
 
     def positions(self, points: Sequence[int], nodes: NDArray[np.intp] | NDArray[np.int32]) -> Array:
         """Place some points in some nodes: (len(nodes), len(points), 3), camera frame, metres."""
-        frame, code = self.frame[nodes], self.code[nodes]
-        placed = np.empty((len(nodes), len(points), 3))
+        first, (frames, width) = self.candidates.first, self.candidates.table.shape[:2]
+        code, row = self.code[nodes], self.frame[nodes] * np.intp(width)
+        place = np.empty((len(nodes), len(points)), dtype=np.intp)
         for column, point in enumerate(points):
-            if point >= len(self.joints):
-                known = point - len(self.joints) < self.given.shape[1]
-                placed[:, column] = self.given[frame, point - len(self.joints)] if known else np.nan
+            beyond = point - len(self.joints)
+            if beyond >= 0:  # it was given, or is not known: the table's last column
+                place[:, column] = row + min(first[-1] + beyond, width - 1)
             else:
                 path = select(self.level, path_of(point, self.parents))[code]
-                placed[:, column] = self.candidates.positions[point][frame, path]
-        return placed
+                np.add(row, path + first[point], out=place[:, column])
+        return np.take(self.candidates.table.reshape(frames * width, 3), place, axis=0)
 
     def postures(self) -> Array:
         """Place all joints in all nodes: (N, J, 3), camera frame, metres; NaN where a joint is unknown."""

@@ -79,7 +79,7 @@ def growing(
                 lost.append(gone)
                 alive = np.ascontiguousarray(alive[~dead])
         left = np.concatenate([np.empty(0, dtype=np.int64), *unsure])
-        everything = np.concatenate([np.empty((0, 4), dtype=np.int32), *lost])
+        everything = lost[0] if len(lost) == 1 else np.concatenate([np.empty((0, 4), dtype=np.int32), *lost])
         if len(left):
             everything = everything[~np.isin(everything[:, kernels.OF_FRAME], left)]
         return FrameBlock(
@@ -100,8 +100,8 @@ class _Run:
         self.programme, self.span, self.frames = programme, stretch.span, frames
         self.codes = np.ascontiguousarray(stem[:, 1])
         self.starts = np.searchsorted(stem[:, 0], np.arange(frames[0], frames[1] + 1)).astype(np.int64)
-        self.alive = np.empty((max(LEAF_ROWS * n, len(stem)), 2), dtype=np.int32)
-        self.lost = np.empty((LOSS_ROWS * n, 4), dtype=np.int32)
+        self.alive = np.empty((max(LEAF_ROWS * n, 2 * len(stem)), 2), dtype=np.int32)
+        self.lost = np.empty((max(LOSS_ROWS * n, 4 * len(stem)), 4), dtype=np.int32)
         self.presumed = np.empty((QUESTION_ROWS * n, MAX_PRESUMED))
         self.asked = np.empty(QUESTION_ROWS * n, dtype=np.int64)
         self.unsure, self.used = np.empty(n, dtype=np.int64), np.zeros(4, dtype=np.int64)
