@@ -49,6 +49,7 @@ def worst_margins(checks: Sequence[Check], points: Array, alike: Alike | None = 
     Parameters
     ----------
     checks : sequence of Check
+        Which margins; of two that judge one place the later holds where it is decided.
     points : array (N, 19, 3)
         Whole postures, metres.
     alike : callable, optional
