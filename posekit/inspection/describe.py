@@ -14,11 +14,12 @@ from posekit.inspection.inspection import inspect
 from posekit.inspection.reports import evaluation_lines, report_lines
 from posekit.inspection.results import result_lines
 from posekit.objects import object_lines
+from posekit.safe_io import read_json
 from posekit.views.source import Source
 
 OWN_LINES: Final[Mapping[Content, Callable[[Path], list[str]]]] = {
     Content.RESULT: lambda path: result_lines(files.read_result(path)),
-    Content.EVALUATION: lambda path: evaluation_lines(path, files.read_json(path)),
+    Content.EVALUATION: lambda path: evaluation_lines(path, read_json(path)),
     Content.REPORT: lambda path: report_lines(files.read_report(path)),
     Content.OBJECTS: lambda path: object_lines(files.read_object(path)),
 }

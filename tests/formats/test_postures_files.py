@@ -11,7 +11,7 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.formats.own import Postures, Result, ResultFrame, read_postures, write_postures, write_result
-from posekit.formats.own.npz import open_npz
+from posekit.safe_io.npz_file import open_npz
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
 
 

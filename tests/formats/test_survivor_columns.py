@@ -13,13 +13,14 @@ from posekit.batch.recipe import Recipe
 from posekit.body import load_figure
 from posekit.formats.own import ResultFrame, schema, write_result
 from posekit.formats.own.column import column, columns_in
-from posekit.formats.own.npz import open_npz, write_npz
+from posekit.formats.own.npz import write_npz
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, Likelihoods, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
 from posekit.formats.own.survivor_models import model_of
 from posekit.formats.own.survivor_npz import survivor_arrays, survivors_in
 from posekit.geometry import Array
 from posekit.recovery import recover, result_of
+from posekit.safe_io.npz_file import open_npz
 from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 

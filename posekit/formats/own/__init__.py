@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures_q import NamedConfigurations as NamedConfigurations
     from posekit.formats.own.postures_q import read_configurations as read_configurations
     from posekit.formats.own.postures_q import write_configurations as write_configurations
-    from posekit.formats.own.reading import read_json as read_json
     from posekit.formats.own.report import Finding as Finding
     from posekit.formats.own.report import JudgedCheck as JudgedCheck
     from posekit.formats.own.report import PostureReport as PostureReport
@@ -85,7 +84,6 @@ else:
                 "read_configurations",
                 "write_configurations",
             ),
-            "reading": ("read_json",),
             "report": (
                 "Finding",
                 "JudgedCheck",

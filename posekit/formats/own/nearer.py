@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import FailFast, Field
 
-from posekit.formats.own.reading import read_json
+from posekit.safe_io.json_file import read_json
 from posekit.tables.file_model import FEW_ENTRIES, FileModel, validated
 
 NEARER_SCHEMA = "posekit.nearer/1"

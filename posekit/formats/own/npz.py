@@ -14,10 +14,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from posekit.safe_io.npz_file import MAX_ARRAYS, Archive, not_finite, open_npz
 from posekit.safe_io.refusal import cut, nearest, refusal
-
-__all__ = ["MAX_ARRAYS", "Archive", "Ragged", "not_finite", "open_npz", "suffix", "write_npz"]
 
 _CHUNK: Final = 1 << 22
 COMPRESSION_LEVEL: Final = 3

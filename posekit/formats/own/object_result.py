@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from posekit.formats.own.family import Family
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.object_result_schema import OBJECT_SCHEMA, ObjectFile, ObjectFrameRecord
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
+from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import check_target, json_pieces, write_text
 from posekit.tables.file_model import validated

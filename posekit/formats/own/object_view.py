@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from posekit.formats.own.camera_model import ScaledOrthographicModel
 from posekit.formats.own.object_view_schema import OBJECT_VIEW_SCHEMA, ObjectViewFile
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.linkages import Linkage
+from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, write_text
 from posekit.tables.file_model import validated

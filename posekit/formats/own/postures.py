@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
+from posekit.formats.own.npz import suffix, write_npz
 from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.result import RESULT_SCHEMA, Result
 from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
 from posekit.formats.own.units import Unit, from_metres, to_metres
+from posekit.safe_io.json_file import read_json
+from posekit.safe_io.npz_file import MAX_ARRAYS, Archive, not_finite, open_npz
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINT, POINTS

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.npz import MAX_ARRAYS, Archive, not_finite, open_npz, suffix, write_npz
+from posekit.formats.own.npz import suffix, write_npz
 from posekit.formats.own.postures_q_schema import CONFIGURATIONS_SCHEMA, ConfigurationsFile
-from posekit.formats.own.reading import read_json
+from posekit.safe_io.json_file import read_json
+from posekit.safe_io.npz_file import MAX_ARRAYS, Archive, not_finite, open_npz
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.safe_io.writing import json_pieces, replacing, write_text
 from posekit.tables.file_model import validated

@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.npz import suffix
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_csv import csv_lines
 from posekit.formats.own.report_schema import (
@@ -25,6 +24,7 @@ from posekit.formats.own.report_schema import (
     Verdict,
 )
 from posekit.formats.own.report_table import markdown_lines
+from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
 from posekit.tables.file_model import validated

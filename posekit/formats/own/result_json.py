@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from posekit.formats.own.family import Family
 from posekit.formats.own.paths import FollowedPaths
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.result import RESULT_SCHEMA, Result, ResultFrame
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
 from posekit.formats.own.units import Unit, from_metres, to_metres
+from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
 

@@ -26,15 +26,16 @@ from pydantic import ValidationError
 
 from posekit.formats.own.family import Family
 from posekit.formats.own.inferred import Inferred
-from posekit.formats.own.npz import MAX_ARRAYS, Archive, Ragged, not_finite, open_npz, write_npz
+from posekit.formats.own.npz import Ragged, write_npz
 from posekit.formats.own.paths import FollowedPaths, path_shapes
-from posekit.formats.own.reading import parse_json
 from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, RESULT_SCHEMA, Result, ResultFrame
 from posekit.formats.own.result_schema import ResultDetails, ResultPathsTold
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_npz import PADDED_PREFIXES, survivor_arrays, survivors_in
 from posekit.formats.own.units import UNIT_NAMES, Unit, from_metres, to_metres
+from posekit.safe_io.json_file import parse_json
+from posekit.safe_io.npz_file import MAX_ARRAYS, Archive, not_finite, open_npz
 from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import replacing
 from posekit.skeleton import JOINTS

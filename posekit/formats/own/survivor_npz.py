@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.column import Column, columns_in
-from posekit.formats.own.npz import Archive, Ragged, not_finite
+from posekit.formats.own.npz import Ragged
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
+from posekit.safe_io.npz_file import Archive, not_finite
 
 PADDED_PREFIXES: Final = tuple(
     f"{name}/" if column.by_check or column.kind == "table" else name

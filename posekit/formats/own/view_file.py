@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from posekit.cameras.lee_chen import image_from_paper
 from posekit.errors import CameraError
 from posekit.formats.own.camera_model import CameraModel, LeeChenModel, OpenCVModel, ScaledOrthographicModel
-from posekit.formats.own.reading import read_json
 from posekit.formats.own.units import PER_METRE, Unit, from_metres, to_metres
 from posekit.formats.own.view import View
 from posekit.formats.own.view_schema import (
@@ -22,6 +21,7 @@ from posekit.formats.own.view_schema import (
     ScaledOrthographicFields,
     ViewFile,
 )
+from posekit.safe_io.json_file import read_json
 from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
