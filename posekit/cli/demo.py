@@ -9,7 +9,7 @@ import typer
 
 from posekit.cli.options import Pictures, examples
 
-DEMO_EXAMPLES = examples("posekit demo -o demo-results")
+EXAMPLES = examples("posekit demo -o demo-results")
 
 
 def demo(

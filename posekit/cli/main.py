@@ -4,23 +4,11 @@ from __future__ import annotations
 
 import sys
 import warnings
-from typing import Annotated, Any, TextIO
+from importlib import import_module
+from typing import Annotated, Any, Final, TextIO
 
 import typer
 
-from posekit.cli import (
-    batch,
-    convert,
-    demo,
-    evaluate,
-    inspect,
-    recover,
-    render,
-    reproduce,
-    synth,
-    validate,
-    view,
-)
 from posekit.cli.options import examples
 from posekit.errors import PosekitError
 
@@ -30,28 +18,20 @@ BAD_INPUT = 2
 UsageError: Any = typer.BadParameter.__bases__[0]
 ClickError: Any = UsageError.__bases__[0]
 
-app = typer.Typer(
-    name="posekit",
-    help="Every physically possible posture behind one view, each certified.",
-    epilog=examples(
-        "posekit demo -o demo-results",
-        "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
-        "posekit recover --help",
-    ),
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+COMMANDS: Final = (
+    "recover",
+    "validate",
+    "convert",
+    "inspect",
+    "evaluate",
+    "synth",
+    "reproduce",
+    "batch",
+    "render",
+    "view",
+    "demo",
 )
-app.command("recover", epilog=recover.EXAMPLES)(recover.recover)
-app.command("validate", epilog=validate.EXAMPLES)(validate.validate)
-app.command("convert", epilog=convert.EXAMPLES)(convert.convert)
-app.command("inspect", epilog=inspect.EXAMPLES)(inspect.inspect)
-app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
-app.add_typer(synth.app, name="synth")
-app.command("reproduce", epilog=reproduce.REPRODUCE_EXAMPLES)(reproduce.reproduce)
-app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
-app.command("render", epilog=render.EXAMPLES)(render.render)
-app.command("view", epilog=view.EXAMPLES)(view.view)
-app.command("demo", epilog=demo.DEMO_EXAMPLES)(demo.demo)
+"""In the order of the help; each has its own module of that name."""
 
 
 def _print_version(asked: bool) -> None:
@@ -62,7 +42,6 @@ def _print_version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def _root(
     version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
@@ -71,11 +50,36 @@ def _root(
     """Every physically possible posture behind one view, each certified."""
 
 
+def application(first: str) -> typer.Typer:
+    """Make the command line: of the command that is named `first` alone, or of all where that is no command."""
+    app = typer.Typer(
+        name="posekit",
+        help="Every physically possible posture behind one view, each certified.",
+        epilog=examples(
+            "posekit demo -o demo-results",
+            "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
+            "posekit recover --help",
+        ),
+        pretty_exceptions_enable=False,
+        rich_markup_mode=None,
+    )
+    app.callback()(_root)
+    # What reads the options of a command takes some milliseconds to make: those of the others are not needed.
+    for name in (first,) if first in COMMANDS else COMMANDS:
+        module = import_module(f"posekit.cli.{name}")
+        if name == "synth":
+            app.add_typer(module.app, name=name)
+        else:
+            app.command(name, epilog=module.EXAMPLES)(getattr(module, name))
+    return app
+
+
 def main() -> None:
     """Run the command line: 0 done, 1 some postures are not valid, 2 bad input; errors are one line."""
     warnings.showwarning = _warn
     try:
-        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
+        arguments = sys.argv[1:] or ["--help"]
+        code = application(arguments[0])(arguments, standalone_mode=False)
     except PosekitError as error:
         code = _fail(str(error))
     except UsageError as error:
