@@ -8,13 +8,13 @@ from typing import Final
 
 from posekit.conversion.motion_output import (
     TABLE_FORMATS,
-    Output,
+    MotionOutput,
     by_suffix,
     carries_points,
     write_moving,
     write_points,
 )
-from posekit.conversion.moving import moving, one_clip, read_clips
+from posekit.conversion.posture_sequence import one_clip, read_clips, read_sequence
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
@@ -145,12 +145,12 @@ def convert(job: Conversion) -> list[str]:
         raise refusal(
             job.given, "--to", f"view, of {what.holds.value}", "key points", "convert to postures or motion"
         )
-    output = Output(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
+    output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
     if what.holds is Content.MOTION and carries_points(output.to):
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
         return write_points(output, carried, job.source.skeleton)
-    found = moving(
+    found = read_sequence(
         job.given,
         what,
         posture=job.posture,

@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.conversion.moving import Moving
+from posekit.conversion.posture_sequence import PostureSequence
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.motion import (
@@ -43,7 +43,7 @@ TABLE_FORMATS: Final = ("csv", "npz", "parquet")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Output:
+class MotionOutput:
     """What is to be written.
 
     Parameters
@@ -100,7 +100,7 @@ def carries_points(to: str) -> bool:
     return to != "postures" and motion_format(to).write_points is not None
 
 
-def write_points(output: Output, motion: Motion, skeleton: str = "") -> list[str]:
+def write_points(output: MotionOutput, motion: Motion, skeleton: str = "") -> list[str]:
     """Write points, all that there are.
 
     Which way is up, where the file does not say it, is guessed from a body's points, if it has some.
@@ -127,7 +127,7 @@ def write_points(output: Output, motion: Motion, skeleton: str = "") -> list[str
     return [*says, f"{len(motion)} frames{clips} of {len(motion.names)} points, {axis}"]
 
 
-def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[str]:
+def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = False) -> list[str]:
     """Write postures: one a frame, or all survivors of a result where `every`.
 
     Raises
@@ -159,15 +159,15 @@ def write_moving(output: Output, found: Moving, *, every: bool = False) -> list[
     ]
 
 
-def _write_postures(output: Output, found: Moving) -> list[str]:
+def _write_postures(output: MotionOutput, found: PostureSequence) -> list[str]:
     points = found.turned(output.up) if output.up else found.points
     head = points[:, 14:] if np.isfinite(points[:, 14:]).any() else None
     files.write_postures(output.path, Postures(joints=points[:, :14], head=head))
     return [f"{len(points)} postures, {output.up or found.up} up"]
 
 
-def _write_every(output: Output, found: Moving) -> list[str]:
-    writer: Callable[[Output, Moving], list[str]] | None = (
+def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
+    writer: Callable[[MotionOutput, PostureSequence], list[str]] | None = (
         _write_table if output.to in TABLE_FORMATS else _write_bodies if output.to == "glb" else None
     )
     if writer is None:
@@ -178,13 +178,13 @@ def _write_every(output: Output, found: Moving) -> list[str]:
     return writer(output, found)
 
 
-def _write_table(output: Output, found: Moving) -> list[str]:
+def _write_table(output: MotionOutput, found: PostureSequence) -> list[str]:
     up = output.up or found.up
     write_survivors(output.path, replace(found, points=found.turned(up)).table())
     return [f"{len(found)} survivors of {len(np.unique(found.frame))} frames, {up} up"]
 
 
-def _write_bodies(output: Output, found: Moving) -> list[str]:
+def _write_bodies(output: MotionOutput, found: PostureSequence) -> list[str]:
     """Write the survivors of the first frame that has any, the best where they are too many."""
     first = np.flatnonzero(found.frame == found.frame[0])
     kept = first[np.sort(np.argsort(found.values["rank"][first], kind="stable")[:MAX_BODIES])]

@@ -34,7 +34,7 @@ AXIS_TURNS: Final = _turns()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reconciled:
+class AlignedTruth:
     """How a truth was laid onto a view.
 
     Parameters
@@ -52,7 +52,7 @@ class Reconciled:
     frames: int
 
 
-def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled]:
+def with_truth(view: View, joints: Array, time: Array) -> tuple[View, AlignedTruth]:
     """Give a view its truth from motion capture of the same seconds.
 
     Axes are reconciled by the image: of the 24 ways to lay one set of axes onto another, the one whose projection is
@@ -106,5 +106,5 @@ def with_truth(view: View, joints: Array, time: Array) -> tuple[View, Reconciled
         )
     turn = AXIS_TURNS[best]
     names = [("" if row[abs(row).argmax()] > 0 else "-") + "xyz"[int(abs(row).argmax())] for row in turn]
-    told = Reconciled(turn=f"({', '.join(names)})", error=errors[best], frames=int(matched.sum()))
+    told = AlignedTruth(turn=f"({', '.join(names)})", error=errors[best], frames=int(matched.sum()))
     return replace(view, truth=turned[best]), told

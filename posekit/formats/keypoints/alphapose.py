@@ -18,7 +18,7 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_count
-from posekit.formats.keypoints.rows import Rows, number, numbers, whole
+from posekit.formats.keypoints.rows import DetectionRows, number, numbers, whole
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import cut, refusal, shown
 
@@ -54,7 +54,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where it is none of its layouts, or nothing tells what the points are.
     """
-    rows = Rows(str(given.path))
+    rows = DetectionRows(str(given.path))
     by_pictures = False
     for path, document in given.documents():
         rows.source = str(path)
@@ -83,7 +83,7 @@ def _usual() -> dict[int, SkeletonMap]:
     return {17: load_skeleton_map("coco_17"), 26: body, 68: without_face, 136: full}
 
 
-def _read_list(rows: Rows, people: list[Any]) -> None:
+def _read_list(rows: DetectionRows, people: list[Any]) -> None:
     for index, person in enumerate(people):
         place = f"[{index}]"
         if not _is_row(person) or not isinstance(person["image_id"], str | int):
@@ -92,7 +92,7 @@ def _read_list(rows: Rows, people: list[Any]) -> None:
         _add(rows, person["image_id"], person["keypoints"], f"{place}.keypoints", person)
 
 
-def _read_picture(rows: Rows, label: str, picture: object) -> None:
+def _read_picture(rows: DetectionRows, label: str, picture: object) -> None:
     kind = next((kind for kind in POINTS_FIELD_OF_PEOPLE if _is_picture(picture, (kind,))), None)
     if kind is None or not isinstance(picture, dict):
         raise refusal(rows.source, cut(label), shown(picture), "bodies or people", "check the file")
@@ -112,7 +112,7 @@ def _read_picture(rows: Rows, label: str, picture: object) -> None:
         )
 
 
-def _add(rows: Rows, label: object, keypoints: object, field: str, person: dict[str, Any]) -> None:
+def _add(rows: DetectionRows, label: object, keypoints: object, field: str, person: dict[str, Any]) -> None:
     found = numbers(keypoints, rows.source, field, 3)
     found[(found == 0).all(axis=1)] = np.nan
     identity = person.get("idx")

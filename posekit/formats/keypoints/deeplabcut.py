@@ -19,7 +19,7 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_names
-from posekit.formats.keypoints.rows import LARGEST_NUMBER, Rows
+from posekit.formats.keypoints.rows import LARGEST_NUMBER, DetectionRows
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
@@ -138,7 +138,7 @@ def _people(
     individuals = header.get("individuals") or [""] * len(header["coords"])
     names = {name: _parts(path, header, individuals, name) for name in dict.fromkeys(individuals)}
     fitted = _layout(path, {name: list(parts) for name, parts in names.items()}, layout)
-    rows = Rows(str(path))
+    rows = DetectionRows(str(path))
     for label in labels:
         rows.picture(label)
     for person, (who, parts) in enumerate(names.items()):

@@ -20,7 +20,7 @@ from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_json import add_document, looks_like_landmarks
 from posekit.formats.keypoints.mediapipe_table import add_table, looks_like_table
-from posekit.formats.keypoints.rows import Rows
+from posekit.formats.keypoints.rows import DetectionRows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import refusal
 
@@ -63,7 +63,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where nothing looks like 33 landmarks, or they are world landmarks.
     """
-    rows = Rows(str(given.path))
+    rows = DetectionRows(str(given.path))
     if given.suffix == ".csv":
         add_table(rows, given.text)
     else:

@@ -19,7 +19,7 @@ from posekit.formats.keypoints.mediapipe_names import (
     landmark,
     one_of,
 )
-from posekit.formats.keypoints.rows import COORDINATE_TYPES, LARGEST_NUMBER, Rows, number, whole
+from posekit.formats.keypoints.rows import COORDINATE_TYPES, LARGEST_NUMBER, DetectionRows, number, whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
@@ -100,7 +100,7 @@ def _frames(document: object) -> list[Any]:
     return []
 
 
-def add_document(rows: Rows, document: object, name: str) -> None:
+def add_document(rows: DetectionRows, document: object, name: str) -> None:
     """Note the frames of a document; a frame alone is called `name`.
 
     Raises
@@ -165,7 +165,7 @@ def _size(holder: object, known: tuple[float, float] = (np.nan, np.nan)) -> tupl
     return known
 
 
-def _add_frame(rows: Rows, label: str, frame: object, place: str) -> None:
+def _add_frame(rows: DetectionRows, label: str, frame: object, place: str) -> None:
     if isinstance(frame, dict) and not {"x", "y"} & set(frame):
         people = one_of(frame, PEOPLE_NAMES)
         if (
@@ -205,7 +205,7 @@ def _is_named(entry: object) -> bool:
     return isinstance(entry, dict) and {"x", "y"} <= set(entry)
 
 
-def _add_person(rows: Rows, label: str, person: object, place: str) -> None:
+def _add_person(rows: DetectionRows, label: str, person: object, place: str) -> None:
     expected = f"a list of {len(LANDMARK_NAMES)} landmarks {{x, y, z, visibility}}"
     if isinstance(person, dict) and all(landmark(name) is not None for name in person):
         person = [{"name": name, **entry} for name, entry in person.items() if isinstance(entry, dict)]
@@ -236,7 +236,7 @@ def _index(entry: object) -> int | None:
     return landmark(entry[field]) if field is not None else None
 
 
-def _point(rows: Rows, entry: object, place: str) -> tuple[Array, float]:
+def _point(rows: DetectionRows, entry: object, place: str) -> tuple[Array, float]:
     """Read a landmark, as an object or as [x, y, z, visibility]."""
     if isinstance(entry, dict):
         x, y = entry.get("x"), entry.get("y")

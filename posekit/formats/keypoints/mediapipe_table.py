@@ -21,7 +21,7 @@ from posekit.formats.keypoints.mediapipe_names import (
     landmark,
     one_of,
 )
-from posekit.formats.keypoints.rows import LARGEST_NUMBER, Rows, whole
+from posekit.formats.keypoints.rows import LARGEST_NUMBER, DetectionRows, whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
@@ -99,7 +99,7 @@ def _columns(header: list[str]) -> dict[int, dict[str, int]]:
     return {k: parts for k, parts in named.items() if k < len(LANDMARK_NAMES) and {"x", "y"} <= set(parts)}
 
 
-def add_table(rows: Rows, text: str) -> None:
+def add_table(rows: DetectionRows, text: str) -> None:
     """Note the rows of a table.
 
     Raises
@@ -123,7 +123,7 @@ def add_table(rows: Rows, text: str) -> None:
     _add_wide(rows, header, columns, text)
 
 
-def _lines(rows: Rows, header: list[str], text: str) -> Iterator[tuple[int, list[str]]]:
+def _lines(rows: DetectionRows, header: list[str], text: str) -> Iterator[tuple[int, list[str]]]:
     reader = csv.reader(text.lstrip().splitlines())
     try:
         next(reader)
@@ -140,7 +140,7 @@ def _lines(rows: Rows, header: list[str], text: str) -> Iterator[tuple[int, list
         ) from None
 
 
-def _value(rows: Rows, line: int, name: str, text: str) -> float:
+def _value(rows: DetectionRows, line: int, name: str, text: str) -> float:
     """Read a field; empty and NaN are not known."""
     text = text.strip()
     if not text or text.casefold() in ("nan", "none", "null"):
@@ -184,7 +184,7 @@ def _label(text: str) -> str:
     return value if index is None else str(index)
 
 
-def _add_wide(rows: Rows, header: list[str], columns: dict[int, dict[str, int]], text: str) -> None:
+def _add_wide(rows: DetectionRows, header: list[str], columns: dict[int, dict[str, int]], text: str) -> None:
     label, time, unit = _described(header)
     labels, times = [], []
     for count, (line, fields) in enumerate(_lines(rows, header, text)):
@@ -202,7 +202,7 @@ def _add_wide(rows: Rows, header: list[str], columns: dict[int, dict[str, int]],
     _note_times(rows, labels, times, unit)
 
 
-def _add_long(rows: Rows, header: list[str], text: str) -> None:
+def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
     label, time, unit = _described(header)
     which = header.index(one_of(header, LANDMARK_COLUMN_NAMES) or "")
     x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
@@ -237,6 +237,6 @@ def _add_long(rows: Rows, header: list[str], text: str) -> None:
     _note_times(rows, list(labels), list(labels.values()), unit)
 
 
-def _note_times(rows: Rows, labels: list[str], times: list[float], unit: str) -> None:
+def _note_times(rows: DetectionRows, labels: list[str], times: list[float], unit: str) -> None:
     for label, time in zip(labels, in_seconds(np.array(times), unit), strict=True):
         rows.picture(label, time=float(time))

@@ -15,7 +15,7 @@ from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.mmpose_instances import add_frames, add_instances, is_frame
 from posekit.formats.keypoints.named_layout import by_names
-from posekit.formats.keypoints.rows import Rows, whole
+from posekit.formats.keypoints.rows import DetectionRows, whole
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.safe_io import refusal, shown
 
@@ -36,7 +36,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where it is not that layout, is of points in space, or its names fit no skeleton map.
     """
-    rows = Rows(str(given.path))
+    rows = DetectionRows(str(given.path))
     names: list[str] = []
     for path, document in given.documents():
         rows.source = str(path)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from posekit.formats.keypoints.rows import Rows, number, numbers, pairs, whole
+from posekit.formats.keypoints.rows import DetectionRows, number, numbers, pairs, whole
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
@@ -28,7 +28,7 @@ def is_frame(entry: object) -> bool:
     return isinstance(entry, dict) and isinstance(entry.get("instances"), list) and "frame_id" in entry
 
 
-def add_frames(rows: Rows, frames: list[Any], field: str) -> None:
+def add_frames(rows: DetectionRows, frames: list[Any], field: str) -> None:
     """Note pictures ``{frame_id, instances}``."""
     for index, frame in enumerate(frames):
         place = f"{field}[{index}]"
@@ -44,7 +44,7 @@ def add_frames(rows: Rows, frames: list[Any], field: str) -> None:
         add_instances(rows, rows.picture(label), frame["instances"], f"{place}.instances")
 
 
-def add_instances(rows: Rows, label: str, instances: list[Any], field: str) -> None:
+def add_instances(rows: DetectionRows, label: str, instances: list[Any], field: str) -> None:
     """Note the people of one picture."""
     rows.picture(label)
     for index, instance in enumerate(instances):

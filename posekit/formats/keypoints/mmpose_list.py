@@ -23,7 +23,7 @@ from posekit.formats.keypoints.mmpose_instances import (
     is_instance,
 )
 from posekit.formats.keypoints.named_layout import by_count
-from posekit.formats.keypoints.rows import Rows
+from posekit.formats.keypoints.rows import DetectionRows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import refusal, shown
 
@@ -46,7 +46,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where it is not that layout, is of points in space, or nothing tells what the points are.
     """
-    rows = Rows(str(given.path))
+    rows = DetectionRows(str(given.path))
     for path, document in given.documents():
         rows.source = str(path)
         if not isinstance(document, list):
@@ -63,7 +63,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     return rows.keypoints("mmpose-list", _layout(rows, layout))
 
 
-def _layout(rows: Rows, layout: SkeletonMap | None) -> SkeletonMap:
+def _layout(rows: DetectionRows, layout: SkeletonMap | None) -> SkeletonMap:
     count = len(rows.points[0])
     if layout is None and count == 17:
         share = head_share(np.array(rows.points))

@@ -1,4 +1,4 @@
-"""Rows of key points as a file lists them: person by person, in any order, picture by picture in the end."""
+"""DetectionRows of key points as a file lists them: person by person, in any order, picture by picture in the end."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _wrong(values: object) -> str:
 
 
 @dataclass
-class Rows:
+class DetectionRows:
     """What a file says of pictures and people, in the order in which it says it.
 
     Parameters

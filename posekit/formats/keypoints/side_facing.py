@@ -33,7 +33,7 @@ BODY_LANDMARKS: Final = tuple(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Order:
+class SideOrder:
     """Which way round the parts of one person are in each picture.
 
     Parameters
@@ -57,14 +57,14 @@ class Order:
         return np.asarray((self.shoulders * self.face < 0) & (self.hips * self.face <= 0))
 
 
-def order(landmarks: Array, around: int = PICTURES_AROUND) -> Order:
+def order(landmarks: Array, around: int = PICTURES_AROUND) -> SideOrder:
     """Find which way round shoulders, hips and face are in each picture of landmarks (F, 21, 2); see `size`."""
     unit = size(landmarks, around)
     ears, eyes = (
         _way(pair(landmarks, part)[:, 0] / unit, least)
         for part, least in (("ear", EARS_CLEAR_WIDTH), ("eye", EYES_CLEAR_WIDTH))
     )
-    return Order(
+    return SideOrder(
         shoulders=_way(pair(landmarks, "shoulder")[:, 0] / unit, SHOULDERS_CLEAR_WIDTH),
         hips=_way(pair(landmarks, "hip")[:, 0] / unit, HIPS_CLEAR_WIDTH),
         face=np.where(ears * eyes < 0, 0, np.where(ears != 0, ears, eyes)).astype(np.int8),

@@ -9,7 +9,7 @@ import numpy as np
 
 from posekit.formats.motion.bvh_file import open_bvh
 from posekit.formats.motion.bvh_kinematics import points_of, positions_are_absolute
-from posekit.formats.motion.bvh_size import Unit, guessed_unit, guessed_up
+from posekit.formats.motion.bvh_size import BvhUnit, guessed_unit, guessed_up
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.safe_io import refusal, shown
@@ -22,14 +22,14 @@ class BvhReading(NamedTuple):
     ----------
     motion : Motion
         The points of the joints over time.
-    unit : Unit
+    unit : BvhUnit
         What lengths in the file are in, and how that is known.
     absolute : bool
         Whether position channels were taken in place of the offsets.
     """
 
     motion: Motion
-    unit: Unit
+    unit: BvhUnit
     absolute: bool
 
 
@@ -77,7 +77,7 @@ def examine_bvh(
     if unit is None:
         scale = guessed_unit(file, points)
     else:
-        scale = Unit(unit, METRES_IN_UNIT[unit], "stated")
+        scale = BvhUnit(unit, METRES_IN_UNIT[unit], "stated")
     tree = file.hierarchy
     kept = [k for k, site in enumerate(tree.sites) if not site or tree.offsets[k].any()]
     names = tuple(tree.names[k] for k in kept)

@@ -26,7 +26,7 @@ UPRIGHT_COSINE, LEANING_COSINE = 0.8, 0.3
 """Cosines between the body and an axis, as a mean over frames, for it to be up in place of y."""
 
 
-class Unit(NamedTuple):
+class BvhUnit(NamedTuple):
     """A unit: its name, the metres in it, and how it is known."""
 
     name: str
@@ -39,7 +39,7 @@ def sampled(points: Array) -> Array:
     return points[:: max(1, len(points) // FRAMES_SAMPLED)]
 
 
-def guessed_unit(file: BvhFile, points: Array) -> Unit:
+def guessed_unit(file: BvhFile, points: Array) -> BvhUnit:
     """Tell the unit by the length of the body's longest chain of bones, which no posture changes.
 
     Raises
@@ -59,7 +59,7 @@ def guessed_unit(file: BvhFile, points: Array) -> Unit:
             f"about {BODY_METRES:g} m in {', '.join(METRES_IN_BVH_UNIT)}",
             "state the unit",
         )
-    return Unit(
+    return BvhUnit(
         name, METRES_IN_BVH_UNIT[name], f"its longest chain of bones has {length:.4g} units, {metres:.2f} m"
     )
 

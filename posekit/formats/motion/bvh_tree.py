@@ -32,7 +32,7 @@ FARTHEST_PERSON_METRES: Final = 1e6
 """Metres from the origin at which a person may stand."""
 
 
-class Node(NamedTuple):
+class BodyNode(NamedTuple):
     """A place of the tree: its name, its parent's index, the points whose mean it is, the link that turns with it."""
 
     name: str
@@ -41,11 +41,11 @@ class Node(NamedTuple):
     link: str
 
 
-def _nodes() -> tuple[Node, ...]:
-    nodes = [Node("pelvis", -1, ("pelvis",), "hips"), Node("torso", 0, ("pelvis",), "torso")]
+def _nodes() -> tuple[BodyNode, ...]:
+    nodes = [BodyNode("pelvis", -1, ("pelvis",), "hips"), BodyNode("torso", 0, ("pelvis",), "torso")]
 
     def add(name: str, parent: str, link: str = "", points: tuple[str, ...] = ()) -> None:
-        nodes.append(Node(name, [node.name for node in nodes].index(parent), points or (name,), link))
+        nodes.append(BodyNode(name, [node.name for node in nodes].index(parent), points or (name,), link))
 
     add("neck", "torso", "head")
     add("head", "neck", points=("right_ear", "left_ear"))
@@ -87,7 +87,7 @@ class PlacedBody(NamedTuple):
     angles: Array
 
 
-def neutral_place(figure: Figure, node: Node) -> Array:
+def neutral_place(figure: Figure, node: BodyNode) -> Array:
     """Return where a node is at the neutral configuration (3,): metres, the URDF's axes, from the neck."""
     return np.asarray(figure.neutral_points[[POINT[point] for point in node.points]].mean(axis=0))
 

@@ -15,7 +15,7 @@ HALF_SPHERE_RINGS: Final = 6
 """Rings of a half sphere, its equator among them, its pole not."""
 
 
-class Mesh(NamedTuple):
+class CapsuleMesh(NamedTuple):
     """Triangles.
 
     Attributes
@@ -33,7 +33,7 @@ class Mesh(NamedTuple):
     faces: NDArray[np.intp]
 
 
-def capsule_mesh(start: Array, end: Array, radius: float) -> Mesh:
+def capsule_mesh(start: Array, end: Array, radius: float) -> CapsuleMesh:
     """Mesh the capsule of a radius (m) about the line from one point (3,) to another, metres.
 
     Vertices lie on the capsule; its faces inside it, by 1 - cos(pi / 24) of the radius at most, under one percent.
@@ -48,7 +48,7 @@ def capsule_mesh(start: Array, end: Array, radius: float) -> Mesh:
     below = half - 2 * np.sin(lift)[:, None, None] * axis
     normals = np.concatenate([-axis[None], *below[::-1], *half, axis[None]])
     centres = np.where(np.arange(len(normals))[:, None] < len(normals) // 2, start, end)
-    return Mesh(centres + radius * normals, normals, _faces(2 * HALF_SPHERE_RINGS))
+    return CapsuleMesh(centres + radius * normals, normals, _faces(2 * HALF_SPHERE_RINGS))
 
 
 def _faces(rings: int) -> NDArray[np.intp]:

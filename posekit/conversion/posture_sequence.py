@@ -42,7 +42,7 @@ CAMERA_UP: Final = "-y"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moving:
+class PostureSequence:
     """Postures over time, N rows.
 
     Parameters
@@ -82,7 +82,7 @@ class Moving:
         """Count the rows."""
         return len(self.points)
 
-    def take(self, rows: NDArray[np.intp]) -> Moving:
+    def take(self, rows: NDArray[np.intp]) -> PostureSequence:
         """Take some rows."""
         return replace(
             self,
@@ -162,7 +162,7 @@ def one_clip(motion: Motion) -> Motion:
     return motion
 
 
-def moving(
+def read_sequence(
     path: Path,
     what: Recognised,
     *,
@@ -172,7 +172,7 @@ def moving(
     clip: str = "",
     unit: str = "",
     up: str = "",
-) -> Moving:
+) -> PostureSequence:
     """Read what moves in a file.
 
     Parameters
@@ -218,7 +218,7 @@ def moving(
     )
 
 
-def _of_result(result: Result, posture: str, view: View | None, stated: str) -> Moving:
+def _of_result(result: Result, posture: str, view: View | None, stated: str) -> PostureSequence:
     figure, _ = recovered_with(result)
     if posture == "path":
         return _of_path(result, figure, view, stated)
@@ -257,7 +257,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
             values = {**margins, **values}
         elif of_frame:
             values[column.key] = np.array([of_frame[k][row] for k, row in rows])
-    return Moving(
+    return PostureSequence(
         points=points,
         time=np.array([result.frames[k].time for k, _ in rows]),
         frame=np.array([k for k, _ in rows]),
@@ -271,7 +271,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
     )
 
 
-def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> Moving:
+def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> PostureSequence:
     """Take the first path through a result, its depths smoothed where the camera is known."""
     paths = result.paths
     if paths is None:
@@ -292,7 +292,7 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     codes = [""] * len(time)
     for row, k in zip(place.tolist(), known.tolist(), strict=True):
         codes[row] = result.frames[k].branches[survivor[row]] if survivor[row] >= 0 else ""
-    return Moving(
+    return PostureSequence(
         points=points,
         time=time,
         frame=np.arange(len(time)),
@@ -356,7 +356,7 @@ def _in_world(points: Array, view: View) -> Array:
     return np.asarray((points - model.t) @ model.R)
 
 
-def _of_truth(view: View, source: str, stated: str) -> Moving:
+def _of_truth(view: View, source: str, stated: str) -> PostureSequence:
     known = np.isfinite(view.truth).any(axis=(1, 2))
     if not known.any():
         raise InputError(
@@ -370,7 +370,7 @@ def _of_truth(view: View, source: str, stated: str) -> Moving:
     return _recorded(points, view.time[known], up)
 
 
-def _of_motion(motion: Motion, layout: SkeletonMap | None) -> Moving:
+def _of_motion(motion: Motion, layout: SkeletonMap | None) -> PostureSequence:
     found = postures_of(motion, layout)
     points = np.concatenate([found.joints, found.head], axis=1)
     says = [f"skeleton map {found.layout.name}"]
@@ -382,9 +382,9 @@ def _of_motion(motion: Motion, layout: SkeletonMap | None) -> Moving:
     return _recorded(points, motion.time, up, says)
 
 
-def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> Moving:
+def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> PostureSequence:
     """Make it of postures that were measured, with a figure of their own lengths."""
-    return Moving(
+    return PostureSequence(
         points=points,
         time=time,
         frame=np.arange(len(points)),
