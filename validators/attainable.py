@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array, cross
 from posekit.linkages.robot_linkage import Carried
 from posekit.robots import Robot
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, body_points, frame_index
 
 Groups = NDArray[np.intp]
 Invariant = Callable[[Array, Groups], Array]
@@ -115,7 +115,7 @@ class Attainable:
             frame = model.frames[frame_index(model)[home[body]]]
             x, y, z = frame.placement.actInv(at).tolist()
             points.append(
-                BodyPoint(name=f"{k} on {home[body]}", sites=(Site(frame=home[body], offset=(x, y, z)),))
+                BodyPoint(name=f"{k} on {home[body]}", sites=(BodySite(frame=home[body], offset=(x, y, z)),))
             )
         return tuple(points)
 

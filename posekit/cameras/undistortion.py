@@ -33,6 +33,7 @@ def undistorted(pixels: Array, camera: CalibratedCamera) -> Array:
     pixels : array (..., 2)
         The file's own pixels; NaN is missing.
     camera : CalibratedCamera
+        Whose distortion it is.
 
     Returns
     -------

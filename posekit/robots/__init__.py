@@ -6,7 +6,7 @@ from posekit.on_demand import on_demand
 
 if TYPE_CHECKING:
     from posekit.robots.body_point import BodyPoint as BodyPoint
-    from posekit.robots.body_point import Site as Site
+    from posekit.robots.body_point import BodySite as BodySite
     from posekit.robots.find import RobotFiles as RobotFiles
     from posekit.robots.find import robot_names as robot_names
     from posekit.robots.ik import InverseKinematics as InverseKinematics
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from posekit.robots.kinematics import body_points as body_points
     from posekit.robots.loading import load_robot as load_robot
     from posekit.robots.robot import Robot as Robot
-    from posekit.robots.scaling import Scaled as Scaled
+    from posekit.robots.scaling import ScaledRobot as ScaledRobot
     from posekit.robots.scaling import scaled as scaled
     from posekit.robots.scaling import segment_lengths as segment_lengths
     from posekit.robots.scaling import shoulders_are_behind as shoulders_are_behind

@@ -12,7 +12,7 @@ from posekit.errors import InputError
 
 
 @dataclass(frozen=True, kw_only=True)
-class Site:
+class BodySite:
     """A place on a body: a frame's origin, or an offset in that frame.
 
     Parameters
@@ -35,12 +35,12 @@ class BodyPoint:
     """A named point of a model: one site, or the weighted mean of several."""
 
     name: str
-    sites: tuple[Site, ...]
+    sites: tuple[BodySite, ...]
 
 
 def body_points(frames: Sequence[str]) -> tuple[BodyPoint, ...]:
     """Make a point of each frame, named after it."""
-    return tuple(BodyPoint(name=name, sites=(Site(frame=name),)) for name in frames)
+    return tuple(BodyPoint(name=name, sites=(BodySite(frame=name),)) for name in frames)
 
 
 def frame_index(model: pin.Model) -> dict[str, int]:

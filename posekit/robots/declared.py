@@ -23,7 +23,7 @@ _ALL: Final = {1: "it positive", 2: "both positive", 3: "all positive"}
 
 
 @dataclass(frozen=True, kw_only=True)
-class Body:
+class DeclaredBody:
     """A collision or visual body as the text declares it.
 
     Parameters
@@ -43,7 +43,7 @@ class Body:
 
 def declared_bodies(
     robot: ElementTree.Element, kind: Literal["collision", "visual"] = "collision"
-) -> Iterator[Body]:
+) -> Iterator[DeclaredBody]:
     """List the bodies of a URDF, in the order of the text."""
     for link in robot.findall("link"):
         capsules = {capsule.get("name") for capsule in link.findall("collision_checking/capsule")}
@@ -53,7 +53,7 @@ def declared_bodies(
                     element.tag == "cylinder" and kind == "collision" and body.get("name") in capsules
                 )
                 shape = "capsule" if is_capsule else element.tag
-                yield Body(link=link.get("name", ""), shape=shape, element=element)
+                yield DeclaredBody(link=link.get("name", ""), shape=shape, element=element)
 
 
 def check_bodies(robot: ElementTree.Element, source: str) -> None:
@@ -102,7 +102,7 @@ def _check_body(body: ElementTree.Element, kind: str, place: str, source: str) -
         raise refusal(source, place, "a mesh without a file name", '<mesh filename="…"/>', "add it")
 
 
-def _check_shape(declared: Body, place: str, source: str) -> None:
+def _check_shape(declared: DeclaredBody, place: str, source: str) -> None:
     element, tag = declared.element, declared.element.tag
     if tag not in SIZE_ATTRIBUTES:
         got = f"a collision body <{shown(tag)[1:-1]}>"

@@ -66,9 +66,11 @@ class KinematicDescent(NamedTuple):
     Attributes
     ----------
     q : array (N, nq)
+        The configurations that were reached.
     cost : array (N,)
         Half the weighted sum of squared distances and the pull's share, m^2.
     steps : int array (N,)
+        How many steps were tried.
     settled : bool array (N,)
         Whether it ended at a minimum, not for want of steps.
     """

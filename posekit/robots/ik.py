@@ -13,9 +13,9 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.descent import KinematicProblem
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.search import Found, Search, unlimited
+from posekit.robots.search import KinematicSearchResult, PostureSearch, unlimited
 from posekit.robots.start_tables import make_tables
-from posekit.robots.starts import Starts
+from posekit.robots.starts import SearchStarts
 
 IK_TOLERANCE_METRES = 1e-3
 """Metres: a posture is met when none of its known points is farther off."""
@@ -150,6 +150,7 @@ class InverseKinematics:
             Of squared distances, relative to each other; a point of weight 0 is not looked at. All 1 unless told
             otherwise.
         start : array (nq,) or (N, nq), optional
+            Configurations to start from, and to stay near where the points do not tell.
 
         Returns
         -------
@@ -198,6 +199,7 @@ class InverseKinematics:
         sequence : array (T,), optional
             Which sequence a frame belongs to; all to one unless told otherwise.
         weights : array (P,) or (T, P), optional
+            Of squared distances, as `solve` takes them.
 
         Returns
         -------
@@ -216,7 +218,7 @@ class InverseKinematics:
             raise InputError(f"sequence has shape {which.shape}; expected ({n},), one entry a frame")
         frames = _frames(which)
         reference = problem.reference.copy()
-        parts: list[Found] = []
+        parts: list[KinematicSearchResult] = []
         level = np.zeros(len(frames[0]) if frames else 0)
         for k, rows in enumerate(frames):
             here = problem.take(rows)
@@ -238,7 +240,7 @@ class InverseKinematics:
             parts.append(found)
         order = np.argsort(np.concatenate(frames)) if frames else np.zeros(0, dtype=np.intp)
         joined = (
-            Found(*(np.concatenate(arrays)[order] for arrays in zip(*parts, strict=True)))
+            KinematicSearchResult(*(np.concatenate(arrays)[order] for arrays in zip(*parts, strict=True)))
             if parts
             else self._search.descend(problem, reference)
         )
@@ -266,10 +268,10 @@ class InverseKinematics:
         return lower, upper
 
     @cached_property
-    def _search(self) -> Search:
+    def _search(self) -> PostureSearch:
         tables = make_tables(self.kinematics, *self._limits)
-        starts = Starts(kinematics=self.kinematics, tables=tables)
-        return Search(starts=starts, tolerance=min(self.precision, self.tolerance))
+        starts = SearchStarts(kinematics=self.kinematics, tables=tables)
+        return PostureSearch(starts=starts, tolerance=min(self.precision, self.tolerance))
 
     def _problem(self, targets: ArrayLike, weights: ArrayLike | None) -> KinematicProblem:
         """Check what is asked for."""
@@ -303,7 +305,7 @@ class InverseKinematics:
             pull=REFERENCE_PULL,
         )
 
-    def _explain(self, problem: KinematicProblem, found: Found) -> Solution:
+    def _explain(self, problem: KinematicProblem, found: KinematicSearchResult) -> Solution:
         """Tell whether limits or lengths are the reason where a posture is not met."""
         q, space = found.q, self.kinematics.space
         reach = np.full(len(q), Reach.MET, dtype=np.intp)

@@ -13,7 +13,7 @@ from posekit.geometry import Array, cross, rotation_from_quaternion
 from posekit.geometry.batch_last import matrix_product, matrix_vector
 
 
-class Level(NamedTuple):
+class ChainLevel(NamedTuple):
     """Joints of one depth; `turning`, `sliding` and `flying` are places among them."""
 
     joints: NDArray[np.intp]
@@ -30,6 +30,7 @@ class JointChain:
     Parameters
     ----------
     model : pinocchio.Model
+        Whose joints they are.
     bodies : iterable of int
         The joints whose placements are wanted.
     carrier : int
@@ -42,6 +43,7 @@ class JointChain:
     supports : bool array (njoints, nv)
         Which entries of v move which joint's body.
     dof_joint : int array (nv,)
+        Which joint each entry of v belongs to.
     dof_axis : array (nv, 3)
         Axis of every entry of v in its joint's frame.
     dof_turns : bool array (nv,)
@@ -102,7 +104,7 @@ class JointChain:
             origin[level.joints] = origin[parents] + matrix_vector(rotation[parents], shift)
         return rotation, origin
 
-    def _local(self, level: Level, columns: Array) -> tuple[Array, Array]:
+    def _local(self, level: ChainLevel, columns: Array) -> tuple[Array, Array]:
         """Return the placements of a level's joints in their parents' bodies."""
         n, joints = columns.shape[1], level.joints
         if len(level.turning) == len(joints):
@@ -139,7 +141,7 @@ class JointChain:
         keep = continuous[:, None]
         return np.where(keep, first, np.cos(first)), np.where(keep, second, np.sin(first))
 
-    def _levels(self, bodies: Iterable[int], kinds: dict[str, list[int]]) -> tuple[Level, ...]:
+    def _levels(self, bodies: Iterable[int], kinds: dict[str, list[int]]) -> tuple[ChainLevel, ...]:
         needed = {self.carrier}
         for body in bodies:
             joint = int(body)
@@ -154,7 +156,7 @@ class JointChain:
             joints = np.array([j for j in self.beyond if depth[j] == d and j in needed], dtype=np.intp)
             if joints.size:
                 places = [np.flatnonzero(np.isin(joints, kind)) for kind in kinds.values()]
-                levels.append(Level(joints, *places))
+                levels.append(ChainLevel(joints, *places))
         return tuple(levels)
 
 

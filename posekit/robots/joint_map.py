@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site, find_frame, frame_index
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, find_frame, frame_index
 from posekit.safe_io import nearest, one_line, refusal, shown
 from posekit.skeleton import JOINTS, POINT, POINTS
 
@@ -178,7 +178,9 @@ def joint_map_of(table: JointMapTable, name: str) -> JointMap:
 
 def _point(name: str, place: SiteTable | MeanTable) -> BodyPoint:
     sites = (
-        Site(frame=site.frame, offset=(site.offset[0], site.offset[1], site.offset[2]), weight=site.weight)
+        BodySite(
+            frame=site.frame, offset=(site.offset[0], site.offset[1], site.offset[2]), weight=site.weight
+        )
         for site in getattr(place, "mean", [place])
     )
     return BodyPoint(name=name, sites=tuple(sites))

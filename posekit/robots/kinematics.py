@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.geometry.batch_last import matrix_vector
-from posekit.robots.body_point import BodyPoint, Site, body_points, find_frame, frame_index
+from posekit.robots.body_point import BodyPoint, BodySite, body_points, find_frame, frame_index
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.joint_chain import JointChain
 
-__all__ = ["BodyPoint", "Kinematics", "PlacedPoints", "Site", "body_points", "find_frame", "frame_index"]
+__all__ = ["BodyPoint", "BodySite", "Kinematics", "PlacedPoints", "body_points", "find_frame", "frame_index"]
 
 BLOCK_CONFIGURATIONS = 256
 """Configurations worked on at once: their rotations and Jacobians stay in the processor's cache."""
@@ -57,6 +57,7 @@ class Kinematics:
     model : pinocchio.Model
         See `ConfigurationSpace` for the joints it may have.
     points : sequence of BodyPoint
+        The points that are placed, by name.
     carrier : int
         The joint in whose body's frame positions and Jacobians are expressed, and beyond which alone joints are
         moved; the world unless told otherwise.
@@ -114,6 +115,7 @@ class Kinematics:
         Parameters
         ----------
         q : array (N, nq)
+            Configurations in Pinocchio's order.
 
         Returns
         -------
@@ -141,10 +143,11 @@ class Kinematics:
         Parameters
         ----------
         q : array (N, nq)
+            Configurations in Pinocchio's order.
 
         Returns
         -------
-        Placed
+        PlacedPoints
 
         Raises
         ------

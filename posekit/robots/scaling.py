@@ -13,11 +13,11 @@ import pinocchio as pin
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.stretching import EXACT_METRES, Stretching, shoulders_are_behind
+from posekit.robots.stretching import EXACT_METRES, ModelStretching, shoulders_are_behind
 from posekit.safe_io import nearest
 from posekit.skeleton import JOINTS, SEGMENT_NAMES, SEGMENTS, segment_name
 
-__all__ = ["Scaled", "model_lengths", "scaled", "segment_lengths", "shoulders_are_behind"]
+__all__ = ["ScaledRobot", "model_lengths", "scaled", "segment_lengths", "shoulders_are_behind"]
 
 MAX_PASSES = 30
 STUCK_METRES = 1e-10
@@ -31,7 +31,7 @@ RATIO_BOUNDS = (0.05, 20.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scaled:
+class ScaledRobot:
     """A model with other lengths.
 
     Parameters
@@ -84,7 +84,7 @@ def scaled(
     geometry: pin.GeometryModel | None = None,
     *,
     behind: bool | None = None,
-) -> Scaled:
+) -> ScaledRobot:
     """Copy a model so that its mapped segments have given lengths at the neutral configuration.
 
     What lies between the two joints of a limb's segment is scaled by one ratio: the distance then has that ratio
@@ -108,7 +108,7 @@ def scaled(
 
     Returns
     -------
-    Scaled
+    ScaledRobot
 
     Raises
     ------
@@ -117,7 +117,7 @@ def scaled(
     """
     own = model_lengths(kinematics)
     wanted = _check(lengths, own)
-    work = Stretching(kinematics, behind)
+    work = ModelStretching(kinematics, behind)
     turned = behind is not None and work.behind() not in (behind, None)
     if turned or any(abs(length / own[name] - 1) > SAME_LENGTH for name, length in wanted.items()):
         last = math.inf
@@ -130,7 +130,7 @@ def scaled(
             last = missed
     new_geometry = None if geometry is None else work.geometry(geometry)
     reached = model_lengths(work.kinematics)
-    return Scaled(
+    return ScaledRobot(
         kinematics=work.kinematics,
         geometry=new_geometry,
         lengths=MappingProxyType(reached),

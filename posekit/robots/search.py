@@ -14,8 +14,8 @@ from posekit.robots.body_point import frame_index
 from posekit.robots.descent import KinematicDescent, KinematicProblem, descend
 from posekit.robots.joint_chain import beyond
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.start_tables import Table
-from posekit.robots.starts import Starts
+from posekit.robots.start_tables import ShapeTable
+from posekit.robots.starts import SearchStarts
 
 N_RETRIES = 6
 """Other shapes of a trunk or a limb that are tried where the first does not meet its own points."""
@@ -35,17 +35,21 @@ DISTINCT_TRUNK = 0.05
 """Radians (of a joint, or of the base) or metres by which another trunk must differ."""
 
 
-class Found(NamedTuple):
+class KinematicSearchResult(NamedTuple):
     """The best that was found for each posture.
 
     Attributes
     ----------
     q : array (N, nq)
+        Configurations in Pinocchio's order.
     cost : array (N,)
+        As `KinematicDescent` has it, m^2.
     worst : array (N,)
         The largest distance of a known point of some weight from its target, metres.
     steps : int array (N,)
+        How many steps all searches took together.
     settled : bool array (N,)
+        Whether the search ended at a minimum.
     """
 
     q: Array
@@ -54,7 +58,7 @@ class Found(NamedTuple):
     steps: NDArray[np.intp]
     settled: NDArray[np.bool_]
 
-    def improve(self, rows: NDArray[np.intp], other: Found) -> None:
+    def improve(self, rows: NDArray[np.intp], other: KinematicSearchResult) -> None:
         """Take over, in place, what another search did better on some rows; its steps count in any case."""
         self.steps[rows] += other.steps
         better = other.cost < self.cost[rows]
@@ -76,17 +80,18 @@ class _Part(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Search:
+class PostureSearch:
     """Searches for one model.
 
     Parameters
     ----------
-    starts : Starts
+    starts : SearchStarts
+        Where searches begin.
     tolerance : float
         Metres: where no point is farther off, the search ends.
     """
 
-    starts: Starts
+    starts: SearchStarts
     tolerance: float
 
     @property
@@ -94,11 +99,11 @@ class Search:
         """The model and its points."""
         return self.starts.kinematics
 
-    def descend(self, problem: KinematicProblem, start: Array) -> Found:
+    def descend(self, problem: KinematicProblem, start: Array) -> KinematicSearchResult:
         """Search from one start, all joints together."""
         return self._found(descend(self.kinematics, problem, start), problem)
 
-    def everywhere(self, problem: KinematicProblem) -> Found:
+    def everywhere(self, problem: KinematicProblem) -> KinematicSearchResult:
         """Search from the tables of starts: trunk, limbs, then all joints; other trunks where that did not do."""
         trunk = self._trunk(problem)
         found = self.descend(problem, self._with_limbs(trunk, problem))
@@ -108,7 +113,7 @@ class Search:
         return found
 
     def _try_other_trunks(
-        self, found: Found, problem: KinematicProblem, rows: NDArray[np.intp], trunk: Array
+        self, found: KinematicSearchResult, problem: KinematicProblem, rows: NDArray[np.intp], trunk: Array
     ) -> None:
         """Start from trunks that lie on their points as well, but otherwise: as a flat trunk does back to front.
 
@@ -133,11 +138,11 @@ class Search:
                 few = problem.take(some)
                 found.improve(rows[some], self.descend(few, self._with_limbs(other[some], few)))
 
-    def _found(self, descent: KinematicDescent, problem: KinematicProblem) -> Found:
+    def _found(self, descent: KinematicDescent, problem: KinematicProblem) -> KinematicSearchResult:
         gap = np.linalg.norm(self.kinematics.positions(descent.q) - problem.targets, axis=2)
         counts = np.isfinite(gap) & (problem.weights > 0)
         worst = np.where(counts, gap, 0.0).max(axis=1, initial=0.0)
-        return Found(descent.q, descent.cost, worst, descent.steps, descent.settled)
+        return KinematicSearchResult(descent.q, descent.cost, worst, descent.steps, descent.settled)
 
     def _trunk(self, problem: KinematicProblem) -> Array:
         """Lay the trunk: the first candidate, and the best of the others where it does not meet its points."""
@@ -225,7 +230,7 @@ class Search:
     def _limb_parts(self) -> tuple[_Part, ...]:
         return tuple(self._part(table, np.zeros(0, dtype=np.intp)) for table in self.starts.tables.limbs)
 
-    def _part(self, table: Table, free: NDArray[np.intp]) -> _Part:
+    def _part(self, table: ShapeTable, free: NDArray[np.intp]) -> _Part:
         columns = np.concatenate([free, table.dofs])
         if not table.points.size:
             return _Part(self.kinematics, np.zeros(0, dtype=np.intp), table.points)

@@ -29,7 +29,7 @@ HELD_METRES = 1e-9
 """Metres within which a point keeps its place in a body."""
 
 
-class Branch(NamedTuple):
+class CarriedBranch(NamedTuple):
     """Entries of v that move points as a chain does: each moves a part of what the one before moves.
 
     Attributes
@@ -44,7 +44,7 @@ class Branch(NamedTuple):
     points: NDArray[np.intp]
 
 
-class Table(NamedTuple):
+class ShapeTable(NamedTuple):
     """Sampled shapes.
 
     Attributes
@@ -54,7 +54,9 @@ class Table(NamedTuple):
     values : array (M, D)
         Their values: angles and positions, zero for a continuous joint's neutral.
     points : int array (K,)
+        Which points the shape places.
     weights : array (K,)
+        Of the points' squared distances.
     positions : array (M, K, 3)
         Where the points are, in the frame of the body that carries the shape (the world for a trunk), metres.
     penalty : array (M,)
@@ -72,7 +74,7 @@ class Table(NamedTuple):
     carrier: int
 
 
-class Tables(NamedTuple):
+class ShapeTables(NamedTuple):
     """All tables of a model.
 
     Attributes
@@ -80,19 +82,20 @@ class Tables(NamedTuple):
     trunk : Table
         Joints that move several limbs, and the roots of limbs; without the free-flyer.
     limbs : tuple of Table
+        One for each limb.
     base : int
         Where the free-flyer at the root starts in q; -1 for a fixed base.
     rest : array (nq,)
         The neutral configuration inside the limits.
     """
 
-    trunk: Table
-    limbs: tuple[Table, ...]
+    trunk: ShapeTable
+    limbs: tuple[ShapeTable, ...]
     base: int
     rest: Array
 
 
-def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> Tables:
+def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> ShapeTables:
     """Sample the tables: deterministic, the same for the same model, points and limits (nq,)."""
     space, model = kinematics.space, kinematics.model
     rest = np.clip(kinematics.neutral, lower, upper)
@@ -126,10 +129,10 @@ def make_tables(kinematics: Kinematics, lower: Array, upper: Array) -> Tables:
         points, weights = list(range(len(moved))), [1.0] * len(moved)
     dofs = np.array(trunk_dofs, dtype=np.intp)
     trunk = _sample(kinematics, (lower, upper), rest, dofs, points, weights, 0)
-    return Tables(trunk, tuple(limbs), base, rest)
+    return ShapeTables(trunk, tuple(limbs), base, rest)
 
 
-def find_branches(kinematics: Kinematics) -> tuple[Branch, ...]:
+def find_branches(kinematics: Kinematics) -> tuple[CarriedBranch, ...]:
     """Find the limbs: the longest runs of joints that move ever fewer of the same points."""
     moved = kinematics.moved_by
     free = _free(kinematics.space)
@@ -144,7 +147,7 @@ def find_branches(kinematics: Kinematics) -> tuple[Branch, ...]:
     branches = []
     for top in tops:
         dofs = sorted((v for v, s in sets.items() if s <= top), key=lambda v: (-len(sets[v]), v))
-        branches.append(Branch(np.array(dofs, dtype=np.intp), np.array(sorted(top), dtype=np.intp)))
+        branches.append(CarriedBranch(np.array(dofs, dtype=np.intp), np.array(sorted(top), dtype=np.intp)))
     return tuple(branches)
 
 
@@ -192,7 +195,7 @@ def _sample(
     points: list[int],
     weights: list[float],
     carrier: int,
-) -> Table:
+) -> ShapeTable:
     """Sample joints within their limits by an additive recurrence of low discrepancy (Roberts 2018), rest first."""
     space = kinematics.space
     lower, upper = limits
@@ -212,7 +215,7 @@ def _sample(
     q = write(space, np.tile(rest, (count, 1)), dofs, values)
     positions = kinematics.positions(q)[:, points]
     rotation, origin = kinematics.joint_placements(q, carrier)
-    return Table(
+    return ShapeTable(
         dofs=dofs,
         values=values,
         points=np.array(points, dtype=np.intp),

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array, best_rotation, centred_covariance, quaternion_from_rotation
 from posekit.robots.kinematics import Kinematics
-from posekit.robots.start_tables import Table, Tables, write
+from posekit.robots.start_tables import ShapeTable, ShapeTables, write
 
 N_NEAREST = 96
 """Shapes of a table among which the starts are chosen."""
@@ -19,17 +19,19 @@ DISTINCT_RADIANS = 0.7
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Starts:
+class SearchStarts:
     """Starts for one model, its points and its limits.
 
     Parameters
     ----------
     kinematics : Kinematics
-    tables : Tables
+        The model and its points.
+    tables : ShapeTables
+        Sampled shapes of its parts.
     """
 
     kinematics: Kinematics
-    tables: Tables
+    tables: ShapeTables
 
     def trunks(self, targets: Array, count: int) -> Array:
         """Find configurations whose trunk lies best on the targets.
@@ -42,6 +44,7 @@ class Starts:
         targets : array (N, P, 3)
             NaN is unknown.
         count : int
+            How many are wanted.
 
         Returns
         -------
@@ -83,8 +86,11 @@ class Starts:
         index : int
             Into `limbs`.
         q : array (N, nq)
+            Configurations whose other joints are laid.
         targets : array (N, P, 3)
+            Metres; NaN is unknown.
         count : int
+            How many are wanted.
 
         Returns
         -------
@@ -100,7 +106,7 @@ class Starts:
         rank = choose(table, misfit, count)
         return np.stack([self._write(q.copy(), table, chosen) for chosen in rank.T])
 
-    def _write(self, q: Array, table: Table, chosen: NDArray[np.intp]) -> Array:
+    def _write(self, q: Array, table: ShapeTable, chosen: NDArray[np.intp]) -> Array:
         return write(self.kinematics.space, q, table.dofs, table.values[chosen])
 
     def _lay_base(self, q: Array, R: Array, t: Array) -> Array:
@@ -116,7 +122,7 @@ class Starts:
         return q
 
 
-def choose(table: Table, misfit: Array, count: int) -> NDArray[np.intp]:
+def choose(table: ShapeTable, misfit: Array, count: int) -> NDArray[np.intp]:
     """Choose shapes (N, count) of small misfit (N, M) that are apart from each other, the best first."""
     total = misfit + table.penalty
     keep = min(N_NEAREST, total.shape[1])

@@ -12,7 +12,7 @@ from posekit.geometry import Array, cross
 from posekit.robots.body_point import BodyPoint
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.scaled_shape import scale_object
-from posekit.robots.structure import GIRDLE_ANCHORS, HIP_PAIR, SHOULDER_PAIR, Girdle, Structure
+from posekit.robots.structure import GIRDLE_ANCHORS, HIP_PAIR, SHOULDER_PAIR, BodyStructure, GirdleCarriers
 from posekit.skeleton import JOINT, segment_name
 
 EXACT_METRES = 1e-12
@@ -25,7 +25,7 @@ MAX_STEP_METRES = 0.05
 """Metres that a point moves at most in a step."""
 
 
-class Stretching:
+class ModelStretching:
     """A model that is being scaled, and by what each of its bodies has been."""
 
     def __init__(self, kinematics: Kinematics, behind: bool | None) -> None:
@@ -33,7 +33,7 @@ class Stretching:
         self.model = kinematics.model.copy()
         self.points = {point.name: point for point in kinematics.points}
         self.stretched = np.tile(np.eye(3), (self.model.njoints, 1, 1))
-        self.structure = Structure(self.model, self.points)
+        self.structure = BodyStructure(self.model, self.points)
 
     @property
     def kinematics(self) -> Kinematics:
@@ -139,7 +139,7 @@ class Stretching:
             if girdle is not None:
                 self._move(name, girdle, rotation, new[name] - place[name])
 
-    def _move(self, name: str, girdle: Girdle, rotation: Array, shift: Array) -> None:
+    def _move(self, name: str, girdle: GirdleCarriers, rotation: Array, shift: Array) -> None:
         """Move a point in the world at the neutral configuration: the joint that carries it, or its offset."""
         if girdle.joint > 0:
             placement = self.model.jointPlacements[girdle.joint]

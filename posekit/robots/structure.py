@@ -30,14 +30,14 @@ SAME_PLACE_METRES = 1e-6
 """Metres within which the origins of joints are one place."""
 
 
-class Spine(NamedTuple):
+class SpineCarriers(NamedTuple):
     """The joints between pelvis and neck, and the bodies on which they sit."""
 
     joints: tuple[int, ...]
     carriers: tuple[int, ...]
 
 
-class Girdle(NamedTuple):
+class GirdleCarriers(NamedTuple):
     """What carries a shoulder or a hip.
 
     The joint that is moved to move the point (0: the point's offset is), the body in which it sits, and the bodies
@@ -49,12 +49,13 @@ class Girdle(NamedTuple):
     bodies: tuple[int, ...]
 
 
-class Structure:
+class BodyStructure:
     """The parts of a model, found once: stretching changes no part's joints.
 
     Parameters
     ----------
     model : pinocchio.Model
+        The robot's.
     points : mapping
         Points by name; see `JointMap.kinematics`.
 
@@ -63,6 +64,7 @@ class Structure:
     limb_bodies : dict
         For each segment of a limb, the bodies that lie between its joints.
     spine : Spine
+        What lies between pelvis and neck.
     girdles : dict
         For each pair of `GIRDLE_ANCHORS`, what carries its two points; none where a point is absent or a mean.
     """
@@ -87,19 +89,21 @@ class Structure:
             return None
         return int(self.model.frames[self.frames[point.sites[0].frame]].parentJoint)
 
-    def _find_spine(self) -> Spine:
+    def _find_spine(self) -> SpineCarriers:
         neck, pelvis = self.body("neck"), self.body("pelvis")
         if neck is None or pelvis is None:
-            return Spine((), ())
+            return SpineCarriers((), ())
         taken = {body for bodies in self.limb_bodies.values() for body in bodies}
         joints = [joint for joint in self._path(neck, pelvis) if int(self.model.parents[joint]) not in taken]
         carriers = {int(self.model.parents[joint]) for joint in joints}
         carriers |= {
             body for name, body in (("neck", neck), ("pelvis", pelvis)) if np.any(self._offset(name))
         }
-        return Spine(tuple(joints), tuple(sorted(carriers - taken - {0})))
+        return SpineCarriers(tuple(joints), tuple(sorted(carriers - taken - {0})))
 
-    def _find_girdle(self, name: str, anchors: tuple[str, ...], place: Mapping[str, Array]) -> Girdle | None:
+    def _find_girdle(
+        self, name: str, anchors: tuple[str, ...], place: Mapping[str, Array]
+    ) -> GirdleCarriers | None:
         """Find what carries a shoulder or a hip: from the spine, or the pelvis, out to the point."""
         body = self.body(name)
         if body is None:
@@ -126,12 +130,16 @@ class Structure:
         near = [joint for joint in chain if np.linalg.norm(origins[joint] - place[name]) <= SAME_PLACE_METRES]
         bodies = [joint for joint in chain if joint not in near]
         if not chain or not movable or (np.any(self._offset(name)) and not near and len(chain) == 1):
-            return Girdle(0, body, tuple(bodies))
+            return GirdleCarriers(0, body, tuple(bodies))
         joint = movable[-1]
         carrier = int(self.model.parents[joint])
         if name.endswith("hip") and carrier > 0:
             bodies.append(carrier)
-        return Girdle(joint, carrier, tuple(bodies)) if carrier > 0 else Girdle(0, body, tuple(bodies))
+        return (
+            GirdleCarriers(joint, carrier, tuple(bodies))
+            if carrier > 0
+            else GirdleCarriers(0, body, tuple(bodies))
+        )
 
     def _origins(self) -> Array:
         """Return the joints' origins at the neutral configuration (njoints, 3)."""

@@ -6,7 +6,7 @@ import pytest
 from posekit.body import load_figure
 from posekit.body.lengths import torso_points
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck.pose import Poses, poses
+from posekit.cameras.neck.pose import PartPoses, poses
 from posekit.skeleton import JOINT, TORSO
 from posekit.synthesis import SyntheticScene, random_views
 
@@ -23,7 +23,7 @@ PARTS = {
 }
 
 
-def placed(part: str, scene: SyntheticScene, deviation: float = 1.0) -> Poses:
+def placed(part: str, scene: SyntheticScene, deviation: float = 1.0) -> PartPoses:
     points, image = PARTS[part][0], PARTS[part][1](scene)
     return poses(scene.camera, points, image, np.full(image.shape[:2], deviation), np.zeros(len(points)))
 

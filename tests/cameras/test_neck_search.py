@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 from posekit.body import load_figure
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck.body import Sight, sight
-from posekit.cameras.neck.closure import Closure
-from posekit.cameras.neck.search import Depths, search
+from posekit.cameras.neck.body import NeckRays, sight
+from posekit.cameras.neck.closure import RigidClosure
+from posekit.cameras.neck.search import NeckDepths, search
 from posekit.skeleton import JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import CameraSphere, SyntheticScene, random_views, seq1, seq2
 from posekit.tree import InterpretationTree
@@ -28,7 +28,7 @@ SWAPPED = [
 
 def searched(
     scene: SyntheticScene, tolerance: float, tangent: float = ROUNDING, image: np.ndarray | None = None
-) -> tuple[Sight, Closure, list[Depths]]:
+) -> tuple[NeckRays, RigidClosure, list[NeckDepths]]:
     seen = sight(
         scene.camera, scene.figure, scene.image if image is None else image, np.full(len(scene), tangent)
     )
@@ -41,7 +41,7 @@ def true_distance(scene: SyntheticScene) -> np.ndarray:
     return np.asarray(np.linalg.norm(scene.joints_cam[:, 0], axis=1))
 
 
-def inside(found: Depths, distance: float, slack: float = 1e-7) -> bool:
+def inside(found: NeckDepths, distance: float, slack: float = 1e-7) -> bool:
     low, high = found.intervals.T
     return bool(((low <= distance + slack) & (high >= distance - slack)).any())
 
@@ -165,7 +165,7 @@ def test_a_mirrored_image_has_the_same_depths(swap: bool) -> None:
 def test_a_larger_tolerance_never_shrinks_the_intervals(noise: float) -> None:
     scene = VIEWS.select(range(30)).with_noise(noise, np.random.default_rng(8))
     levels = [(1e-8, 1e-9), (0.005, 1e-9), (0.02, 0.01), (0.05, 0.01), (0.05, 0.03), (0.1, 0.05), (0.3, 0.1)]
-    before: list[Depths] | None = None
+    before: list[NeckDepths] | None = None
     for tolerance, tangent in levels:
         _, _, found = searched(scene, tolerance, tangent)
         for narrow, wide in zip(before or [], found, strict=bool(before)):

@@ -15,7 +15,7 @@ from posekit.errors import InputError
 from posekit.robots import load_robot
 from posekit.robots.ik import InverseKinematics, Reach, Solution, solve, solve_sequence
 from posekit.robots.joint_map import load_joint_map
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, body_points
 from posekit.robots.limited_step import limited_step
 from posekit.robots.start_tables import find_branches
 
@@ -314,7 +314,7 @@ def test_sequences_need_fewer_steps(rng: np.random.Generator) -> None:
 
 def test_a_mean_of_frames_is_placed(rng: np.random.Generator) -> None:
     human = mapped("human")
-    neck = BodyPoint(name="neck", sites=(Site(frame="right_upperarm"), Site(frame="left_upperarm")))
+    neck = BodyPoint(name="neck", sites=(BodySite(frame="right_upperarm"), BodySite(frame="left_upperarm")))
     points = tuple(neck if point.name == "neck" else point for point in human.points)
     kinematics = Kinematics(model=human.model, points=points)
     solution = solve(kinematics, kinematics.positions(legal(kinematics, 40, rng)))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.robots import load_robot
 from posekit.robots.configuration_space import ConfigurationSpace
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points, frame_index
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, body_points, frame_index
 
 PUBLISHED = ("human", "simple_humanoid", "talos", "g1", "ur5", "panda", "allegro_left_hand", "icub", "tiago")
 ROUNDING = 1e-10
@@ -59,7 +59,7 @@ def test_positions_and_jacobians_are_those_of_pinocchio(
     names = [*frames][:: max(1, len(frames) // 25)]
     chosen = rng.choice([*frames], 3, replace=False)
     mean = tuple(
-        Site(frame=str(frame), offset=tuple(rng.normal(size=3)), weight=float(rng.uniform(0.2, 2)))
+        BodySite(frame=str(frame), offset=tuple(rng.normal(size=3)), weight=float(rng.uniform(0.2, 2)))
         for frame in chosen
     )
     points = (*body_points(names), BodyPoint(name="a mean", sites=mean))
@@ -191,11 +191,11 @@ def test_a_mimic_joint_is_refused() -> None:
         (body_points(["right_hand", "right_hand"]), "'right_hand' is given twice"),
         ((BodyPoint(name="x", sites=()),), "'x' has no frame"),
         (
-            (BodyPoint(name="x", sites=(Site(frame="right_hand", offset=(np.nan, 0, 0)),)),),
+            (BodyPoint(name="x", sites=(BodySite(frame="right_hand", offset=(np.nan, 0, 0)),)),),
             "three finite numbers",
         ),
-        ((BodyPoint(name="x", sites=(Site(frame="right_hand", weight=-1.0),)),), "positive and finite"),
-        ((BodyPoint(name="x", sites=(Site(frame="right_hand", weight=np.nan),)),), "positive and finite"),
+        ((BodyPoint(name="x", sites=(BodySite(frame="right_hand", weight=-1.0),)),), "positive and finite"),
+        ((BodyPoint(name="x", sites=(BodySite(frame="right_hand", weight=np.nan),)),), "positive and finite"),
     ],
 )
 def test_impossible_points_are_refused(points: tuple[BodyPoint, ...], message: str) -> None:

@@ -16,7 +16,7 @@ from posekit.errors import InputError
 from posekit.robots import load_robot
 from posekit.robots.ik import InverseKinematics
 from posekit.robots.joint_map import load_joint_map, postures_of, targets_of
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics
 from posekit.robots.scaling import model_lengths, scaled, segment_lengths
 from posekit.robots.stretching import shoulders_are_behind
 from posekit.robots.structure import LIMB_SEGMENTS
@@ -228,7 +228,7 @@ def test_every_shape_grows() -> None:
 
 def test_what_the_structure_does_not_allow_is_said() -> None:
     human = mapped("human")
-    between = (Site(frame="right_upperarm"), Site(frame="left_upperarm"))
+    between = (BodySite(frame="right_upperarm"), BodySite(frame="left_upperarm"))
     points = tuple(
         BodyPoint(name="neck", sites=between) if point.name == "neck" else point for point in human.points
     )

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from posekit.errors import InputError
 from posekit.linkages.robot_linkage import Carried, linkage_of
 from posekit.robots import Robot, load_robot
-from posekit.robots.kinematics import BodyPoint, Kinematics, Site, body_points
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, body_points
 from posekit.validators.attainable import Attainable, six_volumes
 from posekit.validators.axis_points import find_axis_points, place_axis_point
 from posekit.validators.robot_limits import RobotLimits
@@ -190,7 +190,7 @@ class TestLaws:
         for point in axis_points:
             placed = place_axis_point(points, point)
             joint = robot.model.names[point.body]
-            site = Site(frame=joint, offset=tuple(point.place))
+            site = BodySite(frame=joint, offset=tuple(point.place))
             known_body = joint in robot.frame_names and point.body > 1
             if known_body:
                 truth = Kinematics(model=robot.model, points=(BodyPoint(name="p", sites=(site,)),)).positions(

@@ -27,7 +27,7 @@ DIFFERENCE_STEP: Final = 0.01
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Parameters:
+class LikelihoodParameters:
     """What is estimated: everything in logarithms.
 
     Parameters
@@ -43,7 +43,7 @@ class Parameters:
     width: float
 
     @classmethod
-    def from_vector(cls, y: Array) -> Parameters:
+    def from_vector(cls, y: Array) -> LikelihoodParameters:
         """Take a vector (M + 2,) apart."""
         return cls(dimensions=y[:-2], middle=float(y[-2]), width=float(y[-1]))
 
@@ -129,18 +129,18 @@ class ViewLikelihood:
             return np.zeros_like(self.scales)
         return np.asarray(-0.5 * ((self.scales - middle) / np.exp(width)) ** 2 - width)
 
-    def terms(self, p: Parameters) -> Array:
+    def terms(self, p: LikelihoodParameters) -> Array:
         """Return the logarithms of all lengths' densities (M, T, S)."""
         return np.stack([self.of_length(m, float(p.dimensions[m])) for m in range(self.seen.shape[1])])
 
     def pictures(self, y: Array) -> Array:
         """Return the logarithm of the likelihood of each picture (T,)."""
-        p = Parameters.from_vector(y)
+        p = LikelihoodParameters.from_vector(y)
         return _integrated(self.terms(p).sum(axis=0) + self.of_scale(p.middle, p.width))
 
     def slopes(self, y: Array) -> Array:
         """Return the slope of each picture's logarithm (T, M + 2), by central differences."""
-        p = Parameters.from_vector(y)
+        p = LikelihoodParameters.from_vector(y)
         terms, scale = self.terms(p), self.of_scale(p.middle, p.width)
         lengths = terms.sum(axis=0)
         slopes = np.zeros((len(self.seen), len(y)))
@@ -182,7 +182,7 @@ class ViewLikelihood:
 
     def posterior_scales(self, y: Array) -> Array:
         """Return the mean of the logarithm of each picture's scale (T,)."""
-        p = Parameters.from_vector(y)
+        p = LikelihoodParameters.from_vector(y)
         density = self.terms(p).sum(axis=0) + self.of_scale(p.middle, p.width)
         weight = np.exp(density - density.max(axis=1, keepdims=True))
         return np.asarray((weight * self.scales).sum(axis=1) / weight.sum(axis=1))

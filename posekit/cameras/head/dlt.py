@@ -31,7 +31,7 @@ BEHIND_CAMERA = (
 )
 
 
-class Direct(NamedTuple):
+class LinearSolution(NamedTuple):
     """What the linear equations give, for F heads; NaN where `determined` is false."""
 
     P: Array
@@ -136,7 +136,7 @@ def require(reasons: tuple[str, ...]) -> None:
             raise HeadError(f"frame {frame}: {reason}" if len(reasons) > 1 else reason)
 
 
-def solve(points: Array, image: Array, seen: NDArray[np.bool_]) -> Direct:
+def solve(points: Array, image: Array, seen: NDArray[np.bool_]) -> LinearSolution:
     """Solve for F heads of points (F, P, 3), image points (F, P, 2), those that are `seen` (F, P)."""
     space, to_space = _normalise(points, seen)
     plane, to_plane = _normalise(image, seen)
@@ -163,7 +163,7 @@ def solve(points: Array, image: Array, seen: NDArray[np.bool_]) -> Direct:
     t = unscaled[:, :, 3].copy()
     for array in (P, R, t, f):
         array[~determined] = np.nan
-    return Direct(P, R, t, f, determined, in_front & determined)
+    return LinearSolution(P, R, t, f, determined, in_front & determined)
 
 
 def _normalise(points: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array]:

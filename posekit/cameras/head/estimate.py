@@ -58,7 +58,9 @@ def estimate(
     Parameters
     ----------
     head : HeadPoints
-    sighting : Sighting
+        The head, in its own frame.
+    sighting : HeadSighting
+        What each frame shows of it.
     known : (PinholeCamera, array (F, P, 2)), optional
         The camera and the normalised image points; without it f is free.
     """

@@ -37,6 +37,7 @@ def misfits(heads: Heads, plane: Array, fitted: HeadFit) -> tuple[NDArray[np.int
     Parameters
     ----------
     heads : Heads
+        What is seen of the heads.
     plane : array (F, P, 2)
         The image points, normalised where K is known.
     fitted : HeadFit

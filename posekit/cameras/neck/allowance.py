@@ -28,14 +28,14 @@ EXACT_RIGID, EXACT_TANGENT = 1e-8, 1e-9
 RIGID_JOINTS = sorted({JOINT[name] for name in (*TORSO, *HIPS)})
 
 
-class Allowance(NamedTuple):
+class NeckAllowance(NamedTuple):
     """Metres by which rigid distances may be off, and segments too short for their image, in F frames (F,)."""
 
     rigid: Array
     tangent: Array
 
 
-def allowances(camera: PinholeCamera, figure: Figure, given: PlacementInput) -> Allowance:
+def allowances(camera: PinholeCamera, figure: Figure, given: PlacementInput) -> NeckAllowance:
     """Take the tolerances that are given, and derive those that are not.
 
     The deviation of an image point is taken to metres at the farthest depth that the image leaves the neck.
@@ -46,7 +46,7 @@ def allowances(camera: PinholeCamera, figure: Figure, given: PlacementInput) -> 
         for value in (given.settings.tolerance, given.settings.tangent)
     )
     if given.settings.tolerance is not None and given.settings.tangent is not None:
-        return Allowance(rigid, tangent)
+        return NeckAllowance(rigid, tangent)
     first = _sigma(camera, figure, given, np.zeros(frames))
     # The image as it is, with its errors, leaves too little room, with their allowance too much: between the two.
     sigma = (first + _sigma(camera, figure, given, TANGENT_SIGMAS * first)) / 2
@@ -55,7 +55,7 @@ def allowances(camera: PinholeCamera, figure: Figure, given: PlacementInput) -> 
         rigid = np.maximum(RIGID_SIGMAS * sigma + np.sqrt(2 * shoulder * sigma), EXACT_RIGID)
     if given.settings.tangent is None:
         tangent = np.maximum(TANGENT_SIGMAS * sigma, EXACT_TANGENT)
-    return Allowance(rigid, tangent)
+    return NeckAllowance(rigid, tangent)
 
 
 def _sigma(camera: PinholeCamera, figure: Figure, given: PlacementInput, tangent: Array) -> Array:

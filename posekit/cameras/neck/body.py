@@ -28,7 +28,7 @@ SEGMENT_OF_PAIR = {frozenset(pair): segment_name(pair) for pair in (*TREE_SEGMEN
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Sight:
+class NeckRays:
     """The rays of F frames, and the farthest that each joint can be.
 
     Parameters
@@ -71,7 +71,7 @@ class Sight:
         return "" if joint < 0 else segment_name((PARENTS[joint], joint))
 
 
-def sight(camera: PinholeCamera, figure: Figure, image: Array, tangent: Array) -> Sight:
+def sight(camera: PinholeCamera, figure: Figure, image: Array, tangent: Array) -> NeckRays:
     r"""Measure the rays of joints (F, 14, 2), NaN where not seen, and bound every joint's distance; tangent is (F,).
 
     Going up the tree, a joint is bounded by each child: :math:`\rho \sin\theta \le l`, and where the child itself
@@ -97,7 +97,7 @@ def sight(camera: PinholeCamera, figure: Figure, image: Array, tangent: Array) -
         nearer = bound < farthest[:, parent]  # False where either is NaN: not seen
         farthest[nearer, parent] = bound[nearer]
         bounding[nearer, parent] = source[nearer]
-    return Sight(rays=rays, lengths=lengths, tangent=tangent, farthest=farthest, bounding=bounding)
+    return NeckRays(rays=rays, lengths=lengths, tangent=tangent, farthest=farthest, bounding=bounding)
 
 
 def _bound(

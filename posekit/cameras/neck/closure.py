@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.neck.body import Sight
+from posekit.cameras.neck.body import NeckRays
 from posekit.geometry import Array
 from posekit.skeleton import JOINT
 
@@ -69,12 +69,12 @@ class _Distance(NamedTuple):
         return np.where(self.seen[rows].reshape(shape), apart - self.length, unseen)
 
 
-class Closure:
+class RigidClosure:
     """The misfit of the four distances that lift nothing, as a function of the neck's distance.
 
     Parameters
     ----------
-    sight : Sight
+    sight : NeckRays
         The rays of F frames.
 
     Attributes
@@ -85,7 +85,7 @@ class Closure:
         The least distance of the neck, and the length of neck-pelvis, metres.
     """
 
-    def __init__(self, sight: Sight) -> None:
+    def __init__(self, sight: NeckRays) -> None:
         seen = np.isfinite(sight.rays[..., 0])
         self._lifts = {}
         for parent, child in ((N, R), (N, L), (N, P), (P, A), (P, B)):

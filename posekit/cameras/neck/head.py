@@ -15,7 +15,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.pose import poses
-from posekit.cameras.neck.suggestion import Suggestion, suggest
+from posekit.cameras.neck.suggestion import PartSuggestion, suggest
 from posekit.geometry import Array
 
 
@@ -27,7 +27,7 @@ def head_suggestion(
     deviation: Array,
     offset: Array,
     bent: float,
-) -> Suggestion:
+) -> PartSuggestion:
     """Place the head in F frames and tell the neck's distance.
 
     Parameters

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from posekit.cameras.neck.closure import Closure, Rows
+from posekit.cameras.neck.closure import RigidClosure, Rows
 from posekit.geometry import Array
 
 WORTH_REFINING = 0.6
@@ -29,7 +29,7 @@ ROUNDING_METRES = 1e-13
 """Metres that rounding leaves of a misfit a few metres away."""
 
 
-class Samples(NamedTuple):
+class MisfitSamples(NamedTuple):
     """Distances that no grid would meet: frame, distance and misfit of each (K,)."""
 
     frame: Rows
@@ -37,7 +37,7 @@ class Samples(NamedTuple):
     misfit: Array
 
 
-def minima_of(closure: Closure, frames: Rows, upper: Array, psi: Array, misfit: Array) -> Samples:
+def minima_of(closure: RigidClosure, frames: Rows, upper: Array, psi: Array, misfit: Array) -> MisfitSamples:
     """Bracket the local minima of every branch on the grid, look closer where one may hide, and refine them.
 
     They come frame by frame, best first.
@@ -67,7 +67,7 @@ def minima_of(closure: Closure, frames: Rows, upper: Array, psi: Array, misfit: 
     for angle in (best - ASIDE_RADIANS, best + ASIDE_RADIANS):
         true &= least <= closure.one(frames[row], branch, upper[row] * np.cos(angle)) + ROUNDING_METRES
     order = np.flatnonzero(true)[np.lexsort((least[true], row[true]))]
-    return Samples(row[order], distance[order], least[order])
+    return MisfitSamples(row[order], distance[order], least[order])
 
 
 class _Brackets(NamedTuple):
@@ -97,7 +97,7 @@ def _brackets(psi: Array, misfit: Array) -> _Brackets:
     )
 
 
-def _golden(closure: Closure, frame: Rows, upper: Array, brackets: _Brackets) -> tuple[Array, Array]:
+def _golden(closure: RigidClosure, frame: Rows, upper: Array, brackets: _Brackets) -> tuple[Array, Array]:
     """Shrink brackets by golden sections (Kiefer 1953); return the best angle (K,) and the misfit there."""
     _, branch, low, high, best, least = brackets
 

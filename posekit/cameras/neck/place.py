@@ -10,15 +10,15 @@ from numpy.typing import ArrayLike
 
 from posekit.body import Figure
 from posekit.cameras import PinholeCamera
-from posekit.cameras.neck.allowance import Allowance, allowances
-from posekit.cameras.neck.body import Sight, sight
-from posekit.cameras.neck.closure import Closure
+from posekit.cameras.neck.allowance import NeckAllowance, allowances
+from posekit.cameras.neck.body import NeckRays, sight
+from posekit.cameras.neck.closure import RigidClosure
 from posekit.cameras.neck.cover import cover, meet
 from posekit.cameras.neck.given import NeckSettings, PlacementInput
 from posekit.cameras.neck.head import head_suggestion
 from posekit.cameras.neck.placement import NeckPlacement
-from posekit.cameras.neck.search import Depths, search
-from posekit.cameras.neck.suggestion import KEPT_SIGMAS, Suggestion
+from posekit.cameras.neck.search import NeckDepths, search
+from posekit.cameras.neck.suggestion import KEPT_SIGMAS, PartSuggestion
 from posekit.cameras.neck.torso import torso_suggestion
 from posekit.errors import InputError
 from posekit.geometry import Array
@@ -99,7 +99,7 @@ def place(
 
 def _suggestions(
     camera: PinholeCamera, figure: Figure, given: PlacementInput, ray: Array, method: RootMethod
-) -> list[Suggestion]:
+) -> list[PartSuggestion]:
     """Ask the rigid parts that the method allows, in the order in which they are believed."""
     n, parts = len(JOINTS), []
     if method in ("auto", "head"):
@@ -113,13 +113,13 @@ def _suggestions(
 
 def _choose(
     given: PlacementInput,
-    seen: Sight,
-    closure: Closure,
-    depths: Depths,
-    parts: list[Suggestion],
+    seen: NeckRays,
+    closure: RigidClosure,
+    depths: NeckDepths,
+    parts: list[PartSuggestion],
     method: RootMethod,
     frame: int,
-    allowed: Allowance,
+    allowed: NeckAllowance,
 ) -> NeckPlacement:
     """Take the first part that suffices, or else the search, and choose depths from what it leaves."""
     z = float(seen.rays[frame, 0, 2])
@@ -161,7 +161,7 @@ def _choose(
 
 
 def _necks(
-    given: PlacementInput, seen: Sight, closure: Closure, depths: Depths, left: Array, frame: int
+    given: PlacementInput, seen: NeckRays, closure: RigidClosure, depths: NeckDepths, left: Array, frame: int
 ) -> dict[str, Any]:
     """Choose exact minima in what is left of the intervals, or samples that cover it."""
     ray = seen.rays[frame, 0]
@@ -184,11 +184,11 @@ def _necks(
 
 def _as_given(
     given: PlacementInput,
-    seen: Sight,
-    closure: Closure,
-    depths: Depths | None,
+    seen: NeckRays,
+    closure: RigidClosure,
+    depths: NeckDepths | None,
     frame: int,
-    allowed: Allowance,
+    allowed: NeckAllowance,
 ) -> NeckPlacement:
     """Keep a root that is given, and say where it stands to the search's depths."""
     root = given.root[frame]
@@ -216,7 +216,7 @@ def _as_given(
     )
 
 
-def _searched(depths: Depths, z: float, allowed: Allowance, frame: int) -> NeckPlacement:
+def _searched(depths: NeckDepths, z: float, allowed: NeckAllowance, frame: int) -> NeckPlacement:
     """Say what the search found of a frame, as depths; z is the ray's."""
     return NeckPlacement(
         method="none",
@@ -232,7 +232,7 @@ def _searched(depths: Depths, z: float, allowed: Allowance, frame: int) -> NeckP
     )
 
 
-def _outside(part: Suggestion, depths: Depths, frame: int, z: float) -> str:
+def _outside(part: PartSuggestion, depths: NeckDepths, frame: int, z: float) -> str:
     """Say that a part's depth is none that the search leaves."""
     at, deviation = float(part.distance[frame, 0]) * z, float(part.deviation[frame, 0]) * z
     return (
@@ -241,12 +241,12 @@ def _outside(part: Suggestion, depths: Depths, frame: int, z: float) -> str:
     )
 
 
-def _feasible(depths: Depths, z: float) -> str:
+def _feasible(depths: NeckDepths, z: float) -> str:
     ranges = ", ".join(f"{low:.4g} to {high:.4g}" for low, high in depths.intervals * z) or "none"
     return f"outside of the depths at which the rigid parts close ({ranges} m)"
 
 
-def _does_not_close(depths: Depths, z: float, tolerance: float) -> str:
+def _does_not_close(depths: NeckDepths, z: float, tolerance: float) -> str:
     """Say by how much the rigid parts do not close at any depth."""
     if not len(depths.minima):
         return (
@@ -259,7 +259,7 @@ def _does_not_close(depths: Depths, z: float, tolerance: float) -> str:
     )
 
 
-def _why(seen: Sight, frame: int) -> str:
+def _why(seen: NeckRays, frame: int) -> str:
     """Say why a frame cannot be searched."""
     upper = seen.farthest[frame, 0]
     if np.isnan(upper):

@@ -39,7 +39,7 @@ POSES_APART = 1e-2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Poses:
+class PartPoses:
     """The local minima of F frames, at most K each, best first; NaN, and infinite cost, where there is none.
 
     Parameters
@@ -81,7 +81,7 @@ class Poses:
         return deviation
 
 
-def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, offset: Array) -> Poses:
+def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, offset: Array) -> PartPoses:
     """Find the poses of points known in the body's frame.
 
     Levenberg-Marquardt from scaled orthographic views (DeMenthon & Davis 1995) and their depth-reversed twins: a
@@ -90,6 +90,7 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
     Parameters
     ----------
     camera : PinholeCamera
+        With one K, or one a frame.
     points : array (P, 3)
         Body frame, metres.
     image : array (F, P, 2)
@@ -160,7 +161,7 @@ def poses(camera: PinholeCamera, points: Array, image: Array, deviation: Array, 
 
     freedom = np.zeros(total, dtype=np.intp)
     freedom[number] = 2 * seen.sum(axis=1) - 6
-    return Poses(
+    return PartPoses(
         R=spread(R, np.nan),
         origin=spread(origin, np.nan),
         cost=spread(cost, np.inf),

@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.neck.body import Sight
-from posekit.cameras.neck.closure import Closure, Rows
-from posekit.cameras.neck.minima import Samples, minima_of
+from posekit.cameras.neck.body import NeckRays
+from posekit.cameras.neck.closure import RigidClosure, Rows
+from posekit.cameras.neck.minima import MisfitSamples, minima_of
 from posekit.geometry import Array
 
 N_CELLS = 96
@@ -30,7 +30,7 @@ SAME_DISTANCE = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Depths:
+class NeckDepths:
     """What the search found for one frame; distances are of the neck along its ray, metres.
 
     Parameters
@@ -68,7 +68,7 @@ class Depths:
                 value.flags.writeable = False
 
 
-def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[Depths]]:
+def search(sight: NeckRays, frames: Rows, tolerance: Array) -> tuple[RigidClosure, list[NeckDepths]]:
     """Search the distance of the neck in some frames.
 
     The misfit r is the largest of the four errors of the distances that lift nothing, so that ``r <= tolerance`` is
@@ -76,7 +76,7 @@ def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[
 
     Parameters
     ----------
-    sight : Sight
+    sight : NeckRays
         Of frames with a neck that is seen, and bounded above the nearest distance.
     frames : int array (n,)
         Which.
@@ -85,12 +85,12 @@ def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[
 
     Returns
     -------
-    closure : Closure
+    closure : RigidClosure
     depths : list of Depths
         One for each of `frames`.
     """
-    closure = Closure(sight)
-    found: list[Depths] = []
+    closure = RigidClosure(sight)
+    found: list[NeckDepths] = []
     for start in range(0, len(frames), BLOCK_FRAMES):
         found += _search(
             closure, sight, frames[start : start + BLOCK_FRAMES], tolerance[start : start + BLOCK_FRAMES]
@@ -98,7 +98,7 @@ def search(sight: Sight, frames: Rows, tolerance: Array) -> tuple[Closure, list[
     return closure, found
 
 
-def _search(closure: Closure, sight: Sight, frames: Rows, tolerance: Array) -> list[Depths]:
+def _search(closure: RigidClosure, sight: NeckRays, frames: Rows, tolerance: Array) -> list[NeckDepths]:
     upper = sight.farthest[frames, 0]
     psi = _angles(closure, frames, upper)
     distance = upper[:, None] * np.cos(psi)
@@ -115,7 +115,7 @@ def _search(closure: Closure, sight: Sight, frames: Rows, tolerance: Array) -> l
         at, residual = _distinct(minima.distance[own], minima.misfit[own])
         kept = residual <= max(tolerance[k], residual.min(initial=np.inf))
         depths.append(
-            Depths(
+            NeckDepths(
                 lower=closure.nearest,
                 upper=float(upper[k]),
                 segment=sight.segment(int(frame)),
@@ -130,7 +130,7 @@ def _search(closure: Closure, sight: Sight, frames: Rows, tolerance: Array) -> l
     return depths
 
 
-def _angles(closure: Closure, frames: Rows, upper: Array) -> Array:
+def _angles(closure: RigidClosure, frames: Rows, upper: Array) -> Array:
     """Lay the grid (n, G) over the angle, ascending: even, and finer where branches begin and end close together."""
     last = np.arccos(np.minimum(closure.nearest / upper, 1.0))[:, None]
     even = last * np.linspace(0, 1, N_CELLS + 1)
@@ -155,8 +155,8 @@ def _distinct(distance: Array, misfit: Array) -> tuple[Array, Array]:
 
 
 def _gaps(
-    closure: Closure, frames: Rows, distance: Array, within: NDArray[np.bool_], tolerance: Array
-) -> Samples:
+    closure: RigidClosure, frames: Rows, distance: Array, within: NDArray[np.bool_], tolerance: Array
+) -> MisfitSamples:
     """Find gaps between one branch that leaves the tolerance and another that enters it, inside one cell.
 
     Returns samples, unsorted: the ends of each gap, and its middle.
@@ -179,11 +179,11 @@ def _gaps(
     row, high, low = row[gap], ends[0][gap], ends[1][gap]
     at = np.concatenate([high, low, (high + low) / 2])
     row = np.tile(row, 3)
-    return Samples(row, at, closure.least(frames[row], at))
+    return MisfitSamples(row, at, closure.least(frames[row], at))
 
 
 def _nodes(
-    distance: Array, envelope: Array, minima: Samples, gaps: Samples
+    distance: Array, envelope: Array, minima: MisfitSamples, gaps: MisfitSamples
 ) -> tuple[list[Array], list[Array]]:
     """Put the minima and the gaps among the samples: for each frame distances, ascending, and the misfit there."""
     nodes, values = [], []
@@ -199,7 +199,7 @@ def _nodes(
 
 
 def _intervals(
-    closure: Closure, frames: Rows, nodes: list[Array], values: list[Array], tolerance: Array
+    closure: RigidClosure, frames: Rows, nodes: list[Array], values: list[Array], tolerance: Array
 ) -> list[Array]:
     """Find where the misfit is within the tolerance: each edge is bisected between two samples."""
     within = [value <= limit for value, limit in zip(values, tolerance, strict=True)]

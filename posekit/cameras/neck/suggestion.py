@@ -8,7 +8,7 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras.neck.pose import MIN_POINTS, Poses
+from posekit.cameras.neck.pose import MIN_POINTS, PartPoses
 from posekit.geometry import Array
 
 Part = Literal["head", "torso"]
@@ -30,12 +30,13 @@ EXPLAINED_COST = {2: 13.82, 4: 18.47, 6: 22.46}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Suggestion:
+class PartSuggestion:
     """The neck's distance along its ray in F frames, by at most K poses of a part; NaN where there is none.
 
     Parameters
     ----------
     part : {"head", "torso"}
+        The rigid part that was asked.
     distance, deviation : array (F, K)
         Metres, of plausible poses, best first.
     rms : array (F,)
@@ -65,7 +66,7 @@ class Suggestion:
         return np.stack([middle - half, middle + half], axis=-1)
 
 
-def suggest(part: Part, poses: Poses, ray: Array, seen: NDArray[np.intp], bent: float) -> Suggestion:
+def suggest(part: Part, poses: PartPoses, ray: Array, seen: NDArray[np.intp], bent: float) -> PartSuggestion:
     """Take the neck's distance from the poses of a part.
 
     The neck of a pose is the part's own; its distance is that of the point of the neck's ray nearest to it.
@@ -73,7 +74,8 @@ def suggest(part: Part, poses: Poses, ray: Array, seen: NDArray[np.intp], bent: 
     Parameters
     ----------
     part : str
-    poses : Poses
+        The rigid part: ``head`` or ``torso``.
+    poses : PartPoses
         Their origin is the neck.
     ray : array (F, 3)
         Unit vectors to the neck's image.
@@ -104,7 +106,7 @@ def suggest(part: Part, poses: Poses, ray: Array, seen: NDArray[np.intp], bent: 
         else:
             why = ""
         reasons.append(f"the {part} does not suffice: {why}" if why else "")
-    return Suggestion(
+    return PartSuggestion(
         part=part,
         distance=distance,
         deviation=deviation,

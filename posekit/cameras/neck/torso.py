@@ -12,7 +12,7 @@ from posekit.body import Figure
 from posekit.body.lengths import torso_points
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck.pose import poses
-from posekit.cameras.neck.suggestion import Suggestion, suggest
+from posekit.cameras.neck.suggestion import PartSuggestion, suggest
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, TORSO
 
@@ -21,7 +21,7 @@ TORSO_POINTS = [JOINT[name] for name in TORSO]
 
 def torso_suggestion(
     camera: PinholeCamera, figure: Figure, image: Array, ray: Array, deviation: Array, offset: Array
-) -> Suggestion:
+) -> PartSuggestion:
     """Place the torso in F frames and tell the neck's distance.
 
     Parameters
