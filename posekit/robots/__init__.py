@@ -36,7 +36,7 @@ else:
         {
             "body_point": (
                 "BodyPoint",
-                "Site",
+                "BodySite",
             ),
             "find": (
                 "RobotFiles",
@@ -63,7 +63,7 @@ else:
             "loading": ("load_robot",),
             "robot": ("Robot",),
             "scaling": (
-                "Scaled",
+                "ScaledRobot",
                 "scaled",
                 "segment_lengths",
                 "shoulders_are_behind",
