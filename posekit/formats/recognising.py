@@ -29,7 +29,8 @@ class Recognised:
     schema : str
         The schema that it names, as ``posekit.view/1``; empty where it names none.
     said : str
-        The name of the format, as the user said it, perhaps with a layout; empty where it was recognised.
+        The name of the format, as the user said it, perhaps with a layout, or as the end of a table's name says it;
+        empty where it was recognised.
     """
 
     holds: Content
@@ -93,7 +94,8 @@ def recognise(path: str | Path, format: str = "") -> Recognised:
     given = GivenFile(path)
     for own in OWN_FORMATS:
         if (own.folder if is_folder else given.suffix in own.suffixes) and own.looks_like(given):
-            return Recognised(holds=own.holds, formats=(own,), schema=given.schema)
+            table = given.suffix.removeprefix(".") if own.holds is Content.SURVIVORS else ""
+            return Recognised(holds=own.holds, formats=(own,), schema=given.schema, said=table)
     if is_folder:
         return _of_folder(given)
     if given.schema.startswith("posekit."):

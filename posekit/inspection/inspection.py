@@ -54,6 +54,15 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     if what.holds is Content.SURVIVORS:
         table = read_survivors(path)
         return [*lines, f"{len(np.unique(table.frame))} frames", *_postures(table.joints)]
+    if what.holds is Content.ROBOT:
+        from posekit.robots import load_robot
+
+        robot = load_robot(path)
+        bodies = 0 if robot.geometry is None else robot.geometry.ngeoms
+        return [
+            *lines,
+            f"{robot.model.njoints - 1} joints, {robot.model.nq} numbers in a configuration, {bodies} collision bodies",
+        ]
     if what.holds is Content.CONFIGURATIONS:
         found = read_configurations(path)
         named = f" of {_listed(found.names)}" if found.names else ""

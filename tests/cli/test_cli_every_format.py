@@ -79,6 +79,19 @@ def test_render_draws_a_page_of_every_format(
         assert neck > max(ankles) + 8000
 
 
+def test_inspect_tells_a_robot_and_a_table_of_survivors(
+    walks: dict[str, Path], command: Callable[..., Any], tmp_path: Path
+) -> None:
+    told = command("inspect", walks["urdf"] / "figure.urdf")
+    assert told.out.splitlines()[0].endswith("figure.urdf: a robot")
+    assert "29 numbers in a configuration" in told.out
+    assert command("recover", walks["view"], "-o", tmp_path / "r.npz").code == 0
+    assert command("convert", tmp_path / "r.npz", tmp_path / "r.csv", "--posture", "all").code == 0
+    assert "a table of survivors (csv)" in command("inspect", tmp_path / "r.csv").out
+    judged = command("validate", tmp_path / "r.csv")
+    assert judged.code == 0 and " 0 invalid" in judged.out
+
+
 def test_what_holds_no_posture_is_refused_with_what_does(
     walks: dict[str, Path], command: Callable[..., Any], tmp_path: Path
 ) -> None:
