@@ -59,7 +59,7 @@ class PairCollision(Check):
     slow = True
     of_configuration = True
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """The two links."""
         return (Place(bodies=(self.a.link, self.b.link)),)

@@ -194,7 +194,7 @@ class LimbRange(Check):
     noise = Loosening.DIRECTIONS
     of_configuration = True
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """The angles judged."""
         return Place.of_angles(*(self._angles[:2] if len(self.limb) == 2 else self._angles))

@@ -95,7 +95,7 @@ class ProjectedBall(Check):
     noise = Loosening.DIRECTIONS
     pulls = True
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """Flexion and abduction."""
         joint = f"{self.side}_{self.limb[0]}"
@@ -147,7 +147,7 @@ class ProjectedHinge(Check):
     noise = Loosening.DIRECTIONS
     pulls = True
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """The hinge's flexion; at the knee, the hip's too."""
         hinge = f"{self.side}_{self.limb[1]}.flexion"

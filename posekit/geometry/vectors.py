@@ -76,7 +76,9 @@ def unit(vectors: Array, *, axis: int = -1) -> Array:
         Unit vectors; NaN for the zero vector, which has no direction.
     """
     length = np.sqrt(dot(vectors, vectors, axis=axis))
-    return np.asarray(vectors / np.expand_dims(np.where(length > 0, length, np.nan), axis))
+    known = np.where(length > 0, length, np.nan)
+    # Indexed, since `numpy.expand_dims` takes longer than the division of short batches.
+    return np.asarray(vectors / (known[..., None] if axis == -1 else known[..., None, :]))
 
 
 def perpendicular(vectors: Array, axis_vectors: Array, *, axis: int = -1) -> Array:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -89,7 +90,7 @@ class Loose(Check):
         """The check's."""
         return self.check.name
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """The check's."""
         return self.check.places

@@ -14,7 +14,7 @@ from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array
 from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_JOINTS
 from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
-from posekit.tree import Check, Place
+from posekit.tree import Check
 
 MAX_ANGLES: Final = 4
 """The most angles of a limb that are judged."""
@@ -77,13 +77,13 @@ class LimbWalls:
         points[:, middle] = points[:, start] + upper @ part.T
         points[:, end] = points[:, middle] + lower @ part.T
         above, below = np.full((2, MAX_ANGLES, len(upper)), -np.inf)
-        rows: dict[Place, int] = {}
+        rows: dict[str, int] = {}
         for check in self.checks[limb]:
             findings = check.judge(points[:, list(check.points)])
             # A rotation of an almost straight limb has its tolerance over the sine of the bend: its weight is that.
             weight = np.radians(self.tolerance / np.broadcast_to(findings.tolerance, findings.value.shape))
-            for k, place in enumerate(check.places):
-                row = rows.setdefault(place, len(rows))
+            for k, where in enumerate(check.where):
+                row = rows.setdefault(where, len(rows))
                 value = findings.value[:, k]
                 lower_, upper_ = (
                     np.broadcast_to(limit, findings.value.shape)[:, k]

@@ -56,7 +56,7 @@ class NoisyRange(Check):
         """The check's name."""
         return self.inner.name
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """Its places."""
         return self.inner.places

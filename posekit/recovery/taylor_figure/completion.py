@@ -134,7 +134,7 @@ class Completed(Check):
         """The validator's name."""
         return self.check.name
 
-    @property
+    @cached_property
     def places(self) -> tuple[Place, ...]:
         """The places it judges."""
         return self.check.places
