@@ -22,7 +22,7 @@ from posekit.cli.options import ContactMargin, examples, signed_length
 if TYPE_CHECKING:
     from posekit.batch import Progress, Summary
 
-EXAMPLES = examples(
+BATCH_EXAMPLES = examples(
     "posekit batch archive/ -o results",
     "posekit batch cam1/*.json -o results --camera calibration.toml:cam1 --stature 175cm --person all",
     "posekit batch views.parquet -o results --jobs 16 --q --margins",

@@ -15,7 +15,7 @@ from posekit.cli.groups import with_groups
 from posekit.cli.options import distinct, examples
 from posekit.errors import PosekitError
 
-EXAMPLES = examples(
+CONVERT_EXAMPLES = examples(
     "posekit convert keypoints/ view.json --camera calibration.toml:cam_01 --stature 175cm",
     "posekit convert predictions.json view.json --person largest --fov 60",
     "posekit convert postures.json walk.bvh",

@@ -9,7 +9,7 @@ import typer
 
 from posekit.cli.options import Pictures, examples
 
-EXAMPLES = examples("posekit demo -o demo-results")
+DEMO_EXAMPLES = examples("posekit demo -o demo-results")
 
 
 def demo(

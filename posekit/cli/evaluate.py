@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from posekit.formats.own import View
     from posekit.synthesis import Capture
 
-EXAMPLES = examples(
+EVALUATE_EXAMPLES = examples(
     "posekit evaluate motion.npz -o report.json -o report.csv --plots",
     "posekit evaluate walk.trc -o report.json --noise 0,2 --heights 1.5m --yaw-step 45",
     "posekit evaluate motion.npz -o report.json --actions walking,running --ranges table1 --jobs 2",

@@ -11,7 +11,7 @@ from posekit.cli.detector_options import Format, Reading, Size, Skeleton, SwapSi
 from posekit.cli.detector_source import source_of
 from posekit.cli.options import examples
 
-EXAMPLES = examples(
+INSPECT_EXAMPLES = examples(
     "posekit inspect keypoints/",
     "posekit inspect predictions.json --skeleton coco_17 --size 1920x1080",
     "posekit inspect trial.trc",

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.views.opened import Opened
 
-EXAMPLES = examples(
+RECOVER_EXAMPLES = examples(
     "posekit synth walker -o walk.json && posekit recover walk.json -o postures.json",
     "posekit recover walk.json -o postures.npz --checks rigid-parts,joint-range,collision,walking",
     "posekit recover measured.json -o postures.json --rigid-tolerance 2cm --group 5cm --explain",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from posekit.formats.own import Postures, Result, View
     from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
-EXAMPLES = examples(
+RENDER_EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
     "posekit render postures.json --view walk.json -o first.png --frame 1 --posture 1 --supersample 3",
     "posekit render postures.json -o all.png --layout superposed --background grey",

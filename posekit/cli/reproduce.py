@@ -11,7 +11,7 @@ from posekit.cli.options import Pictures, examples
 from posekit.errors import InputError
 
 PAPER_NAMES = ("lee-chen", "taylor")
-EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
+REPRODUCE_EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit reproduce taylor -o tables")
 
 
 def reproduce(

@@ -39,7 +39,7 @@ UPS = {
     for k, axis in enumerate("xyz")
     for sign in ("+", "-", "")
 }
-EXAMPLES = examples(
+VALIDATE_EXAMPLES = examples(
     "posekit validate postures.json -o report.json",
     "posekit validate lifted.npz -o report.json --checks joint-range,collision --ranges table1",
     "posekit validate dataset.npz --urdf human --fail-over 1% -o report.csv",

@@ -16,7 +16,7 @@ from posekit.errors import InputError
 
 LAST_PORT = 65535
 
-EXAMPLES = examples(
+VIEW_EXAMPLES = examples(
     "posekit view postures.json --view walk.json",
     "posekit view trial.trc",
     "posekit view walk.json --frames 1-20 --no-open --port 8000",
