@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -15,12 +16,15 @@ if TYPE_CHECKING:
 MAX_SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""
 
+TOLERANCE_WORDS: Final[Mapping[str, str]] = {"given": "as given", "noisy": "from noise"}
+"""What the table says of frames that were judged so, where the word alone would be a riddle."""
+
 
 def summary_lines(recovery: Recovery) -> list[str]:
     """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
     frames = list(enumerate(recovery.frames))
     lines = [
-        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'judged as':>10}  rejected by (leaves, 8192 a tree)"
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'tolerances':>10}  rejected by (leaves, 8192 a tree)"
     ]
     cut = len(frames) - 2 * MAX_SHOWN
     for k, frame in frames:
@@ -56,7 +60,7 @@ def _scale_lines(recovery: Recovery) -> list[str]:
 
 def _frame_line(k: int, frame: FrameRecovery) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
-    judged = frame.judged or "-"
+    judged = "-" if frame.judged is None else TOLERANCE_WORDS.get(frame.judged, frame.judged)
     if frame.reason:
         return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
     lost = Counter(frame.rejected).most_common()
