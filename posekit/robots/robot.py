@@ -172,11 +172,6 @@ class Robot:
         """Where the pairs come from: ``srdf``, or ``neutral posture``."""
         return "neutral posture" if self._srdf is None else "srdf"
 
-    @cached_property
-    def has_masses(self) -> bool:
-        """Whether some link has a mass: balance can be asked for."""
-        return any(float(mass.get("value", 0)) > 0 for mass in self.tree.findall("link/inertial/mass"))
-
     @property
     def unknown_links(self) -> tuple[str, ...]:
         """Links that the SRDF names and the robot has not; empty unless the SRDF is shared."""

@@ -261,7 +261,6 @@ def test_a_person_stands_until_the_centre_of_mass_leaves_the_feet() -> None:
 
 
 def test_balance_is_undecided_without_masses_or_feet() -> None:
-    assert not robot("stick_figure").has_masses
     assert Validator(robot("stick_figure"), checks=("balance",)).check(
         q=standing("stick_figure")
     ).verdicts == ["undecided"]
