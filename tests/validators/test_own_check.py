@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.batch import Recipe, read_frames, run_batch, write_view_table
+from posekit.batch import Recipe, Workers, read_frames, run_batch, write_view_table
 from posekit.body import load_figure
 from posekit.compiled import compiling
 from posekit.errors import InputError
@@ -242,7 +242,7 @@ def test_workers_make_it_from_its_settings(installed: Path, tmp_path: Path, feet
     own = name if name != "object" else feet(ground=-0.3)
     settings = RecoverSettings(checks=("rigid-parts", own))
     recipe = Recipe(settings=settings, shard_frames=3, rank=False, margins=True)
-    summary = run_batch([tmp_path / "views.parquet"], tmp_path / "run", recipe, jobs=2)
+    summary = run_batch([tmp_path / "views.parquet"], tmp_path / "run", recipe, Workers(jobs=2))
     assert not summary.failures
     rows = list(read_frames(tmp_path / "run"))
     assert sum(len(table) for table in rows) == 6
