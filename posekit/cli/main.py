@@ -70,7 +70,8 @@ def application(first: str) -> typer.Typer:
         if name == "synth":
             app.add_typer(module.app, name=name)
         else:
-            app.command(name, epilog=module.EXAMPLES)(getattr(module, name))
+            examples_of = getattr(module, f"{name.upper()}_EXAMPLES")
+            app.command(name, epilog=examples_of)(getattr(module, name))
     return app
 
 
