@@ -38,7 +38,7 @@ def least(ways: dict[str, Callable[[], object]]) -> dict[str, float]:
 
 def configurations(name: str, bodies: str, n: int) -> None:
     robot = load_robot(name)
-    validator = Validator(robot, checks=("joint-range", "collision"), bodies=bodies)  # type: ignore[arg-type]
+    validator = Validator(robot, checks=("joint-range", "collision"), bodies=bodies)
     subject = validator._robot.models.own.subject
     model, geometry = subject.model, subject.geometry
     q = np.tile(pin.neutral(model), (n, 1))
