@@ -14,7 +14,9 @@ MAX_SHOWN_CHARACTERS = 60
 """Characters of a value, a name or a list of names that are shown before it is cut."""
 
 
-def refusal(source: str | PathLike[str], field: str, got: str, expected: str, remedy: str) -> InputError:
+def refusal(
+    source: str | PathLike[str], field: str, got: str, expected: str, remedy: str = "correct it"
+) -> InputError:
     """Word a refusal as ``file: field: got value; expected this; do that``.
 
     Parameters
@@ -24,7 +26,8 @@ def refusal(source: str | PathLike[str], field: str, got: str, expected: str, re
     field : str
         Where in it, as ``frames[3].image.left_elbow``; empty for the whole.
     got, expected, remedy : str
-        The value (see `shown`), what would be accepted, and what to do about it.
+        The value (see `shown`), what would be accepted, and what to do about it; to correct it, where
+        nothing more can be said.
     """
     places = [str(place) for place in (source, field) if str(place)]
     return InputError(one_line(": ".join([*places, f"got {got}; expected {expected}; {remedy}"])))

@@ -24,22 +24,9 @@ else:
         {
             "key_point_format": ("KeyPointFormat",),
             "keypoints": ("KeyPoints",),
-            "persons": (
-                "Person",
-                "choose",
-                "list_people",
-            ),
-            "reading": (
-                "chosen",
-                "is_format",
-                "key_point_formats",
-                "read_keypoints",
-            ),
-            "sides": (
-                "SideCheck",
-                "check_sides",
-                "swap",
-            ),
+            "persons": ("Person", "choose", "list_people"),
+            "reading": ("chosen", "is_format", "key_point_formats", "read_keypoints"),
+            "sides": ("SideCheck", "check_sides", "swap"),
             "tracking": ("track",),
         },
     )

@@ -18,7 +18,7 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.named_layout import by_count
-from posekit.formats.keypoints.rows import DetectionRows, number, numbers, whole
+from posekit.formats.keypoints.rows import DetectionRows, numbers
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import cut, refusal, shown
 
@@ -56,8 +56,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """
     rows = DetectionRows(str(given.path))
     by_pictures = False
-    for path, document in given.documents():
-        rows.source = str(path)
+    for path, document in rows.documents(given):
         if isinstance(document, list):
             _read_list(rows, document)
             continue
@@ -69,11 +68,8 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             )
         for label, picture in pictures.items():
             _read_picture(rows, label, picture)
-    rows.source = str(given.path)
     usual = {18: load_skeleton_map("coco_18")} if by_pictures else _usual()
-    if not rows.points:
-        return rows.keypoints("alphapose", layout or next(iter(usual.values())))
-    return rows.keypoints("alphapose", by_count(len(rows.points[0]), layout, given.path, usual))
+    return rows.keypoints("alphapose", by_count(rows.count, layout, given.path, usual))
 
 
 def _usual() -> dict[int, SkeletonMap]:
@@ -97,19 +93,12 @@ def _read_picture(rows: DetectionRows, label: str, picture: object) -> None:
     if kind is None or not isinstance(picture, dict):
         raise refusal(rows.source, cut(label), shown(picture), "bodies or people", "check the file")
     rows.picture(label)
+    field = POINTS_FIELD_OF_PEOPLE[kind]
     for index, person in enumerate(picture[kind]):
         place = f"{cut(label)}.{kind}[{index}]"
         if not isinstance(person, dict):
-            raise refusal(
-                rows.source, place, shown(person), f"{{{POINTS_FIELD_OF_PEOPLE[kind]}}}", "check the file"
-            )
-        _add(
-            rows,
-            label,
-            person.get(POINTS_FIELD_OF_PEOPLE[kind]),
-            f"{place}.{POINTS_FIELD_OF_PEOPLE[kind]}",
-            person,
-        )
+            raise refusal(rows.source, place, shown(person), f"{{{field}}}", "check the file")
+        _add(rows, label, person.get(field), f"{place}.{field}", person)
 
 
 def _add(rows: DetectionRows, label: object, keypoints: object, field: str, person: dict[str, Any]) -> None:
@@ -118,14 +107,7 @@ def _add(rows: DetectionRows, label: object, keypoints: object, field: str, pers
     identity = person.get("idx")
     while isinstance(identity, list) and identity:
         identity = identity[0]
-    who = whole(identity)
-    rows.add(
-        label,
-        found[:, :2],
-        found[:, 2],
-        person=-1 if who is None else who,
-        score=number(person.get("score")),
-    )
+    rows.add(label, found[:, :2], found[:, 2], person=identity, score=person.get("score"))
 
 
 ALPHAPOSE_FORMAT: Final = KeyPointFormat(

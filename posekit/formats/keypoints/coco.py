@@ -99,10 +99,7 @@ def _names(document: Any) -> dict[Any, tuple[str, ...]]:
 
 
 def _of_one_kind(
-    source: Path,
-    people: list[dict[str, Any]],
-    names: dict[Any, tuple[str, ...]],
-    layout: SkeletonMap | None,
+    source: Path, people: list[dict[str, Any]], names: dict[Any, tuple[str, ...]], layout: SkeletonMap | None
 ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Keep the people whose category names the points of a body; return them and the names."""
     kinds = {names.get(one.get("category_id"), ()) for one in people if _hashable(one.get("category_id"))}
@@ -146,7 +143,7 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
     if not np.isin(third, (0, 1, 2)).all():
         if not (third % 1 != 0).any():
             odd = float(third[~np.isin(third, (0, 1, 2))][0])
-            raise refusal(source, "keypoints", f"v = {odd:g}", "0, 1, 2, or a confidence", "correct it")
+            raise refusal(source, "keypoints", f"v = {odd:g}", "0, 1, 2, or a confidence")
         points, confidence = as_confidences(values)
         return points, confidence, np.zeros(third.shape, dtype=np.bool_)
     points = values[..., :2].copy()

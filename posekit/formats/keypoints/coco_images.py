@@ -46,7 +46,7 @@ def images_of(source: Path, images: Any) -> Images:
     for place, one in enumerate(images):
         identity = one.get("id")
         if type(identity) not in (int, str):
-            raise refusal(source, f"images[{place}].id", shown(identity), "a number", "correct it")
+            raise refusal(source, f"images[{place}].id", shown(identity), "a number")
         if identity in index:
             raise refusal(
                 source,
@@ -62,9 +62,7 @@ def images_of(source: Path, images: Any) -> Images:
             value = one.get(side)
             if value is not None:
                 if type(value) not in (int, float) or value <= 0:
-                    raise refusal(
-                        source, f"images[{place}].{side}", shown(value), "pixels, above 0", "correct it"
-                    )
+                    raise refusal(source, f"images[{place}].{side}", shown(value), "pixels, above 0")
                 size[place, column] = value
     names = [one.get("file_name") for one in images]
     if len(set(map(str, names))) != len(names) or not all(isinstance(name, str) and name for name in names):

@@ -60,9 +60,7 @@ def joined(source: Path, field: str, people: Sequence[dict[str, Any]]) -> Array:
                 values = [0] * (3 * count)
             if not isinstance(values, list) or len(values) != 3 * count:
                 got = f"{len(values)} numbers" if isinstance(values, list) else shown(values)
-                raise refusal(
-                    source, f"{field}[{place}].{name}", got, f"{3 * count}: [x, y, v] * {count}", "correct it"
-                )
+                raise refusal(source, f"{field}[{place}].{name}", got, f"{3 * count}: [x, y, v] * {count}")
             lists.append(values)
         columns.append(triples(source, lists, lambda k, name=name: f"{field}[{k}].{name}"))  # type: ignore[misc]
     return np.concatenate(columns, axis=1)

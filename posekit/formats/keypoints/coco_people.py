@@ -51,7 +51,7 @@ def identities_of(source: Path, field: str, people: Sequence[dict[str, Any]]) ->
     for place, one in enumerate(people):
         identity = one.get("image_id")
         if not isinstance(identity, int | str) or isinstance(identity, bool):
-            raise refusal(source, f"{field}[{place}].image_id", shown(identity), "a number", "correct it")
+            raise refusal(source, f"{field}[{place}].image_id", shown(identity), "a number")
         found.append(identity)
     return found
 
@@ -61,7 +61,7 @@ def scores_of(source: Path, field: str, people: Sequence[dict[str, Any]]) -> Arr
     values = [one.get("score") for one in people]
     for place, value in enumerate(values):
         if value is not None and type(value) not in (int, float):
-            raise refusal(source, f"{field}[{place}].score", shown(value), "a number", "correct it")
+            raise refusal(source, f"{field}[{place}].score", shown(value), "a number")
     return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
@@ -70,7 +70,7 @@ def tracks_of(source: Path, field: str, people: Sequence[dict[str, Any]]) -> NDA
     values = [one.get("track_id", -1) for one in people]
     for place, value in enumerate(values):
         if value is not None and (type(value) is not int or not -1 <= value < 2**31):
-            raise refusal(source, f"{field}[{place}].track_id", shown(value), "a number from 0", "correct it")
+            raise refusal(source, f"{field}[{place}].track_id", shown(value), "a number from 0")
     return np.array([-1 if value is None else value for value in values], dtype=np.intp)
 
 

@@ -62,7 +62,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         raise refusal(source, "", shown(document), "a list of people", "check that it is COCO results")
     for place, one in enumerate(document):
         if not isinstance(one, dict) or "keypoints" not in one:
-            raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"', "correct it")
+            raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"')
     images = images_from(identities_of(source, "", document))
     values = triples(source, [one["keypoints"] for one in document], lambda k: f"[{k}].keypoints")
     points, confidence = as_confidences(values)

@@ -132,9 +132,7 @@ def _people(
     if beyond.any():
         row, column = (int(k) for k in np.argwhere(beyond)[0])
         got = shown(float(table[row, column]))
-        raise refusal(
-            path, f"row {row + 1} after the header", got, f"at most {LARGEST_NUMBER:g} in size", "correct it"
-        )
+        raise refusal(path, f"row {row + 1} after the header", got, f"at most {LARGEST_NUMBER:g} in size")
     individuals = header.get("individuals") or [""] * len(header["coords"])
     names = {name: _parts(path, header, individuals, name) for name in dict.fromkeys(individuals)}
     fitted = _layout(path, {name: list(parts) for name, parts in names.items()}, layout)

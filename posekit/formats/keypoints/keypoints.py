@@ -117,7 +117,6 @@ class KeyPoints:
                 f"{self.pictures[int(self.frame[row])]}: {self.layout.points[point]}",
                 str(self.points[row, point].tolist()),
                 f"two numbers up to {FARTHEST_PIXEL:,.0f}, or a missing point",
-                "correct it",
             )
         if len(self.frame) and (
             (np.diff(self.frame) < 0).any() or self.frame[0] < 0 or self.frame[-1] >= len(self.pictures)
@@ -134,11 +133,7 @@ class KeyPoints:
                 where = tuple(int(k) for k in np.argwhere(impossible)[0])
                 of = where[0] if name in ("size", "time") else int(self.frame[where[0]])
                 raise refusal(
-                    self.source,
-                    f"{self.pictures[of]}: {name}",
-                    str(values[where].item()),
-                    expected,
-                    "correct it",
+                    self.source, f"{self.pictures[of]}: {name}", str(values[where].item()), expected
                 )
 
     @property

@@ -19,7 +19,9 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.mediapipe_json import add_document, looks_like_landmarks
+from posekit.formats.keypoints.mediapipe_names import LANDMARK_NAMES
 from posekit.formats.keypoints.mediapipe_table import add_table, looks_like_table
+from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.keypoints.rows import DetectionRows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.safe_io import refusal
@@ -29,7 +31,6 @@ PIXELS_FROM = 3.0
 WORLD_MIDDLE_WITHIN = 0.02
 """World landmarks have the middle of the hips at the origin, which as a fraction is the picture's corner."""
 HIP_LANDMARKS = (23, 24)
-POINT_COUNT = 33
 
 
 def looks_like(given: GivenFile) -> bool:
@@ -67,19 +68,11 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     if given.suffix == ".csv":
         add_table(rows, given.text)
     else:
-        for path, document in given.documents():
-            rows.source = str(path)
+        for path, document in rows.documents(given):
             add_document(rows, document, path.stem)
-    rows.source = str(given.path)
-    if layout is not None and len(layout.points) != POINT_COUNT:
-        raise refusal(
-            given.path,
-            "points",
-            f"{POINT_COUNT} a person",
-            f"{len(layout.points)}, as the skeleton map {layout.name} has",
-            "give a map of MediaPipe's points, or none",
-        )
-    found = rows.keypoints("mediapipe", layout or load_skeleton_map("mediapipe_33"), normalised=True)
+    usual = {len(LANDMARK_NAMES): load_skeleton_map("mediapipe_33")}
+    fitting = by_count(len(LANDMARK_NAMES), layout, given.path, usual)
+    found = rows.keypoints("mediapipe", fitting, normalised=True)
     return _in_pixels(found)
 
 

@@ -8,15 +8,13 @@ import numpy as np
 
 from posekit.formats.keypoints.mediapipe_names import (
     LANDMARK_NAMES,
-    MICROSECONDS_NAMES,
-    MILLISECONDS_NAMES,
     PICTURE_LABEL_NAMES,
     PRESENCE_NAMES,
-    SECONDS_NAMES,
-    SECONDS_OR_MILLISECONDS_NAMES,
+    TIME_NAMES,
     VISIBILITY_NAMES,
-    in_seconds,
     landmark,
+    nobody,
+    note_times,
     one_of,
 )
 from posekit.formats.keypoints.rows import COORDINATE_TYPES, LARGEST_NUMBER, DetectionRows, number, whole
@@ -42,7 +40,6 @@ SIZE_HOLDER_NAMES = (
 )
 PICTURE_WIDTH_NAMES = ("imagewidth", "framewidth", "videowidth", "width", "w")
 PICTURE_HEIGHT_NAMES = ("imageheight", "frameheight", "videoheight", "height", "h")
-FRAME_TIME_NAMES = (*MILLISECONDS_NAMES, *MICROSECONDS_NAMES, *SECONDS_NAMES, *SECONDS_OR_MILLISECONDS_NAMES)
 
 
 def looks_like_landmarks(document: object) -> bool:
@@ -121,7 +118,7 @@ def add_document(rows: DetectionRows, document: object, name: str) -> None:
             field = one_of(frame, PICTURE_LABEL_NAMES)
             if field is not None and isinstance(frame[field], str | int | float):
                 label = frame[field]
-            field = one_of(frame, FRAME_TIME_NAMES)
+            field = one_of(frame, TIME_NAMES)
             if field is not None:
                 time, unit = number(frame[field]), plain(field)
             world += (
@@ -143,8 +140,7 @@ def add_document(rows: DetectionRows, document: object, name: str) -> None:
             "landmarks in the picture",
             "save pose_landmarks too",
         )
-    for label, time in zip(labels, in_seconds(np.array(times), unit), strict=True):
-        rows.picture(label, time=float(time))
+    note_times(rows, labels, times, unit)
 
 
 def _size(holder: object, known: tuple[float, float] = (np.nan, np.nan)) -> tuple[float, float]:
@@ -167,32 +163,29 @@ def _size(holder: object, known: tuple[float, float] = (np.nan, np.nan)) -> tupl
 
 def _add_frame(rows: DetectionRows, label: str, frame: object, place: str) -> None:
     if isinstance(frame, dict) and not {"x", "y"} & set(frame):
-        people = one_of(frame, PEOPLE_NAMES)
-        if (
-            people is not None
-            and isinstance(frame[people], list)
-            and one_of(frame, PICTURE_LANDMARKS_NAMES) is None
-        ):
-            for index, person in enumerate(frame[people]):
-                _add_frame(rows, label, person, f"{place}.{people}[{index}]")
-            return
-        field = one_of(frame, PICTURE_LANDMARKS_NAMES)
+        people, field = one_of(frame, PEOPLE_NAMES), one_of(frame, PICTURE_LANDMARKS_NAMES)
         if field is not None:
             _add_frame(rows, label, frame[field], f"{place}.{field}")
+        elif people is not None and isinstance(frame[people], list):
+            for index, person in enumerate(frame[people]):
+                _add_frame(rows, label, person, f"{place}.{people}[{index}]")
         elif frame and all(landmark(name) is not None for name in frame):
             _add_person(rows, label, frame, place)
         return
     if frame is None or frame in ([], {}):
         return
-    if isinstance(frame, list) and isinstance(frame[0], list) and not _is_point(frame[0]):
-        for index, person in enumerate(frame):
-            _add_frame(rows, label, person, f"{place}[{index}]")
-        return
-    if isinstance(frame, list) and isinstance(frame[0], dict) and one_of(frame[0], PICTURE_LANDMARKS_NAMES):
+    if isinstance(frame, list) and _is_person_of_several(frame[0]):
         for index, person in enumerate(frame):
             _add_frame(rows, label, person, f"{place}[{index}]")
         return
     _add_person(rows, label, frame, place)
+
+
+def _is_person_of_several(entry: object) -> bool:
+    """Tell whether what stands in a list is a whole person and no landmark."""
+    if isinstance(entry, dict):
+        return one_of(entry, PICTURE_LANDMARKS_NAMES) is not None
+    return isinstance(entry, list) and not _is_point(entry)
 
 
 def _is_point(entry: object) -> bool:
@@ -222,7 +215,7 @@ def _add_person(rows: DetectionRows, label: str, person: object, place: str) -> 
         )
     if None in numbered:
         numbered = list(range(len(LANDMARK_NAMES)))
-    points, sure = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
+    points, sure = nobody()
     for index, entry in zip(numbered, person, strict=True):
         if index is not None:
             points[index], sure[index] = _point(rows, entry, f"{place}: {LANDMARK_NAMES[index]}")
@@ -249,5 +242,5 @@ def _point(rows: DetectionRows, entry: object, place: str) -> tuple[Array, float
         raise refusal(rows.source, place, shown(entry), "{x, y, z, visibility}", "save it again")
     for value in (x, y):
         if type(value) not in COORDINATE_TYPES or abs(number(value)) > LARGEST_NUMBER:
-            raise refusal(rows.source, place, shown(value), "a fraction of the picture", "correct it")
+            raise refusal(rows.source, place, shown(value), "a fraction of the picture")
     return np.array([number(x), number(y)]), sure

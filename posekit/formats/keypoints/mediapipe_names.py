@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Final
 
 import numpy as np
 
-from posekit.formats.keypoints.rows import whole
+from posekit.formats.keypoints.rows import DetectionRows, whole
 from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 
@@ -38,6 +38,7 @@ MILLISECONDS_NAMES: Final = ("timestampms", "timems", "milliseconds", "ms")
 MICROSECONDS_NAMES: Final = ("timestampus", "timeus")
 SECONDS_OR_MILLISECONDS_NAMES: Final = ("timestamp",)
 """Seconds or milliseconds: the steps between frames tell."""
+TIME_NAMES: Final = (*MILLISECONDS_NAMES, *MICROSECONDS_NAMES, *SECONDS_NAMES, *SECONDS_OR_MILLISECONDS_NAMES)
 VISIBILITY_NAMES: Final = ("visibility", "vis", "v", "confidence", "conf", "score", "c")
 PRESENCE_NAMES: Final = ("presence", "pres", "p")
 
@@ -69,3 +70,14 @@ def in_seconds(times: Array, unit: str) -> Array:
         if len(steps) and float(np.median(steps)) > 2:
             return times * 1e-3
     return times
+
+
+def note_times(rows: DetectionRows, labels: Iterable[str], times: Sequence[float], unit: str) -> None:
+    """Note the times of pictures, as the file has them in a unit by its name."""
+    for label, time in zip(labels, in_seconds(np.array(times), unit), strict=True):
+        rows.picture(label, time=float(time))
+
+
+def nobody() -> tuple[Array, Array]:
+    """Make the points (33, 2) and confidences (33,) of a person of whom nothing is known yet."""
+    return np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)

@@ -10,15 +10,13 @@ import numpy as np
 
 from posekit.formats.keypoints.mediapipe_names import (
     LANDMARK_NAMES,
-    MICROSECONDS_NAMES,
-    MILLISECONDS_NAMES,
     PICTURE_LABEL_NAMES,
     PRESENCE_NAMES,
-    SECONDS_NAMES,
-    SECONDS_OR_MILLISECONDS_NAMES,
+    TIME_NAMES,
     VISIBILITY_NAMES,
-    in_seconds,
     landmark,
+    nobody,
+    note_times,
     one_of,
 )
 from posekit.formats.keypoints.rows import LARGEST_NUMBER, DetectionRows, whole
@@ -26,7 +24,6 @@ from posekit.formats.skeleton_maps.skeleton_map import plain
 from posekit.geometry import Array
 from posekit.safe_io import cut, refusal, shown
 
-TIME_COLUMN_NAMES = (*MILLISECONDS_NAMES, *MICROSECONDS_NAMES, *SECONDS_NAMES, *SECONDS_OR_MILLISECONDS_NAMES)
 LANDMARK_COLUMN_NAMES = (
     "landmarkname",
     "landmark",
@@ -75,7 +72,7 @@ def _is_long(header: list[str]) -> bool:
     return (
         {"x", "y"} <= names
         and bool(names & set(LANDMARK_COLUMN_NAMES))
-        and bool(names & {*PICTURE_LABEL_NAMES, *TIME_COLUMN_NAMES})
+        and bool(names & {*PICTURE_LABEL_NAMES, *TIME_NAMES})
     )
 
 
@@ -150,9 +147,7 @@ def _value(rows: DetectionRows, line: int, name: str, text: str) -> float:
     except ValueError:
         value = np.inf
     if not abs(value) <= LARGEST_NUMBER:
-        raise refusal(
-            rows.source, f"line {line}: {cut(name)}", shown(text), "a number, or nothing", "correct it"
-        )
+        raise refusal(rows.source, f"line {line}: {cut(name)}", shown(text), "a number, or nothing")
     return value
 
 
@@ -166,7 +161,7 @@ def _time(text: str) -> float:
 
 
 def _described(header: list[str]) -> tuple[int | None, int | None, str]:
-    label, time = one_of(header, PICTURE_LABEL_NAMES), one_of(header, TIME_COLUMN_NAMES)
+    label, time = one_of(header, PICTURE_LABEL_NAMES), one_of(header, TIME_NAMES)
     return (
         header.index(label) if label is not None else None,
         header.index(time) if time is not None else None,
@@ -190,7 +185,7 @@ def _add_wide(rows: DetectionRows, header: list[str], columns: dict[int, dict[st
     for count, (line, fields) in enumerate(_lines(rows, header, text)):
         labels.append(rows.picture(_label(fields[label]) if label is not None else count))
         times.append(_time(fields[time]) if time is not None else np.nan)
-        points, sure = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
+        points, sure = nobody()
         for index, parts in columns.items():
             for axis, part in enumerate("xy"):
                 points[index, axis] = _value(rows, line, header[parts[part]], fields[parts[part]])
@@ -199,7 +194,7 @@ def _add_wide(rows: DetectionRows, header: list[str], columns: dict[int, dict[st
                 sure[index] = _value(rows, line, header[surest], fields[surest])
         if not np.isnan(points).all():
             rows.add(labels[-1], points, sure)
-    _note_times(rows, labels, times, unit)
+    note_times(rows, labels, times, unit)
 
 
 def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
@@ -221,11 +216,8 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
             if not fields[which].strip():
                 continue
             expected = f"a landmark's name, or its number 0 to {len(LANDMARK_NAMES) - 1}"
-            raise refusal(
-                rows.source, f"line {line}: {header[which]}", shown(fields[which]), expected, "correct it"
-            )
-        empty = np.full((len(LANDMARK_NAMES), 2), np.nan), np.full(len(LANDMARK_NAMES), np.nan)
-        points, sure = people.setdefault((key, fields[who] if who is not None else ""), empty)
+            raise refusal(rows.source, f"line {line}: {header[which]}", shown(fields[which]), expected)
+        points, sure = people.setdefault((key, fields[who] if who is not None else ""), nobody())
         if not np.isnan(points[index]).all():
             got, expected = f"{LANDMARK_NAMES[index]} twice in a picture", "once, or a column person"
             raise refusal(rows.source, f"line {line}", got, expected, "number the people")
@@ -234,9 +226,4 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
             sure[index] = _value(rows, line, header[surest], fields[surest])
     for (key, _), (points, sure) in people.items():
         rows.add(key, points, sure)
-    _note_times(rows, list(labels), list(labels.values()), unit)
-
-
-def _note_times(rows: DetectionRows, labels: list[str], times: list[float], unit: str) -> None:
-    for label, time in zip(labels, in_seconds(np.array(times), unit), strict=True):
-        rows.picture(label, time=float(time))
+    note_times(rows, labels, list(labels.values()), unit)

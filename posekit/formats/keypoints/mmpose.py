@@ -38,8 +38,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     """
     rows = DetectionRows(str(given.path))
     names: list[str] = []
-    for path, document in given.documents():
-        rows.source = str(path)
+    for path, document in rows.documents(given):
         info = document.get("instance_info") if isinstance(document, dict) else None
         if not isinstance(info, list):
             raise refusal(path, "instance_info", shown(info), "a list", "save it with --save-predictions")
@@ -53,9 +52,8 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             add_frames(rows, info, "instance_info")
         else:
             add_instances(rows, rows.picture(path.stem), info, "instance_info")
-    rows.source = str(given.path)
-    if rows.points and len(rows.points[0]) != len(names):
-        got = f"{len(rows.points[0])} points a person, {len(names)} names in meta_info"
+    if rows.points and rows.count != len(names):
+        got = f"{rows.count} points a person, {len(names)} names in meta_info"
         raise refusal(given.path, "meta_info", got, "a name a point", "save the file again")
     return rows.keypoints("mmpose", by_names(names, layout, given.path))
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from posekit.formats.keypoints.rows import DetectionRows, number, numbers, pairs, whole
+from posekit.formats.keypoints.rows import DetectionRows, numbers, pairs, whole
 from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
@@ -38,9 +38,7 @@ def add_frames(rows: DetectionRows, frames: list[Any], field: str) -> None:
             )
         label = frame["frame_id"]
         if whole(label) is None and not isinstance(label, str):
-            raise refusal(
-                rows.source, f"{place}.frame_id", shown(label), "the picture's number", "correct it"
-            )
+            raise refusal(rows.source, f"{place}.frame_id", shown(label), "the picture's number")
         add_instances(rows, rows.picture(label), frame["instances"], f"{place}.instances")
 
 
@@ -64,14 +62,8 @@ def add_instances(rows: DetectionRows, label: str, instances: list[Any], field: 
                 "save the predictions of a 2-D model: a lifted pose is no picture",
             )
         scores = _scores(rows.source, f"{place}.keypoint_scores", instance["keypoint_scores"], len(points))
-        person = whole(instance.get("track_id"))
-        rows.add(
-            label,
-            np.where((scores <= 0)[:, None], np.nan, points),
-            scores,
-            person=-1 if person is None else person,
-            score=number(instance.get("bbox_score")),
-        )
+        points = np.where((scores <= 0)[:, None], np.nan, points)
+        rows.add(label, points, scores, person=instance.get("track_id"), score=instance.get("bbox_score"))
 
 
 def _scores(source: str | Path, field: str, scores: object, count: int) -> Array:

@@ -16,12 +16,7 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.head_share import HEAD_COCO, HEAD_H36M, head_share
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
-from posekit.formats.keypoints.mmpose_instances import (
-    add_frames,
-    add_instances,
-    is_frame,
-    is_instance,
-)
+from posekit.formats.keypoints.mmpose_instances import add_frames, add_instances, is_frame, is_instance
 from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.keypoints.rows import DetectionRows
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
@@ -47,8 +42,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         Where it is not that layout, is of points in space, or nothing tells what the points are.
     """
     rows = DetectionRows(str(given.path))
-    for path, document in given.documents():
-        rows.source = str(path)
+    for path, document in rows.documents(given):
         if not isinstance(document, list):
             raise refusal(
                 path, "", shown(document), "a list of people or of pictures", "name the file that is"
@@ -57,15 +51,11 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             add_frames(rows, document, "")
         else:
             add_instances(rows, rows.picture(path.stem), document, "")
-    rows.source = str(given.path)
-    if not rows.points:
-        return rows.keypoints("mmpose-list", layout or load_skeleton_map("coco_17"))
     return rows.keypoints("mmpose-list", _layout(rows, layout))
 
 
 def _layout(rows: DetectionRows, layout: SkeletonMap | None) -> SkeletonMap:
-    count = len(rows.points[0])
-    if layout is None and count == 17:
+    if layout is None and rows.count == 17:
         share = head_share(np.array(rows.points))
         if share > HEAD_H36M:
             return load_skeleton_map("h36m_17")
@@ -78,7 +68,7 @@ def _layout(rows: DetectionRows, layout: SkeletonMap | None) -> SkeletonMap:
                 "say which with --skeleton coco_17 or --skeleton h36m_17",
             )
     usual = {number: load_skeleton_map(name) for number, name in BY_COUNT.items()}
-    return by_count(count, layout, rows.source, usual)
+    return by_count(rows.count, layout, rows.source, usual)
 
 
 MMPOSE_LIST_FORMAT: Final = KeyPointFormat(

@@ -14,7 +14,7 @@ from posekit.formats.skeleton_maps import (
     skeleton_map_names,
 )
 from posekit.formats.skeleton_maps.skeleton_map import plain
-from posekit.safe_io import refusal, shown
+from posekit.safe_io import cut, refusal, shown
 
 MIN_FITTING_LANDMARKS = 4
 """Landmarks by name below which it is not said that a map fits in part."""
@@ -81,23 +81,23 @@ def by_count(
 
     Parameters
     ----------
+    count : int
+        Points of a person; 0 where the file has nobody, whom any map fits.
     usual : dict
-        What the format's models write, by the number of points.
+        What the format's models write, by the number of points, the most usual first.
 
     Raises
     ------
     InputError
         Where the user's map has another number of points, or nothing usual has so many (what has is named).
     """
+    if count == 0:
+        return layout if layout is not None and layout.points else next(iter(usual.values()))
     if layout is not None:
         if len(layout.points) != count:
-            raise refusal(
-                source,
-                "points",
-                f"{count} a person",
-                f"{len(layout.points)}, as the skeleton map {layout.name} has",
-                "give the map that belongs to the file",
-            )
+            expected = f"{len(layout.points)}, as the skeleton map {cut(layout.name)} has"
+            remedy = "give the map that belongs to the file, with its points in order"
+            raise refusal(source, "points", f"{count} a person", expected, remedy)
         return layout
     if count in usual:
         return usual[count]

@@ -21,11 +21,12 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.coco_triples import triples
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.keypoints.openpose_layout import tell_apart
 from posekit.formats.keypoints.openpose_names import check_one_camera, picture_name
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
-from posekit.safe_io import cut, refusal, shown
+from posekit.safe_io import refusal, shown
 
 POINTS_FIELDS: Final = ("pose_keypoints_2d", "pose_keypoints")
 """Where a person's points are; the second in files older than 2018."""
@@ -126,7 +127,7 @@ def _identity(source: Path, field: str, person: dict[str, Any]) -> int:
     if isinstance(value, list):
         value = value[0] if len(value) == 1 else (-1 if not value else value)
     if type(value) is not int or not -1 <= value < 2**31:
-        raise refusal(source, field, shown(value), "a number, or -1 for unknown", "correct it")
+        raise refusal(source, field, shown(value), "a number, or -1 for unknown")
     return value
 
 
@@ -147,30 +148,9 @@ def _known(values: Array) -> tuple[Array, Array, bool]:
 
 
 def _layout(source: Path, points: Array, layout: SkeletonMap | None) -> SkeletonMap:
-    if not len(points):
-        return layout if layout is not None and layout.points else load_skeleton_map(OPENPOSE_LAYOUTS[0])
-    count = points.shape[1]
-    if layout is not None:
-        if len(layout.points) != count:
-            raise refusal(
-                source,
-                "points of a person",
-                f"{count}",
-                f"{len(layout.points)}, as skeleton map {cut(layout.name)} has",
-                "choose the map of the detector's model, with its points in order",
-            )
-        return layout
-    candidates = [one for one in map(load_skeleton_map, OPENPOSE_LAYOUTS) if len(one.points) == count]
-    if not candidates:
-        raise refusal(
-            source,
-            "points of a person",
-            f"{count}",
-            "25 (BODY_25, BODY_25B) or 18 (COCO)",
-            "give a map that names them in order with --skeleton",
-        )
-    if len(candidates) > 1:
-        candidates = tell_apart(points)
+    usual = {25: load_skeleton_map("body_25"), 18: load_skeleton_map("coco_18")}
+    found = by_count(points.shape[1], layout, source, usual)
+    candidates = tell_apart(points) if layout is None and found is usual[25] and len(points) else [found]
     if len(candidates) > 1:
         raise refusal(
             source,

@@ -97,9 +97,7 @@ def choose(keypoints: KeyPoints, person: int | str = "largest") -> KeyPoints:
     people = np.unique(tracked.person)
     number = whole(person)
     if number is None and person not in PERSON_RULES:
-        raise refusal(
-            keypoints.source, "person", shown(person), f"a number, or {', '.join(PERSON_RULES)}", "correct it"
-        )
+        raise refusal(keypoints.source, "person", shown(person), f"a number, or {', '.join(PERSON_RULES)}")
     if not len(people):
         return tracked
     if number is None and not keypoints.sequence:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from posekit.formats.given_file import counted
+from posekit.formats.given_file import GivenFile, counted
 from posekit.formats.keypoints.keypoints import FARTHEST_PIXEL, KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
@@ -29,7 +30,7 @@ def numbers(values: object, source: str | Path, field: str, width: int) -> Array
         Where it is no such list, or a number is beyond `LARGEST_NUMBER`.
     """
     if not isinstance(values, list) or not set(map(type, values)) <= COORDINATE_TYPES:
-        raise refusal(source, field, _wrong(values), f"a list of numbers, {width} a point", "correct it")
+        raise refusal(source, field, _wrong(values), f"a list of numbers, {width} a point")
     if not values or len(values) % width:
         got = f"{len(values)} numbers"
         raise refusal(source, field, got, f"a multiple of {width}: {width} a point", "write it again")
@@ -37,19 +38,17 @@ def numbers(values: object, source: str | Path, field: str, width: int) -> Array
     beyond = np.asarray(np.abs(array) > LARGEST_NUMBER)
     if beyond.any():
         worst = float(array[beyond][0])
-        raise refusal(source, field, shown(worst), f"at most {LARGEST_NUMBER:g} in size", "correct it")
+        raise refusal(source, field, shown(worst), f"at most {LARGEST_NUMBER:g} in size")
     return array
 
 
 def pairs(values: object, source: str | Path, field: str) -> Array:
     """Read ``[[x, y], …]`` as an array (K, n), n the same for all points."""
     if not isinstance(values, list) or not values or not all(isinstance(point, list) for point in values):
-        raise refusal(source, field, shown(values), "a list of [x, y]", "correct it")
+        raise refusal(source, field, shown(values), "a list of [x, y]")
     widths = set(map(len, values))
     if len(widths) > 1 or 0 in widths:
-        raise refusal(
-            source, field, f"points of {min(widths)} to {max(widths)} numbers", "[x, y] each", "correct it"
-        )
+        raise refusal(source, field, f"points of {min(widths)} to {max(widths)} numbers", "[x, y] each")
     return numbers([number for point in values for number in point], source, field, widths.pop())
 
 
@@ -78,6 +77,18 @@ class DetectionRows:
     person: list[int] = field(default_factory=list)
     score: list[float] = field(default_factory=list)
 
+    @property
+    def count(self) -> int:
+        """The number of points of a person; 0 as long as there is nobody."""
+        return len(self.points[0]) if self.points else 0
+
+    def documents(self, given: GivenFile) -> Iterator[tuple[Path, Any]]:
+        """Go through the JSON files that are given; each is the source of errors while it is the turn of it."""
+        for path, document in given.documents():
+            self.source = str(path)
+            yield path, document
+        self.source = str(given.path)
+
     def picture(
         self, label: object, *, time: float = np.nan, size: Sequence[float] = (np.nan, np.nan)
     ) -> str:
@@ -90,14 +101,17 @@ class DetectionRows:
         return text
 
     def add(
-        self, label: object, points: Array, confidence: Array, *, person: int = -1, score: float = np.nan
+        self, label: object, points: Array, confidence: Array, *, person: object = None, score: object = None
     ) -> None:
-        """Note a person in a picture: points (K, 2) and how sure they are (K,); a point known in part is none."""
-        if self.points and len(points) != len(self.points[0]):
+        """Note a person in a picture: points (K, 2) and how sure they are (K,); a point known in part is none.
+
+        The person's number and score are as the file has them, or None: what is no number is not known.
+        """
+        if len(points) != (self.count or len(points)):
             raise refusal(
                 self.source,
                 f"picture {cut(str(label))}",
-                f"a person of {len(points)} points after one of {len(self.points[0])}",
+                f"a person of {len(points)} points after one of {self.count}",
                 "the same number for all",
                 "read the files of each model by themselves",
             )
@@ -105,8 +119,9 @@ class DetectionRows:
         self.labels.append(self.picture(label))
         self.points.append(np.where(missing[:, None], np.nan, points))
         self.confidence.append(np.where(missing, np.nan, confidence))
-        self.person.append(person)
-        self.score.append(score)
+        who = whole(person)
+        self.person.append(-1 if who is None else who)
+        self.score.append(number(score))
 
     def keypoints(self, name: str, layout: SkeletonMap, *, normalised: bool = False) -> KeyPoints:
         """Make key points of all rows: pictures in the order of the numbers in their labels."""

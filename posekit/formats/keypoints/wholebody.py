@@ -82,7 +82,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         field, people = "", document
         for place, one in enumerate(people):
             if not isinstance(one, dict) or not is_person(one):
-                raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"', "correct it")
+                raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"')
         images = images_from(identities_of(source, field, people))
     else:
         field = ANNOTATIONS_FIELD
@@ -116,7 +116,7 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
     third = values[..., 2]
     if not ((third >= 0) & (third <= 2)).all():
         odd = float(third[~((third >= 0) & (third <= 2))][0])
-        raise refusal(source, "v", f"{odd:g}", "0, 1, 2, or a fraction", "correct it")
+        raise refusal(source, "v", f"{odd:g}", "0, 1, 2, or a fraction")
     fraction = third % 1 != 0
     fraction[:, :FLAGGED_POINTS] |= fraction[
         :, :FLAGGED_POINTS

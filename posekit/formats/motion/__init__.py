@@ -26,31 +26,13 @@ else:
     __getattr__ = on_demand(
         __name__,
         {
-            "motion": (
-                "UP_DIRECTIONS",
-                "Motion",
-            ),
+            "motion": ("UP_DIRECTIONS", "Motion"),
             "motion_axes": ("with_up",),
-            "motion_format": (
-                "METRES_IN_UNIT",
-                "MotionFormat",
-            ),
-            "postures": (
-                "MotionPostures",
-                "postures_of",
-            ),
+            "motion_format": ("METRES_IN_UNIT", "MotionFormat"),
+            "postures": ("MotionPostures", "postures_of"),
             "postures_up": ("guess_up",),
-            "reading": (
-                "format_of",
-                "motion_formats",
-                "read_motion",
-                "write_configurations",
-                "write_motion",
-            ),
+            "reading": ("format_of", "motion_formats", "read_motion", "write_configurations", "write_motion"),
             "survivors": ("SurvivorTable",),
-            "survivors_files": (
-                "read_survivors",
-                "write_survivors",
-            ),
+            "survivors_files": ("read_survivors", "write_survivors"),
         },
     )

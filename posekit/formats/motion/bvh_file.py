@@ -79,14 +79,14 @@ def open_bvh(path: str | Path) -> BvhFile:
 
 def _declared(path: str | Path, frames: str, frame_time: str) -> tuple[int, float]:
     if not (frames.isascii() and frames.isdigit() and len(frames) < 13 and int(frames) > 0):
-        raise refusal(path, "Frames", shown(frames), "a positive whole number", "correct it")
+        raise refusal(path, "Frames", shown(frames), "a positive whole number")
     try:
         seconds = float(frame_time) if frame_time.isascii() and "_" not in frame_time else np.nan
     except ValueError:
         seconds = np.nan
     if not 1e-6 <= seconds <= 1e6:
         expected = "the seconds from frame to frame, 1e-6 to 1e6"
-        raise refusal(path, "Frame Time", shown(frame_time), expected, "correct it")
+        raise refusal(path, "Frame Time", shown(frame_time), expected)
     return int(frames), seconds
 
 

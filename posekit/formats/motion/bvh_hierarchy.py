@@ -85,7 +85,7 @@ class _Parser:
         self.joints: list[_Joint] = []
         self.open: list[int] = []
 
-    def refuse(self, got: str, expected: str, remedy: str) -> NoReturn:
+    def refuse(self, got: str, expected: str, remedy: str = "correct it") -> NoReturn:
         line = self.text.count("\n", 0, self.at) + 1
         raise refusal(self.path, f"line {line}", got, expected, remedy)
 
@@ -103,7 +103,7 @@ class _Parser:
         word = self.next(what)
         value = float(word) if _NUMBER.fullmatch(word) else np.nan
         if not abs(value) <= LARGEST_VALUE:
-            self.refuse(shown(word), f"{what}, a number of at most {LARGEST_VALUE:g}", "correct it")
+            self.refuse(shown(word), f"{what}, a number of at most {LARGEST_VALUE:g}")
         return value
 
     def name(self) -> str:

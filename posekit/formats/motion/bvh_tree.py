@@ -130,7 +130,6 @@ def checked(path: str | Path, figure: Figure, q: Array, time: Array | None = Non
             f"q[{frame}]",
             f"a torso {np.abs(q[frame, :3]).max():g} m away",
             f"{FARTHEST_PERSON_METRES:g} m at most",
-            "correct it",
         )
     off = np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1)
     if not (off < 1e-6).all():

@@ -143,7 +143,7 @@ def _rate(path: str | Path, content: C3dContent) -> float:
     rates = [content.rate] if told is None else [*told.numbers[:1].tolist(), content.rate]
     rate = next((rate for rate in rates if math.isfinite(rate) and rate > 0), None)
     if rate is None:
-        raise refusal(path, "POINT:RATE", shown(content.rate), "frames a second, above 0", "correct it")
+        raise refusal(path, "POINT:RATE", shown(content.rate), "frames a second, above 0")
     return rate
 
 

@@ -166,13 +166,11 @@ def _chunk(
         except ValueError:
             k = next(k for k, cell in enumerate(cells) if cell and not _is_number(cell))
             where = f"row {before + k + 1}, {cut(name)}"
-            raise refusal(
-                path, where, shown(cells[k]), "a number, or nothing where it is missing", "correct it"
-            ) from None
+            raise refusal(path, where, shown(cells[k]), "a number, or nothing where it is missing") from None
         if np.isinf(columns[name]).any():
             k = int(np.argmax(np.isinf(columns[name])))
             where = f"row {before + k + 1}, {cut(name)}"
-            raise refusal(path, where, shown(cells[k]), "a finite number", "correct it")
+            raise refusal(path, where, shown(cells[k]), "a finite number")
     return columns
 
 

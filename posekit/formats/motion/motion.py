@@ -77,9 +77,7 @@ class Motion:
                 "frames, names, three coordinates"
             )
         if not np.isfinite(time).all() or not (np.isfinite(self.rate) and self.rate > 0):
-            raise refusal(
-                self.source, "rate", shown(float(self.rate)), "a positive rate, finite times", "correct it"
-            )
+            raise refusal(self.source, "rate", shown(float(self.rate)), "a positive rate, finite times")
         if len(set(self.names)) != len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise refusal(self.source, "names", f"{shown(twice)} twice", "each once", "rename one of the two")
@@ -92,7 +90,6 @@ class Motion:
                 f"frame {frame}: {self.names[point]}",
                 str(points[frame, point].tolist()),
                 "three finite numbers, or a missing point",
-                "correct it",
             )
         rates = np.array(self.rates, dtype=np.float64)
         if rates.shape == (0,):
@@ -145,11 +142,7 @@ class Motion:
         if clip.size and (clip.min() < 0 or clip.max() >= count):
             first, last = int(clip.min()), int(clip.max())
             raise refusal(
-                self.source,
-                "clip",
-                f"clips {first} to {last}",
-                f"0 to {count - 1}, as clips are named",
-                "correct it",
+                self.source, "clip", f"clips {first} to {last}", f"0 to {count - 1}, as clips are named"
             )
         if rates.shape != (count,) or not (np.isfinite(rates) & (rates > 0)).all():
             raise refusal(
@@ -160,9 +153,7 @@ class Motion:
                 "correct them",
             )
         if self.up and self.up not in UP_DIRECTIONS:
-            raise refusal(
-                self.source, "up", shown(self.up), f"one of {', '.join(UP_DIRECTIONS)}", "correct it"
-            )
+            raise refusal(self.source, "up", shown(self.up), f"one of {', '.join(UP_DIRECTIONS)}")
 
     def _check_order(self, time: Array, clip: NDArray[np.intp]) -> None:
         """Refuse times that stand still or go back within a clip."""

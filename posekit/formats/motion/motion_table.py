@@ -178,7 +178,7 @@ def _long(columns: Mapping[str, Column], source: str) -> tuple[tuple[str, ...], 
         raise refusal(source, "frame", "a frame whose rows are apart", "rows in order", "sort them by frame")
     if (time != time[rows][index]).any():
         row = int(np.argmax(time != time[rows][index]))
-        raise refusal(source, f"row {row + 1}", f"time {time[row]:g} s", "one time a frame", "correct it")
+        raise refusal(source, f"row {row + 1}", f"time {time[row]:g} s", "one time a frame")
     if len(names) > MAX_POINTS or len(rows) * len(names) * 3 > MAX_VALUES:
         got = f"{len(rows):,} frames of {len(names):,} points"
         raise refusal(source, "name", got, f"at most {MAX_VALUES:,} numbers", "split it")

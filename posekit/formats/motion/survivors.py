@@ -75,22 +75,14 @@ class SurvivorTable:
                     self.source, cut(name), f"shape {array.shape}", f"shape {shapes[name]}", "reshape it"
                 )
             if np.isinf(array).any():
-                raise refusal(
-                    self.source, cut(name), "an infinite number", "finite numbers, or NaN", "correct it"
-                )
+                raise refusal(self.source, cut(name), "an infinite number", "finite numbers, or NaN")
             array.flags.writeable = False
         taken = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"} & values.keys()
         if taken or not all(name and name.isprintable() for name in values):
             got = shown(min(taken, default="a name that does not print"))
             raise refusal(self.source, "values", got, "names of their own", "rename the value")
         if len(self.branches) not in (0, count):
-            raise refusal(
-                self.source,
-                "branches",
-                f"{len(self.branches)} for {count} survivors",
-                "one each",
-                "correct it",
-            )
+            raise refusal(self.source, "branches", f"{len(self.branches)} for {count} survivors", "one each")
         keys = np.stack([arrays["frame"], arrays["survivor"]], axis=1)
         if (np.diff(keys[:, 0]) < 0).any() or len(np.unique(keys, axis=0)) != count:
             raise refusal(
@@ -164,5 +156,5 @@ def _whole(source: str, name: str, values: NDArray[Any]) -> NDArray[np.int64]:
     """Take whole numbers, which tables may hold as floats."""
     given = np.asarray(values, dtype=np.float64)
     if not (np.isfinite(given) & (given == np.round(given)) & (np.abs(given) < 2**53)).all():
-        raise refusal(source, name, "a number that is not whole", "whole numbers", "correct it")
+        raise refusal(source, name, "a number that is not whole", "whole numbers")
     return given.astype(np.int64)

@@ -74,13 +74,7 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
     values = _rows(path, body, 2 + 3 * len(header.names), text.endswith(("\n", "\r")))
     if np.isnan(values[:, :2]).any() or np.isinf(values).any():
         row = int(np.argmax(np.isnan(values[:, :2]).any(axis=1) | np.isinf(values).any(axis=1)))
-        raise refusal(
-            path,
-            f"line {body[row][0]}",
-            "a number that is missing or infinite",
-            "finite numbers",
-            "correct it",
-        )
+        raise refusal(path, f"line {body[row][0]}", "a number that is missing or infinite", "finite numbers")
     back = np.flatnonzero(np.diff(values[:, 0]) <= 0)
     if len(back):
         row = int(back[0]) + 1
@@ -146,7 +140,7 @@ def _header(path: str | Path, lines: Sequence[str]) -> _Header:
     fields = dict(zip(_cells(lines[1]), _cells(lines[2]), strict=False))
     titles = _cells(lines[3])
     if len(titles) < 3 or titles[0].casefold().rstrip("#") != "frame" or titles[1].casefold() != "time":
-        raise refusal(path, "line 4", shown(lines[3][:60]), "Frame#, Time and names", "correct it")
+        raise refusal(path, "line 4", shown(lines[3][:60]), "Frame#, Time and names")
     # Some programs write a name into one column of three, some leave no columns between; X1 Y1 Z1 say which.
     spread = titles[2::3] if not any(titles[3::3]) and not any(titles[4::3]) else titles[2:]
     names = tuple(name for name in spread if name)
@@ -213,9 +207,7 @@ def _chunk(path: str | Path, body: Sequence[tuple[int, str]], width: int, last: 
         for column, cell in enumerate(row, 1):
             if cell and cell.casefold() != "nan" and _float(cell) is None:
                 where = f"line {number}, column {column}"
-                raise refusal(
-                    path, where, shown(cell), "a finite number, or nothing where it is missing", "correct it"
-                )
+                raise refusal(path, where, shown(cell), "a finite number, or nothing where it is missing")
     return np.array([[float(cell or "nan") for cell in row] for row in rows])
 
 
