@@ -10,9 +10,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 
 MOST_CLASS_NAMES_USED_TWICE = 0
-MOST_ONE_WORD_CONSTANTS = 40  # each counted in every module that assigns it; single letters are not
+MOST_ONE_WORD_CONSTANTS = (
+    12  # each counted in every module that assigns it; single letters are not: those of posekit.skeleton
+)
 MOST_LONG_SIGNATURES = 0  # more than eight parameters, outside compiled/ and cli/
-MOST_UNDESCRIBED_PARAMETERS = 90
+MOST_UNDESCRIBED_PARAMETERS = 0
 MOST_LONG_TEST_FILES = 0
 
 

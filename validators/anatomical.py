@@ -63,6 +63,7 @@ class Coupling:
     angle : str
         The angle that is bounded: one of `posekit.tables.angles.ANGLES`, ``shoulder.elevation``, ``shoulder.turn``.
     side : {"lower", "upper"}
+        Which end of the range it is.
     of : str
         The angle on which the end depends.
     points : tuple of (float, float)
@@ -70,6 +71,7 @@ class Coupling:
     spread : float
         One standard deviation of the end over people.
     source : tuple of str
+        Keys of the publications that it is from, as `Anatomy.sources` explains them.
     """
 
     angle: str
@@ -90,9 +92,11 @@ class Sinus:
     Parameters
     ----------
     joint : {"hip"}
+        The ball joint that is rounded off.
     power : float
         The p, from 1: 2 is an ellipsoid, infinity the box.
     source : tuple of str
+        Keys of the publications that it is from, as `Anatomy.sources` explains them.
     """
 
     joint: str
@@ -109,6 +113,7 @@ class Anatomy:
     motions : mapping
         Each of `posekit.tables.angles.ANGLES`.
     couplings : tuple of Coupling
+        Ends of angles that depend on other angles.
     sinuses : tuple of Sinus
         At most one of a joint.
     spreads : float

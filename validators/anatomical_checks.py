@@ -38,7 +38,9 @@ class AnatomicalLimb(Check):
     Parameters
     ----------
     figure : Figure
+        The person's figure: lengths, capsules, limits.
     anatomy : Anatomy
+        The table of ranges and couplings.
     limb : tuple of str
         ``("right_shoulder", "right_elbow", "right_wrist")``, or the first two.
     tolerance : float

@@ -51,6 +51,7 @@ class Wall:
     place : int
         Which angle.
     side : {"lower", "upper"}
+        Which end of the range it is.
     mean : float or array broadcastable to (N, W)
         Degrees.
     spread : float or array, as `mean`
@@ -78,6 +79,7 @@ class LimbReadings:
     values : array (N, W, K)
         Degrees.
     walls : tuple of Wall
+        The ends of the angles that are judged.
     """
 
     names: tuple[str, ...]
@@ -128,7 +130,9 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
     Parameters
     ----------
     anatomy : Anatomy
+        The table of ranges and couplings.
     joint : {"shoulder", "hip"}
+        The ball joint of the limb.
     angles : array (N, 4) or (N, 2)
         In one of its writings, degrees: ball joint and hinge, or the first two of the ball joint.
     tolerance : float

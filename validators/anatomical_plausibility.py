@@ -37,6 +37,7 @@ def plausibility(angles: Array, anatomy: Anatomy) -> Array:
     angles : array (N, 22)
         In the order of `posekit.skeleton.DOFS`, radians; NaN where unknown.
     anatomy : Anatomy
+        The table of ranges and couplings.
 
     Returns
     -------

@@ -29,7 +29,9 @@ def limb_numbers(
     Parameters
     ----------
     anatomy : Anatomy
+        The table of ranges and couplings.
     joint : {"shoulder", "hip"}
+        The ball joint of the limb.
     signs : array (4,) or (2,)
         Of the angles that are known, as `posekit.body.angles.Limits` has them: all four, or the first two.
     rigid : int

@@ -46,6 +46,7 @@ class Attainable:
     Parameters
     ----------
     robot : Robot
+        The robot that is judged, as it was loaded.
     names : tuple of str
         Frames of the robot, not the same place twice.
     extra : tuple of (int, array (3,))

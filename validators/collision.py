@@ -34,6 +34,7 @@ def collision(figure: Figure, *, contact_margin: float = 0.0, exact: bool = Fals
     Parameters
     ----------
     figure : Figure
+        The person's figure: lengths, capsules, limits.
     contact_margin : float
         Metres that two bodies must keep from each other; negative allows that much penetration (flesh).
     exact : bool

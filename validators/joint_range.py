@@ -53,6 +53,7 @@ def joint_range(
     figure : Figure
         Its limits are the ranges where `ranges` gives none.
     ranges : Ranges
+        The table of ranges; by default the URDF's own.
     tolerance : float
         Degrees by which the direction of a segment may be off; see `LimbRange` for what follows for axial rotations.
     directions : bool

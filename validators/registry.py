@@ -111,6 +111,7 @@ def make_checks(
     Parameters
     ----------
     figure : Figure
+        The figure that they are made for.
     checks : iterable of str, Check or CheckSettings
         Which; see `chosen_checks`.
     options : CheckOptions, optional

@@ -70,6 +70,7 @@ class RobotLimits:
     Parameters
     ----------
     robot : Robot
+        The robot that is judged, as it was loaded.
     names : tuple of str
         Frames of the robot: the points of its linkage (`posekit.linkages.robot_linkage.linkage_of`).
 

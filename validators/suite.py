@@ -22,10 +22,13 @@ class Judgement:
     check : str
         The validator.
     where : tuple of str (K,)
+        The places that it judges, as findings name them.
     unit : tuple of str (K,)
+        The unit of the values at each place: m or deg.
     value, lower, upper, margin : array (N, K)
         A negative margin is outside; NaN is undecided.
     violated : bool array (N, K)
+        Where a value is outside its bounds by more than the tolerance; False where undecided.
     """
 
     check: str

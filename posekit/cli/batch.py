@@ -28,8 +28,8 @@ BATCH_EXAMPLES = examples(
     "posekit batch views.parquet -o results --jobs 16 --q --margins",
     "posekit batch archive/ -o results --cluster 10.0.0.1:6379",
 )
-SOME_FAILED, INTERRUPTED = 1, 130
-EVERY = 10.0
+EXIT_SOME_FAILED, EXIT_INTERRUPTED = 1, 130
+PROGRESS_EVERY_SECONDS = 10.0
 """Seconds between two lines of progress where there is no terminal."""
 
 
@@ -137,10 +137,10 @@ def batch(
             )
     except KeyboardInterrupt:
         typer.echo(f"posekit: error: interrupted; run it again to go on in {output}", err=True)
-        raise typer.Exit(INTERRUPTED) from None
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     _report(summary, output)
     if summary.failures:
-        raise typer.Exit(SOME_FAILED)
+        raise typer.Exit(EXIT_SOME_FAILED)
 
 
 def _report(summary: Summary, output: Path) -> None:
@@ -200,7 +200,7 @@ class Speed:
 
     def __init__(self) -> None:
         self.began: float | None = None
-        self.told = -EVERY
+        self.told = -PROGRESS_EVERY_SECONDS
 
     def of(self, now: Progress) -> str:
         """Say it in a few words; nothing while inputs are opened."""
@@ -221,7 +221,7 @@ class Speed:
         """Print it as a line, not too often."""
         words = self.of(now)
         ended = now.done >= now.total
-        if time.monotonic() - self.told < EVERY and not ended:
+        if time.monotonic() - self.told < PROGRESS_EVERY_SECONDS and not ended:
             return
         self.told = time.monotonic()
         unit = "frames" if now.stage == "recovering" else "inputs"

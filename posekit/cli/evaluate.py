@@ -28,8 +28,16 @@ EVALUATE_EXAMPLES = examples(
     "posekit evaluate view.json -o report.json",
 )
 
-SWEPT = ("--yaw-step", "--heights", "--distance", "--f", "--size")
-SAMPLED = ("--frames-per-clip", "--clips", "--actions", "--consecutive", "--skeleton", "--unit", "--up")
+SWEEP_OPTIONS = ("--yaw-step", "--heights", "--distance", "--f", "--size")
+SAMPLING_OPTIONS = (
+    "--frames-per-clip",
+    "--clips",
+    "--actions",
+    "--consecutive",
+    "--skeleton",
+    "--unit",
+    "--up",
+)
 
 
 @with_groups
@@ -168,7 +176,7 @@ def evaluate(
     given = _read(file, format=format, skeleton=skeleton, unit=unit, up=up)
     if isinstance(given, View):
         for name in options_given(ctx):
-            if name in (*SWEPT, *SAMPLED):
+            if name in (*SWEEP_OPTIONS, *SAMPLING_OPTIONS):
                 raise InputError(
                     f"{name}: a view is evaluated as it is; expected motion; leave the option out"
                 )

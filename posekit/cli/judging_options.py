@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.options import PHYSICAL, AngleTolerance, Rules, as_recover, rule_numbers, split
+from posekit.cli.options import PHYSICAL_CHECKS_TEXT, AngleTolerance, Rules, as_recover, rule_numbers, split
 
 if TYPE_CHECKING:
     from posekit.settings import PartialTolerance
@@ -24,7 +24,7 @@ class Judging:
             metavar="LIST",
             help="Some of rigid-parts, joint-range, collision, walking, by commas.",
         ),
-    ] = PHYSICAL
+    ] = PHYSICAL_CHECKS_TEXT
     ranges: Annotated[
         str,
         typer.Option(

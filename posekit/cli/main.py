@@ -18,7 +18,7 @@ BAD_INPUT = 2
 UsageError: Any = typer.BadParameter.__bases__[0]
 ClickError: Any = UsageError.__bases__[0]
 
-COMMANDS: Final = (
+COMMAND_NAMES: Final = (
     "recover",
     "validate",
     "convert",
@@ -65,7 +65,7 @@ def application(first: str) -> typer.Typer:
     )
     app.callback()(_root)
     # What reads the options of a command takes some milliseconds to make: those of the others are not needed.
-    for name in (first,) if first in COMMANDS else COMMANDS:
+    for name in (first,) if first in COMMAND_NAMES else COMMAND_NAMES:
         module = import_module(f"posekit.cli.{name}")
         if name == "synth":
             app.add_typer(module.app, name=name)

@@ -12,7 +12,7 @@ import typer
 
 from posekit.errors import InputError, PosekitError
 
-PHYSICAL = "rigid-parts,joint-range,collision"
+PHYSICAL_CHECKS_TEXT = "rigid-parts,joint-range,collision"
 
 Rules = Annotated[
     str,

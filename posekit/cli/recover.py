@@ -42,9 +42,9 @@ RECOVER_EXAMPLES = examples(
     "posekit recover panda.json -o found.json --linkage panda --scale closure",
 )
 
-NAMED: Final = 5
+FRAMES_NAMED_IN_WARNINGS: Final = 5
 """Frames of one reason that are named."""
-REASONS: Final = 3
+REASONS_SHOWN: Final = 3
 """Reasons that are told."""
 
 
@@ -251,13 +251,15 @@ def summarize(recovery: Recovery) -> None:
         typer.echo(line)
     total = len(recovery.frames)
     reasons = sorted(recovery.unrecovered.items(), key=lambda pair: -len(pair[1]))
-    for reason, frames in reasons[:REASONS]:
-        named = ", ".join(str(k + 1) for k in frames[:NAMED]) + (", …" if len(frames) > NAMED else "")
+    for reason, frames in reasons[:REASONS_SHOWN]:
+        named = ", ".join(str(k + 1) for k in frames[:FRAMES_NAMED_IN_WARNINGS]) + (
+            ", …" if len(frames) > FRAMES_NAMED_IN_WARNINGS else ""
+        )
         which = f"frame{'s' if len(frames) > 1 else ''} {named}"
         typer.echo(
             f"posekit: warning: {len(frames)} of {total} frames not recovered: {reason} ({which})", err=True
         )
-    others = sum(len(frames) for _, frames in reasons[REASONS:])
+    others = sum(len(frames) for _, frames in reasons[REASONS_SHOWN:])
     if others:
         typer.echo(
             f"posekit: warning: {others} more not recovered, each with its reason in the result's "

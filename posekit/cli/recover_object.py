@@ -12,7 +12,14 @@ from posekit.cli.judging_options import Tolerances
 from posekit.cli.options import about, progress
 from posekit.errors import InputError
 
-TAKEN: Final = ("--output", "--linkage", "--scale", "--nearer", "--rigid-tolerance", "--tangent-tolerance")
+OPTIONS_OF_OBJECTS: Final = (
+    "--output",
+    "--linkage",
+    "--scale",
+    "--nearer",
+    "--rigid-tolerance",
+    "--tangent-tolerance",
+)
 """Options that say something of an object too."""
 
 
@@ -25,7 +32,7 @@ def refuse_options_of_persons(given: Sequence[str]) -> None:
         For the first of them.
     """
     for name in given:
-        if name not in TAKEN:
+        if name not in OPTIONS_OF_OBJECTS:
             raise InputError(f"{name} is for persons; leave it out with --linkage")
 
 

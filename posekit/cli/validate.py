@@ -27,14 +27,17 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
-LOOSE = 0.1
+LOOSE_ANGLE_DEGREES = 0.1
 """Degrees of tolerance from which it is said."""
 
 SOME_INVALID = 1
-DETAIL: Final[Mapping[str, Literal["findings", "margins"]]] = {".json": "findings", ".csv": "margins"}
+DETAIL_BY_SUFFIX: Final[Mapping[str, Literal["findings", "margins"]]] = {
+    ".json": "findings",
+    ".csv": "margins",
+}
 """What a report of each kind shows of every posture; others show what is behind those that are not valid."""
 
-UPS = {
+UP_AXES = {
     f"{sign}{axis}": (k, -1.0 if sign == "-" else 1.0)
     for k, axis in enumerate("xyz")
     for sign in ("+", "-", "")
@@ -250,14 +253,14 @@ def validate(
             every=every,
             sequence=_clips(given) if sequence else None,
             distances=distances,
-            detail=DETAIL.get("" if output is None else output.suffix.lower(), "verdicts"),
+            detail=DETAIL_BY_SUFFIX.get("" if output is None else output.suffix.lower(), "verdicts"),
         )
     if output is not None:
         files.write_report(output, report)
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)
-    if settings.angle_tolerance >= LOOSE or settings.contact_margin < 0:
+    if settings.angle_tolerance >= LOOSE_ANGLE_DEGREES or settings.contact_margin < 0:
         typer.echo(
             f"judged with {settings.angle_tolerance:g} degrees of tolerance, and {100 * settings.contact_margin:g} cm "
             "between bodies"
@@ -304,9 +307,9 @@ def _clips(given: _Input) -> Any:
 
 def _direction(text: str) -> Any:
     """Read the direction up."""
-    if text not in UPS:
+    if text not in UP_AXES:
         raise InputError(f"--up: {text!r}; expected one of +x, -x, +y, -y, +z, -z")
-    axis, sign = UPS[text]
+    axis, sign = UP_AXES[text]
     return tuple(sign if k == axis else 0.0 for k in range(3))
 
 

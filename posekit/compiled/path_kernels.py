@@ -228,13 +228,13 @@ def arrive(  # noqa: PLR0912 -- calls with many arrays cost more than what they 
     return count, most
 
 
-F1, F2, F3, I1, B1 = "f8[::1]", "f8[:, ::1]", "f8[:, :, ::1]", "i8[::1]", "b1[::1]"
+F8_1, F8_2, F8_3, I8_1, B1_1 = "f8[::1]", "f8[:, ::1]", "f8[:, :, ::1]", "i8[::1]", "b1[::1]"
 COMPILED_TYPES = {
-    "lay": f"({I1}, {I1}, {F3}, {F2}, {F3}, {F3})",
+    "lay": f"({I8_1}, {I8_1}, {F8_3}, {F8_2}, {F8_3}, {F8_3})",
     "step": "",
     "turn": "",
     "put": "",
-    "arrive": f"({I1}, {I1}, {F1}, {B1}, {F1}, {F1}, b1, {F3}, {F3}, {F3}, {F1}, {F1}, {F1}, {B1}, {I1}, {F1}, {F1}, "
-    f"f8, f8, f8, {F2}, i8[:, ::1], i8[:, ::1])",
+    "arrive": f"({I8_1}, {I8_1}, {F8_1}, {B1_1}, {F8_1}, {F8_1}, b1, {F8_3}, {F8_3}, {F8_3}, {F8_1}, {F8_1}, "
+    f"{F8_1}, {B1_1}, {I8_1}, {F8_1}, {F8_1}, f8, f8, f8, {F8_2}, i8[:, ::1], i8[:, ::1])",
 }
 """The kernels, in the order in which they need each other, with the types they take."""

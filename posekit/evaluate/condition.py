@@ -11,22 +11,22 @@ from numpy.typing import NDArray
 
 from posekit.evaluate.evaluated_frames import EvaluatedFrames
 from posekit.evaluate.scores import correct_poses, correct_poses_score, reliability
-from posekit.evaluate.work import ROLES
+from posekit.evaluate.work import SURVIVOR_ROLES
 from posekit.geometry import Array
 
-NEAR: Final = 0.010
+NEAR_METRES: Final = 0.010
 """Metres of mean joint error within which a survivor is the truth."""
 
 NEAR_NOISY: Final = 0.035
 """The same where image points carry noise."""
 
-TOLD: Final = ("mpjpe", "centred", "pa")
+TOLD_ERRORS: Final = ("mpjpe", "centred", "pa")
 
 
 def roles_of(frames: EvaluatedFrames) -> tuple[str, ...]:
     """Return whose errors there are: without a choice through sequences there is no path."""
     followed = np.isfinite(frames.error("path", "mpjpe")).any()
-    return ROLES if followed else ROLES[:-1]
+    return SURVIVOR_ROLES if followed else SURVIVOR_ROLES[:-1]
 
 
 def numbers(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
@@ -42,7 +42,7 @@ def numbers(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
     return {
         "frames": len(rows),
         "frames_without_survivor": int((survivors == 0).sum()),
-        "retained_within_10mm": plain((best <= NEAR).mean()),
+        "retained_within_10mm": plain((best <= NEAR_METRES).mean()),
         "retained_within_35mm": plain((best <= NEAR_NOISY).mean()),
         "retained_branch": _mean(branch),
         "survivors": {
@@ -104,15 +104,15 @@ def plains(values: Array) -> list[float | None]:
 
 
 def _errors(frames: EvaluatedFrames, rows: NDArray[np.intp]) -> dict[str, Any]:
-    told: dict[str, Any] = {measure: {} for measure in TOLD}
+    told: dict[str, Any] = {measure: {} for measure in TOLD_ERRORS}
     for role in roles_of(frames):
-        values = np.stack([frames.error(role, measure)[rows] for measure in TOLD], axis=1) * 1000
+        values = np.stack([frames.error(role, measure)[rows] for measure in TOLD_ERRORS], axis=1) * 1000
         values = values[np.isfinite(values).all(axis=1)]
         if len(values):
             lines = [values.mean(axis=0), *np.quantile(values, (0.5, 0.95), axis=0)]
         else:
-            lines = [np.full(len(TOLD), np.nan)] * 3
-        for k, measure in enumerate(TOLD):
+            lines = [np.full(len(TOLD_ERRORS), np.nan)] * 3
+        for k, measure in enumerate(TOLD_ERRORS):
             told[measure][role] = {
                 name: plain(line[k]) for name, line in zip(("mean", "median", "p95"), lines, strict=True)
             }

@@ -25,7 +25,7 @@ from posekit.settings import MEASURED_TOLERANCE, RecoverSettings
 
 RootFrom = Literal["given", "auto"]
 
-NOISE: Final = (0.0, 1.0, 2.0, 5.0, 10.0)
+NOISE_LEVELS_PIXELS: Final = (0.0, 1.0, 2.0, 5.0, 10.0)
 """Standard deviations of image points, pixels. Wang et al. (2014, section 4.3.2) add ten levels of Gaussian noise, the
 largest as long as the lower leg; pixels are what detectors are measured in."""
 
@@ -56,7 +56,7 @@ class Method:
         Where one of them is impossible.
     """
 
-    noise: tuple[float, ...] = NOISE
+    noise: tuple[float, ...] = NOISE_LEVELS_PIXELS
     root: RootFrom | None = None
     settings: RecoverSettings = field(default_factory=RecoverSettings)
     seed: int = 0

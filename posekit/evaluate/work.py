@@ -24,11 +24,11 @@ from posekit.recovery.trees import Batch
 from posekit.settings import Tolerance
 from posekit.skeleton import JOINTS
 
-ROLES: Final = ("best", "first", "random", "path")
+SURVIVOR_ROLES: Final = ("best", "first", "random", "path")
 """Whose errors are told: the best survivor by each measure, the one that is ranked first, one drawn by lot, and the one
 that was chosen by following the sequence, or what bridges it there."""
 
-CERTIFIED: Final = 16
+MAX_CERTIFIED_SURVIVORS: Final = 16
 """Survivors of a frame that are certified: evenly over them, all where there are no more."""
 
 
@@ -270,5 +270,7 @@ def _certified(
 
 
 def _evenly(count: int) -> NDArray[np.intp]:
-    places: NDArray[np.intp] = np.unique(np.linspace(0, count - 1, min(count, CERTIFIED)).astype(np.intp))
+    places: NDArray[np.intp] = np.unique(
+        np.linspace(0, count - 1, min(count, MAX_CERTIFIED_SURVIVORS)).astype(np.intp)
+    )
     return places

@@ -39,6 +39,7 @@ class NoisyRange(Check):
         How far a point may be off beside its ray, times one metre over its depth (its standard deviations' multiple
         over the focal length, pixels); absolute, metres, where the camera is orthographic.
     perspective : bool
+        Whether the camera is one with a perspective: directions then depend on depths.
     """
 
     inner: Check

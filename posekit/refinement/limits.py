@@ -59,6 +59,7 @@ class Outside(NamedTuple):
     Attributes
     ----------
     limb, row : int array (M,)
+        Which limb of the figure each one is, and in which posture of the batch.
     over : array (4, M)
         Radians above the upper limit (positive) or below the lower; watched limits that are not reached count too.
     weight : array (4, M)
@@ -131,6 +132,7 @@ def limb_limits(
     Parameters
     ----------
     found : Limbs
+        The limbs, with the angles of every branch.
     bounds : Bounds
         (4, 4).
     watch : int array (4, 4, N), optional
@@ -253,6 +255,7 @@ class Ball(NamedTuple):
     jacobian : array (3, 3, N) or None
         Along the child's rotation vector, camera frame; the parent's has the opposite sign. None where all are zero.
     crossed : int array (3, N)
+        1 above the upper limit, -1 below the lower, 0 inside.
     """
 
     residual: Array

@@ -73,7 +73,9 @@ def tolerance_of(
     deviation : float
         Standard deviation of the key points in each coordinate, pixels: the largest that counts.
     camera : Camera
+        What projects and lifts; its first axis counts frames.
     figure : Figure
+        The person's figure: lengths, capsules, limits.
     depth : float
         How far the person is at most, metres; of no meaning for a scaled orthographic camera.
     deviations : float

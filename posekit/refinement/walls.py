@@ -60,6 +60,7 @@ class Walls(Protocol):
         Parameters
         ----------
         part : {"pelvis", "neck"}
+            Which of the two ball joints of the trunk it is.
         turn : array (M, 3, 3)
             Rotations of the part in the torso's frame.
 
@@ -77,6 +78,7 @@ class Beyond(NamedTuple):
     Attributes
     ----------
     limb, row : int array (M,)
+        Which limb of the figure each one is, and in which posture of the batch.
     over : array (4, M)
         Radians above the upper limit (positive) or below the lower; watched limits that are not reached count too.
     side : int array (4, M)

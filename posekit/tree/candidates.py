@@ -106,6 +106,7 @@ def lift_all(
     Parameters
     ----------
     camera : Camera
+        What projects and lifts; its first axis counts frames.
     root : array (F, 3)
         The root joint, camera frame, metres.
     image : array (F, J, 2)

@@ -25,6 +25,7 @@ def enumerate_leaves(
     Parameters
     ----------
     camera : Camera
+        What projects and lifts; its first axis counts frames.
     root : array (3,)
         The root joint, camera frame, metres.
     image : array (J, 2)

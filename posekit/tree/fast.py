@@ -47,6 +47,7 @@ def grow(lifting: Lifting, checks: Sequence[Sequence[Check]]) -> Leaves | None:
     Parameters
     ----------
     lifting : Lifting
+        The views, and the segments of the object in them.
     checks : sequence of sequences
         By level.
 

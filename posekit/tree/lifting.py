@@ -20,7 +20,9 @@ class Lifting:
     Parameters
     ----------
     joints : tuple of str (J,)
+        Names of the joints, the root first, each after its parent.
     parents : tuple of int (J,)
+        Parent of each joint; -1 for the root.
     camera, root, image, lengths, given, tolerance
         See `posekit.tree.candidates.lift_all`.
     """

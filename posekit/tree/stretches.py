@@ -40,6 +40,7 @@ def growing(
     Parameters
     ----------
     programme : Programme
+        The checks laid out in arrays, as the compiled loops read them.
     checks : sequence of Check
         All checks, level by level.
     roots : Leaves

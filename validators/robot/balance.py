@@ -23,6 +23,7 @@ class Balance:
     Parameters
     ----------
     model : pinocchio.Model
+        The kinematic model of Pinocchio.
     corners : sequence of Corner
         Of the soles; empty where there are none.
     up : array (3,)

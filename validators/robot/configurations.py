@@ -24,6 +24,7 @@ def judge_quickly(
     Parameters
     ----------
     subject : Subject
+        The model with its geometry, and what was prepared for it once.
     collision : SelfCollision, optional
         What judges collisions, where they are asked about.
     q : array (N, nq)

@@ -29,6 +29,7 @@ class FigureConfigurations:
     Parameters
     ----------
     figure : Figure
+        The stick figure, whose closed form gives configurations.
     checks : sequence of str
         Those of the stick figure. Rigid parts have nothing to say: the lengths are the figure's own.
     ranges : Ranges

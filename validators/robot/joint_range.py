@@ -58,6 +58,7 @@ def judge_joint_range(
     subject : Subject
         Of K joints with limits.
     q : array (N, nq)
+        Configurations in Pinocchio's order, quaternions x, y, z, w.
     tolerance : float
         Degrees outside a limit that are no violation; a hundredth as many metres for joints that slide.
     seen : bool array (N, K), optional

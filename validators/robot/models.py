@@ -44,9 +44,11 @@ class JudgedModel:
     Parameters
     ----------
     subject : Subject
+        The model with its geometry, and what was prepared for it once.
     kinematics : Kinematics or None
         The points of the joint map; None where the robot has none and only configurations are judged.
     settings : RobotSettings
+        What the judging was asked.
     """
 
     subject: Subject
@@ -81,7 +83,9 @@ class Models:
     Parameters
     ----------
     robot : Robot
+        The robot that is judged, as it was loaded.
     settings : RobotSettings
+        What the judging was asked.
     """
 
     robot: Robot

@@ -32,6 +32,7 @@ class NearPairs:
     Parameters
     ----------
     model : pinocchio.Model
+        The kinematic model of Pinocchio.
     geometry : pinocchio.GeometryModel
         With P pairs.
     margins : array (P,)

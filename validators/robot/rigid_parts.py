@@ -27,6 +27,7 @@ def judge_rigid_parts(kinematics: Kinematics, targets: Array, *, tolerance: floa
     Parameters
     ----------
     kinematics : Kinematics
+        The robot's kinematics, which place its bodies.
     targets : array (N, P, 3)
         Metres; NaN is unknown.
     tolerance : float

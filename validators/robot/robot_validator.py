@@ -42,6 +42,7 @@ class Verdict(NamedTuple):
     Attributes
     ----------
     judgements : sequence of Judgement
+        What each check says, a row a configuration.
     complete : bool array (N,)
         Whether all joints that the model has are known.
     q : array (N, nq)
@@ -69,7 +70,9 @@ class RobotValidator:
     Parameters
     ----------
     robot : Robot
+        The robot that is judged, as it was loaded.
     settings : RobotSettings
+        What the judging was asked.
     """
 
     robot: Robot
@@ -117,6 +120,7 @@ class RobotValidator:
         Parameters
         ----------
         postures : array
+            Joint positions (N, J, 3), metres; NaN where a joint is not known.
         sequence : int array (N,), optional
             Which sequence in time each belongs to; then a fit starts from the one before.
         lengths : mapping, optional

@@ -22,6 +22,7 @@ class Subject:
     Parameters
     ----------
     model : pinocchio.Model
+        The kinematic model of Pinocchio.
     lower, upper : array (nq,)
         Limits, radians and metres.
     geometry : pinocchio.GeometryModel or None
