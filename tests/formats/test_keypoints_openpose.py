@@ -346,7 +346,10 @@ PEOPLE = [
     ('{"people": [{"pose_keypoints_2d": [[1, 2, 3]]}]}', "1 numbers|flat list"),
     ('{"people": [{"pose_keypoints_2d": {"a": 1}}]}', "a list"),
     ('{"people": [{"pose_keypoints_2d": []}]}', "body detector"),
-    ('{"people": [{"pose_keypoints_2d": [1, 2, 3, 4, 5, 6]}]}', "2 a person, unnamed; expected 18, 25 points"),
+    (
+        '{"people": [{"pose_keypoints_2d": [1, 2, 3, 4, 5, 6]}]}',
+        "2 a person, unnamed; expected 18, 25 points",
+    ),
     ('{"people": [{"person_id": [[1]], "pose_keypoints_2d": [1, 2, 3]}]}', "person_id"),
     ('{"people": [{"person_id": [1, 2], "pose_keypoints_2d": [1, 2, 3]}]}', "person_id"),
     ('{"people": [{"person_id": [-5], "pose_keypoints_2d": [1, 2, 3]}]}', "person_id"),

@@ -15,20 +15,13 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.formats.given_file import GivenFile
 from posekit.formats.keypoints.coco_annotations import ANNOTATIONS_FIELD, annotations_of
 from posekit.formats.keypoints.coco_layout import layout_of
 from posekit.formats.keypoints.coco_parts import is_wholebody
-from posekit.formats.keypoints.coco_people import (
-    as_confidences,
-    by_picture,
-    pictures_of,
-    scores_of,
-    tracks_of,
-)
+from posekit.formats.keypoints.coco_people import Parted, as_confidences, key_points_of
 from posekit.formats.keypoints.coco_triples import triples
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
@@ -66,24 +59,9 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         [one["keypoints"] for one in people],
         lambda k: f"{ANNOTATIONS_FIELD}[…].keypoints, person {k}",
     )
-    points, confidence, occluded = _flagged(source, values)
     found = _layout(source, values, names, layout)
-    frame = pictures_of(source, ANNOTATIONS_FIELD, people, images)
-    rows = by_picture(frame, points)
-    return KeyPoints(
-        format=COCO_FORMAT.name,
-        source=str(source),
-        layout=found,
-        pictures=images.names,
-        size=images.size,
-        frame=frame[rows],
-        points=points[rows] if points.size else np.empty((0, len(found.points), 2)),
-        confidence=confidence[rows],
-        occluded=occluded[rows],
-        score=scores_of(source, ANNOTATIONS_FIELD, people)[rows],
-        person=tracks_of(source, ANNOTATIONS_FIELD, people)[rows],
-        sequence=False,
-    )
+    parted = _flagged(source, values)
+    return key_points_of(source, ANNOTATIONS_FIELD, people, images, parted, found, format=COCO_FORMAT.name)
 
 
 def _names(document: Any) -> dict[Any, tuple[str, ...]]:
@@ -137,18 +115,17 @@ def _layout(source: Path, values: Array, names: tuple[str, ...], layout: Skeleto
     return layout_of(source, COCO_FORMAT.name, count, names, layout)
 
 
-def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _flagged(source: Path, values: Array) -> Parted:
     """Part triples into points, confidences, and which points are hidden."""
     third = values[..., 2]
     if not np.isin(third, (0, 1, 2)).all():
         if not (third % 1 != 0).any():
             odd = float(third[~np.isin(third, (0, 1, 2))][0])
             raise refusal(source, "keypoints", f"v = {odd:g}", "0, 1, 2, or a confidence")
-        points, confidence = as_confidences(values)
-        return points, confidence, np.zeros(third.shape, dtype=np.bool_)
+        return as_confidences(values)
     points = values[..., :2].copy()
     points[third == 0] = np.nan
-    return points, np.full(third.shape, np.nan), third == 1
+    return Parted(points, np.full(third.shape, np.nan), third == 1)
 
 
 COCO_FORMAT: Final = KeyPointFormat(

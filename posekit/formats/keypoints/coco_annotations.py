@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Final
 
 from posekit.formats.given_file import GivenFile
@@ -47,3 +48,29 @@ def annotations_of(given: GivenFile) -> tuple[list[dict[str, Any]], Images]:
 
 def _is_object(entry: Any) -> bool:
     return isinstance(entry, dict)
+
+
+def results_of(
+    given: GivenFile, is_person: Callable[[dict[str, Any]], bool]
+) -> tuple[list[dict[str, Any]], Images]:
+    """Return the people of a flat list, and their pictures.
+
+    Parameters
+    ----------
+    given : GivenFile
+        The file.
+    is_person : callable
+        Tells whether an entry has key points.
+
+    Raises
+    ------
+    InputError
+        Where it is no list of people with key points, or the picture of one is not told.
+    """
+    source, document = given.path, None if given.is_folder else given.document
+    if not isinstance(document, list):
+        raise refusal(source, "", shown(document), "a list of people", "check that it is COCO results")
+    for place, one in enumerate(document):
+        if not _is_object(one) or not is_person(one):
+            raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"')
+    return document, images_from(identities_of(source, "", document))

@@ -13,25 +13,15 @@ from __future__ import annotations
 
 from typing import Final
 
-import numpy as np
-
 from posekit.formats.given_file import GivenFile
-from posekit.formats.keypoints.coco_images import images_from
+from posekit.formats.keypoints.coco_annotations import results_of
 from posekit.formats.keypoints.coco_layout import layout_of
 from posekit.formats.keypoints.coco_parts import is_wholebody
-from posekit.formats.keypoints.coco_people import (
-    as_confidences,
-    by_picture,
-    identities_of,
-    pictures_of,
-    scores_of,
-    tracks_of,
-)
+from posekit.formats.keypoints.coco_people import as_confidences, key_points_of
 from posekit.formats.keypoints.coco_triples import triples
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.skeleton_maps import SkeletonMap
-from posekit.safe_io import refusal, shown
 
 
 def looks_like(given: GivenFile) -> bool:
@@ -57,28 +47,19 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     InputError
         Where it is malformed, or the layout is not clear.
     """
-    source, document = given.path, None if given.is_folder else given.document
-    if not isinstance(document, list):
-        raise refusal(source, "", shown(document), "a list of people", "check that it is COCO results")
-    for place, one in enumerate(document):
-        if not isinstance(one, dict) or "keypoints" not in one:
-            raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"')
-    images = images_from(identities_of(source, "", document))
-    values = triples(source, [one["keypoints"] for one in document], lambda k: f"[{k}].keypoints")
-    points, confidence = as_confidences(values)
+    source = given.path
+    people, images = results_of(given, lambda one: "keypoints" in one)
+    values = triples(source, [one["keypoints"] for one in people], lambda k: f"[{k}].keypoints")
     count = values.shape[1] or (len(layout.points) if layout is not None else 17)
-    frame = pictures_of(source, "", document, images)
-    rows = by_picture(frame, points)
-    return KeyPoints(
+    return key_points_of(
+        source,
+        "",
+        people,
+        images,
+        as_confidences(values),
+        layout_of(source, COCO_RESULTS_FORMAT.name, count, (), layout),
         format=COCO_RESULTS_FORMAT.name,
-        source=str(source),
-        layout=layout_of(source, COCO_RESULTS_FORMAT.name, count, (), layout),
-        pictures=images.names,
-        frame=frame[rows],
-        points=points[rows] if points.size else np.empty((0, count, 2)),
-        confidence=confidence[rows],
-        score=scores_of(source, "", document)[rows],
-        person=tracks_of(source, "", document)[rows],
+        sequence=True,
     )
 
 

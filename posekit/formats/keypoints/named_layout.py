@@ -96,7 +96,7 @@ def by_count(
     if layout is not None:
         if len(layout.points) != count:
             expected = f"{len(layout.points)}, as the skeleton map {cut(layout.name)} has"
-            remedy = "give the map that belongs to the file, with its points in order"
+            remedy = f"leave the map out, or take {usual[count].name if count in usual else 'one of as many'}"
             raise refusal(source, "points", f"{count} a person", expected, remedy)
         return layout
     if count in usual:

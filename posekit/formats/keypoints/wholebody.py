@@ -15,11 +15,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.formats.given_file import GivenFile
-from posekit.formats.keypoints.coco_annotations import ANNOTATIONS_FIELD, annotations_of
-from posekit.formats.keypoints.coco_images import images_from
+from posekit.formats.keypoints.coco_annotations import ANNOTATIONS_FIELD, annotations_of, results_of
 from posekit.formats.keypoints.coco_parts import (
     FLAGGED_POINTS,
     WHOLEBODY_PARTS,
@@ -27,19 +25,13 @@ from posekit.formats.keypoints.coco_parts import (
     is_wholebody,
     joined,
 )
-from posekit.formats.keypoints.coco_people import (
-    as_confidences,
-    by_picture,
-    identities_of,
-    pictures_of,
-    scores_of,
-    tracks_of,
-)
+from posekit.formats.keypoints.coco_people import Parted, as_confidences, key_points_of
 from posekit.formats.keypoints.key_point_format import KeyPointFormat
 from posekit.formats.keypoints.keypoints import KeyPoints
+from posekit.formats.keypoints.named_layout import by_count
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
-from posekit.safe_io import cut, refusal, shown
+from posekit.safe_io import refusal
 
 WHOLEBODY_LAYOUT: Final = "coco_wholebody_133"
 
@@ -68,50 +60,17 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         Where the file is malformed, or the given layout has not 133 points.
     """
     source = given.path
-    found = load_skeleton_map(WHOLEBODY_LAYOUT) if layout is None else layout
-    if len(found.points) != WHOLEBODY_POINTS:
-        raise refusal(
-            source,
-            "points of a person",
-            f"{WHOLEBODY_POINTS}",
-            f"{len(found.points)}, as skeleton map {cut(found.name)} has",
-            f"leave the map out, or take {WHOLEBODY_LAYOUT}",
-        )
-    document = None if given.is_folder else given.document
-    if isinstance(document, list):
-        field, people = "", document
-        for place, one in enumerate(people):
-            if not isinstance(one, dict) or not is_person(one):
-                raise refusal(source, f"[{place}]", shown(one), 'an object with "keypoints"')
-        images = images_from(identities_of(source, field, people))
-    else:
-        field = ANNOTATIONS_FIELD
-        people, images = annotations_of(given)
+    usual = {WHOLEBODY_POINTS: load_skeleton_map(WHOLEBODY_LAYOUT)}
+    found = by_count(WHOLEBODY_POINTS, layout, source, usual)
+    is_results = not given.is_folder and isinstance(given.document, list)
+    field = "" if is_results else ANNOTATIONS_FIELD
+    people, images = results_of(given, is_person) if is_results else annotations_of(given)
     values = joined(source, field, people)
-    frame = pictures_of(source, field, people, images)
-    if isinstance(document, list):
-        points, confidence = as_confidences(values)
-        occluded = np.zeros(confidence.shape, dtype=np.bool_)
-    else:
-        points, confidence, occluded = _flagged(source, values)
-    rows = by_picture(frame, points)
-    return KeyPoints(
-        format=WHOLEBODY_FORMAT.name,
-        source=str(source),
-        sequence=False,
-        layout=found,
-        pictures=images.names,
-        size=images.size,
-        frame=frame[rows],
-        points=points[rows],
-        confidence=confidence[rows],
-        occluded=occluded[rows],
-        score=scores_of(source, field, people)[rows],
-        person=tracks_of(source, field, people)[rows],
-    )
+    parted = as_confidences(values) if is_results else _flagged(source, values)
+    return key_points_of(source, field, people, images, parted, found, format=WHOLEBODY_FORMAT.name)
 
 
-def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _flagged(source: Path, values: Array) -> Parted:
     """Part triples into points, confidences, and which points are hidden."""
     third = values[..., 2]
     if not ((third >= 0) & (third <= 2)).all():
@@ -127,7 +86,7 @@ def _flagged(source: Path, values: Array) -> tuple[Array, Array, NDArray[np.bool
     confidence = np.where(fraction & ~np.isnan(points[..., 0]), third, np.nan)
     occluded = (third == 1) & ~fraction
     occluded[:, FLAGGED_POINTS:] = False
-    return points, confidence, occluded
+    return Parted(points, confidence, occluded)
 
 
 WHOLEBODY_FORMAT: Final = KeyPointFormat(
