@@ -143,7 +143,7 @@ def test_bad_files_are_refused_in_one_line(tmp_path, change, words):
         (lambda q, time: (q, time[::-1]), "times that ascend"),
         (lambda q, time: (q * 2, time), "a quaternion of length 2"),
         (lambda q, time: (q + np.inf, time), "infinite"),
-        (lambda q, time: (q, time * np.nan), "infinite"),
+        (lambda q, time: (q, time * np.nan), "got nan s; expected finite times"),
         (lambda q, time: (q[:0], time[:0]), "one or more"),
     ],
 )

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple, NoReturn
 
 import numpy as np
 
+from posekit.formats.distinct import check_distinct
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal, shown
 
@@ -197,15 +198,10 @@ class _Parser:
         return self.finished()
 
     def finished(self) -> Hierarchy:
-        names = [joint.name for joint in self.joints]
-        if len(set(names)) != len(names):
-            seen: set[str] = set()
-            twice = next(name for name in names if name in seen or seen.add(name))  # type: ignore[func-returns-value]
-            raise refusal(
-                self.path, "joints", f"{shown(twice)} twice", "each name once", "rename one of the two"
-            )
+        names = tuple(joint.name for joint in self.joints)
+        check_distinct(self.path, "joints", names)
         return Hierarchy(
-            names=tuple(joint.name for joint in self.joints),
+            names=names,
             parents=tuple(joint.parent for joint in self.joints),
             offsets=np.array([joint.offset for joint in self.joints], dtype=np.float64),
             channels=tuple(tuple(joint.channels or ()) for joint in self.joints),

@@ -22,6 +22,7 @@ from posekit.body import Figure
 from posekit.formats.motion.bvh_angles import euler_angles, euler_rotation
 from posekit.formats.motion.motion import UP_DIRECTIONS
 from posekit.formats.motion.motion_axes import up_rotation
+from posekit.formats.motion.motion_checks import check_time, check_turns
 from posekit.geometry import Array, rotation_from_quaternion, unit
 from posekit.safe_io import refusal, shown
 from posekit.skeleton import DOFS, HEAD_POINTS, POINT, SIDES
@@ -131,28 +132,12 @@ def checked(path: str | Path, figure: Figure, q: Array, time: Array | None = Non
             f"a torso {np.abs(q[frame, :3]).max():g} m away",
             f"{FARTHEST_PERSON_METRES:g} m at most",
         )
-    off = np.abs(np.linalg.norm(q[:, 3:7], axis=1) - 1)
-    if not (off < 1e-6).all():
-        frame = int(np.argmax(off))
-        length = f"a quaternion of length {np.linalg.norm(q[frame, 3:7]):g}"
-        raise refusal(path, f"q[{frame}]", length, "1", "normalise q[3:7]")
+    check_turns(path, q)
     if up not in UP_DIRECTIONS:
         raise refusal(path, "up", shown(up), " or ".join(UP_DIRECTIONS), "state which axis of q points up")
     if time is not None:
         check_time(path, np.asarray(time, dtype=np.float64), len(q))
     return q
-
-
-def check_time(path: str | Path, time: Array, frames: int) -> None:
-    """Refuse times that are not one a frame, finite and ascending."""
-    if time.shape != (frames,):
-        raise refusal(
-            path, "time", f"shape {time.shape}", f"({frames},), one a frame", "give a time for each row"
-        )
-    if not np.isfinite(time).all() or not (np.diff(time) > 0).all():
-        frame = int(np.argmax(~np.isfinite(time) | np.r_[False, ~(np.diff(time) > 0)]))
-        expected = "finite times, each after the one before"
-        raise refusal(path, f"time[{frame}]", f"{time[frame]:g} s", expected, "put the frames in order")
 
 
 def place(figure: Figure, q: Array, up: str = "+z") -> PlacedBody:

@@ -16,6 +16,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.formats.distinct import check_distinct
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.c3d_content import MAX_VALUES, C3dContent, decode_c3d
 from posekit.formats.motion.c3d_parameters import Parameter
@@ -156,11 +157,7 @@ def _names(path: str | Path, parameters: Mapping[str, Parameter], count: int) ->
         k += 1
     names = [*names, *[""] * (count - len(names))][:count]
     names = [name or f"unnamed_{k}" for k, name in enumerate(names, 1)]
-    if len(set(names)) != count:
-        twice = next(name for name in names if names.count(name) > 1)
-        raise refusal(
-            path, "POINT:LABELS", f"{shown(twice)} twice", "each name once", "rename one of the two"
-        )
+    check_distinct(path, "POINT:LABELS", names)
     return tuple(names)
 
 

@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.distinct import check_distinct
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
@@ -50,16 +51,7 @@ def read_csv_motion(path: str | Path, unit: str | None = None) -> Motion:
     InputError
         Where it is no such table, a row is short, a cell no number, or the frames are out of order.
     """
-    columns = read_columns(path, number_columns)
-    if "survivor" in columns:
-        raise refusal(
-            path,
-            "columns",
-            "survivor",
-            "points of one posture a frame",
-            "read it as survivors, or choose one of each frame",
-        )
-    return motion_of(columns, str(path), unit)
+    return motion_of(read_columns(path, number_columns), str(path), unit)
 
 
 def write_csv_motion(path: str | Path, motion: Motion, *, long: bool = False) -> None:
@@ -142,9 +134,7 @@ def _check_names(path: str | Path, names: Sequence[str]) -> None:
         raise refusal(
             path, "", f"{len(names):,} columns", f"1 to {MAX_COLUMNS:,}", "check that it is a table"
         )
-    if len(set(names)) != len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise refusal(path, "columns", f"{shown(twice)} twice", "each once", "rename one of the two")
+    check_distinct(path, "columns", names)
 
 
 def _chunk(

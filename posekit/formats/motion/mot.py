@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from posekit.formats.motion.motion_checks import check_time, check_turns
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, rotation_from_quaternion
 from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_text
@@ -144,22 +145,12 @@ def checked_configurations(path: str | Path, figure: Figure, q: Array, time: Arr
     if q.ndim != 2 or q.shape[1] != figure.model.nq or time.shape != (len(q),) or len(q) == 0:
         got = f"q of shape {q.shape}, time of shape {time.shape}"
         raise refusal(path, "q", got, f"(T, {figure.model.nq}) and (T,), T of one or more", "reshape them")
-    if np.isinf(q).any() or not np.isfinite(time).all():
-        raise refusal(
-            path, "q", "an infinite number, or a time that is none", "finite numbers", "correct them"
-        )
-    length = np.linalg.norm(q[:, 3:7], axis=1)
-    if (np.abs(length - 1) > 1e-6).any():
-        frame = int(np.argmax(np.abs(length - 1) > 1e-6))
-        got = f"a quaternion of length {length[frame]:g}"
-        raise refusal(path, f"frame {frame}", got, "length 1", "normalise q[3:7]")
-    back = np.diff(time) <= 0
-    if back.any():
-        frame = int(np.argmax(back)) + 1
-        got = f"time {time[frame]:g} s after {time[frame - 1]:g} s"
-        raise refusal(path, f"frame {frame}", got, "times that ascend", "put the frames in order, each once")
+    if np.isinf(q).any():
+        raise refusal(path, "q", "an infinite number", "finite numbers")
+    check_turns(path, q)
+    check_time(path, time, len(q))
     q = q.copy()
-    q[:, 3:7] /= length[:, None]
+    q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1)[:, None]
     return q, time
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
+from posekit.formats.distinct import check_distinct
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal, shown
 
@@ -78,9 +79,7 @@ class Motion:
             )
         if not np.isfinite(time).all() or not (np.isfinite(self.rate) and self.rate > 0):
             raise refusal(self.source, "rate", shown(float(self.rate)), "a positive rate, finite times")
-        if len(set(self.names)) != len(self.names):
-            twice = next(name for name in self.names if self.names.count(name) > 1)
-            raise refusal(self.source, "names", f"{shown(twice)} twice", "each once", "rename one of the two")
+        check_distinct(self.source, "names", self.names)
         unknown = np.isnan(points)
         bad = np.isinf(points) | (unknown ^ unknown.all(axis=-1, keepdims=True))
         if bad.any():

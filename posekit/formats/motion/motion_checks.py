@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from posekit.formats.motion.motion import Motion
+from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
 SMALLEST_SPAN_METRES, WIDEST_SPAN_METRES = 0.1, 20.0
@@ -43,3 +44,25 @@ def check_size(motion: Motion) -> None:
             f"{SMALLEST_SPAN_METRES:g} to {WIDEST_SPAN_METRES:g} m",
             "state the unit in which the file is: m, cm, mm or in",
         )
+
+
+def check_turns(path: str | Path, q: Array) -> None:
+    """Refuse configurations (T, nq) whose quaternion is not of unit length; one that is not known is none."""
+    length = np.linalg.norm(q[:, 3:7], axis=1)
+    off = np.abs(length - 1) >= 1e-6
+    if off.any():
+        frame = int(np.argmax(off))
+        got = f"a quaternion of length {length[frame]:g}"
+        raise refusal(path, f"q[{frame}]", got, "1", "normalise q[3:7]")
+
+
+def check_time(path: str | Path, time: Array, frames: int) -> None:
+    """Refuse times that are not one a frame, finite and ascending."""
+    if time.shape != (frames,):
+        raise refusal(
+            path, "time", f"shape {time.shape}", f"({frames},), one a frame", "give a time for each row"
+        )
+    if not np.isfinite(time).all() or not (np.diff(time) > 0).all():
+        frame = int(np.argmax(~np.isfinite(time) | np.r_[False, ~(np.diff(time) > 0)]))
+        expected = "finite times that ascend, each after the one before"
+        raise refusal(path, f"time[{frame}]", f"{time[frame]:g} s", expected, "put the frames in order")

@@ -72,9 +72,12 @@ def motion_of(
     Raises
     ------
     InputError
-        Where there is no ``time``, no point with three coordinates, frames are out of order, or a point comes twice
-        in a frame.
+        Where they are of sets of survivors, there is no ``time``, no point with three coordinates, frames are out of
+        order, or a point comes twice in a frame.
     """
+    if "survivor" in columns:
+        remedy = "read it as survivors, or choose one of each frame"
+        raise refusal(source, "columns", "survivor", "points of one posture a frame", remedy)
     if "time" not in columns:
         raise refusal(source, "columns", _listed(columns), "a column time, seconds", "add it")
     if len(columns["time"]) == 0:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO, Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -52,7 +52,6 @@ def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
         check_rows(path, file.metadata.num_rows, file.metadata.num_columns)
         columns = numpy_columns(path, file.read())
         up = _up(file.schema_arrow)
-    _refuse_survivors(path, columns)
     return motion_of(columns, str(path), unit, up)
 
 
@@ -77,7 +76,6 @@ def read_parquet_pieces(path: str | Path, unit: str | None = None) -> Iterator[M
             group = file.metadata.row_group(index)
             check_rows(path, group.num_rows, file.metadata.num_columns)
             columns = numpy_columns(path, file.read_row_group(index))
-            _refuse_survivors(path, columns)
             columns = (
                 {name: np.concatenate([held[name], columns[name]]) for name in columns} if held else columns
             )
@@ -145,7 +143,7 @@ def opened(path: str | Path) -> Iterator[Any]:
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
     with open_file(path, limit=MAX_BYTES) as file:
         try:
-            yield _parquet_file(pq, file)
+            yield pq.ParquetFile(file)
         except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
             reason = cut(one_line(str(error)) or type(error).__name__)
             raise refusal(
@@ -185,10 +183,6 @@ def check_rows(path: str | Path, rows: int, columns: int) -> None:
         )
 
 
-def _parquet_file(pq: Any, file: BinaryIO) -> Any:
-    return pq.ParquetFile(file)
-
-
 def _arrow(pa: Any, name: str, values: Column) -> Any:
     if values.dtype.kind == "U":
         return pa.array(values.tolist(), pa.string()).dictionary_encode()
@@ -198,14 +192,6 @@ def _arrow(pa: Any, name: str, values: Column) -> Any:
 def _up(schema: Any) -> str:
     found = (schema.metadata or {}).get(b"up", b"").decode("utf-8", "replace")
     return found if found in UP_DIRECTIONS else ""
-
-
-def _refuse_survivors(path: str | Path, columns: Mapping[str, Column]) -> None:
-    if "survivor" in columns:
-        expected = "points of one posture a frame"
-        raise refusal(
-            path, "columns", "survivor", expected, "read it as survivors, or choose one of each frame"
-        )
 
 
 PARQUET_FORMAT: Final = MotionFormat(
