@@ -117,7 +117,7 @@ def test_the_header_is_opensims(tmp_path):
     [
         (lambda text: text.replace("endheader", "end"), "no endheader"),
         (lambda text: text[: text.rindex("\n", 0, -1)], "nrows: got 2"),
-        (lambda text: text[:-20], "line 14: got 28 numbers|nrows"),
+        (lambda text: text[:-20], "line 14: got 28 columns|nrows"),
         (lambda text: text.replace("torso_rz\t", "torso_r\t"), r"no torso_rz; .*did you mean torso_r"),
         (lambda text: text.replace("nColumns=29", "nColumns=30"), "ncolumns: got 29"),
         (lambda text: text[: text.rindex("\t")] + "\tx\n", 'got "x"'),

@@ -17,7 +17,6 @@ lengths are not in the file: keep its URDF beside it.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -26,6 +25,7 @@ import numpy as np
 
 from posekit.formats.motion.motion_checks import check_time, check_turns
 from posekit.formats.motion.motion_format import MotionFormat
+from posekit.formats.motion.number_rows import numbers_of
 from posekit.geometry import Array, coordinate_rotation, quaternion_from_rotation, rotation_from_quaternion
 from posekit.safe_io import nearest, one_line, read_text, refusal, shown, write_text
 
@@ -192,27 +192,9 @@ def _read_table(path: str | Path) -> tuple[list[str], Array, bool]:
             raise refusal(
                 path, field, got, "as many as the header says", "the file is cut off, or correct it"
             )
-    rows = []
-    for k, line in body:
-        row = [_number(cell) for cell in line.split()]
-        if len(row) != len(names) or any(cell is None for cell in row):
-            bad = next((cell for cell, value in zip(line.split(), row, strict=True) if value is None), None)
-            got = shown(bad) if bad is not None else f"{len(row)} numbers"
-            raise refusal(
-                path, f"line {k}", got, f"{len(names)} numbers, as there are columns", "correct the row"
-            )
-        rows.append(row)
-    if not rows:
-        raise refusal(path, "", "no frames", "a row a frame", "check how it was written")
-    return names, np.array(rows, dtype=np.float64), header.get("indegrees", "yes").casefold() != "no"
-
-
-def _number(cell: str) -> float | None:
-    try:
-        value = float(cell)
-    except ValueError:
-        return None
-    return None if math.isinf(value) or "_" in cell else value
+    expected = f"{len(names)}, as there are names"
+    values = numbers_of(path, body, lambda _, line: line.split(), len(names), expected)
+    return names, values, header.get("indegrees", "yes").casefold() != "no"
 
 
 MOT_FORMAT: Final = MotionFormat(

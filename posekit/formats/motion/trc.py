@@ -21,7 +21,7 @@ from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_axes import with_up
 from posekit.formats.motion.motion_checks import the_one_clip
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
-from posekit.geometry import Array
+from posekit.formats.motion.number_rows import numbers_of
 from posekit.safe_io import read_text, refusal, shown, write_text
 
 MAX_BYTES: Final = 500_000_000
@@ -71,10 +71,17 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
             f"{header.frames}, as the header says",
             "the file is cut off, or correct the header",
         )
-    values = _rows(path, body, 2 + 3 * len(header.names), text.endswith(("\n", "\r")))
-    if np.isnan(values[:, :2]).any() or np.isinf(values).any():
-        row = int(np.argmax(np.isnan(values[:, :2]).any(axis=1) | np.isinf(values).any(axis=1)))
-        raise refusal(path, f"line {body[row][0]}", "a number that is missing or infinite", "finite numbers")
+    width = 2 + 3 * len(header.names)
+    cut_off = body[-1][0] if body and not text.endswith(("\n", "\r")) else 0
+
+    def cells_of(number: int, line: str) -> list[str]:
+        return _row(line, width, number != cut_off)
+
+    values = numbers_of(path, body, cells_of, width, f"{width}, three a marker and two")
+    vague = np.isnan(values[:, :2]).any(axis=1)
+    if vague.any():
+        line = body[int(np.argmax(vague))][0]
+        raise refusal(path, f"line {line}", "a frame or time that is missing", "both in every row")
     back = np.flatnonzero(np.diff(values[:, 0]) <= 0)
     if len(back):
         row = int(back[0]) + 1
@@ -172,43 +179,14 @@ def _header(path: str | Path, lines: Sequence[str]) -> _Header:
     return _Header(names=names, rate=rate, unit=unit, frames=_whole(path, fields, "NumFrames", 0), rows=5)
 
 
-def _rows(path: str | Path, body: Sequence[tuple[int, str]], width: int, ended: bool) -> Array:
-    """Turn lines into numbers (T, width), NaN for empty cells; `ended` says that the last line is whole."""
-    if not body:
-        raise refusal(path, "", "no frames", "a row a frame", "check how it was written")
-    last = body[-1][0] if not ended else 0
-    chunks = [
-        _chunk(path, body[start : start + _CHUNK], width, last) for start in range(0, len(body), _CHUNK)
-    ]
-    return np.concatenate(chunks)
-
-
-def _chunk(path: str | Path, body: Sequence[tuple[int, str]], width: int, last: int) -> Array:
-    rows = []
-    for number, line in body:
-        cells = line.split("\t")
-        if len(cells) > width and not any(cell.strip() for cell in cells[width:]):
-            del cells[width:]
-        elif (
-            len(cells) < width and len(cells) % 3 == 2 and number != last
-        ):  # editors strip tabs from line ends
-            cells += [""] * (width - len(cells))
-        if len(cells) != width:
-            got = f"{len(cells)} columns"
-            raise refusal(path, f"line {number}", got, f"{width}, three a marker and two", "complete the row")
-        rows.append(cells)
-    if not any("_" in line for _, line in body):  # float() reads 1_000 as a thousand
-        try:
-            return np.array([[float(cell or "nan") for cell in row] for row in rows])
-        except ValueError:
-            pass  # white space, or something to name
-    rows = [[cell.strip() for cell in row] for row in rows]
-    for (number, _), row in zip(body, rows, strict=True):
-        for column, cell in enumerate(row, 1):
-            if cell and cell.casefold() != "nan" and _float(cell) is None:
-                where = f"line {number}, column {column}"
-                raise refusal(path, where, shown(cell), "a finite number, or nothing where it is missing")
-    return np.array([[float(cell or "nan") for cell in row] for row in rows])
+def _row(line: str, width: int, whole: bool) -> list[str]:
+    """Part a row into cells; one that is not `whole` is the last of a file that may be cut off."""
+    cells = line.split("\t")
+    if len(cells) > width and not any(cell.strip() for cell in cells[width:]):
+        return cells[:width]
+    if len(cells) < width and len(cells) % 3 == 2 and whole:  # editors strip tabs from line ends
+        cells += [""] * (width - len(cells))
+    return cells
 
 
 def _cells(line: str) -> list[str]:
