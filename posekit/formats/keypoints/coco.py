@@ -88,13 +88,9 @@ def _of_one_kind(
     if layout is not None:
         bodies = [kind for kind in bodies if _places(source, kind, layout)]
     if len(bodies) != 1:
-        raise refusal(
-            source,
-            "categories",
-            f"{len(kinds)} kinds of people with points of their own",
-            "one kind, with the points of a body",
-            "split the file by categories, or give a map that fits one with --skeleton",
-        )
+        got = f"{len(kinds)} kinds of people with points of their own"
+        remedy = "split the file by categories, or give a map that fits one with --skeleton"
+        raise refusal(source, "categories", got, "one kind, with the points of a body", remedy)
     return [one for one in people if names.get(one.get("category_id"), ()) == bodies[0]], bodies[0]
 
 

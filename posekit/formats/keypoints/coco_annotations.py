@@ -25,22 +25,13 @@ def annotations_of(given: GivenFile) -> tuple[list[dict[str, Any]], Images]:
     listed = document.get(ANNOTATIONS_FIELD) if isinstance(document, dict) else None
     if not isinstance(document, dict) or not isinstance(listed, list) or not all(map(_is_object, listed)):
         got = shown(document if listed is None else listed)
-        raise refusal(
-            source,
-            ANNOTATIONS_FIELD,
-            got,
-            f'{{"images": [...], "{ANNOTATIONS_FIELD}": [...]}}',
-            "check that it is COCO's",
-        )
+        expected = f'{{"images": [...], "{ANNOTATIONS_FIELD}": [...]}}'
+        raise refusal(source, ANNOTATIONS_FIELD, got, expected, "check that it is COCO's")
     people = [one for one in listed if "keypoints" in one and not one.get("iscrowd")]
     if listed and not any("keypoints" in one for one in listed):
-        raise refusal(
-            source,
-            f"{ANNOTATIONS_FIELD}[0]",
-            shown(listed[0]),
-            'a person with "keypoints"',
-            "take the file of key points: person_keypoints_….json, not instances_….json",
-        )
+        expected = 'a person with "keypoints"'
+        remedy = "take the file of key points: person_keypoints_….json, not instances_….json"
+        raise refusal(source, f"{ANNOTATIONS_FIELD}[0]", shown(listed[0]), expected, remedy)
     if "images" in document:
         return people, images_of(source, document["images"])
     return people, images_from(identities_of(source, ANNOTATIONS_FIELD, people))

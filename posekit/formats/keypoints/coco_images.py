@@ -48,13 +48,8 @@ def images_of(source: Path, images: Any) -> Images:
         if type(identity) not in (int, str):
             raise refusal(source, f"images[{place}].id", shown(identity), "a number")
         if identity in index:
-            raise refusal(
-                source,
-                f"images[{place}].id",
-                f"{shown(identity)} twice",
-                "each id once",
-                "remove one of them",
-            )
+            got = f"{shown(identity)} twice"
+            raise refusal(source, f"images[{place}].id", got, "each id once", "remove one of them")
         index[identity] = place
     size = np.full((len(images), 2), np.nan)
     for place, one in enumerate(images):

@@ -41,13 +41,8 @@ def layout_of(
         Where names and number do not fit together or to the given map, and where no map fits, or several.
     """
     if names and len(names) != count:
-        raise refusal(
-            source,
-            "categories",
-            f"{len(names)} names for {count} points",
-            "a name for each",
-            "correct the names",
-        )
+        got = f"{len(names)} names for {count} points"
+        raise refusal(source, "categories", got, "a name for each", "correct the names")
     if given is not None:
         return _as_given(source, count, names, given)
     if names:
@@ -56,20 +51,12 @@ def layout_of(
     if len(candidates) == 1:
         return candidates[0]
     if candidates:
-        raise refusal(
-            source,
-            "format",
-            f"{count} points that could be of several orders",
-            " or ".join(one.name for one in candidates),
-            f"say which with --skeleton, as --skeleton {candidates[0].name}",
-        )
-    raise refusal(
-        source,
-        "points of a person",
-        f"{count} without names",
-        "a number that a built-in skeleton map has",
-        "give a map that names them in order with --skeleton",
-    )
+        got = f"{count} points that could be of several orders"
+        remedy = f"say which with --skeleton, as --skeleton {candidates[0].name}"
+        raise refusal(source, "format", got, " or ".join(one.name for one in candidates), remedy)
+    expected = "a number that a built-in skeleton map has"
+    remedy = "give a map that names them in order with --skeleton"
+    raise refusal(source, "points of a person", f"{count} without names", expected, remedy)
 
 
 def _as_given(source: str | Path, count: int, names: Sequence[str], given: SkeletonMap) -> SkeletonMap:
@@ -79,13 +66,9 @@ def _as_given(source: str | Path, count: int, names: Sequence[str], given: Skele
     if len(given.points) == count:
         return given
     missing = [name for name in given.needed if plain(name) not in known]
-    raise refusal(
-        source,
-        "points of a person",
-        f"{count} points" + (f" without {', '.join(missing[:3])}" if names else " without names"),
-        f"what skeleton map {cut(given.name)} names ({len(given.points) or len(given.needed)} points)",
-        "choose the map of the detector's model",
-    )
+    got = f"{count} points" + (f" without {', '.join(missing[:3])}" if names else " without names")
+    expected = f"what skeleton map {cut(given.name)} names ({len(given.points) or len(given.needed)} points)"
+    raise refusal(source, "points of a person", got, expected, "choose the map of the detector's model")
 
 
 def _by_names(source: str | Path, names: Sequence[str]) -> SkeletonMap:

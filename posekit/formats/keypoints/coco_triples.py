@@ -47,13 +47,9 @@ def triples(source: str | Path, lists: Sequence[Any], place: Callable[[int], str
                 source, place(index), got, "a list [x, y, v, x, y, v, …]", "check how it was written"
             )
         if len(values) != len(lists[0]):
-            raise refusal(
-                source,
-                place(index),
-                f"{len(values) // 3} points",
-                f"{len(lists[0]) // 3}, as in {place(0)}",
-                "split the file by the kind of detector",
-            )
+            expected = f"{len(lists[0]) // 3}, as in {place(0)}"
+            remedy = "split the file by the kind of detector"
+            raise refusal(source, place(index), f"{len(values) // 3} points", expected, remedy)
     kinds = set(map(type, chain.from_iterable(lists)))
     if not kinds <= NUMBER_TYPES | {type(None)}:
         raise _no_number(source, lists, place)

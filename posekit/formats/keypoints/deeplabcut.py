@@ -45,13 +45,8 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         Where it is HDF5, no such table, or its names fit no skeleton map.
     """
     if given.suffix in HDF5_SUFFIXES:
-        raise refusal(
-            given.path,
-            "",
-            "HDF5",
-            "DeepLabCut's CSV",
-            "save it with deeplabcut.analyze_videos_converth5_to_csv, or pandas.read_hdf(…).to_csv(…)",
-        )
+        remedy = "save it with deeplabcut.analyze_videos_converth5_to_csv, or pandas.read_hdf(…).to_csv(…)"
+        raise refusal(given.path, "", "HDF5", "DeepLabCut's CSV", remedy)
     reader = csv.reader(given.text.lstrip().splitlines())
     try:
         header, lead = _header(given.path, reader)

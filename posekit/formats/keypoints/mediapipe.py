@@ -86,13 +86,9 @@ def _in_pixels(found: KeyPoints) -> KeyPoints:
     hips = found.points[:, HIP_LANDMARKS].mean(axis=1)
     hips = hips[~np.isnan(hips[:, 0])]
     if len(hips) and float(np.median(np.abs(hips))) < WORLD_MIDDLE_WITHIN:
-        raise refusal(
-            found.source,
-            "",
-            "landmarks around the middle of the hips: world landmarks, metres",
-            "landmarks in the picture",
-            "save pose_landmarks, not pose_world_landmarks",
-        )
+        got = "landmarks around the middle of the hips: world landmarks, metres"
+        remedy = "save pose_landmarks, not pose_world_landmarks"
+        raise refusal(found.source, "", got, "landmarks in the picture", remedy)
     size = found.size[found.frame]
     if np.isnan(size).any():
         return found

@@ -133,13 +133,8 @@ def add_document(rows: DetectionRows, document: object, name: str) -> None:
     if not (world or seen or rows.points):
         raise refusal(rows.source, "", shown(document), "frames with pose_landmarks", "save them so")
     if world and not seen:
-        raise refusal(
-            rows.source,
-            "",
-            "world landmarks alone: metres around the hips",
-            "landmarks in the picture",
-            "save pose_landmarks too",
-        )
+        got = "world landmarks alone: metres around the hips"
+        raise refusal(rows.source, "", got, "landmarks in the picture", "save pose_landmarks too")
     note_times(rows, labels, times, unit)
 
 
@@ -206,13 +201,9 @@ def _add_person(rows: DetectionRows, label: str, person: object, place: str) -> 
         raise refusal(rows.source, place, shown(person), expected, "save pose_landmarks")
     numbered = [_index(entry) for entry in person]
     if len(person) != len(LANDMARK_NAMES) and None in numbered:
-        raise refusal(
-            rows.source,
-            place,
-            f"{len(person)} landmarks without names",
-            f"{len(LANDMARK_NAMES)}, or a name or id each",
-            "save all landmarks of the full-body model",
-        )
+        expected = f"{len(LANDMARK_NAMES)}, or a name or id each"
+        remedy = "save all landmarks of the full-body model"
+        raise refusal(rows.source, place, f"{len(person)} landmarks without names", expected, remedy)
     if None in numbered:
         numbered = list(range(len(LANDMARK_NAMES)))
     points, sure = nobody()

@@ -110,13 +110,8 @@ def add_table(rows: DetectionRows, text: str) -> None:
         return
     columns = _columns(header)
     if not columns:
-        raise refusal(
-            rows.source,
-            "line 1",
-            shown(",".join(header)),
-            "columns as nose_x, nose_y, nose_visibility, or frame, landmark, x, y, visibility",
-            "name the columns so",
-        )
+        expected = "columns as nose_x, nose_y, nose_visibility, or frame, landmark, x, y, visibility"
+        raise refusal(rows.source, "line 1", shown(",".join(header)), expected, "name the columns so")
     _add_wide(rows, header, columns, text)
 
 

@@ -54,13 +54,9 @@ def add_instances(rows: DetectionRows, label: str, instances: list[Any], field: 
         points = pairs(instance["keypoints"], rows.source, f"{place}.keypoints")
         if points.shape[1] != 2:
             what = "three: points in space" if points.shape[1] == 3 else str(points.shape[1])
-            raise refusal(
-                rows.source,
-                f"{place}.keypoints",
-                f"{what} coordinates a point",
-                "two, pixels",
-                "save the predictions of a 2-D model: a lifted pose is no picture",
-            )
+            got = f"{what} coordinates a point"
+            remedy = "save the predictions of a 2-D model: a lifted pose is no picture"
+            raise refusal(rows.source, f"{place}.keypoints", got, "two, pixels", remedy)
         scores = _scores(rows.source, f"{place}.keypoint_scores", instance["keypoint_scores"], len(points))
         points = np.where((scores <= 0)[:, None], np.nan, points)
         rows.add(label, points, scores, person=instance.get("track_id"), score=instance.get("bbox_score"))

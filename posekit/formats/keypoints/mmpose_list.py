@@ -60,13 +60,9 @@ def _layout(rows: DetectionRows, layout: SkeletonMap | None) -> SkeletonMap:
         if share > HEAD_H36M:
             return load_skeleton_map("h36m_17")
         if not share < HEAD_COCO:
-            raise refusal(
-                rows.source,
-                "points",
-                "17 a person, unnamed",
-                "points that are clearly coco_17 or h36m_17",
-                "say which with --skeleton coco_17 or --skeleton h36m_17",
-            )
+            expected = "points that are clearly coco_17 or h36m_17"
+            remedy = "say which with --skeleton coco_17 or --skeleton h36m_17"
+            raise refusal(rows.source, "points", "17 a person, unnamed", expected, remedy)
     usual = {number: load_skeleton_map(name) for number, name in BY_COUNT.items()}
     return by_count(rows.count, layout, rows.source, usual)
 

@@ -52,13 +52,10 @@ def by_names(names: Sequence[str], layout: SkeletonMap | None, source: str | Pat
         if len(laid.landmarks) >= MIN_FITTING_LANDMARKS:
             return replace(laid, name=f"{len(names)} points by the names of {candidate.name}")
     fitting = layout.name if layout else "any built-in skeleton map"
-    raise refusal(
-        source,
-        "points",
-        f"names as {', '.join(shown(name) for name in list(names)[:4])}",
-        f"at least {MIN_FITTING_LANDMARKS} landmarks by the names of {fitting}",
-        "write a skeleton map (TOML) that says which point is what, and give it with --skeleton",
-    )
+    got = f"names as {', '.join(shown(name) for name in list(names)[:4])}"
+    expected = f"at least {MIN_FITTING_LANDMARKS} landmarks by the names of {fitting}"
+    remedy = "write a skeleton map (TOML) that says which point is what, and give it with --skeleton"
+    raise refusal(source, "points", got, expected, remedy)
 
 
 def _in_part(own: dict[str, str]) -> list[SkeletonMap]:
@@ -102,10 +99,6 @@ def by_count(
     if count in usual:
         return usual[count]
     others = ", ".join(one.name for one in find_by_order(count)) or "none that is built in"
-    raise refusal(
-        source,
-        "points",
-        f"{count} a person, unnamed",
-        f"{', '.join(str(one) for one in sorted(usual))} points",
-        f"say which with --skeleton (with {count} points: {others})",
-    )
+    expected = f"{', '.join(str(one) for one in sorted(usual))} points"
+    remedy = f"say which with --skeleton (with {count} points: {others})"
+    raise refusal(source, "points", f"{count} a person, unnamed", expected, remedy)

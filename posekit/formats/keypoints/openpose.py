@@ -64,13 +64,8 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
             field = f"{where}people[{number}]"
             values = _points(one)
             if values is None:
-                raise refusal(
-                    given.path,
-                    field,
-                    shown(one),
-                    f'an object with "{POINTS_FIELDS[0]}"',
-                    "check how it was written",
-                )
+                expected = f'an object with "{POINTS_FIELDS[0]}"'
+                raise refusal(given.path, field, shown(one), expected, "check how it was written")
             people += 1
             if values != []:
                 lists.append(values)
@@ -78,13 +73,9 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
                 person.append(_identity(given.path, f"{field}.person_id", one))
                 places.append(f"{field}.{POINTS_FIELDS[0]}")
     if people and not lists:
-        raise refusal(
-            given.path,
-            "people",
-            f"{people} without points of the body",
-            f'points in "{POINTS_FIELDS[0]}"',
-            "run OpenPose with its body detector (not --body 0)",
-        )
+        got = f"{people} without points of the body"
+        remedy = "run OpenPose with its body detector (not --body 0)"
+        raise refusal(given.path, "people", got, f'points in "{POINTS_FIELDS[0]}"', remedy)
     values = triples(given.path, lists, places.__getitem__)
     points, confidence, normalised = _known(values)
     found = _layout(given.path, points, layout)
@@ -105,13 +96,9 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
 def _people(path: Path, document: Any) -> list[Any]:
     people = document.get("people") if isinstance(document, dict) else None
     if not isinstance(people, list):
-        raise refusal(
-            path,
-            "people",
-            shown(document if people is None else people),
-            '{"people": [...]} as OpenPose writes it',
-            "keep files of other formats out of the folder",
-        )
+        got = shown(document if people is None else people)
+        remedy = "keep files of other formats out of the folder"
+        raise refusal(path, "people", got, '{"people": [...]} as OpenPose writes it', remedy)
     return people
 
 
@@ -152,13 +139,9 @@ def _layout(source: Path, points: Array, layout: SkeletonMap | None) -> Skeleton
     found = by_count(points.shape[1], layout, source, usual)
     candidates = tell_apart(points) if layout is None and found is usual[25] and len(points) else [found]
     if len(candidates) > 1:
-        raise refusal(
-            source,
-            "format",
-            "25 points that could be of either order",
-            " or ".join(f"{OPENPOSE_FORMAT.name}-{one.name}" for one in candidates),
-            "say which with --format",
-        )
+        got = "25 points that could be of either order"
+        expected = " or ".join(f"{OPENPOSE_FORMAT.name}-{one.name}" for one in candidates)
+        raise refusal(source, "format", got, expected, "say which with --format")
     return candidates[0]
 
 

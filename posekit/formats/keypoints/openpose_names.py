@@ -35,13 +35,9 @@ def check_one_camera(folder: Path, files: Sequence[Path]) -> None:
     """
     twice = _counted_twice([picture_name(path) for path in files])
     if twice:
-        raise refusal(
-            folder,
-            "",
-            f"{cut(twice[0])} and {cut(twice[1])}: more than one series of pictures",
-            "the pictures of one camera",
-            "put each camera's files into a folder of its own",
-        )
+        got = f"{cut(twice[0])} and {cut(twice[1])}: more than one series of pictures"
+        remedy = "put each camera's files into a folder of its own"
+        raise refusal(folder, "", got, "the pictures of one camera", remedy)
 
 
 def _counted_twice(names: Sequence[str]) -> tuple[str, str] | None:

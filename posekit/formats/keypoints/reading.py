@@ -49,13 +49,9 @@ def read_keypoints(
     if candidates:
         names = " or ".join(one.name for one in candidates)
         raise refusal(path, "format", f"a file that is {names}", "one of them", "say which with --format")
-    raise refusal(
-        path,
-        "format",
-        _described(given),
-        f"key points as {', '.join(key_point_formats())}",
-        "say which with --format to learn what does not fit",
-    )
+    expected = f"key points as {', '.join(key_point_formats())}"
+    remedy = "say which with --format to learn what does not fit"
+    raise refusal(path, "format", _described(given), expected, remedy)
 
 
 def _candidates(given: GivenFile) -> list[KeyPointFormat]:

@@ -108,13 +108,9 @@ class DetectionRows:
         The person's number and score are as the file has them, or None: what is no number is not known.
         """
         if len(points) != (self.count or len(points)):
-            raise refusal(
-                self.source,
-                f"picture {cut(str(label))}",
-                f"a person of {len(points)} points after one of {self.count}",
-                "the same number for all",
-                "read the files of each model by themselves",
-            )
+            got = f"a person of {len(points)} points after one of {self.count}"
+            remedy = "read the files of each model by themselves"
+            raise refusal(self.source, f"picture {cut(str(label))}", got, "the same number for all", remedy)
         missing = np.asarray(np.isnan(points).any(axis=-1))
         self.labels.append(self.picture(label))
         self.points.append(np.where(missing[:, None], np.nan, points))

@@ -70,13 +70,9 @@ def track(
     busiest = int(np.bincount(frames).max())
     if busiest > MAX_PEOPLE:
         picture = keypoints.pictures[int(np.argmax(np.bincount(frames)))]
-        raise refusal(
-            keypoints.source,
-            f"picture {picture}",
-            f"{busiest:,} people",
-            f"at most {MAX_PEOPLE:,} to track",
-            "leave out the unsure ones",
-        )
+        expected = f"at most {MAX_PEOPLE:,} to track"
+        remedy = "leave out the unsure ones"
+        raise refusal(keypoints.source, f"picture {picture}", f"{busiest:,} people", expected, remedy)
     points = keypoints.landmarks[unknown][:, COMPARED_LANDMARKS]
     areas = area(points)
     person = keypoints.person.copy()

@@ -52,13 +52,9 @@ def guessed_unit(file: BvhFile, points: Array) -> BvhUnit:
     name = min(METRES_IN_BVH_UNIT, key=lambda unit: abs(np.log(max(ratio[unit], 1e-300))))
     metres = length * METRES_IN_BVH_UNIT[name]
     if not SMALLEST_BODY_METRES <= metres <= LARGEST_BODY_METRES:
-        raise refusal(
-            file.path,
-            "unit",
-            f"a skeleton whose longest chain of bones has {length:.4g} units",
-            f"about {BODY_METRES:g} m in {', '.join(METRES_IN_BVH_UNIT)}",
-            "state the unit",
-        )
+        got = f"a skeleton whose longest chain of bones has {length:.4g} units"
+        expected = f"about {BODY_METRES:g} m in {', '.join(METRES_IN_BVH_UNIT)}"
+        raise refusal(file.path, "unit", got, expected, "state the unit")
     return BvhUnit(
         name, METRES_IN_BVH_UNIT[name], f"its longest chain of bones has {length:.4g} units, {metres:.2f} m"
     )

@@ -126,12 +126,8 @@ def checked(path: str | Path, figure: Figure, q: Array, time: Array | None = Non
         )
     if not (np.abs(q[:, :3]) <= FARTHEST_PERSON_METRES).all():
         frame = int(np.argmax(np.abs(q[:, :3]).max(axis=1)))
-        raise refusal(
-            path,
-            f"q[{frame}]",
-            f"a torso {np.abs(q[frame, :3]).max():g} m away",
-            f"{FARTHEST_PERSON_METRES:g} m at most",
-        )
+        got = f"a torso {np.abs(q[frame, :3]).max():g} m away"
+        raise refusal(path, f"q[{frame}]", got, f"{FARTHEST_PERSON_METRES:g} m at most")
     check_turns(path, q)
     if up not in UP_DIRECTIONS:
         raise refusal(path, "up", shown(up), " or ".join(UP_DIRECTIONS), "state which axis of q points up")
@@ -193,13 +189,8 @@ def filled(path: str | Path, figure: Figure, q: Array, unknown: str) -> Array:
         frame, k = (int(i) for i in np.argwhere(missing)[0])
         name, count = figure.configuration_names[k], int(missing.any(axis=1).sum())
         got = f"no value for {name} in frame {frame} ({count} such frames)"
-        raise refusal(
-            path,
-            "q",
-            got,
-            "every angle, for the format marks none as missing",
-            "write csv or npz, or fill it",
-        )
+        expected = "every angle, for the format marks none as missing"
+        raise refusal(path, "q", got, expected, "write csv or npz, or fill it")
     q = q.copy()
     rest = np.clip(0.0, figure.limits.lower, figure.limits.upper)
     for k, neutral in zip(figure.angle_index, rest, strict=True):

@@ -96,13 +96,8 @@ def write_c3d(path: str | Path, motion: Motion) -> None:
         try:
             content.write(str(made))
         except (RuntimeError, ValueError, TypeError, OSError) as error:
-            raise refusal(
-                path,
-                "",
-                f"ezc3d: {cut(one_line(str(error)))}",
-                "a motion that C3D can hold",
-                "choose another format",
-            ) from None
+            got = f"ezc3d: {cut(one_line(str(error)))}"
+            raise refusal(path, "", got, "a motion that C3D can hold", "choose another format") from None
         data = made.read_bytes()
     with replacing(path) as file:
         file.write(data)
@@ -130,13 +125,8 @@ def _check_writable(path: str | Path, motion: Motion) -> None:
     if (np.abs(steps - 1) > 0.01).any():
         k = int(np.argmax(np.abs(steps - 1) > 0.01))
         got = f"{steps[k]:.3g} frames between frames {k} and {k + 1}"
-        raise refusal(
-            path,
-            "time",
-            got,
-            "evenly spaced frames",
-            "C3D has no times: choose another format, or fill the gap",
-        )
+        remedy = "C3D has no times: choose another format, or fill the gap"
+        raise refusal(path, "time", got, "evenly spaced frames", remedy)
 
 
 def _rate(path: str | Path, content: C3dContent) -> float:
@@ -166,13 +156,8 @@ def _unit(path: str | Path, parameters: Mapping[str, Parameter]) -> str:
     plain = found.casefold()
     name = {"meters": "m", "metres": "m", "millimeters": "mm", "centimeters": "cm"}.get(plain, plain)
     if name not in METRES_IN_UNIT:
-        raise refusal(
-            path,
-            "POINT:UNITS",
-            shown(found),
-            f"one of {', '.join(METRES_IN_UNIT)}",
-            "state the unit yourself",
-        )
+        expected = f"one of {', '.join(METRES_IN_UNIT)}"
+        raise refusal(path, "POINT:UNITS", shown(found), expected, "state the unit yourself")
     return name
 
 

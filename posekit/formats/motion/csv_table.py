@@ -82,13 +82,8 @@ def read_columns(path: str | Path, numbers: Callable[[Sequence[str]], Collection
             chunks.append(_chunk(path, names, rows, chosen, count))
             count += len(rows)
     except csv.Error as error:
-        raise refusal(
-            path,
-            f"line {lines.line_num}",
-            cut(one_line(str(error))),
-            "a table of cells",
-            "correct the quotes",
-        ) from None
+        got = cut(one_line(str(error)))
+        raise refusal(path, f"line {lines.line_num}", got, "a table of cells", "correct the quotes") from None
     if not chunks:
         raise refusal(path, "", "no rows", "a row of names, then rows of numbers", "check how it was written")
     return {name: np.concatenate([chunk[name] for chunk in chunks]) for name in names}

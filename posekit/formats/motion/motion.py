@@ -84,12 +84,9 @@ class Motion:
         bad = np.isinf(points) | (unknown ^ unknown.all(axis=-1, keepdims=True))
         if bad.any():
             frame, point, _ = (int(k) for k in np.argwhere(bad)[0])
-            raise refusal(
-                self.source,
-                f"frame {frame}: {self.names[point]}",
-                str(points[frame, point].tolist()),
-                "three finite numbers, or a missing point",
-            )
+            got = str(points[frame, point].tolist())
+            expected = "three finite numbers, or a missing point"
+            raise refusal(self.source, f"frame {frame}: {self.names[point]}", got, expected)
         rates = np.array(self.rates, dtype=np.float64)
         if rates.shape == (0,):
             rates = np.full(len(self.clips), float(self.rate))
@@ -131,26 +128,16 @@ class Motion:
     def _check_clips(self, clip: NDArray[np.intp], rates: Array) -> None:
         count = len(self.clips)
         if count == 0 or len(set(self.clips)) != count or (self.actions and len(self.actions) != count):
-            raise refusal(
-                self.source,
-                "clips",
-                f"{count} clips",
-                "each named once, one action a clip",
-                "correct the names",
-            )
+            expected = "each named once, one action a clip"
+            raise refusal(self.source, "clips", f"{count} clips", expected, "correct the names")
         if clip.size and (clip.min() < 0 or clip.max() >= count):
             first, last = int(clip.min()), int(clip.max())
             raise refusal(
                 self.source, "clip", f"clips {first} to {last}", f"0 to {count - 1}, as clips are named"
             )
         if rates.shape != (count,) or not (np.isfinite(rates) & (rates > 0)).all():
-            raise refusal(
-                self.source,
-                "rates",
-                shown(rates.tolist()),
-                f"{count} positive rates, one a clip",
-                "correct them",
-            )
+            expected = f"{count} positive rates, one a clip"
+            raise refusal(self.source, "rates", shown(rates.tolist()), expected, "correct them")
         if self.up and self.up not in UP_DIRECTIONS:
             raise refusal(self.source, "up", shown(self.up), f"one of {', '.join(UP_DIRECTIONS)}")
 
@@ -161,10 +148,6 @@ class Motion:
         if late.any():
             k = int(np.argmax(late))
             before, after = order[k], order[k + 1]
-            raise refusal(
-                self.source,
-                f"frame {after}",
-                f"time {time[after]:g} s after {time[before]:g} s",
-                "times that ascend",
-                "put the frames in order, each once",
-            )
+            got = f"time {time[after]:g} s after {time[before]:g} s"
+            remedy = "put the frames in order, each once"
+            raise refusal(self.source, f"frame {after}", got, "times that ascend", remedy)

@@ -37,13 +37,9 @@ def check_size(motion: Motion) -> None:
     points = motion.points[rows]
     extent = float(np.median(np.linalg.norm(np.nanmax(points, axis=1) - np.nanmin(points, axis=1), axis=-1)))
     if not SMALLEST_SPAN_METRES <= extent <= WIDEST_SPAN_METRES:
-        raise refusal(
-            motion.source,
-            "unit",
-            f"points that span {extent:.4g} m",
-            f"{SMALLEST_SPAN_METRES:g} to {WIDEST_SPAN_METRES:g} m",
-            "state the unit in which the file is: m, cm, mm or in",
-        )
+        expected = f"{SMALLEST_SPAN_METRES:g} to {WIDEST_SPAN_METRES:g} m"
+        remedy = "state the unit in which the file is: m, cm, mm or in"
+        raise refusal(motion.source, "unit", f"points that span {extent:.4g} m", expected, remedy)
 
 
 def check_turns(path: str | Path, q: Array) -> None:

@@ -143,13 +143,8 @@ def rate_of(time: Array) -> float:
 def _wide(columns: Mapping[str, Column], source: str) -> tuple[tuple[str, ...], Array, NDArray[np.intp]]:
     names = points_in(list(columns))
     if not names or len(names) > MAX_POINTS:
-        raise refusal(
-            source,
-            "columns",
-            _listed(columns),
-            f"name, x, y, z; or triples as neck_x, neck_y, neck_z, up to {MAX_POINTS:,}",
-            "rename the columns",
-        )
+        expected = f"name, x, y, z; or triples as neck_x, neck_y, neck_z, up to {MAX_POINTS:,}"
+        raise refusal(source, "columns", _listed(columns), expected, "rename the columns")
     by_name: dict[tuple[str, str], Column] = {}
     for column, values in columns.items():
         if match := _COORDINATE.fullmatch(column):

@@ -85,13 +85,9 @@ def postures_of(
     layout = layout or layout_of(motion.names, motion.source)
     landmarks = layout.gather(motion.points, motion.names)
     if not np.isfinite(landmarks).any():
-        raise refusal(
-            motion.source,
-            "points",
-            f"no point of the map {layout.name}",
-            f"some of {cut(', '.join(layout.needed))}",
-            "choose another map, or check the names",
-        )
+        expected = f"some of {cut(', '.join(layout.needed))}"
+        remedy = "choose another map, or check the names"
+        raise refusal(motion.source, "points", f"no point of the map {layout.name}", expected, remedy)
     points = landmarks[:, : len(POINTS)].copy()
     placed = {
         name
@@ -164,24 +160,16 @@ def _none_fits(names: Sequence[str], source: str) -> InputError:
             best = one, lacking
     if best is None or len(best[1]) == len(LIMB_LANDMARKS):
         maps = ", ".join(skeleton_map_names())
-        return refusal(
-            source,
-            "points",
-            cut(", ".join(names)),
-            f"names of one of the maps {maps}",
-            "write a map and name it (--skeleton)",
-        )
+        remedy = "write a map and name it (--skeleton)"
+        return refusal(source, "points", cut(", ".join(names)), f"names of one of the maps {maps}", remedy)
     layout, lacking = best
     part = layout.landmarks[lacking[0]][0]
     near = nearest(part, names)
     hint = f"; {near}" if near.startswith("did") else ""
-    return refusal(
-        source,
-        "points",
-        f"no {', no '.join(lacking)} by the map {layout.name}, which has most of the names{hint}",
-        f"{cut(', '.join(layout.landmarks[lacking[0]]))} for {lacking[0]}, and so on",
-        "rename the points, or name a map of your own (--skeleton)",
-    )
+    got = f"no {', no '.join(lacking)} by the map {layout.name}, which has most of the names{hint}"
+    expected = f"{cut(', '.join(layout.landmarks[lacking[0]]))} for {lacking[0]}, and so on"
+    remedy = "rename the points, or name a map of your own (--skeleton)"
+    return refusal(source, "points", got, expected, remedy)
 
 
 def _plain(names: Sequence[str]) -> set[str]:

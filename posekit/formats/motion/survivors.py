@@ -85,13 +85,8 @@ class SurvivorTable:
             raise refusal(self.source, "branches", f"{len(self.branches)} for {count} survivors", "one each")
         keys = np.stack([arrays["frame"], arrays["survivor"]], axis=1)
         if (np.diff(keys[:, 0]) < 0).any() or len(np.unique(keys, axis=0)) != count:
-            raise refusal(
-                self.source,
-                "frame",
-                "frames out of order, or a survivor twice",
-                "rows in order",
-                "sort the rows",
-            )
+            got = "frames out of order, or a survivor twice"
+            raise refusal(self.source, "frame", got, "rows in order", "sort the rows")
         for name, array in arrays.items():
             object.__setattr__(self, name, array)
         object.__setattr__(self, "values", MappingProxyType(values))
@@ -122,13 +117,9 @@ class SurvivorTable:
         """
         missing = [name for name in (*KEY_COLUMNS, *COORDINATE_COLUMNS) if name not in columns]
         if missing:
-            raise refusal(
-                source,
-                "columns",
-                f"no {missing[0]} among {cut(one_line(', '.join(columns)))}",
-                f"{', '.join(KEY_COLUMNS)} and the joints' coordinates ({COORDINATE_COLUMNS[0]}, …)",
-                "give a table of survivors, in metres",
-            )
+            got = f"no {missing[0]} among {cut(one_line(', '.join(columns)))}"
+            expected = f"{', '.join(KEY_COLUMNS)} and the joints' coordinates ({COORDINATE_COLUMNS[0]}, …)"
+            raise refusal(source, "columns", got, expected, "give a table of survivors, in metres")
         known = {*KEY_COLUMNS, *COORDINATE_COLUMNS, "branches"}
         return cls(
             frame=columns["frame"],

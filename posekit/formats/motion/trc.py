@@ -64,13 +64,9 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
         (number, line) for number, line in enumerate(lines[header.rows :], header.rows + 1) if line.strip()
     ]
     if len(body) < header.frames:
-        raise refusal(
-            path,
-            "NumFrames",
-            f"{len(body)} rows of data",
-            f"{header.frames}, as the header says",
-            "the file is cut off, or correct the header",
-        )
+        expected = f"{header.frames}, as the header says"
+        remedy = "the file is cut off, or correct the header"
+        raise refusal(path, "NumFrames", f"{len(body)} rows of data", expected, remedy)
     width = 2 + 3 * len(header.names)
     cut_off = body[-1][0] if body and not text.endswith(("\n", "\r")) else 0
 
@@ -160,22 +156,12 @@ def _header(path: str | Path, lines: Sequence[str]) -> _Header:
         raise refusal(path, "NumMarkers", got, "as many as names", "correct one of the two")
     rate = _float(fields.get("DataRate", ""))
     if rate is None or rate <= 0:
-        raise refusal(
-            path,
-            "DataRate",
-            shown(fields.get("DataRate")),
-            "frames a second, above 0",
-            "write it into line 3",
-        )
+        got = shown(fields.get("DataRate"))
+        raise refusal(path, "DataRate", got, "frames a second, above 0", "write it into line 3")
     unit = _UNIT_NAMES.get(fields.get("Units", "").casefold())
     if unit is None:
-        raise refusal(
-            path,
-            "Units",
-            shown(fields.get("Units")),
-            f"one of {', '.join(_UNIT_NAMES)}",
-            "write it into line 3",
-        )
+        expected = f"one of {', '.join(_UNIT_NAMES)}"
+        raise refusal(path, "Units", shown(fields.get("Units")), expected, "write it into line 3")
     return _Header(names=names, rate=rate, unit=unit, frames=_whole(path, fields, "NumFrames", 0), rows=5)
 
 

@@ -101,13 +101,8 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
     """
     folder = Path(path)
     if not (folder / FIGURE_FILE).is_file() or not (folder / NPZ_FILE).is_file():
-        raise refusal(
-            path,
-            "",
-            "another folder or file",
-            f"a folder with {FIGURE_FILE} and {NPZ_FILE}",
-            "name that folder",
-        )
+        expected = f"a folder with {FIGURE_FILE} and {NPZ_FILE}"
+        raise refusal(path, "", "another folder or file", expected, "name that folder")
     with open_npz(folder / NPZ_FILE) as archive:
         q = archive.array("q", "f", (None, None)).astype(np.float64)
         names = archive.array("configuration_names", "U", (None,)).tolist()
