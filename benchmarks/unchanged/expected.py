@@ -58,6 +58,7 @@ EXPECTED_DIFFERENCES: tuple[Allowed, ...] = (
     Allowed("*", "*:settings.values[0].asked*", "settings are written whole into every result"),
     Allowed("*", "*.npz:settings.dtype", "settings are written whole: the text is longer"),
     Allowed("*", "*.npz:roots.dtype", "the text of roots is as long as its longest value needs"),
+    Allowed("demo", "*.report.json:settings.*", "a report says what it was judged with, from Python too"),
     Allowed(
         "recover-default-tolerance-given",
         "*:settings.judged*",
