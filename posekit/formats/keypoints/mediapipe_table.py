@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -155,13 +155,15 @@ def _time(text: str) -> float:
     return value if np.isfinite(value) else np.nan
 
 
+def _column(header: list[str], wanted: Iterable[str]) -> int | None:
+    """Return the place of the first column that is called as wanted; None where there is none."""
+    found = one_of(header, wanted)
+    return header.index(found) if found is not None else None
+
+
 def _described(header: list[str]) -> tuple[int | None, int | None, str]:
-    label, time = one_of(header, PICTURE_LABEL_NAMES), one_of(header, TIME_NAMES)
-    return (
-        header.index(label) if label is not None else None,
-        header.index(time) if time is not None else None,
-        plain(time) if time is not None else "",
-    )
+    label, time = _column(header, PICTURE_LABEL_NAMES), _column(header, TIME_NAMES)
+    return label, time, plain(header[time]) if time is not None else ""
 
 
 def _label(text: str) -> str:
@@ -196,10 +198,8 @@ def _add_long(rows: DetectionRows, header: list[str], text: str) -> None:
     label, time, unit = _described(header)
     which = header.index(one_of(header, LANDMARK_COLUMN_NAMES) or "")
     x, y = (header.index(one_of(header, (axis,)) or "") for axis in "xy")
-    named = one_of(header, VISIBILITY_NAMES) or one_of(header, PRESENCE_NAMES)
-    surest = header.index(named) if named is not None else None
-    person = one_of(header, PERSON_COLUMN_NAMES)
-    who = header.index(person) if person is not None else None
+    surest = _column(header, (*VISIBILITY_NAMES, *PRESENCE_NAMES))
+    who = _column(header, PERSON_COLUMN_NAMES)
     people: dict[tuple[str, str], tuple[Array, Array]] = {}
     labels: dict[str, float] = {}
     for line, fields in _lines(rows, header, text):

@@ -110,11 +110,6 @@ def _points(path: str | Path, arrays: Arrays, schema: str, others: str) -> tuple
         if head.dtype.kind != "f" or head.shape != (len(points), len(HEAD_POINTS), 3):
             raise _wrong(path, "head", _kind(head), f"floats ({len(points)}, {len(HEAD_POINTS)}, 3)")
         points, names = np.concatenate([points, head], axis=1), (*names, *HEAD_POINTS)
-    if np.isinf(points).any():
-        where = [int(k) for k in np.argwhere(np.isinf(points))[0]]
-        raise _wrong(
-            path, f"{key}{where}", "an infinite number", "finite numbers, or NaN where one is missing"
-        )
     return points.astype(np.float64), names
 
 

@@ -49,8 +49,7 @@ def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
         such table.
     """
     with opened(path) as file:
-        check_rows(path, file.metadata.num_rows, file.metadata.num_columns)
-        columns = numpy_columns(path, file.read())
+        columns = columns_of(path, file)
         up = _up(file.schema_arrow)
     return motion_of(columns, str(path), unit, up)
 
@@ -73,9 +72,7 @@ def read_parquet_pieces(path: str | Path, unit: str | None = None) -> Iterator[M
         held: dict[str, Column] = {}
         rate = None
         for index in range(file.metadata.num_row_groups):
-            group = file.metadata.row_group(index)
-            check_rows(path, group.num_rows, file.metadata.num_columns)
-            columns = numpy_columns(path, file.read_row_group(index))
+            columns = columns_of(path, file, index)
             columns = (
                 {name: np.concatenate([held[name], columns[name]]) for name in columns} if held else columns
             )
@@ -151,14 +148,30 @@ def opened(path: str | Path) -> Iterator[Any]:
             ) from None
 
 
-def numpy_columns(path: str | Path, table: Any) -> dict[str, Column]:
-    """Turn pyarrow's columns into NumPy's: numbers where they are numbers, text else; null is NaN or empty.
+def columns_of(path: str | Path, file: Any, group: int | None = None) -> dict[str, Column]:
+    """Read a table, or one of its row groups, as NumPy's columns: numbers, or else text; null is NaN or empty.
+
+    Parameters
+    ----------
+    path : path
+        What to call it in errors.
+    file : pyarrow.parquet.ParquetFile
+        As `opened` gives it.
+    group : int, optional
+        The row group; all of them if not given.
 
     Raises
     ------
     InputError
-        Where a column that a motion needs is no number.
+        Where it has more numbers than memory is meant for, or a column that a motion needs is no number.
     """
+    rows = (file.metadata if group is None else file.metadata.row_group(group)).num_rows
+    count = file.metadata.num_columns
+    if rows < 1 or rows * count > MAX_VALUES:
+        got = f"{rows:,} rows of {count:,} columns"
+        remedy = "split it, or write it in smaller row groups"
+        raise refusal(path, "", got, f"1 to {MAX_VALUES:,} numbers", remedy)
+    table = file.read() if group is None else file.read_row_group(group)
     pa = extra("pyarrow", "parquet", "reading Parquet")
     wanted = number_columns(table.column_names)
     columns: dict[str, Column] = {}
@@ -172,15 +185,6 @@ def numpy_columns(path: str | Path, table: Any) -> dict[str, Column]:
             texts = values.combine_chunks().cast(pa.string()).fill_null("")
             columns[name] = np.array(texts.to_pylist(), dtype=np.str_)
     return columns
-
-
-def check_rows(path: str | Path, rows: int, columns: int) -> None:
-    """Refuse more numbers than memory is meant for, before they are read."""
-    if rows < 1 or rows * columns > MAX_VALUES:
-        got = f"{rows:,} rows of {columns:,} columns"
-        raise refusal(
-            path, "", got, f"1 to {MAX_VALUES:,} numbers", "split it, or write it in smaller row groups"
-        )
 
 
 def _arrow(pa: Any, name: str, values: Column) -> Any:

@@ -10,7 +10,7 @@ import numpy as np
 
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.csv_table import read_columns, write_columns
-from posekit.formats.motion.parquet import check_rows, numpy_columns, opened, write_tables
+from posekit.formats.motion.parquet import columns_of, opened, write_tables
 from posekit.formats.motion.survivors import COORDINATE_COLUMNS, KEY_COLUMNS, SurvivorTable, number_columns
 from posekit.safe_io import open_npz, refusal, replacing, shown
 from posekit.skeleton import JOINTS
@@ -66,9 +66,7 @@ def read_survivors(path: str | Path) -> SurvivorTable:
         return SurvivorTable.of_columns(read_columns(path, number_columns), str(path))
     if kind == "parquet":
         with opened(path) as file:
-            check_rows(path, file.metadata.num_rows, file.metadata.num_columns)
-            columns = numpy_columns(path, file.read())
-        return SurvivorTable.of_columns(columns, str(path))
+            return SurvivorTable.of_columns(columns_of(path, file), str(path))
     with open_npz(path, limit=MAX_BYTES) as archive:
         schema = str(archive.array("schema", "U", ()))
         names = tuple(archive.array("joint_names", "U", (None,)).tolist())
@@ -102,8 +100,7 @@ def read_survivor_pieces(path: str | Path) -> Iterator[SurvivorTable]:
     """Read a Parquet file of survivors one row group after the other."""
     with opened(path) as file:
         for index in range(file.metadata.num_row_groups):
-            check_rows(path, file.metadata.row_group(index).num_rows, file.metadata.num_columns)
-            yield SurvivorTable.of_columns(numpy_columns(path, file.read_row_group(index)), str(path))
+            yield SurvivorTable.of_columns(columns_of(path, file, index), str(path))
 
 
 def _kind(path: str | Path) -> str:
