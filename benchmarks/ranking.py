@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from ranking_views import Clip, Priors, Views, views_of  # type: ignore[import-not-found]  # the script beside this one
 
+from benchmarks.studies.weight_fitting import fit_weights
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import OpenCVModel
 from posekit.ranking import (
@@ -30,7 +31,6 @@ from posekit.ranking import (
     RankingEvidence,
     Up,
     deviation_of_tolerance,
-    fit_weights,
     load_prior,
     rank,
     write_prior,

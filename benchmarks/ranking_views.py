@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.studies.prior_fitting import DEFAULT_TEMPERATURE, fit_prior
 from posekit.body import Figure
 from posekit.formats.own import View
-from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance, fit_prior
-from posekit.ranking.fitting import DEFAULT_TEMPERATURE
+from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance
 from posekit.recovery import recover
 from posekit.refinement import MEASURED_LENGTH_DEVIATIONS, ObservedFrames, RootPrior, merge, refine
 from posekit.settings import MEASURED_TOLERANCE, Rooting, Tolerance

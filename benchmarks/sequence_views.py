@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks.studies.prior_fitting import fit_prior
 from posekit.body import Figure
 from posekit.errors import PosekitError
 from posekit.following import SurvivorFrame
 from posekit.formats.own import OpenCVModel, View
-from posekit.ranking import Prior, RankingEvidence, Up, fit_prior, load_prior, rank
+from posekit.ranking import Prior, RankingEvidence, Up, load_prior, rank
 from posekit.recovery import recover
 from posekit.refinement import (
     ObservedFrames,

@@ -1,7 +1,6 @@
 """Which survivor, and how sure: a probability for each, from the image, a prior on postures, gravity and the ground.
 
-`rank` orders the survivors of many frames at once by their `RankingEvidence`; `load_prior` reads the table that it
-uses, `fit_prior` and `fit_weights` make one.
+`rank` orders the survivors of many frames at once by their `RankingEvidence`; `load_prior` reads the table that it uses.
 """
 
 from typing import TYPE_CHECKING
@@ -15,7 +14,6 @@ if TYPE_CHECKING:
     from posekit.ranking.deviation import deviation_of_noise as deviation_of_noise
     from posekit.ranking.deviation import deviation_of_tolerance as deviation_of_tolerance
     from posekit.ranking.evidence import RankingEvidence as RankingEvidence
-    from posekit.ranking.fitting import fit_prior as fit_prior
     from posekit.ranking.posture_prior import TERM_NAMES as TERM_NAMES
     from posekit.ranking.posture_prior import Prior as Prior
     from posekit.ranking.prior_file import load_prior as load_prior
@@ -23,7 +21,6 @@ if TYPE_CHECKING:
     from posekit.ranking.rank import Term as Term
     from posekit.ranking.ranking import Ranking as Ranking
     from posekit.ranking.upright import Up as Up
-    from posekit.ranking.weights import fit_weights as fit_weights
 else:
     __getattr__ = on_demand(
         __name__,
@@ -34,7 +31,6 @@ else:
                 "deviation_of_tolerance",
             ),
             "evidence": ("RankingEvidence",),
-            "fitting": ("fit_prior",),
             "posture_prior": (
                 "TERM_NAMES",
                 "Prior",
@@ -46,6 +42,5 @@ else:
             "rank": ("Term",),
             "ranking": ("Ranking",),
             "upright": ("Up",),
-            "weights": ("fit_weights",),
         },
     )

@@ -9,21 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.studies.prior_fitting import fit_prior
+from benchmarks.studies.weight_fitting import fit_weights
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.ranking import (
-    TERM_NAMES,
-    Prior,
-    Ranking,
-    RankingEvidence,
-    Up,
-    fit_prior,
-    fit_weights,
-    load_prior,
-    rank,
-    write_prior,
-)
+from posekit.ranking import TERM_NAMES, Prior, Ranking, RankingEvidence, Up, load_prior, rank, write_prior
 from posekit.ranking.directions import DIRECTION_NAMES, directions, mirrored
 from posekit.ranking.posture_prior import WEIGHT_NAMES
 from posekit.ranking.prior_file import prior_lines
