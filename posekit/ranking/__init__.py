@@ -1,6 +1,6 @@
 """Which survivor, and how sure: a probability for each, from the image, a prior on postures, gravity and the ground.
 
-`rank` orders the survivors of many frames at once by their `RankingEvidence`; `load_prior` reads the table that it uses.
+`rank` orders the survivors of many frames at once by their `RankingEvidence`; `load_prior` reads the table for it.
 """
 
 from typing import TYPE_CHECKING
