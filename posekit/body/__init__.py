@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from posekit.body.figure import Figure as Figure
     from posekit.body.loading import load_figure as load_figure
     from posekit.body.stature import stature_from_lengths as stature_from_lengths
+    from posekit.body.uncertainty import LengthUncertainty as LengthUncertainty
 else:
     __getattr__ = on_demand(
         __name__,
@@ -21,5 +22,6 @@ else:
             ),
             "loading": ("load_figure",),
             "stature": ("stature_from_lengths",),
+            "uncertainty": ("LengthUncertainty",),
         },
     )
