@@ -25,8 +25,9 @@ NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 class LengthUncertainty:
     r"""Standard deviations of the logarithms of a body's 17 lengths, which for small ones are relative deviations.
 
-    With the body's one size s and each segment's own part :math:`t_i`, the length is :math:`l_i = e^{s + t_i} \bar l_i`,
-    and the covariance of the logarithms :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
+    With the body's one size s and each segment's own part :math:`t_i`, a length is
+    :math:`l_i = e^{s + t_i} \bar l_i`, and the covariance of the logarithms
+    :math:`\sigma_s^2\,1 1^T + \mathrm{diag}(\sigma_i^2)`.
 
     Parameters
     ----------
@@ -42,8 +43,8 @@ class LengthUncertainty:
 
     Examples
     --------
-    >>> LengthUncertainty.uniform(0.05).total("neck-pelvis").round(3)
-    np.float64(0.071)
+    >>> LengthUncertainty.uniform(0.05).total("neck-pelvis") > 0.07
+    True
     """
 
     common: float = 0.0
@@ -87,9 +88,9 @@ class LengthUncertainty:
         """The covariance of the logarithms (17, 17), in the order of `posekit.skeleton.SEGMENT_NAMES`."""
         return np.asarray(self.common**2 + np.diag([self.own[name] ** 2 for name in SEGMENT_NAMES]))
 
-    def total(self, segment: str) -> np.float64:
+    def total(self, segment: str) -> float:
         """Return the standard deviation of one length's logarithm."""
-        return np.hypot(self.common, self.own[segment])
+        return math.hypot(self.common, self.own[segment])
 
 
 def _uncertainty(common: float, own: Mapping[str, float]) -> LengthUncertainty:
@@ -119,8 +120,8 @@ They come from a stature, another detector or another day: 5 % of the size is wh
 UNKNOWN_ADULT: Final = LengthUncertainty(common=0.07, own=_varying(0.05, 0.05))
 """Of an adult of whom nothing is known, when the figure's own lengths are taken.
 
-Statures of 4082 men are 1756 (68.6) mm, of 1986 women 1629 (64.2) mm (Gordon et al. 2014, "2012 Anthropometric Survey of
-U.S. Army Personnel", NATICK/TR-15/007): both together deviate by 5.5 %, and soldiers less than people. What a limb
+Statures of 4082 men are 1756 (68.6) mm, of 1986 women 1629 (64.2) mm (Gordon et al. 2014, "2012 Anthropometric Survey
+of U.S. Army Personnel", NATICK/TR-15/007): both together deviate by 5.5 %, and soldiers less than people. What a limb
 differs beside stature is 3.5 % (upper arm) to 5.7 % (thigh) in the same survey.
 """
 
