@@ -12,10 +12,8 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import SEGMENT_NAMES
-
-MAX_LENGTH_DEVIATION: Final = 0.3
-"""The largest relative standard deviation of lengths that is taken for one."""
 
 NON_RIGID_SEGMENTS: Final = ("right_shoulder-pelvis", "left_shoulder-pelvis")
 """What a bending spine and moving clavicles change in one person."""

@@ -14,7 +14,6 @@ from posekit.compiled.verdicts import NO_VIOLATION
 from posekit.geometry import Array
 from posekit.recovery.body import ranges_of
 from posekit.recovery.noise import Noise, contact_under_noise
-from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.observed_frames import LIMIT_DEVIATION
 from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
 from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
@@ -23,15 +22,15 @@ from posekit.validators import CheckOptions, Judgement, judge, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP
 
 
-def certified_within(noise: Noise) -> Tolerance:
+def certified_within(noise: Noise, figure: Figure) -> Tolerance:
     """Return how far refined postures may be off.
 
     Angles: limits pull at what is beyond them, so an angle that feels one is known at least as well as that,
     whatever the noise: three of those deviations do not contradict it. Distances: what is allowed of any measured body,
-    and more in proportion where lengths are known worse than such bodies'.
+    and more where lengths are known worse than such bodies'; how well a body fits its lengths, chi-square has judged.
     """
-    worse = max(1.0, max(noise.by_segment.values()) / max(MEASURED_LENGTH_DEVIATIONS.values()))
-    rigid = RIGID_TOLERANCE * worse
+    off = max(noise.lengths.total(name) * length for name, length in figure.lengths.items())
+    rigid = max(RIGID_TOLERANCE, ALLOWED_DEVIATIONS * off)
     return Tolerance(rigid=rigid, tangent=rigid, placement=False, angle=ALLOWED_DEVIATIONS * LIMIT_DEVIATION)
 
 

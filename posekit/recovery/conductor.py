@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, load_figure
+from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.own.units import PER_METRE
@@ -20,7 +20,7 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.judged import record_of
 from posekit.recovery.noise import Noise
 from posekit.recovery.observed import lost_to, neckless, trunkless, with_reasons
-from posekit.recovery.person import body_of, refuse_settings
+from posekit.recovery.person import body_of, refuse_settings, uncertainty_of
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.rooting import tolerance_of
 from posekit.recovery.trees import FrameTrees, trees_of
@@ -94,7 +94,9 @@ def recover(
     without_neck, bare = neckless(view), trunkless(view, body)
     fit = _fit(view, body, asked, tolerance)
     fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
-    noise = _noise(view, body, asked)
+    noise = _noise(
+        view, body, asked, uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
+    )
 
     # Tree and refinement: as exact where that may be, and all other frames as noise or tolerances allow.
     grower = Grower(view=view, fit=fit, body=body, settings=asked, nearer=_nearer(asked, body, len(view)))
@@ -146,7 +148,7 @@ def recover(
         tolerance,
         body.figure,
         [(frame.judged, frame.tolerance) for frame in frames],
-        None if noise is None else {**asdict(noise), "by_segment": dict(noise.by_segment)},
+        None if noise is None else noise.document(),
     )
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=record, grower=grower)
 
@@ -160,7 +162,7 @@ def _fit(view: View, body: LiftedBody, asked: RecoverSettings, tolerance: Tolera
     return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance)
 
 
-def _noise(view: View, body: LiftedBody, asked: RecoverSettings) -> Noise | None:
+def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: LengthUncertainty) -> Noise | None:
     """Say what noise frames are refined with; None where they are not.
 
     Raises
@@ -177,7 +179,7 @@ def _noise(view: View, body: LiftedBody, asked: RecoverSettings) -> Noise | None
         if asked.length_deviation is not None:
             raise InputError("--length-deviation: nothing is refined here; leave it out")
         return None
-    return Noise.of(view, asked.rooting.deviation, asked.length_deviation, asked=bool(asked.refine))
+    return Noise.of(view, asked.rooting.deviation, lengths, asked=asked.refine)
 
 
 def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds | None:

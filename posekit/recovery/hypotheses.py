@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -81,7 +81,8 @@ class ObservedHypotheses:
             image=view.image[frames],
             deviation=deviation[:, : len(JOINTS)],
             root=necks,
-            length_deviation=noise.by_segment,
+            length_deviation=noise.lengths.own,
+            size_deviation=noise.lengths.common,
             limits=limits,
             walls=walls,
         )
@@ -91,10 +92,11 @@ class ObservedHypotheses:
 def neck_priors(
     fit: CameraFit, chosen: NDArray[np.intp], camera: Camera, beside: float
 ) -> tuple[RootPrior, float]:
-    """Return what is known of the neck in some hypotheses, and the largest deviation of a depth, metres.
+    """Return what is known of the neck in some hypotheses, and the largest deviation of a placed depth, metres.
 
     A neck that was given is there; one that was placed, within its step along the ray. Each hypothesis keeps its own
     depth: how far a person is, one picture tells badly, and a single best depth would stand for a whole valley.
+    A placed neck is where the figure's size puts it.
 
     Parameters
     ----------
@@ -111,7 +113,8 @@ def neck_priors(
     by_frame = fit.placements or [None] * len(fit.reasons)
     step = np.array([_step(by_frame[k]) for k in fit.frame[chosen].tolist()])
     lateral = np.where(step > 0, LATERAL_DEVIATIONS * beside * root[:, 2], 0.0)
-    return RootPrior.along_ray(camera, root, depth=step, lateral=lateral), float(step.max(initial=0.0))
+    prior = RootPrior.along_ray(camera, root, depth=step, lateral=lateral)
+    return replace(prior, by_size=step > 0), float(step.max(initial=0.0))
 
 
 def _step(placement: NeckPlacement | None) -> float:

@@ -61,11 +61,7 @@ def length_diagnosis_lines(recovery: Recovery, grower: Grower, lost: list[int]) 
     if not isinstance(view.camera, OpenCVModel):
         return []
     said = recovery.settings.get("noise")
-    noise = (
-        Noise(deviation=ASSUMED_DEVIATION_PIXELS)
-        if said is None
-        else Noise(deviation=said["deviation"], offset=said["offset"], lengths=said["lengths"])
-    )
+    noise = Noise(deviation=ASSUMED_DEVIATION_PIXELS) if said is None else Noise.from_document(said)
     frames = np.array(lost, dtype=np.intp)
     given = np.array([fit.placements is None or fit.placements[k] is None for k in lost])
     told = bool(given.any())

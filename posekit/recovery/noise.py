@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Final
+from dataclasses import dataclass, field
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import LengthUncertainty
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.settings.rooting import DETECTED_DEVIATION
-from posekit.skeleton import RIGID_SEGMENTS, SEGMENT_NAMES, TREE_SEGMENTS, segment_name
+from posekit.skeleton import RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
 JOINT_OFFSET: Final = 0.02
 """Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
@@ -22,8 +23,8 @@ JOINT_OFFSET: Final = 0.02
 LEAST_CONFIDENCE: Final = 0.25
 """A confidence below this counts as this."""
 
-LEAST_LENGTHS: Final = 1e-4
-"""Relative deviations of lengths below this count as none."""
+UNSTATED_DEVIATION_PIXELS: Final = 1.0
+"""Standard deviation (px) of image points of which nobody says any, of a body whose lengths are not exact."""
 
 N_TRUNK_JOINTS: Final = 6
 """Joints of torso and hips: the first six."""
@@ -43,57 +44,68 @@ class Noise:
         Standard deviation of each coordinate of an image point that was seen with full confidence, pixels.
     offset : float
         How far a detector's joints are from the figure's, standard deviation, metres.
-    lengths : float, optional
-        Relative standard deviation of all lengths; if not given what bodies give
-        (`posekit.refinement.MEASURED_LENGTH_DEVIATIONS`).
+    lengths : LengthUncertainty
+        How well the person's lengths are known; exactly if not given.
     """
 
     deviation: float
     offset: float = 0.0
-    lengths: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.lengths is not None and not (math.isfinite(self.lengths) and 0 <= self.lengths <= 0.3):
-            raise InputError(
-                f"--length-deviation: {self.lengths!r}; expected a fraction of the length, 0 to 0.3"
-            )
+    lengths: LengthUncertainty = field(default_factory=LengthUncertainty)
 
     @staticmethod
-    def of(view: View, deviation: float | None, lengths: float | None, *, asked: bool) -> Noise | None:
-        """Say what the noise of a view is; None where nobody does and it was not `asked` for.
+    def of(
+        view: View, deviation: float | None, lengths: LengthUncertainty, *, asked: bool | None
+    ) -> Noise | None:
+        """Say what the noise of a view is; None where neither points nor lengths are off, and it was not `asked` for.
 
         The deviation that is given comes before the view's own, and that before what detectors' points have.
         """
         detected = bool(view.derived)
         known = deviation or view.deviation or (DETECTED_DEVIATION if detected else None)
-        if known is None and not asked:
+        if known is None and lengths.exact and not asked:
             return None
         return Noise(
-            deviation=known or DETECTED_DEVIATION,
+            deviation=known or (DETECTED_DEVIATION if lengths.exact else UNSTATED_DEVIATION_PIXELS),
             offset=JOINT_OFFSET if detected else 0.0,
             lengths=lengths,
         )
 
     @property
-    def by_segment(self) -> Mapping[str, float]:
-        """Relative standard deviations by segment."""
-        if self.lengths is None:
-            from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
-
-            return MEASURED_LENGTH_DEVIATIONS
-        return dict.fromkeys(SEGMENT_NAMES, self.lengths if self.lengths >= LEAST_LENGTHS else 0.0)
-
-    @property
     def limb(self) -> float:
-        """The largest of the limbs' lengths."""
+        """The largest deviation of the limbs' lengths beside the common size."""
         return max(
-            self.by_segment[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= N_TRUNK_JOINTS
+            self.lengths.own[segment_name(pair)] for pair in TREE_SEGMENTS if max(pair) >= N_TRUNK_JOINTS
         )
 
     @property
     def rigid(self) -> float:
-        """The largest of the distances inside torso and hips."""
-        return max(self.by_segment[segment_name(pair)] for pair in RIGID_SEGMENTS)
+        """The largest of the distances inside torso and hips, likewise."""
+        return max(self.lengths.own[segment_name(pair)] for pair in RIGID_SEGMENTS)
+
+    @property
+    def scale(self) -> float:
+        """How far a trunk that was found may be off in scale, to first order: by the common size, or what it shows.
+
+        Height and width show the scale as well as each of them is known.
+        """
+        shown = self.rigid / math.sqrt(2)
+        return 1 / math.hypot(1 / self.lengths.common, 1 / shown) if self.lengths.common and shown else 0.0
+
+    def document(self) -> dict[str, Any]:
+        """Return what results say of it."""
+        lengths = self.lengths
+        return {
+            "deviation": self.deviation,
+            "offset": self.offset,
+            "size": lengths.common,
+            "by_segment": dict(lengths.own),
+        }
+
+    @staticmethod
+    def from_document(said: Mapping[str, Any]) -> Noise:
+        """Read what `document` wrote."""
+        lengths = LengthUncertainty(common=said.get("size", 0.0), own=said["by_segment"])
+        return Noise(deviation=said["deviation"], offset=said["offset"], lengths=lengths)
 
     def of_points(self, view: View, frames: NDArray[np.intp], depth: Array, focal: Array) -> Array:
         """Return the standard deviations of joints and head points (F, 19), pixels.

@@ -6,11 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from posekit.body import Figure, stature_from_lengths
+from posekit.body import Figure, LengthUncertainty, stature_from_lengths
+from posekit.body.uncertainty import KNOWN_STATURE, STATED_LENGTHS, UNKNOWN_ADULT
 from posekit.errors import InputError
 from posekit.formats.own import ScaledOrthographicModel, View
 from posekit.recovery.body import FigureBody, LiftedBody
 from posekit.settings import RecoverSettings, Rooting
+from posekit.skeleton import SEGMENT_NAMES
 
 CACHED_PERSONS = 32
 """Figures of persons that are kept: clips and shards of the same person follow each other."""
@@ -38,6 +40,22 @@ def _person(
     if lengths or head_points:
         figure = figure.scaled(dict(lengths), dict(head_points))
     return figure
+
+
+def uncertainty_of(view: View, asked: float | None, *, own_figure: bool) -> LengthUncertainty:
+    """Say how well the lengths are known that a view is recovered with.
+
+    What is `asked` comes before what the view says, and that before what can be told from where lengths come from: the
+    view's own, or a figure that was made for the person (`own_figure`), a stature, or nobody.
+    """
+    said = view.length_deviation if asked is None else asked
+    if said is not None:
+        return LengthUncertainty.uniform(said)
+    if own_figure:
+        return STATED_LENGTHS
+    other = UNKNOWN_ADULT if view.stature is None else KNOWN_STATURE
+    own = {name: (STATED_LENGTHS if name in view.lengths else other).own[name] for name in SEGMENT_NAMES}
+    return LengthUncertainty(common=STATED_LENGTHS.common if view.lengths else other.common, own=own)
 
 
 def body_of(view: View, figure: Figure, proportions: str) -> LiftedBody:

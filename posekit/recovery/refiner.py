@@ -141,7 +141,7 @@ class Refiner:
     @cached_property
     def tolerance(self) -> Tolerance:
         """By how much survivors may be off."""
-        return certified_within(self.noise)
+        return certified_within(self.noise, self.grower.body.figure)
 
     @cached_property
     def certifying(self) -> Sequence[Check]:
@@ -277,13 +277,16 @@ class Refiner:
             float(fit.root[chosen, 2].max()),
             length_deviation=self.noise.limb,
             root_depth_deviation=seen.step,
+            size_deviation=self.noise.scale,
             trunks=True,
         )
         # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
         rigid = max(ALLOWED_DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
-        suite = under_noise(suite_of(self.settings, body.figure, tolerance), allowed.bound)
+        suite = under_noise(
+            suite_of(self.settings, body.figure, tolerance), allowed.bound, stretch=allowed.stretch
+        )
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )

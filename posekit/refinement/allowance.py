@@ -3,7 +3,8 @@ r"""Joint ranges under noise: every angle is allowed what the noise of its own s
 A segment of length l that looks d long stands at :math:`\varphi = \arccos(d / l)` to the image plane. With d off by
 no more than :math:`\delta`, it stands between :math:`\arccos((d + \delta) / l)` and
 :math:`\arccos((d - \delta) / l)`: off by :math:`\delta / (l \sin\varphi)` where it points well away from the plane,
-:math:`\sqrt{2 \delta / l}` and no more where it lies in it. One tolerance for all segments would have to be the
+:math:`\sqrt{2 \delta / l}` and no more where it lies in it. A length that is off by a share of itself is as a d that
+is off by the same share. One tolerance for all segments would have to be the
 latter.
 """
 
@@ -38,19 +39,23 @@ class NoisyRange(Check):
     bound : float
         How far a point may be off beside its ray, times one metre over its depth (its standard deviations' multiple
         over the focal length, pixels); absolute, metres, where the camera is orthographic.
+    stretch : float
+        By what share of itself a segment may be longer or shorter.
     perspective : bool
         Whether the camera is one with a perspective: directions then depend on depths.
     """
 
     inner: Check
     bound: float
+    stretch: float = 0.0
     perspective: bool = True
 
     def __post_init__(self) -> None:
-        if not 0 <= self.bound < np.inf:
-            raise InputError(
-                f"the noise's bound is {self.bound!r}; expected zero or a positive, finite number"
-            )
+        for name, value in (("bound", self.bound), ("stretch", self.stretch)):
+            if not 0 <= value < np.inf:
+                raise InputError(
+                    f"the noise's {name} is {value!r}; expected zero or a positive, finite number"
+                )
 
     @property
     def name(self) -> str:
@@ -116,6 +121,7 @@ class NoisyRange(Check):
         else:
             away, delta = along[:, 2], np.full(len(along), share * self.bound)
         seen = np.sqrt(np.maximum(length * length - away * away, 0.0))
+        delta = np.hypot(delta, self.stretch * seen)
         angle = np.arctan2(np.abs(away), seen)
         least = np.arccos(np.minimum((seen + delta) / length, 1.0))
         most = np.arccos(np.maximum((seen - delta) / length, -1.0))
@@ -140,13 +146,15 @@ class NoisyRange(Check):
         ]
 
 
-def under_noise(checks: Sequence[Check], bound: float, *, perspective: bool = True) -> list[Check]:
+def under_noise(
+    checks: Sequence[Check], bound: float, *, stretch: float = 0.0, perspective: bool = True
+) -> list[Check]:
     """Loosen checks as they say, for postures that are not refined yet.
 
     Those of `Loosening.DIRECTIONS` must have a tolerance of a degree; those of `Loosening.REFINED` are left out.
     """
     return [
-        NoisyRange(inner=check, bound=bound, perspective=perspective)
+        NoisyRange(inner=check, bound=bound, stretch=stretch, perspective=perspective)
         if check.noise is Loosening.DIRECTIONS
         else check
         for check in checks

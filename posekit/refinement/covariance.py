@@ -38,18 +38,24 @@ MAX_TURN_INFORMATION = 0.5
 """See the module: information on a turn, times the noise over the length."""
 
 
-def covariances(problem: RefinementProblem, state: PostureState) -> Array:
-    """Return the covariance of every joint (N, 14, 3, 3), square metres."""
+def covariances(problem: RefinementProblem, state: PostureState, gain: Array | None = None) -> Array:
+    """Return the covariance of every joint (N, 14, 3, 3), square metres.
+
+    With a `gain` (N, 3), of a body that is scaled about the camera's centre by a factor whose logarithm falls by as
+    much when the root moves (`posekit.refinement.size.BodySize`).
+    """
     n = state.root.shape[1]
     out = np.empty((n, 14, 3, 3))
     for at in range(0, n, BLOCK_POSTURES):
         rows = np.arange(at, min(at + BLOCK_POSTURES, n))
         part, here = problem.take(rows), state.take(rows)
-        out[rows] = _covariances(part, here, linearise(part, here))
+        out[rows] = _covariances(part, here, linearise(part, here), None if gain is None else gain[rows].T)
     return out
 
 
-def _covariances(problem: RefinementProblem, state: PostureState, here: Equations) -> Array:
+def _covariances(
+    problem: RefinementProblem, state: PostureState, here: Equations, gain: Array | None
+) -> Array:
     if here.limbs is None:
         return np.full((state.root.shape[1], 14, 3, 3), np.nan)
     n, width = state.root.shape[1], problem.trunk_width
@@ -66,6 +72,9 @@ def _covariances(problem: RefinementProblem, state: PostureState, here: Equation
     # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
     right = np.ascontiguousarray(here.trunk.jacobian.transpose(2, 0, 1, 3)).reshape(width, 18, n)
     root = forward(trunk, right).reshape(width, 6, 3, n)
+    if gain is not None:
+        joints, shrink = place(state), np.einsum("win,in->wn", root[:, 0], gain)
+        root = root - joints[None, :6] * shrink[:, None, None]
     np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
     if arrow.limbs is None or arrow.starts is None:
         return out.transpose(3, 0, 1, 2)
@@ -77,12 +86,14 @@ def _covariances(problem: RefinementProblem, state: PostureState, here: Equation
     own = np.empty((reach, reach, 4, n))
     own[:] = np.eye(reach)[:, :, None, None]
     own = backward(arrow.limbs.factor, own)
-    for segment, joints in ((0, LIMB_MIDDLES), (1, LIMB_ENDS)):
+    for segment, ends in ((0, LIMB_MIDDLES), (1, LIMB_ENDS)):
         U = _limb_jacobian(state, limbs, segment, reach)
         moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
+        if gain is not None:
+            moving -= joints[list(ends)][:, :, None] * shrink
         alone = np.einsum("liun,uwln->liwn", U, own)
         both = np.concatenate([moving, alone], axis=2)
-        out[list(joints)] = np.einsum("liwn,ljwn->lijn", both, both)
+        out[list(ends)] = np.einsum("liwn,ljwn->lijn", both, both)
     return out.transpose(3, 0, 1, 2)
 
 

@@ -52,6 +52,9 @@ class ObservedFrames:
         The head's key points; their deviation is a pixel unless told otherwise.
     length_deviation : float or mapping
         Relative standard deviation of all lengths, or by segment name ``a-b``; lengths are held where it is zero.
+    size_deviation : float
+        Standard deviation of the logarithm of the body's size, which all lengths share; zero behind a camera without
+        a perspective, whose scale says the same.
     limits : Limits, optional
         The figure's unless told otherwise.
     limit_deviation : float
@@ -73,6 +76,7 @@ class ObservedFrames:
     head_image: ArrayLike | None = None
     head_deviation: ArrayLike | None = None
     length_deviation: Mapping[str, float] | float = 0.0
+    size_deviation: float = 0.0
     limits: Limits | None = None
     limit_deviation: float = LIMIT_DEVIATION
     walls: Walls | None = None
@@ -85,6 +89,10 @@ class ObservedFrames:
             MAX_COORDINATE_PIXELS,
         )
 
+    def roots(self) -> RootPrior | None:
+        """Return where the necks of bodies of the figure's size are: as far off as the size is, too."""
+        return None if self.root is None else self.root.widened(self.size_deviation)
+
     def problem(self, frames: NDArray[np.intp], necks: Array) -> RefinementProblem:
         """Lay out the data of survivors in some frames (N,); their necks (N, 3) are where a root is held."""
         points = self.points()
@@ -96,7 +104,7 @@ class ObservedFrames:
         weight = weights("deviation", self.deviation, points)
         shape_weight, limb_weight = length_weights(self.length_deviation)
         optics = optics_of(self.camera, frames)
-        mean, whitening = root_of(self.root, count)
+        mean, whitening = root_of(self.roots(), count)
         held = np.zeros((3, 3))
         held[2, 2] = 0.0 if optics.perspective else DEPTH_HOLD_PER_METRE
         known = np.asarray(np.isfinite(mean).all(axis=1))[frames]

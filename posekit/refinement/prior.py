@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.cameras import Camera, PinholeCamera
 from posekit.errors import InputError
@@ -27,6 +28,8 @@ class RootPrior:
         Camera frame, metres; NaN where nothing is known.
     covariance : array (F, 3, 3)
         Square metres, symmetric, not negative; zero for a root that is known exactly.
+    by_size : bool array (F,), optional
+        Roots that were found by the figure's size: a larger body is farther away. None of them if not given.
 
     Raises
     ------
@@ -36,6 +39,7 @@ class RootPrior:
 
     mean: Array
     covariance: Array
+    by_size: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
 
     def __post_init__(self) -> None:
         mean, covariance = np.array(self.mean, dtype=np.float64), np.array(self.covariance, dtype=np.float64)
@@ -57,7 +61,12 @@ class RootPrior:
             raise InputError(
                 "the root's covariance has a negative variance; expected square metres, zero or more"
             )
-        for name, value in (("mean", mean), ("covariance", covariance)):
+        by_size = np.array(self.by_size) if len(self.by_size) else np.zeros(len(mean), dtype=np.bool_)
+        if by_size.shape != (len(mean),) or by_size.dtype != np.bool_:
+            raise InputError(
+                f"by_size has shape {by_size.shape} of {by_size.dtype}; expected ({len(mean)},) of bool"
+            )
+        for name, value in (("mean", mean), ("covariance", covariance), ("by_size", by_size)):
             value.flags.writeable = False
             object.__setattr__(self, name, value)
 
@@ -91,6 +100,13 @@ class RootPrior:
         across_squared, along_squared = across[:, None, None] ** 2, along[:, None, None] ** 2
         covariance = across_squared * (np.eye(3) - outer) + along_squared * outer
         return RootPrior(mean=mean, covariance=covariance)
+
+    def widened(self, size: float) -> RootPrior:
+        """Let roots vary along their rays by as much as the size of the body, a relative standard deviation."""
+        if not size:
+            return self
+        mean = np.where(self.by_size[:, None], 0.0, self.mean)
+        return replace(self, covariance=self.covariance + size**2 * mean[:, :, None] * mean[:, None, :])
 
     def whitening(self) -> Array:
         """Return W (F, 3, 3) with W' W the inverse covariance; zero where nothing is known."""

@@ -15,6 +15,7 @@ from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import Refined
 from posekit.refinement.shared_search import SearchResult, search
+from posekit.refinement.size import BodySize, size_of
 from posekit.refinement.state import head_points, place
 from posekit.skeleton import HEAD_POINTS, JOINTS
 
@@ -92,7 +93,10 @@ def refine(
         found = search(
             problem, positions, heads, factors, steps=steps, precision=precision, hopeless=hopeless
         )
-    return _refined(figure, problem, frames, found, placeable)
+    size = None
+    if observed.size_deviation and observed.root is not None:
+        size = size_of(found.descent.state.root.T, observed.root, frames, observed.size_deviation)
+    return _refined(figure, problem, frames, found, placeable, size)
 
 
 def _refined(
@@ -101,6 +105,7 @@ def _refined(
     frames: NDArray[np.intp],
     searched: SearchResult,
     placeable: NDArray[np.bool_],
+    size: BodySize | None,
 ) -> Refined:
     found, first = searched
     joints = place(found.state).transpose(2, 0, 1).copy()
@@ -109,6 +114,9 @@ def _refined(
     if problem.head_image is not None:
         head = (found.state.root + head_points(found.state, problem.anatomy.head)).transpose(2, 0, 1).copy()
         head[~placeable] = np.nan
+    if size is not None:
+        joints *= size.factor[:, None, None]
+        head *= size.factor[:, None, None]
     return Refined(
         figure=figure,
         frame=frames,
@@ -120,6 +128,7 @@ def _refined(
         steps=found.steps,
         converged=found.settled & placeable,
         problem=problem,
+        size=size,
     )
 
 

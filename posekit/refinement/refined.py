@@ -13,7 +13,8 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.refinement.covariance import covariances
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.start import limb_directions, state_of
+from posekit.refinement.size import BodySize
+from posekit.refinement.start import measured_state
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import SEGMENTS
 
@@ -47,6 +48,10 @@ class Refined:
         How many steps of the search each survivor took.
     converged : bool array (N,)
         Whether a minimum was reached.
+    problem : RefinementProblem
+        What was minimised.
+    size : BodySize, optional
+        How much larger than the figure each body is, where that was not known.
     """
 
     figure: Figure
@@ -59,6 +64,7 @@ class Refined:
     steps: NDArray[np.intp]
     converged: NDArray[np.bool_]
     problem: RefinementProblem
+    size: BodySize | None = None
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -78,7 +84,8 @@ class Refined:
             for item in fields(self)
             if isinstance(getattr(self, item.name), np.ndarray)
         }
-        return replace(self, problem=self.problem.take(chosen), **arrays)
+        size = None if self.size is None else self.size.take(chosen)
+        return replace(self, problem=self.problem.take(chosen), size=size, **arrays)
 
     @cached_property
     def p(self) -> Array:
@@ -106,9 +113,16 @@ class Refined:
     @cached_property
     def covariance(self) -> Array:
         """The covariance of every joint (N, 14, 3, 3), square metres, to first order: see `covariances`."""
-        state = state_of(self.problem.anatomy, self.joints, self.head)
-        rows = np.tile(np.arange(len(self)), (4, 1))
-        return covariances(self.problem, state._replace(directions=limb_directions(self.joints, rows, state)))
+        factor = np.ones(len(self)) if self.size is None else self.size.factor
+        joints = self.joints / factor[:, None, None]
+        state = measured_state(self.problem.anatomy, joints, self.head / factor[:, None, None])
+        if self.size is None:
+            return covariances(self.problem, state)
+        inner = covariances(self.problem, state, self.size.gain)
+        outer = self.joints[..., None] * self.joints[..., None, :]
+        return np.asarray(
+            inner * (factor**2)[:, None, None, None] + outer * (self.size.deviation**2)[:, None, None, None]
+        )
 
     @property
     def deviation(self) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -51,6 +53,35 @@ def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None)
         directions=np.zeros((4, 2, 3, n)),
         shape=shape,
         limbs=np.repeat(anatomy.limbs[:, :, None], n, axis=2),
+    )
+
+
+def measured_state(anatomy: FigureNumbers, postures: Array, head: Array) -> PostureState:
+    """Return refined postures (N, 14, 3) and heads (N, 5, 3) as states with lengths of their own."""
+    state = state_of(anatomy, postures, head)
+    rows = np.tile(np.arange(len(postures)), (4, 1))
+    own = [
+        [np.linalg.norm(postures[:, b] - postures[:, a], axis=1) for a, b in pairwise(limb)]
+        for limb in LIMB_JOINTS
+    ]
+    inside = np.einsum("jin,ikn->jkn", _batch_last(postures[:, 1:4] - postures[:, :1]), state.torso)
+    hips = np.einsum("jin,ikn->jkn", _batch_last(postures[:, 4:6] - postures[:, 3:4]), state.hips)
+    right, left, pelvis = inside
+    shape = np.stack(
+        [
+            -pelvis[2],
+            (right[0] + left[0]) / 2,
+            *right[1:],
+            *left[1:],
+            -(hips[0, 2] + hips[1, 2]) / 2,
+            hips[0, 1],
+            hips[1, 1],
+        ]
+    )
+    return state._replace(
+        directions=limb_directions(postures, rows, state),
+        limbs=np.array(own),
+        shape=np.where(np.isfinite(shape), shape, state.shape),
     )
 
 

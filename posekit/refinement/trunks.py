@@ -14,6 +14,8 @@ only needed to find the first.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +37,18 @@ from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureState, trunk_offsets
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+
+N_CHOICES = 32
+"""Near and far choices of a trunk: two for each joint but the neck."""
+
+ROOT_STEP_METRES = 0.15
+"""Metres by which a root may be off for a search to find its trunk; where it may be more, several depths are tried."""
+
+SEARCHED_DEVIATIONS = 2.0
+"""Deviations of a root's depth within which trunks are lifted first."""
+
+MAX_DEPTH_STEPS = 3
+"""Depths tried on either side of where the root is most likely."""
 
 N_CHOICES_FOLLOWED = 2
 """Near and far choices that are followed to their minima, the likeliest first."""
@@ -143,22 +157,28 @@ def find_trunks(
         raise InputError("find_trunks: no root was given; expected a RootPrior that says where necks are")
     in_front = isinstance(observed.camera, ScaledOrthographicCamera) | (observed.root.mean[:, 2] > 0)
     known = np.flatnonzero(np.isfinite(observed.root.mean).all(axis=1) & in_front)
-    starts = _lifts(observed, known)
-    frames = np.repeat(known, starts.shape[1])
-    flat = starts.reshape(-1, 14, 3)
     one = observed.problem(known, observed.root.mean[known]).trunk_alone()
-    begin = state_of(one.anatomy, flat)
-    chi2 = np.empty(len(frames))
-    every = np.repeat(np.arange(len(known)), starts.shape[1])
-    for at in range(0, len(frames), BLOCK_POSTURES):
-        rows = np.arange(at, min(at + BLOCK_POSTURES, len(frames)))
-        chi2[rows] = evaluate(one.take(every[rows]), begin.take(rows))[0]
-    order = np.argsort(chi2.reshape(len(known), starts.shape[1]), axis=1, kind="stable")[
-        :, :N_CHOICES_FOLLOWED
-    ]
-    chosen = (np.arange(len(known))[:, None] * starts.shape[1] + order).reshape(-1)
+    every = np.repeat(np.arange(len(known)), N_CHOICES)
+    starts, chi2 = [], []
+    for factor in _depth_factors(observed, known):
+        begin = state_of(one.anatomy, _lifts(observed, one, one.root * factor).reshape(-1, 14, 3))
+        starts.append(begin)
+        chi2.append(
+            np.concatenate(
+                [evaluate(one.take(every[rows]), begin.take(rows))[0] for rows in _blocks(len(every))]
+            )
+        )
+    # Of each near and far choice the depth that fits best, then the choices that fit best.
+    depth = np.argmin(chi2, axis=0)
+    best_of = np.min(chi2, axis=0).reshape(len(known), N_CHOICES)
+    order = np.argsort(best_of, axis=1, kind="stable")[:, :N_CHOICES_FOLLOWED]
+    chosen = (np.arange(len(known))[:, None] * N_CHOICES + order).reshape(-1)
     which = np.repeat(np.arange(len(known)), order.shape[1])
-    first = descend(one.take(which), begin.take(chosen), steps=MAX_STEPS)
+    begin = starts[0].take(chosen)
+    for k, other in enumerate(starts[1:], start=1):
+        rows = np.flatnonzero(depth[chosen] == k)
+        begin.put(rows, other.take(chosen[rows]))
+    first = descend(one.take(which), begin, steps=MAX_STEPS)
     best = (
         np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
         + np.arange(len(known)) * order.shape[1]
@@ -200,12 +220,31 @@ def _trunks(
     return Trunks(frame=frame, joints=joints, image=image, chi2=chi2, dof=dof, p=p)
 
 
-def _lifts(observed: ObservedFrames, frames: NDArray[np.intp]) -> Array:
-    """Lift trunks by every near and far choice, (len(frames), 32, 14, 3): out of reach means nearest to the ray."""
-    problem = observed.problem(frames, np.zeros((len(frames), 3)))
+def _depth_factors(observed: ObservedFrames, frames: NDArray[np.intp]) -> Array:
+    """Return by what roots are moved along their rays before trunks are lifted: no further apart than a search goes."""
+    roots = observed.roots()
+    if roots is None or not len(frames) or isinstance(observed.camera, ScaledOrthographicCamera):
+        return np.ones(1)
+    mean = roots.mean[frames]
+    far = np.linalg.norm(mean, axis=1)
+    off = np.sqrt(np.einsum("ni,nij,nj->n", mean, roots.covariance[frames], mean)) / far
+    reach = SEARCHED_DEVIATIONS * off
+    steps = math.ceil(float(reach.max()) / ROOT_STEP_METRES) if reach.max() > ROOT_STEP_METRES else 0
+    spread = float(np.max(reach / far)) if steps else 0.0
+    return np.asarray(np.exp(np.linspace(-spread, spread, 2 * min(steps, MAX_DEPTH_STEPS) + 1)))
+
+
+def _blocks(count: int) -> Iterator[NDArray[np.intp]]:
+    """Yield rows that are worked on at once."""
+    for at in range(0, max(count, 1), BLOCK_POSTURES):
+        yield np.arange(at, min(at + BLOCK_POSTURES, count))
+
+
+def _lifts(observed: ObservedFrames, problem: RefinementProblem, root: Array) -> Array:
+    """Lift trunks from roots (3, N) by every near and far choice, (N, 32, 14, 3): out of reach means nearest."""
     image, optics = problem.image[:6], problem.optics
     seen = problem.weight[:6] > 0
-    placed: list[Array] = [problem.root[None]]  # by joint (choices, 3, N), as the bits of its path
+    placed: list[Array] = [root[None]]  # by joint (choices, 3, N), as the bits of its path
     for joint, (parent, _) in enumerate(TREE_SEGMENTS[:5], start=1):
         length = observed.figure.lengths[segment_name((parent, joint))]
         start = placed[parent]
@@ -217,9 +256,9 @@ def _lifts(observed: ObservedFrames, frames: NDArray[np.intp]) -> Array:
         )
         ends = np.stack([foot - half, foot + half], axis=1).reshape(2 * len(start), 3, -1)
         placed.append(np.where(seen[joint], ends, np.nan))
-    out = np.full((len(frames), 32, 14, 3), np.nan)
-    code = np.arange(32)
-    out[:, :, 0] = problem.root.T[:, None]
+    out = np.full((root.shape[1], N_CHOICES, 14, 3), np.nan)
+    code = np.arange(N_CHOICES)
+    out[:, :, 0] = root.T[:, None]
     for joint in range(1, 6):
         bit = code >> (5 - joint) & 1
         choice = bit if PARENTS[joint] == 0 else 2 * (code >> (5 - PARENTS[joint]) & 1) + bit

@@ -12,6 +12,7 @@ from posekit.formats.own.camera_model import CameraModel, ScaledOrthographicMode
 from posekit.formats.own.units import Unit
 from posekit.formats.own.view_schema import HEAD_NAMES
 from posekit.safe_io.refusal import nearest, refusal, shown
+from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 Array = NDArray[np.float64]
@@ -49,6 +50,8 @@ class View:
         Height of the person, metres.
     deviation : float, optional
         Standard deviation of each coordinate of the image points, pixels.
+    length_deviation : float, optional
+        Relative standard deviation of the person's lengths, 0 to 0.3; 0 says that they are exact.
     derived : tuple of str
         Joints of `image` that no detector saw: they were put between others that it saw.
     head_points : mapping of str to array (3,), optional
@@ -77,6 +80,7 @@ class View:
     lengths: Mapping[str, float] = field(default_factory=dict)
     stature: float | None = None
     deviation: float | None = None
+    length_deviation: float | None = None
     derived: tuple[str, ...] = ()
     head_points: Mapping[str, Array] | None = None
     unit: Unit = "m"
@@ -118,6 +122,14 @@ class View:
         object.__setattr__(self, "lengths", {name: float(length) for name, length in self.lengths.items()})
         if self.deviation is not None:
             _check_length("deviation", self.deviation, "a positive number of pixels")
+        if self.length_deviation is not None and not 0 <= self.length_deviation <= MAX_LENGTH_DEVIATION:
+            raise refusal(
+                "view",
+                "length_deviation",
+                shown(self.length_deviation),
+                f"a fraction of the length, 0 to {MAX_LENGTH_DEVIATION:g}",
+                "correct it, or leave it out",
+            )
         for name in self.derived:
             _check_name("derived", name, JOINTS)
         object.__setattr__(self, "derived", tuple(self.derived))

@@ -69,6 +69,7 @@ def read_view(path: str | Path) -> View:
             for name, value in ((figure.lengths or {}) if figure else {}).items()
         },
         deviation=file.deviation,
+        length_deviation=file.length_deviation,
         derived=tuple(file.derived or ()),
         stature=float(to_metres(figure.stature, unit)) if figure and figure.stature else None,
         head_points={name: to_metres(point, unit) for name, point in figure.head_points.items()}
@@ -122,6 +123,8 @@ def write_view(path: str | Path, view: View, unit: Unit | None = None) -> None:
         head_of_file["figure"] = figure
     if view.deviation is not None:
         head_of_file["deviation"] = view.deviation
+    if view.length_deviation is not None:
+        head_of_file["length_deviation"] = view.length_deviation
     if view.derived:
         head_of_file["derived"] = list(view.derived)
     # What is written must be read again: a view made in Python may say what its schema does not allow.

@@ -9,6 +9,7 @@ from pydantic import ConfigDict, FailFast, Field, model_validator
 
 from posekit.formats.own.camera_model import check_intrinsics, check_rotation
 from posekit.formats.own.units import Unit
+from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.tables.file_model import FileModel, checked, named, refuse
 
@@ -112,6 +113,7 @@ class ViewFile(FileModel):
         "image": "an image point is [u, v]; leave out a joint that is not seen",
         "head_image": "an image point is [u, v]; leave out one that is not seen",
         "deviation": "give it in pixels, or leave it out",
+        "length_deviation": "give a fraction of the length, 0 where lengths are exact, or leave it out",
         "derived": "name joints, or leave it out",
         "confidence": "a confidence is a number from 0; leave out one that is not known",
         "truth": "a joint is [x, y, z]; leave out one that is not known",
@@ -142,6 +144,10 @@ class ViewFile(FileModel):
     figure: FigureFields | None = None
     deviation: Positive | None = Field(
         default=None, description="Standard deviation of each coordinate of the image points, pixels."
+    )
+    length_deviation: Annotated[float, Field(ge=0, le=MAX_LENGTH_DEVIATION)] | None = Field(
+        default=None,
+        description="Relative standard deviation of the person's lengths; 0 where they are exact.",
     )
     derived: Derived | None = Field(
         default=None,
