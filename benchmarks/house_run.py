@@ -6,7 +6,8 @@
 - Frames on the stack are posekit's own, from the command line's `main` to a check's `judge`, both counted (those of
   comprehensions are not: Python 3.12 has none). Each check's `judge` is wrapped, wherever in `posekit.validators`, and
   one exact and one noisy frame are recovered by each way through the tree.
-- Times are of the clock, the median of five turns in which all take part; what is printed are their ratios.
+- Times are of the clock, the median of five turns in which all take part; what is printed are their ratios. Bytecode is
+  kept in a folder of this run's own, as what is installed has its.
 """
 
 from __future__ import annotations
@@ -177,6 +178,8 @@ def main() -> None:
     os.environ["PYTHONPATH"] = str(given.checkout.resolve())
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
+        os.environ["PYTHONPYCACHEPREFIX"] = str(Path(folder, "bytecode"))
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
         if not Path(run("import posekit; print(posekit.__file__)")).is_relative_to(given.checkout.resolve()):
             parser.error(f"this Python does not import posekit from {given.checkout}")
         print(json.dumps(measure()))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from inspect import Parameter, signature
 from typing import Any, get_type_hints
 
 
-def with_groups(command: Callable[..., None]) -> Callable[..., None]:
+def with_groups(command: Callable[..., None]) -> Callable[..., Callable[[], None]]:
     """Give a command an option for every field of the groups that it takes.
 
     A parameter whose type is a dataclass is a group: its fields are annotated as parameters of a command are, each with
-    its default, and stand in the help where the group stands in the command. The command is called with the group made
-    of them.
+    its default, and stand in the help where the group stands in the command. What reads the command line gets back the
+    call of the command with the groups made of them, which is then made.
 
     Examples
     --------
@@ -26,7 +26,7 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
     >>> @with_groups
     ... def draw(*, name: str, size: Size, frame: bool = False) -> None:
     ...     print(name, size)
-    >>> draw(name="a", width=5, height=2, frame=True)
+    >>> draw(name="a", width=5, height=2, frame=True)()
     a Size(width=5, height=2)
     """
     hints = get_type_hints(command, include_extras=True)
@@ -45,14 +45,14 @@ def with_groups(command: Callable[..., None]) -> Callable[..., None]:
         ]
 
     @wraps(command)
-    def called(**given: Any) -> None:
+    def call(**given: Any) -> Callable[[], None]:
         made = {
             name: group(**{one.name: given.pop(one.name) for one in fields(group)})
             for name, group in groups.items()
         }
-        command(**given, **made)
+        return partial(command, **given, **made)
 
     # What typer looks at: the options in their places, instead of the groups.
-    called.__signature__ = signature(command).replace(parameters=options)  # type: ignore[attr-defined]
-    called.__annotations__ = {option.name: option.annotation for option in options}
-    return called
+    call.__signature__ = signature(command).replace(parameters=options)  # type: ignore[attr-defined]
+    call.__annotations__ = {option.name: option.annotation for option in options}
+    return call

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 import warnings
 from importlib import import_module
@@ -84,9 +85,15 @@ def main() -> None:
     warnings.showwarning = _warn
     # Importing makes some hundred thousand objects that stay: looking for garbage among them takes a tenth of a start.
     gc.set_threshold(NEW_OBJECTS_PER_COLLECTION)
+    # Models of files have no plugins: looking for some reads the metadata of all that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
+        if callable(code):  # a command with groups of options
+            code = code()
+    except typer.Exit as ended:
+        code = ended.exit_code
     except PosekitError as error:
         code = _fail(str(error))
     except UsageError as error:
@@ -97,8 +104,11 @@ def main() -> None:
     except (typer.Abort, KeyboardInterrupt):
         code = _fail("interrupted", 130)
     except BrokenPipeError:
-        sys.stderr.close()
+        # What is still to be written has no reader: it goes nowhere.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
+    # Python looks for garbage among all that was imported before it ends; a process that ends gives everything back.
+    gc.freeze()
     sys.exit(code if isinstance(code, int) else 0)
 
 

@@ -120,7 +120,7 @@ def recover(
                 if allowed.hips < 1 and judged != "given" and len(lost):
                     trees |= trees_of(grower.grow(lost, replace(allowed, hips=1.0), judged), fit, lost)
         if progress is not None:
-            progress(len(np.unique(fit.frame[part])))
+            progress(len(set(fit.frame[part].tolist())))  # np.unique would load masked arrays for it
 
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = []

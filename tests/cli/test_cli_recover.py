@@ -238,8 +238,8 @@ def test_groups_of_options_stand_where_they_are_taken() -> None:
     made = with_groups(command)
     app.command()(made)
     assert list(inspect.signature(made).parameters) == ["ctx", "name", "left", "right", "last"]
-    app(["n", "--right", "x", "--last"], standalone_mode=False)
-    app(["n"], standalone_mode=False)
+    app(["n", "--right", "x", "--last"], standalone_mode=False)()
+    app(["n"], standalone_mode=False)()
     assert got == [
         ("n", Pair(left=1, right="x"), True, ["--right", "--last"]),
         ("n", Pair(left=1, right="r"), False, []),
