@@ -165,6 +165,14 @@ class FrameTrees:
     hypotheses: int
     fit: CameraFit
 
+    @property
+    def survivors(self) -> int:
+        """Count the postures that are left."""
+        if self.batch is None:
+            return 0
+        offsets = self.batch.offsets
+        return int(offsets[self.index + self.hypotheses] - offsets[self.index])
+
 
 def trees_of(batch: Batch, fit: CameraFit, rows: NDArray[np.intp]) -> dict[int, FrameTrees]:
     """Say for each frame of a batch, which was grown of some hypotheses, where its own trees are."""
