@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -85,6 +86,8 @@ def main() -> None:
     warnings.showwarning = _warn
     # Importing makes some hundred thousand objects that stay: looking for garbage among them takes a tenth of a start.
     gc.set_threshold(NEW_OBJECTS_PER_COLLECTION)
+    # Before it ends, Python looks for garbage among all of it: a process that ends gives everything back anyway.
+    atexit.register(gc.freeze)
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     try:
@@ -107,8 +110,6 @@ def main() -> None:
         # What is still to be written has no reader: it goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
-    # Python looks for garbage among all that was imported before it ends; a process that ends gives everything back.
-    gc.freeze()
     sys.exit(code if isinstance(code, int) else 0)
 
 
