@@ -9,13 +9,12 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.compiled import check_kernels as kernels
+from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HIPS, JOINT, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
-from posekit.validators.anatomical_screen import limb_numbers
 
 UNSEEN_DEGREES = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
@@ -105,6 +104,8 @@ class AnatomicalLimb(Check):
     @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: what the limb hangs on, whether it is whole, ranges, couplings and tolerances."""
+        from posekit.validators.anatomical_screen import limb_numbers  # read by compiled loops alone
+
         first = DOFS.index(f"{self.limb[0]}.flexion")
         numbers = limb_numbers(
             self.anatomy,

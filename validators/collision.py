@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.capsules import Capsule
 from posekit.body.pool import collides, make_pool
-from posekit.compiled import check_kernels as kernels
+from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array, cross
 from posekit.skeleton import JOINTS
 from posekit.tree import Check, Findings, Place, Rule

@@ -15,7 +15,7 @@ from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.body.closed_form import ClosedForm
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.compiled import check_kernels as kernels
+from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule

@@ -15,7 +15,7 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
-from posekit.compiled import check_kernels as kernels
+from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule

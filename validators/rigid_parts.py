@@ -10,7 +10,7 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
-from posekit.compiled import check_kernels as kernels
+from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
 from posekit.settings import RigidTolerance
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name

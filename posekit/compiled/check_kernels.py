@@ -11,7 +11,7 @@ capsules; rigid parts and joint ranges are in files of their own.
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
 from posekit.compiled import anatomical_kernels, angle_kernels, projected_kernels, rigid_kernels
 from posekit.compiled.anatomical_kernels import anatomical
@@ -26,27 +26,24 @@ from posekit.compiled.rigid_kernels import (
     unit,
     unknown,
 )
+from posekit.compiled.screen_kinds import (
+    OF_ANATOMICAL_LIMB,
+    OF_CAPSULES,
+    OF_DISTANCE,
+    OF_HEAD_PLANE,
+    OF_HIP_PLANE,
+    OF_LIMB,
+    OF_NECK,
+    OF_PELVIS,
+    OF_PLACEMENT,
+    OF_PROJECTED_BALL,
+    OF_PROJECTED_HINGE,
+)
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
-OF_DISTANCE: Final = 0
-OF_PLACEMENT: Final = 1
-OF_PELVIS: Final = 2
-OF_NECK: Final = 3
-OF_LIMB: Final = 4
-OF_CAPSULES: Final = 5
-OF_ANATOMICAL_LIMB: Final = 6
-OF_PROJECTED_BALL: Final = 7
-OF_PROJECTED_HINGE: Final = 8
-OF_HIP_PLANE: Final = 9
-OF_HEAD_PLANE: Final = 10
-"""Kinds of screens."""
-
 CLEAR_GAP = 1e-6
 """Metres between two capsules from which they are clear of contact: a thousand times what the judge cares for."""
-
-CAPSULE_NUMBERS = 14
-"""Numbers that say where two capsules are."""
 
 
 def clamp(value: Any) -> Any:

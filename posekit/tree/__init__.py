@@ -1,5 +1,8 @@
 """The binary interpretation tree and the protocol of the checks that prune it."""
 
+from typing import TYPE_CHECKING
+
+from posekit.on_demand import on_demand
 from posekit.tree.candidates import BranchState as BranchState
 from posekit.tree.check import Check as Check
 from posekit.tree.check import Findings as Findings
@@ -13,4 +16,8 @@ from posekit.tree.interpretation_tree import InterpretationTree as Interpretatio
 from posekit.tree.leaves import Leaves as Leaves
 from posekit.tree.leaves import Losses as Losses
 from posekit.tree.leaves import Pruned as Pruned
-from posekit.tree.screening import screened as screened
+
+if TYPE_CHECKING:
+    from posekit.tree.screening import screened as screened
+else:
+    __getattr__ = on_demand(__name__, {"screening": ("screened",)})

@@ -124,7 +124,7 @@ class Rule:
     Parameters
     ----------
     kind : int
-        What the loops take the numbers for: one of the kinds of `posekit.compiled.check_kernels`.
+        What the loops take the numbers for: one of the kinds of `posekit.compiled.screen_kinds`.
     numbers : array (N,)
         What the screen is made with.
     presumed : int

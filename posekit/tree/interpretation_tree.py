@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from posekit.cameras import Camera
 from posekit.compiled.compiling import is_fast
 from posekit.geometry import Array
-from posekit.tree import fast, plain
+from posekit.tree import plain
 from posekit.tree.check import Check
 from posekit.tree.leaves import Leaves
 from posekit.tree.lifting import Lifting
@@ -84,9 +84,12 @@ class InterpretationTree:
             given=given,
             tolerance=tolerance,
         )
-        grown = fast.grow(lifting, by_level) if is_fast(len(root)) else None
-        if grown is not None:
-            return grown
+        if is_fast(len(root)):
+            from posekit.tree import fast
+
+            grown = fast.grow(lifting, by_level)
+            if grown is not None:
+                return grown
         leaves = lifting.roots()
         for joint in range(1, len(self.joints)):
             leaves = plain.branch(leaves, joint)
