@@ -53,7 +53,8 @@ def read_shards(folder: str | Path, columns: Sequence[str] | None = None) -> Ite
     for path in shard_paths(folder):
         with opened(path) as file:
             for group in range(file.metadata.num_row_groups):
-                yield file.read_row_group(group, columns=None if columns is None else list(columns))
+                wanted = None if columns is None else list(columns)
+                yield file.read_row_group(group, columns=wanted, use_threads=False)
 
 
 def read_frames(folder: str | Path) -> Iterator[Any]:

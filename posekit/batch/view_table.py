@@ -10,7 +10,6 @@ document whose only frame is the first.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Final
@@ -21,9 +20,10 @@ from numpy.typing import NDArray
 from posekit.batch.digests import MAX_INPUT_BYTES
 from posekit.batch.image_rows import ImageRows, head_text
 from posekit.errors import InputError
+from posekit.formats.motion.parquet import opened
 from posekit.formats.own import View
 from posekit.geometry import Array
-from posekit.safe_io import cut, extra, one_line, open_file, refusal, replacing
+from posekit.safe_io import extra, refusal, replacing
 from posekit.skeleton import POINTS
 from posekit.views.person_view import ASSUMED_VIEW_RATE
 
@@ -77,7 +77,7 @@ def open_view_table(path: Path) -> ViewTable:
         Where it is damaged, empty, or a column is no number.
     """
     pa = extra("pyarrow", "parquet", "reading Parquet")
-    with _opened(path) as file:
+    with opened(path, limit=MAX_INPUT_BYTES, buffer_bytes=BUFFER_BYTES) as file:
         schema, rows = file.schema_arrow, file.metadata.num_rows
         for name in {*UV_COLUMNS, *CONFIDENCE_COLUMNS, *ROOT_COLUMNS, "frame", "time"} & set(schema.names):
             kind = schema.field(name).type
@@ -104,7 +104,7 @@ def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> I
     InputError
         Where the file is damaged, has fewer rows, or a number is infinite.
     """
-    with _opened(path) as file:
+    with opened(path, limit=MAX_INPUT_BYTES, buffer_bytes=BUFFER_BYTES) as file:
         there = set(file.schema_arrow.names)
         wanted = [
             name
@@ -122,7 +122,7 @@ def read_rows(path: Path, start: int, stop: int, rate: float | None = None) -> I
 
 def read_column(path: Path, name: str) -> Iterator[Array]:
     """Read one column of numbers in pieces."""
-    with _opened(path) as file:
+    with opened(path, limit=MAX_INPUT_BYTES, buffer_bytes=BUFFER_BYTES) as file:
         for columns, _ in _pieces(path, file, [name], 0, file.metadata.num_rows):
             yield columns[name]
 
@@ -193,22 +193,6 @@ def write_rows(file: BinaryIO, head: str, pieces: Iterable[ImageRows], *, group:
 def _chained(first: View, rest: Iterator[View]) -> Iterator[View]:
     yield first
     yield from rest
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """Open a file that is read piece by piece; what pyarrow says about a damaged one is one line."""
-    pa = extra("pyarrow", "parquet", "reading Parquet")
-    pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
-    with open_file(path, limit=MAX_INPUT_BYTES) as file:
-        try:
-            # Without these two a whole row group is read at once, which may be the whole recording.
-            yield pq.ParquetFile(file, pre_buffer=False, buffer_size=BUFFER_BYTES)
-        except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
-            reason = cut(one_line(str(error)) or type(error).__name__)
-            raise refusal(
-                path, "", f"pyarrow: {reason}", "an undamaged Parquet file", "write it again"
-            ) from None
 
 
 def _pieces(

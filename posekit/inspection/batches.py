@@ -171,7 +171,7 @@ def _frames(path: Path) -> Iterator[Any]:
         if not {*wanted, *FRAME_COLUMNS} <= set(file.schema_arrow.names):
             raise _damaged(path, "columns")
         for group in range(file.metadata.num_row_groups):
-            table = file.read_row_group(group, columns=wanted)
+            table = file.read_row_group(group, columns=wanted, use_threads=False)
             first = np.asarray(table.column("survivor").to_numpy()) <= 0
             yield table.filter(pa.array(first))
 

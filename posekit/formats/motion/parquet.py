@@ -134,13 +134,24 @@ def write_tables(path: str | Path, tables: Iterable[tuple[Mapping[str, Column], 
 
 
 @contextmanager
-def opened(path: str | Path) -> Iterator[Any]:
-    """Open a Parquet file; what pyarrow says about a damaged one, also while it is read, is one line."""
+def opened(path: str | Path, *, limit: int = MAX_BYTES, buffer_bytes: int = 0) -> Iterator[Any]:
+    """Open a Parquet file; what pyarrow says about a damaged one, also while it is read, is one line.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    limit : int
+        Bytes that it may have.
+    buffer_bytes : int
+        How much of a row group is read at once; 0 for all of it.
+    """
     pa = extra("pyarrow", "parquet", "reading Parquet")
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
-    with open_file(path, limit=MAX_BYTES) as file:
+    with open_file(path, limit=limit) as file:
         try:
-            yield pq.ParquetFile(file)
+            # Reading ahead takes threads, which call Python for the file's bytes: also while the process ends.
+            yield pq.ParquetFile(file, pre_buffer=False, buffer_size=buffer_bytes)
         except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
             reason = cut(one_line(str(error)) or type(error).__name__)
             raise refusal(
@@ -171,7 +182,8 @@ def columns_of(path: str | Path, file: Any, group: int | None = None) -> dict[st
         got = f"{rows:,} rows of {count:,} columns"
         remedy = "split it, or write it in smaller row groups"
         raise refusal(path, "", got, f"1 to {MAX_VALUES:,} numbers", remedy)
-    table = file.read() if group is None else file.read_row_group(group)
+    groups = range(file.num_row_groups) if group is None else [group]
+    table = file.read_row_groups(groups, use_threads=False)
     pa = extra("pyarrow", "parquet", "reading Parquet")
     wanted = number_columns(table.column_names)
     columns: dict[str, Column] = {}
