@@ -105,7 +105,7 @@ def check_noise(seen: View, deviation: float | None) -> None:
     Raises
     ------
     InputError
-        Where the option is given for another camera than an `opencv` one.
+        Where the option is given for a `lee-chen` camera.
     """
     from posekit.recovery.noise import noiseless_camera, refuse_deviation
 
@@ -114,6 +114,6 @@ def check_noise(seen: View, deviation: float | None) -> None:
     if camera and seen.deviation is not None:
         typer.echo(
             f"posekit: warning: the view's deviation of {seen.deviation:g} px has no effect: its camera is "
-            f"{camera}, and noise is allowed for where it is opencv",
+            f"{camera}, whose noise is not allowed for",
             err=True,
         )

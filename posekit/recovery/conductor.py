@@ -99,14 +99,16 @@ def recover(
     # Root: whose body it is, where the camera sees it, and where the tree grows from.
     body = body_of(view, figure or load_figure(), asked.proportions)
     without_neck, bare = neckless(view), trunkless(view, body)
-    fit = _fit(view, body, asked, tolerance)
+    lengths = uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
+    noise = _noise(view, body, asked, lengths)
+    photographs = uncalibrated and noise is not None
+    fit = _fit(view, body, asked, tolerance, refuse=not photographs)
     fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
-    noise = _noise(
-        view, body, asked, uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
-    )
 
     # Tree and refinement: as exact where that may be, then lengths at their word, then as uncertain as they are.
-    at_their_word = noise is None or _lengths_may_be_right(view, asked, own_figure=figure is not None)
+    at_their_word = noise is None or _lengths_may_be_right(
+        view, asked, own_figure=photographs or figure is not None
+    )
     grower = Grower(view=view, fit=fit, body=body, settings=asked, nearer=_nearer(asked, body, len(view)))
     refiner = None
     trees: dict[int, FrameTrees] = {}
@@ -128,11 +130,16 @@ def recover(
             empty = np.array([not trees[k].survivors for k in uncertain.tolist()], dtype=np.bool_)
             if empty.sum() < max(LEAST_DOUBTS, DOUBTED_SHARE * len(uncertain)):
                 uncertain = uncertain[empty]
-        if noise is not None and len(uncertain):
+        if noise is not None and not photographs and len(uncertain):
             refiner = refiner or _refiner(grower, noise)
             trees |= refiner.grow(uncertain)
         if progress is not None:
             progress(len(set(fit.frame[part].tolist())))  # np.unique would load masked arrays for it
+    if photographs and noise is not None:
+        # Seen with noise, or nothing is left by tolerances: a body of other lengths, or not all of a trunk is seen.
+        empty = np.array([k for k in range(len(view)) if k not in trees or trees[k].undecided], dtype=np.intp)
+        if len(empty):
+            trees |= _refiner(grower, noise).grow(empty)
 
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = []
@@ -145,7 +152,7 @@ def recover(
                 batch=one.batch,
                 index=one.index,
                 hypotheses=one.hypotheses,
-                family=None if fit.families is None else fit.families[k],
+                family=None if one.fit.families is None else one.fit.families[k],
                 placement=None if one.fit.placements is None else one.fit.placements[k],
                 reason=one.fit.reasons[k],
                 lost_to=lost_to(bool(without_neck[k]), bool(bare[k])),
@@ -155,23 +162,26 @@ def recover(
             )
         )
     _refuse_impossible(frames)
+    unused = photographs and all(frame.judged != "refined" for frame in frames)
     record = record_of(
         asked,
         tolerance,
         body.figure,
         [(frame.judged, frame.tolerance) for frame in frames],
-        None if noise is None else noise.document(),
+        None if noise is None or unused else noise.document(),
     )
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=record, grower=grower)
 
 
-def _fit(view: View, body: LiftedBody, asked: RecoverSettings, tolerance: Tolerance | None) -> CameraFit:
+def _fit(
+    view: View, body: LiftedBody, asked: RecoverSettings, tolerance: Tolerance | None, *, refuse: bool
+) -> CameraFit:
     """Find the camera, and where it sees the root."""
     if not isinstance(view.camera, ScaledOrthographicModel):
         return fit_camera(view, body.figure, asked.rooting, tolerance)
     from posekit.recovery.fit_scale import fit_scale
 
-    return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance)
+    return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance, refuse=refuse)
 
 
 def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: LengthUncertainty) -> Noise | None:
@@ -182,15 +192,22 @@ def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: Length
     InputError
         Where refinement is asked for that the view or a tolerance forbids, or a deviation that nothing would heed.
     """
-    able = isinstance(view.camera, OpenCVModel) and isinstance(body, FigureBody)
+    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
+    able = (uncalibrated or isinstance(view.camera, OpenCVModel)) and isinstance(body, FigureBody)
+    if uncalibrated and able:
+        from posekit.recovery.photograph import is_photograph, photograph_noise
+
+        able = is_photograph(view, asked)
     if asked.refine and not able:
-        raise InputError("--refine: only views of a calibrated camera (opencv) are refined; leave it out")
+        raise InputError("--refine: only views of an opencv camera, or of none, are refined; leave it out")
     if asked.refine and asked.tolerance is not None:
         raise InputError("--refine: the noise says what is tolerated; leave out the tolerances, or --refine")
     if asked.refine is False or not able or asked.tolerance is not None:
         if asked.length_deviation is not None:
             raise InputError("--length-deviation: nothing is refined here; leave it out")
         return None
+    if uncalibrated:
+        return photograph_noise(view, asked, lengths)
     return Noise.of(view, asked.rooting.deviation, lengths, asked=asked.refine)
 
 
@@ -212,6 +229,10 @@ def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds 
 
 def _refiner(grower: Grower, noise: Noise) -> Refiner:
     """Make what grows frames as their noise demands; where all are exact, what that needs is not even loaded."""
+    if isinstance(grower.view.camera, ScaledOrthographicModel):
+        from posekit.recovery.photograph import PhotographRefiner
+
+        return PhotographRefiner(grower=grower, noise=noise)
     from posekit.recovery.refiner import Refiner
 
     return Refiner(grower=grower, noise=noise)

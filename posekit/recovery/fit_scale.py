@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from posekit.cameras import ScaledOrthographicCamera
@@ -12,6 +14,7 @@ from posekit.linkages import LinkageFamily as Solutions
 from posekit.linkages import Minima, search
 from posekit.recovery.body import LiftedBody
 from posekit.recovery.fit_camera import CameraFit
+from posekit.recovery.likely_scale import likely_scales
 from posekit.settings import EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, Tolerance
 from posekit.settings.scale import Scale, way_of
 from posekit.skeleton import HEAD, JOINT
@@ -20,7 +23,15 @@ RELATIVE_ROUNDING = 1e-9
 """Of the bound: a scale that is below it by so little is at it."""
 
 
-def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tolerance | None) -> CameraFit:
+def fit_scale(
+    view: View,
+    body: LiftedBody,
+    scale: Scale | None,
+    tolerance: Tolerance | None,
+    *,
+    reasons: Sequence[str] = (),
+    refuse: bool = True,
+) -> CameraFit:
     """Find the scales that each frame is to be recovered at, and put the root at depth zero.
 
     Parameters
@@ -33,6 +44,10 @@ def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tole
         How to find s; None takes the view's own, or else the least.
     tolerance : Tolerance or None
         By how much segments may be too short for their image at a scale that was measured.
+    reasons : sequence of str (F,), optional
+        Why nothing can be grown in a frame, where that is known by now; else an empty text.
+    refuse : bool
+        Whether a view in which no frame has a scale is an error.
 
     Raises
     ------
@@ -44,9 +59,14 @@ def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tole
         raise InputError("--scale: the view's camera is calibrated; leave the option out")
     seen = view.image * np.array([model.aspect, 1.0])
     root_image = body.image(seen)[:, 0]
-    reasons = [""] * len(view.time)
+    reasons = [f"frames[{k}]: {reason}" if reason else "" for k, reason in enumerate(reasons)] or [""] * len(
+        seen
+    )
     families: list[Family | None] = []
     for k, points in enumerate(seen):
+        if reasons[k]:
+            families.append(None)
+            continue
         try:
             if np.isnan(root_image[k]).any():
                 raise InputError(
@@ -56,7 +76,7 @@ def fit_scale(view: View, body: LiftedBody, scale: Scale | None, tolerance: Tole
         except PosekitError as error:
             reasons[k] = f"frames[{k}]: {error}"
             families.append(None)
-    if all(reasons):
+    if refuse and all(reasons):
         raise InputError(reasons[0])
     chosen = [family.chosen if family else np.array([1.0]) for family in families]
     frame = np.repeat(np.arange(len(seen)), [len(scales) for scales in chosen])
@@ -86,7 +106,7 @@ def _family(
     bound, segment = solutions.minimum_scale, solutions.bounding_segment
     if bound == 0:
         raise InputError("all joints are seen at one point, which fixes no scale; correct the image points")
-    minima, curve = np.empty((0, 2)), np.empty((0, 2))
+    minima, curve, deviation = np.empty((0, 2)), np.empty((0, 2)), None
     if scale.how == "constraints":
         found = search(solutions, scale.weights)
         minima = np.stack([found.s, found.residual], axis=-1)
@@ -95,6 +115,9 @@ def _family(
         name = name if len(found) else f"min: {name} fixes no scale here"
     elif scale.how == "min":
         chosen = np.array([bound])
+    elif scale.how == "likely":
+        found_scale = likely_scales(seen[None], body.figure)
+        chosen, deviation = found_scale.scale, float(found_scale.deviation[0])
     else:
         s = float(scale.value or 0.0) / (body.stature if scale.how == "stature" else 1.0)
         longest = float(linkage.lengths[solutions.bounding])
@@ -112,6 +135,7 @@ def _family(
         bound=bound,
         segment=segment,
         chosen=chosen,
+        deviation=deviation,
         minima_s=minima[:, 0],
         minima_residual=minima[:, 1],
         curve_s=curve[:, 0],

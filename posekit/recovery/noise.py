@@ -129,11 +129,8 @@ class Noise:
 
 
 def noiseless_camera(view: View) -> str:
-    """Name the camera of a view whose noise is not allowed for; empty where it is an `opencv` one."""
-    if isinstance(view.camera, OpenCVModel):
-        return ""
-    uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-    return "scaled-orthographic, its calibration not known" if uncalibrated else "lee-chen"
+    """Name the camera of a view whose noise is not allowed for; empty where it is."""
+    return "" if isinstance(view.camera, OpenCVModel | ScaledOrthographicModel) else "lee-chen"
 
 
 def refuse_deviation(view: View, deviation: float | None) -> None:
@@ -142,12 +139,12 @@ def refuse_deviation(view: View, deviation: float | None) -> None:
     Raises
     ------
     InputError
-        Where one is given for another camera than an `opencv` one.
+        Where one is given for a `lee-chen` camera.
     """
     camera = noiseless_camera(view)
     if camera and deviation is not None:
         raise InputError(
-            f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected an opencv "
+            f"--deviation: the view's camera is {camera}: a deviation has no effect there; expected another "
             "camera; leave the option out, or give tolerances (--rigid-tolerance, --tangent-tolerance)"
         )
 

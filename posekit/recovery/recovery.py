@@ -141,6 +141,8 @@ class FrameRecovery:
         """The scale of each survivor (N,), pixels a metre; None where the camera is calibrated."""
         if self.family is None or self.batch is None:
             return None if self.family is None else np.empty(0)
+        if self.refined is not None:
+            return np.full(len(self), self.family.chosen[0])
         return np.asarray(self.family.chosen[self.batch.leaves.frame[self._rows] - self.index])
 
     @property

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.angles import Limits
-from posekit.cameras import Camera, PinholeCamera
+from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import Array
 from posekit.hidden import CompletedSurvivors
 from posekit.ranking import deviation_of_noise
@@ -30,7 +30,7 @@ from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
-from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
+from posekit.refinement.tolerance import ALLOWED_DEVIATIONS, NoiseTolerance
 from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
@@ -177,10 +177,10 @@ class Refiner:
 
     def lift(self, chosen: NDArray[np.intp]) -> Lifted:
         """Find the trunks of some hypotheses of the fit, and put limbs on them."""
-        fit, view, figure = self.fit, self.grower.view, self.grower.body.figure
+        fit = self.fit
         frames, frame = np.unique(fit.frame[chosen], return_inverse=True)
-        camera = _pinhole(fit.cameras(chosen))
-        seen = ObservedHypotheses.of(view, fit, chosen, camera, figure, self.noise, self._limits, self._walls)
+        camera = fit.cameras(chosen)
+        seen = self.observe(chosen, camera)
         trunks = find_trunks(seen.sight)
         own = chosen[trunks.frame]
         tree, tolerance, pruning = self._limb_tree(trunks, chosen, camera, seen)
@@ -218,6 +218,17 @@ class Refiner:
             completion=completion,
         )
 
+    def observe(self, chosen: NDArray[np.intp], camera: Camera) -> ObservedHypotheses:
+        """Gather what some hypotheses saw, and how well."""
+        if not isinstance(camera, PinholeCamera):
+            raise TypeError(
+                "a view without a calibrated camera is a photograph (posekit.recovery.photograph)"
+            )
+        figure = self.grower.body.figure
+        return ObservedHypotheses.of(
+            self.grower.view, self.fit, chosen, camera, figure, self.noise, self._limits, self._walls
+        )
+
     def refine(self, lifted: Lifted) -> LeafOutcomes:
         """Refine leaves, reject and merge."""
         heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
@@ -245,7 +256,6 @@ class Refiner:
     def _trees(self, lifted: Lifted, outcomes: LeafOutcomes) -> dict[int, FrameTrees]:
         """Gather what is left of each frame."""
         leaves, fit = outcomes.prune(lifted.leaves), self.fit
-        depth = np.median(fit.root[lifted.chosen, 2] / lifted.seen.focal)
         batch = Batch(
             leaves=leaves,
             physical=lifted.physical,
@@ -256,7 +266,7 @@ class Refiner:
             exact=np.zeros(leaves.n_frames, dtype=np.bool_),
             completion=None if lifted.completion is None else lifted.completion.take(outcomes.kept),
             refined=outcomes.survivors,
-            spread=float(deviation_of_noise(self.noise.deviation, depth)),
+            spread=self.spread(lifted),
         )
         bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
         return {
@@ -264,39 +274,49 @@ class Refiner:
             for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
         }
 
-    def _limb_tree(
-        self, trunks: Trunks, chosen: NDArray[np.intp], camera: PinholeCamera, seen: ObservedHypotheses
-    ) -> tuple[InterpretationTree, Tolerance, list[Check]]:
-        """Return the tree of the limbs on trunks, its tolerance, and its checks with every angle's own allowance."""
-        fit, body = self.fit, self.grower.body
-        focal = float(np.min(camera.K[..., [0, 1], [0, 1]]))
-        allowed = tolerance_of(
+    def spread(self, lifted: Lifted) -> float:
+        """Say how far off survivors are, metres."""
+        depth = np.median(self.fit.root[lifted.chosen, 2] / lifted.seen.focal)
+        return float(deviation_of_noise(self.noise.deviation, depth))
+
+    def allowed(self, chosen: NDArray[np.intp], camera: Camera, seen: ObservedHypotheses) -> NoiseTolerance:
+        """Return what the tree of the limbs is allowed, on trunks that were found."""
+        focal = 1.0
+        if isinstance(camera, PinholeCamera):
+            focal = float(np.min(camera.K[..., [0, 1], [0, 1]]))
+        else:  # what is off is metres, whatever the scales of the frames
+            camera = ScaledOrthographicCamera(scale=1.0)
+        return tolerance_of(
             seen.worst * focal,
             camera,
-            body.figure,
-            float(fit.root[chosen, 2].max()),
+            self.grower.body.figure,
+            float(self.fit.root[chosen, 2].max()),
             length_deviation=self.noise.limb,
             root_depth_deviation=seen.step,
             size_deviation=self.noise.scale,
             trunks=True,
         )
+
+    def _limb_tree(
+        self, trunks: Trunks, chosen: NDArray[np.intp], camera: Camera, seen: ObservedHypotheses
+    ) -> tuple[InterpretationTree, Tolerance, list[Check]]:
+        """Return the tree of the limbs on trunks, its tolerance, and its checks with every angle's own allowance."""
+        body = self.grower.body
+        allowed = self.allowed(chosen, camera, seen)
         # Trunks were found with lengths that vary: their distances are off by as many deviations as are allowed for.
         longest = max(body.figure.lengths[segment_name(pair)] for pair in RIGID_SEGMENTS)
         rigid = max(ALLOWED_DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
         suite = under_noise(
-            suite_of(self.settings, body.figure, tolerance), allowed.bound, stretch=allowed.stretch
+            suite_of(self.settings, body.figure, tolerance),
+            allowed.bound,
+            perspective=isinstance(camera, PinholeCamera),
+            stretch=allowed.stretch,
         )
         tree = InterpretationTree(
             joints=body.tree.joints, parents=body.tree.parents, lengths=trunks.tree_lengths(body.figure)
         )
         return tree, tolerance, [check for check in suite if check.scope is not Scope.MOTION]
-
-
-def _pinhole(camera: Camera) -> PinholeCamera:
-    if not isinstance(camera, PinholeCamera):
-        raise TypeError("only views of a calibrated camera are refined")
-    return camera
 
 
 def _without_twins(leaves: Leaves, trunks: Trunks) -> Leaves:

@@ -173,6 +173,12 @@ class FrameTrees:
         offsets = self.batch.offsets
         return int(offsets[self.index + self.hypotheses] - offsets[self.index])
 
+    @property
+    def undecided(self) -> bool:
+        """Whether nothing survives, and the image points are not known to be exact."""
+        own = slice(self.index, self.index + self.hypotheses)
+        return not self.survivors and (self.batch is None or not self.batch.exact[own].any())
+
 
 def trees_of(batch: Batch, fit: CameraFit, rows: NDArray[np.intp]) -> dict[int, FrameTrees]:
     """Say for each frame of a batch, which was grown of some hypotheses, where its own trees are."""

@@ -11,10 +11,10 @@ from posekit.errors import InputError
 
 SCALE_CONSTRAINTS = ("closure", "coplanar", "perpendicular", "collinear")
 
-How = Literal["min", "value", "stature", "constraints"]
+How = Literal["min", "likely", "value", "stature", "constraints"]
 
 SCALE_EXPECTED = (
-    f"min, a number, stature:PX, or some of {', '.join(SCALE_CONSTRAINTS)}, "
+    f"min, a number, stature:PX, likely, or some of {', '.join(SCALE_CONSTRAINTS)}, "
     "as in closure or closure:1,coplanar:0.5"
 )
 
@@ -25,8 +25,9 @@ class Scale:
 
     Parameters
     ----------
-    how : {"min", "value", "stature", "constraints"}
-        ``min`` takes the least scale that the lengths allow; ``value`` a given one; ``stature`` the ratio of a
+    how : {"min", "likely", "value", "stature", "constraints"}
+        ``min`` takes the least scale that the lengths allow; ``likely`` that at which a normal body's segments look
+        as long as they are seen (`posekit.recovery.likely_scale`); ``value`` a given one; ``stature`` the ratio of a
         height in pixels to the true one; ``constraints`` searches the minima of their residual.
     value : float, optional
         Pixels a metre, or the height in pixels.
@@ -55,7 +56,7 @@ def parse_scale(text: str, *, per_unit: float = 1.0) -> Scale:
     Parameters
     ----------
     text : str
-        ``min``, ``VALUE`` in pixels a unit of length, ``stature:PX``, or constraints with optional weights.
+        ``min``, ``likely``, ``VALUE`` in pixels a unit of length, ``stature:PX``, or constraints with optional weights.
     per_unit : float
         Units of length in a metre, to turn VALUE into pixels a metre.
 
@@ -70,8 +71,8 @@ def parse_scale(text: str, *, per_unit: float = 1.0) -> Scale:
     {'closure': 1.0, 'coplanar': 0.5}
     """
     text = text.strip()
-    if text == "min":
-        return Scale()
+    if text in ("min", "likely"):
+        return Scale(how="min" if text == "min" else "likely")
     if text.startswith("stature:"):
         return Scale(how="stature", value=_number(text.removeprefix("stature:")))
     if _is_number(text):

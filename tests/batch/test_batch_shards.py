@@ -124,15 +124,12 @@ def test_every_kind_of_view(how: str, tmp_path: Path, folder: Path) -> None:
         assert rows.scale.isna().all()
 
 
-@pytest.mark.parametrize(
-    ("view", "camera"),
-    [(builtin_view("seq1"), "lee-chen"), (forget_camera(seen(1)), "scaled-orthographic, its calibration")],
-)
-def test_a_deviation_is_refused_where_it_has_no_effect(view: View, camera: str) -> None:
+def test_a_deviation_is_refused_where_it_has_no_effect() -> None:
     recipe = Recipe(source=Source(deviation=2.0))
     recipe.check_view(seen(1))
-    with pytest.raises(InputError, match=f"--deviation: the view's camera is {camera}"):
-        recipe.check_view(view)
+    recipe.check_view(forget_camera(seen(1)))
+    with pytest.raises(InputError, match="--deviation: the view's camera is lee-chen"):
+        recipe.check_view(builtin_view("seq1"))
 
 
 def test_where_it_is_cut_changes_nothing(tmp_path: Path, folder: Path) -> None:

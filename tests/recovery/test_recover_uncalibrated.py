@@ -271,13 +271,17 @@ def test_a_scale_below_the_bound_says_which_segment_and_what_is_needed() -> None
     )
 
 
-def test_a_frame_without_the_root_is_left_out_and_the_others_are_not() -> None:
+def test_a_frame_without_a_trunk_is_left_out_and_one_without_the_root_is_not() -> None:
     image = view_of(TRUTH[:3], None).image.copy()
-    image[1, JOINT["neck"]] = np.nan
+    image[1, :6] = np.nan
+    image[2, JOINT["neck"]] = np.nan
     recovery = recover(dataclasses.replace(view_of(TRUTH[:3], None), image=image))
     assert [len(frame) > 0 for frame in recovery.frames] == [True, False, True]
-    assert recovery.frames[1].reason.startswith("frames[1]: neck, from which the tree grows, is not seen")
+    assert recovery.frames[1].reason.startswith(
+        "frames[1]: none of neck, right_shoulder, left_shoulder, pelvis"
+    )
     assert recovery.frames[1].family is None
+    assert recovery.frames[2].judged == "refined"
     result_of(recovery)
 
 

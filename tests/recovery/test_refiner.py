@@ -308,8 +308,8 @@ def test_a_file_keeps_what_refinement_says(name: str, unit: Any, recovery: Recov
 
 def test_what_cannot_be_refined_is_refused(scene: SyntheticScene) -> None:
     view = noisy(scene)
-    with pytest.raises(InputError, match="--refine: only views of a calibrated camera"):
-        recover(forget_camera(view), refine=True)
+    with pytest.raises(InputError, match="--refine: only views of an opencv camera, or of none"):
+        recover(forget_camera(view), refine=True, scale="closure")
     with pytest.raises(InputError, match="--refine: the noise says what is tolerated"):
         recover(replace(view, root=np.full((FRAMES, 3), np.nan)), refine=True, tolerance=MEASURED_TOLERANCE)
     with pytest.raises(InputError, match=r"--length-deviation: 0\.5; expected a fraction"):

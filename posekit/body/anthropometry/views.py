@@ -186,7 +186,7 @@ def lengths_from_views(image: Array, evidence: LengthEvidence | None = None, **c
     covariance = prior_covariance(spread(asked.proportions), asked.both_sides)
     middle, covariance = conditioned(middle, covariance, asked.known, stature, scale is not None)
     chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), MOST_FRAMES)).round().astype(int))
-    seen = _seen(points)
+    seen = seen_dimensions(points)
     given = _given_scale(scale, len(points))
     usable = chosen[np.isfinite(seen[chosen]).any(axis=1) & (np.isfinite(given[chosen]) | (scale is None))]
     if len(usable) == 0:
@@ -199,15 +199,12 @@ def lengths_from_views(image: Array, evidence: LengthEvidence | None = None, **c
             f"{FEWEST_PIXELS:g} or more",
             "give pixels, not fractions of the picture",
         )
-    relief = {limb(side, part): DEPTH_RELIEF_METRES[part] for part in LIMB_PARTS for side in SIDES}
     likelihood = ViewLikelihood(
         seen=seen[usable],
         first=np.log(given[usable]) if scale is not None else _first_scale(seen[usable], middle),
         scale_known=scale is not None,
-        relief=np.array(
-            [relief.get(name, DEPTH_RELIEF_METRES.get(name, np.nan)) for name in BODY_DIMENSIONS]
-        ),
-        loose=np.array([TRUNK_LOOSENESS.get(name, 0.0) for name in BODY_DIMENSIONS]),
+        relief=depth_reliefs(),
+        loose=length_looseness(),
         shorter=np.array(
             [0.0 if upright or name != TRUNK_LENGTH else BENT_TRUNK_SHARE for name in BODY_DIMENSIONS]
         ),
@@ -260,8 +257,19 @@ def _points(image: Array) -> Array:
     return points
 
 
-def _seen(points: Array) -> Array:
-    """Return the lengths of `BODY_DIMENSIONS` in the picture (T, 11), pixels."""
+def depth_reliefs() -> Array:
+    """Return `DEPTH_RELIEF_METRES` of each of `BODY_DIMENSIONS` (11,)."""
+    of_limbs = {limb(side, part): DEPTH_RELIEF_METRES[part] for part in LIMB_PARTS for side in SIDES}
+    return np.array([(DEPTH_RELIEF_METRES | of_limbs)[name] for name in BODY_DIMENSIONS])
+
+
+def length_looseness() -> Array:
+    """Return `TRUNK_LOOSENESS` of each of `BODY_DIMENSIONS` (11,); none of a bone."""
+    return np.array([TRUNK_LOOSENESS.get(name, 0.0) for name in BODY_DIMENSIONS])
+
+
+def seen_dimensions(points: Array) -> Array:
+    """Return the lengths of `BODY_DIMENSIONS` in pictures (T, 14, 2): (T, 11), pixels."""
     ends = [name.split("-") for name in BODY_DIMENSIONS if name != TRUNK_LENGTH]
     starts, stops = ([JOINT[pair[k]] for pair in ends] for k in (0, 1))
     apart = points[:, starts] - points[:, stops]

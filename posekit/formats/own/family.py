@@ -26,13 +26,15 @@ class Family:
     Parameters
     ----------
     how : str
-        How the scale was found: ``min``, ``view``, ``value``, ``stature``, or the constraints.
+        How the scale was found: ``min``, ``likely``, ``view``, ``value``, ``stature``, or the constraints.
     bound : float
         The least scale that the lengths allow, pixels a metre (files: a `unit`).
     segment : str
         The segment that sets the bound.
     chosen : array (H,)
         The scales that postures were recovered at, pixels a metre.
+    deviation : float, optional
+        Relative standard deviation of a likely scale.
     minima_s, minima_residual : array (M,)
         All local minima of the constraints' residual (dimensionless), best first.
     curve_s, curve_residual : array (C,)
@@ -45,6 +47,7 @@ class Family:
     bound: float
     segment: str
     chosen: Array
+    deviation: float | None = None
     minima_s: Array = field(default_factory=_nothing)
     minima_residual: Array = field(default_factory=_nothing)
     curve_s: Array = field(default_factory=_nothing)
@@ -82,6 +85,7 @@ class Family:
             "bound": self.bound / per,
             "segment": self.segment,
             "chosen": (self.chosen / per).tolist(),
+            **({} if self.deviation is None else {"deviation": self.deviation}),
             "minima": [{"s": s, "residual": residual} for s, residual in pairs],
             "curve": {"s": (self.curve_s / per).tolist(), "residual": self.curve_residual.tolist()},
             "mirrored": self.mirrored,
@@ -96,6 +100,7 @@ class Family:
             bound=fields["bound"] * per,
             segment=fields["segment"],
             chosen=np.array(fields["chosen"]) * per,
+            deviation=fields.get("deviation"),
             minima_s=np.array([minimum["s"] for minimum in fields["minima"]]) * per,
             minima_residual=np.array([minimum["residual"] for minimum in fields["minima"]]),
             curve_s=np.array(fields["curve"]["s"]) * per,

@@ -81,11 +81,16 @@ class ResultCurve(FileModel):
 class ResultFamily(FileModel):
     """The scales that an uncalibrated frame can have (Taylor 2000, section 2)."""
 
-    how: str = Field(description="min, view, value, stature, or the constraints that fixed the scale.")
+    how: str = Field(
+        description="min, likely, view, value, stature, or the constraints that fixed the scale."
+    )
     bound: float = Field(description="The least scale that the lengths allow, pixels a `unit`.")
     segment: str = Field(description="The segment that sets the bound.")
     chosen: Annotated[list[float], Field(max_length=100_000), FailFast()] = Field(
         description="The scales that postures were recovered at, pixels a `unit`."
+    )
+    deviation: float | None = Field(
+        default=None, description="Relative standard deviation of a likely scale."
     )
     minima: Annotated[list[ResultMinimum], Field(max_length=100_000), FailFast()] = Field(
         description="All local minima of the constraints' residual, best first."
