@@ -137,9 +137,11 @@ def recover(
             progress(len(set(fit.frame[part].tolist())))  # np.unique would load masked arrays for it
     if photographs and noise is not None:
         # Seen with noise, or nothing is left by tolerances: a body of other lengths, or not all of a trunk is seen.
-        empty = np.array([k for k in range(len(view)) if k not in trees or trees[k].undecided], dtype=np.intp)
-        if len(empty):
-            trees |= _refiner(grower, noise).grow(empty)
+        undecided = np.array(
+            [k for k in range(len(view)) if k not in trees or trees[k].undecided], dtype=np.intp
+        )
+        if len(undecided):
+            trees |= _refiner(grower, noise).grow(undecided)
 
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = []

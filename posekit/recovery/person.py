@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -78,7 +79,7 @@ def refuse_settings(view: View, settings: RecoverSettings) -> None:
         Where a calibrated view is given a scale or Taylor's proportions, or an uncalibrated one a root.
     """
     if isinstance(view.camera, ScaledOrthographicModel):
-        if settings.rooting != Rooting():
+        if replace(settings.rooting, deviation=None) != Rooting():
             raise InputError(
                 "--root: the view's camera is not known, and so no depth is; leave the option out"
             )
