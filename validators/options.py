@@ -9,7 +9,7 @@ from typing import Any, Final
 
 from posekit.errors import InputError
 from posekit.settings import RigidTolerance
-from posekit.settings.recover import checked_rules
+from posekit.settings.judging import checked_rules
 from posekit.validators.joint_range import ANGLE_TOLERANCE
 from posekit.validators.ranges import URDF_RANGES, Ranges, load_ranges
 from posekit.validators.rigid_parts import Mode

@@ -24,7 +24,7 @@ from posekit.validators.robot.figure import FigureConfigurations
 from posekit.validators.robot.load import STICK_FIGURE, load_subject
 from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
-from posekit.validators.robot.settings import LENGTHS_CHOICES, ROBOT_DEFAULT, RobotSettings
+from posekit.validators.robot.settings import robot_settings
 from posekit.validators.suite import judge
 from posekit.validators.walking import thresholds_of
 
@@ -75,24 +75,14 @@ class Validator:
         self.robot = subject if isinstance(subject, Robot) else None
         self._figure = subject if isinstance(subject, Figure) else None
         if isinstance(subject, Robot):
-            own = RobotSettings(
-                checks=ROBOT_DEFAULT if asked.check_names is None else asked.check_names,
-                ranges=asked.ranges if isinstance(asked.ranges, str) else asked.ranges.name,
-                joint_map=asked.joint_map,
-                lengths=asked.lengths or "median",
-                bodies=asked.bodies,
-                rigid_tolerance=asked.rigid_tolerance,
-                angle_tolerance=asked.angle_tolerance,
-                contact_margin=asked.contact_margin,
-                up=asked.up,
-            )
-            self.checks, self.lengths = own.checks, own.lengths
+            own = robot_settings(asked)
+            self.checks, self.lengths = own.check_names, own.lengths
             self._robot = RobotValidator(robot=subject, settings=own)
             _ = self._robot.models.limits
             return
         self.lengths = asked.lengths or "model"
         for option, given, known in (
-            ("--lengths", self.lengths, LENGTHS_CHOICES[:2]),
+            ("--lengths", self.lengths, ("model", "median")),
             ("--bodies", asked.bodies, ("auto", "urdf")),
             ("--joint-map", asked.joint_map, (None,)),
         ):
@@ -111,7 +101,7 @@ class Validator:
             "rules": asked.rules,
             "thresholds": thresholds_of(asked.walkers),
             "contact_margin": asked.contact_margin,
-            "up": tuple(np.asarray(asked.up, dtype=np.float64).tolist()),
+            "up": asked.up,
         }
         self._suite = self._make_suite(subject)
 
@@ -248,7 +238,7 @@ def _report(verdict: Verdict) -> Report:
         points=verdict.points,
         residual=residual,
         colliders=tuple(model.collision for model in verdict.models)
-        if "collision" in verdict.models[0].settings.checks
+        if "collision" in verdict.models[0].settings.check_names
         else (),
     )
 

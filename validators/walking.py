@@ -19,7 +19,7 @@ from posekit.body import Figure
 from posekit.body.frames import torso_frame
 from posekit.errors import InputError
 from posekit.geometry import Array, cross, unit
-from posekit.settings.recover import checked_rules
+from posekit.settings.judging import checked_rules
 from posekit.skeleton import HEAD, JOINT, JOINTS, SIDES, TORSO
 from posekit.tree import Check, Findings, Place, Scope
 

@@ -1,9 +1,9 @@
 """What a run was asked: made once, handed down whole, and written into every result."""
 
 from posekit.settings.check import CheckSettings as CheckSettings
+from posekit.settings.judging import DEFAULT_RULES as DEFAULT_RULES
+from posekit.settings.judging import RangeTable as RangeTable
 from posekit.settings.recover import DEFAULT_CHECKS as DEFAULT_CHECKS
-from posekit.settings.recover import DEFAULT_RULES as DEFAULT_RULES
-from posekit.settings.recover import RangeTable as RangeTable
 from posekit.settings.recover import RecoverSettings as RecoverSettings
 from posekit.settings.rooting import Rooting as Rooting
 from posekit.settings.scale import Scale as Scale

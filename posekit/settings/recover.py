@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
-from typing import Any, Final, Literal, Protocol, get_args
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final, Literal, get_args
 
 from posekit.errors import InputError
-from posekit.settings.check import CheckSettings, check_settings
+from posekit.settings.check import CheckSettings
+from posekit.settings.judging import JudgingSettings
 from posekit.settings.rooting import Rooting
 from posekit.settings.scale import Scale, parse_scale
 from posekit.settings.tolerance import PartialTolerance, Tolerance
@@ -20,29 +21,9 @@ DEFAULT_CHECKS: Final = tuple(
 )
 """The checks of a posture by itself; ``walking`` needs a person who walks."""
 
-DEFAULT_RULES: Final = (1, 2)
-"""Rules of walking that are asked where ``walking`` is."""
-
-WALKING_RULES: Final = (1, 2, 3, 4, 5)
-WALKERS_NAMES: Final = ("paper", "people")
-
-
-class RangeTable(Protocol):
-    """A table of joint ranges that is loaded by now: `posekit.validators.Ranges`."""
-
-    @property
-    def name(self) -> str:
-        """What results call it."""
-        ...
-
-    @property
-    def limits(self) -> Mapping[str, tuple[float, float]]:
-        """The ranges, degrees."""
-        ...
-
 
 @dataclass(frozen=True, kw_only=True)
-class RecoverSettings:
+class RecoverSettings(JudgingSettings):
     """Everything that is asked of a recovery; the view, the figure and the computer come from elsewhere.
 
     Command line, Python, batch and evaluation make one each in their own way, and hand it down whole.
@@ -96,12 +77,8 @@ class RecoverSettings:
     'table1'
     """
 
-    checks: Sequence[Any] = DEFAULT_CHECKS  # a tuple of CheckSettings, once they are made
-    ranges: str | RangeTable = "urdf"
-    rules: Sequence[int] = DEFAULT_RULES
-    walkers: str = "paper"
+    checks: Sequence[Any] = DEFAULT_CHECKS
     tolerance: Tolerance | PartialTolerance | None = None
-    contact_margin: float = 0.0
     group: float | None = None
     scale: Scale | str | None = None
     proportions: str = "figure"
@@ -112,15 +89,11 @@ class RecoverSettings:
     length_deviation: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "checks", tuple(map(check_settings, self.checks)))
-        object.__setattr__(self, "rules", checked_rules(self.rules))
+        super().__post_init__()
         object.__setattr__(self, "rooting", self.rooting or Rooting())
         object.__setattr__(self, "scale", self.scale or None)
-        check_walkers(self.walkers)
         if self.group is not None and not (math.isfinite(self.group) and self.group >= 0):
             raise InputError(f"--group: {self.group!r} m; expected zero or a positive length")
-        if not math.isfinite(self.contact_margin):
-            raise InputError(f"the contact margin is {self.contact_margin!r} m; expected a finite length")
         if self.proportions not in get_args(Proportions):
             raise InputError(
                 f"--proportions: {self.proportions!r}; expected {' or '.join(get_args(Proportions))}"
@@ -135,15 +108,6 @@ class RecoverSettings:
                 f"{MAX_LENGTH_DEVIATION:g}"
             )
 
-    @property
-    def check_names(self) -> tuple[str, ...]:
-        """The names of the checks."""
-        return tuple(check.name for check in self.checks)
-
-    def changed(self, **changes: Any) -> RecoverSettings:
-        """Return the same settings with some of them changed, by the names of the fields."""
-        return replace(self, **changes) if changes else self
-
     def tolerance_for(self, usual: Tolerance) -> Tolerance | None:
         """Return the tolerance that is given, with gaps filled from the `usual` one of the view; None where none is."""
         return (
@@ -154,63 +118,16 @@ class RecoverSettings:
         """Return how the scale is found, for a view that has `per_metre` units in a metre; None where nobody says."""
         return parse_scale(self.scale, per_unit=per_metre) if isinstance(self.scale, str) else self.scale
 
-    def to_json(self) -> dict[str, Any]:
-        """Return the settings as values that JSON has, which `from_json` reads again.
-
-        A table of ranges is given by its name, or the path that it was read from.
-        """
-        document = {one.name: getattr(self, one.name) for one in fields(self)}
-        for name in ("tolerance", "scale", "rooting"):
-            if document[name] is not None and not isinstance(document[name], str):
-                document[name] = asdict(document[name])
-        return document | {
-            "checks": [check.name if not check.parameters else check.to_json() for check in self.checks],
-            "ranges": self.ranges if isinstance(self.ranges, str) else self.ranges.name,
-            "rules": list(self.rules),
-            "nearer": None if self.nearer is None else [dict(one) for one in self.nearer],
-        }
-
-    @staticmethod
-    def from_json(document: Mapping[str, Any]) -> RecoverSettings:
-        """Read settings that `to_json` wrote; what is not said is as it is by default.
-
-        Raises
-        ------
-        InputError
-            Where a setting is unknown or impossible.
-        """
-        known = [one.name for one in fields(RecoverSettings)]
-        unknown = sorted(set(document) - set(known))
-        if unknown:
-            raise InputError(f"settings: {unknown[0]!r} is no setting; expected some of {', '.join(known)}")
-        said = dict(document)
-        try:
-            if said.get("tolerance") is not None:
-                whole = Tolerance if "placement" in said["tolerance"] else PartialTolerance
-                said["tolerance"] = whole(**said["tolerance"])
-            if isinstance(said.get("scale"), Mapping):
-                said["scale"] = Scale(**said["scale"])
-            if isinstance(said.get("rooting"), Mapping):
-                said["rooting"] = Rooting(**said["rooting"])
-            return RecoverSettings(**said)
-        except TypeError as error:
-            raise InputError(f"settings: {error}; expected what `RecoverSettings.to_json` writes") from None
+    @classmethod
+    def _made(cls, said: dict[str, Any]) -> dict[str, Any]:
+        if said.get("tolerance") is not None:
+            whole = Tolerance if "placement" in said["tolerance"] else PartialTolerance
+            said["tolerance"] = whole(**said["tolerance"])
+        for name, kind in (("scale", Scale), ("rooting", Rooting)):
+            if isinstance(said.get(name), Mapping):
+                said[name] = kind(**said[name])
+        return said
 
 
 MAX_LENGTH_DEVIATION: Final = 0.3
 """The largest relative deviation of lengths that is taken for one."""
-
-
-def check_walkers(walkers: str) -> None:
-    """Refuse a name that is none of walkers'."""
-    if walkers not in WALKERS_NAMES:
-        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(WALKERS_NAMES)}")
-
-
-def checked_rules(rules: Iterable[int]) -> tuple[int, ...]:
-    """Return rules of walking, or refuse one that there is not."""
-    chosen = tuple(rules)
-    unknown = [rule for rule in chosen if rule not in WALKING_RULES]
-    if unknown:
-        raise InputError(f"--rules: {unknown[0]} is not a rule; expected some of 1, 2, 3, 4, 5")
-    return chosen

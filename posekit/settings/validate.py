@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, get_args
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.errors import InputError
-from posekit.settings.check import check_settings
-from posekit.settings.recover import DEFAULT_RULES, RangeTable, check_walkers, checked_rules
+from posekit.settings.judging import JudgingSettings
 from posekit.settings.tolerance import EXACT_TOLERANCE, MEASURED_TOLERANCE
 
 Bodies = Literal["auto", "urdf", "visual", "capsules"]
 Lengths = Literal["model", "median", "each"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ValidateSettings:
+@dataclass(frozen=True, kw_only=True)
+class ValidateSettings(JudgingSettings):
     """Everything that is asked of a validation, of the stick figure or of a robot.
 
     Parameters
@@ -65,13 +65,8 @@ class ValidateSettings:
         Where one of them is impossible, whatever is judged.
     """
 
-    checks: Sequence[Any] | None = None  # a tuple of CheckSettings, once they are made
-    ranges: str | RangeTable = "urdf"
-    rules: Sequence[int] = DEFAULT_RULES
-    walkers: str = "paper"
     rigid_tolerance: float = MEASURED_TOLERANCE.rigid
     angle_tolerance: float = EXACT_TOLERANCE.angle
-    contact_margin: float = 0.0
     lengths: Lengths | None = None
     joint_map: Any = None
     bodies: Bodies = "auto"
@@ -81,27 +76,25 @@ class ValidateSettings:
     up: ArrayLike = (0.0, 0.0, 1.0)
 
     def __post_init__(self) -> None:
-        if self.checks is not None:
-            object.__setattr__(self, "checks", tuple(map(check_settings, self.checks)))
-        object.__setattr__(self, "rules", checked_rules(self.rules))
-        check_walkers(self.walkers)
+        super().__post_init__()
         for what, value in (
             ("rigid tolerance", self.rigid_tolerance),
             ("angle tolerance", self.angle_tolerance),
         ):
             if not (math.isfinite(value) and value >= 0):
                 raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
-        if not math.isfinite(self.contact_margin):
-            raise InputError(f"the contact margin is {self.contact_margin!r} m; expected a finite length")
-
-    @property
-    def check_names(self) -> tuple[str, ...] | None:
-        """The names of the checks; None where those are asked that are usual."""
-        return None if self.checks is None else tuple(check.name for check in self.checks)
-
-    def changed(self, **changes: Any) -> ValidateSettings:
-        """Return the same settings with some of them changed, by the names of the fields."""
-        return replace(self, **changes) if changes else self
+        for option, given, known in (
+            ("--lengths", self.lengths, (None, *get_args(Lengths))),
+            ("--bodies", self.bodies, get_args(Bodies)),
+        ):
+            if given not in known:
+                expected = ", ".join(one for one in known if one is not None)
+                raise InputError(f"{option}: {given!r}; expected one of {expected}")
+        up = np.asarray(self.up, dtype=np.float64)
+        if up.shape != (3,) or not np.isfinite(up).all() or not np.linalg.norm(up) > 0:
+            raise InputError(f"up is {self.up!r}; expected a direction, three finite numbers")
+        object.__setattr__(self, "up", tuple(up.tolist()))
+        object.__setattr__(self, "package_dirs", tuple(self.package_dirs))
 
     def told(self) -> dict[str, Any]:
         """Say what decided verdicts as a report does: in the words of the command line."""

@@ -38,16 +38,50 @@ CHANGED = {
 }
 
 
-@pytest.mark.parametrize("name", CHANGED)
-def test_every_setting_is_read_as_it_was_written(name: str) -> None:
-    settings = RecoverSettings().changed(**{name: CHANGED[name]})
-    assert settings != RecoverSettings()
-    assert RecoverSettings.from_json(json.loads(json.dumps(settings.to_json()))) == settings
+CHANGED_OF_VALIDATION = {
+    **{name: CHANGED[name] for name in ("checks", "ranges", "rules", "walkers", "contact_margin")},
+    "rigid_tolerance": 0.01,
+    "angle_tolerance": 2.0,
+    "lengths": "each",
+    "joint_map": "isb",
+    "bodies": "capsules",
+    "srdf": "robot.srdf",
+    "package_dirs": ("meshes",),
+    "untrusted": True,
+    "up": (0.0, -1.0, 0.0),
+}
+ALL_CHANGED = [
+    (kind, name, value)
+    for kind, changes in ((RecoverSettings, CHANGED), (ValidateSettings, CHANGED_OF_VALIDATION))
+    for name, value in changes.items()
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "value"), ALL_CHANGED)
+def test_every_setting_is_read_as_it_was_written(kind: Any, name: str, value: Any) -> None:
+    settings = kind().changed(**{name: value})
+    assert settings != kind()
+    assert kind.from_json(json.loads(json.dumps(settings.to_json()))) == settings
     assert pickle.loads(pickle.dumps(settings)) == settings
 
 
 def test_all_settings_have_a_changed_one() -> None:
     assert set(CHANGED) == set(RecoverSettings().to_json())
+    assert set(CHANGED_OF_VALIDATION) == set(ValidateSettings().to_json())
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"lengths": "longer"}, "--lengths: 'longer'; expected one of model, median, each"),
+        ({"bodies": "none"}, "--bodies: 'none'; expected one of auto, urdf, visual, capsules"),
+        ({"up": [0, 0, 0]}, "up is .*; expected a direction"),
+        ({"rigid_tolerance": -1.0}, "the rigid tolerance is -1.0"),
+    ],
+)
+def test_impossible_settings_of_a_validation_are_refused_at_once(changes: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        ValidateSettings.from_json(changes)
 
 
 @pytest.mark.parametrize(

@@ -10,4 +10,3 @@ from posekit.validators.robot.ranges import load_joint_limits as load_joint_limi
 from posekit.validators.robot.robot_validator import RobotValidator as RobotValidator
 from posekit.validators.robot.settings import ROBOT_CHECKS as ROBOT_CHECKS
 from posekit.validators.robot.settings import ROBOT_DEFAULT as ROBOT_DEFAULT
-from posekit.validators.robot.settings import RobotSettings as RobotSettings

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
+import numpy as np
 import pinocchio as pin
 
 from posekit.errors import InputError
@@ -16,6 +17,7 @@ from posekit.robots.joint_map import JointMap, find_joint_map, load_joint_map
 from posekit.robots.kinematics import Kinematics
 from posekit.robots.pairs import set_pairs
 from posekit.robots.scaling import RATIO_BOUNDS, model_lengths, scaled
+from posekit.settings import ValidateSettings
 from posekit.validators.robot.balance import Balance
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.feet import find_soles
@@ -23,7 +25,7 @@ from posekit.validators.robot.fitting import Fitter
 from posekit.validators.robot.made_up import fitted_capsules
 from posekit.validators.robot.ranges import load_joint_limits
 from posekit.validators.robot.rigid_parts import rigid_segments
-from posekit.validators.robot.settings import BODIES_FROM, RobotSettings
+from posekit.validators.robot.settings import BODIES_FROM
 from posekit.validators.robot.subject import Subject
 
 SAME_LENGTH: Final = 1e-3
@@ -47,13 +49,13 @@ class JudgedModel:
         The model with its geometry, and what was prepared for it once.
     kinematics : Kinematics or None
         The points of the joint map; None where the robot has none and only configurations are judged.
-    settings : RobotSettings
+    settings : ValidateSettings
         What the judging was asked.
     """
 
     subject: Subject
     kinematics: Kinematics | None
-    settings: RobotSettings
+    settings: ValidateSettings
 
     @cached_property
     def fitter(self) -> Fitter:
@@ -73,7 +75,8 @@ class JudgedModel:
     def balance(self) -> Balance:
         """What judges balance."""
         corners = () if self.kinematics is None else find_soles(self.kinematics, self.subject.geometry)
-        return Balance(model=self.subject.model, corners=corners, up=self.settings.upward)
+        up = np.asarray(self.settings.up, dtype=np.float64)
+        return Balance(model=self.subject.model, corners=corners, up=up / np.linalg.norm(up))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,12 +87,12 @@ class Models:
     ----------
     robot : Robot
         The robot that is judged, as it was loaded.
-    settings : RobotSettings
+    settings : ValidateSettings
         What the judging was asked.
     """
 
     robot: Robot
-    settings: RobotSettings
+    settings: ValidateSettings
 
     @cached_property
     def joint_map(self) -> JointMap:
@@ -107,7 +110,8 @@ class Models:
     @cached_property
     def limits(self) -> tuple[Array, Array]:
         """The limits of q (nq,) that are judged by."""
-        return load_joint_limits(self.settings.ranges, self.robot.model)
+        ranges = self.settings.ranges
+        return load_joint_limits(ranges if isinstance(ranges, str) else ranges.name, self.robot.model)
 
     @cached_property
     def bodies(self) -> str:
@@ -121,7 +125,7 @@ class Models:
         """The model with its own lengths."""
         lower, upper = self.limits
         subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
-        needed = "balance" in self.settings.checks
+        needed = "balance" in self.settings.check_names
         return JudgedModel(
             subject=subject, kinematics=self._mapped if needed else None, settings=self.settings
         )
@@ -161,9 +165,9 @@ class Models:
         settings: dict[str, Any] = {
             "figure": self.robot.hash,
             "robot": self.robot.name,
-            "checks": list(self.settings.checks),
+            "checks": list(self.settings.check_names),
         }
-        if "collision" in self.settings.checks:
+        if "collision" in self.settings.check_names:
             settings |= {
                 "bodies": BODIES_FROM[self.bodies],
                 "pairs_from": PAIRS_FROM[self.robot.pairs_from if self.bodies == "urdf" else self.bodies],
@@ -198,16 +202,18 @@ class Models:
     @cached_property
     def _geometry(self) -> pin.GeometryModel | None:
         """The bodies of the model with its own lengths."""
-        if not self.settings.wants_bodies:
+        if not {"collision", "balance"} & set(self.settings.check_names):
             return None
         if self.bodies == "capsules":
             # What is made up has no feet: for balance alone there is nothing to make.
-            geometry = fitted_capsules(self.kinematics) if "collision" in self.settings.checks else None
+            geometry = fitted_capsules(self.kinematics) if "collision" in self.settings.check_names else None
         elif self.bodies == "visual":
             geometry = self._visuals()
         else:
             geometry = self.robot.geometry
-        if "collision" in self.settings.checks and (geometry is None or not len(geometry.collisionPairs)):
+        if "collision" in self.settings.check_names and (
+            geometry is None or not len(geometry.collisionPairs)
+        ):
             raise InputError(
                 f"{self.robot.source}: --bodies {self.bodies}: no pair of bodies can collide; expected two bodies at "
                 "least; take --bodies capsules, or leave the check collision out"

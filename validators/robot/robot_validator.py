@@ -15,13 +15,14 @@ from posekit.geometry import Array
 from posekit.robots import Robot, check_configurations
 from posekit.robots.joint_map import targets_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
+from posekit.settings import ValidateSettings
 from posekit.validators.robot.configurations import judge_quickly
 from posekit.validators.robot.fitting import Fit
 from posekit.validators.robot.joint_range import judge_joint_range
 from posekit.validators.robot.models import JudgedModel, Models
 from posekit.validators.robot.reach import judge_reach
 from posekit.validators.robot.rigid_parts import judge_rigid_parts
-from posekit.validators.robot.settings import OF_POSITIONS, RobotSettings
+from posekit.validators.robot.settings import OF_POSITIONS, reach_tolerance
 from posekit.validators.suite import Judgement
 
 CLEAR_DEGREES: Final = 0.5
@@ -71,12 +72,12 @@ class RobotValidator:
     ----------
     robot : Robot
         The robot that is judged, as it was loaded.
-    settings : RobotSettings
+    settings : ValidateSettings
         What the judging was asked.
     """
 
     robot: Robot
-    settings: RobotSettings
+    settings: ValidateSettings
 
     @cached_property
     def models(self) -> Models:
@@ -93,9 +94,9 @@ class RobotValidator:
         """
         checked = check_configurations(self.robot.model, q, source)
         checked.flags.writeable = False  # its margins may be asked for later
-        if not set(self.settings.checks) - set(OF_POSITIONS):
+        if not set(self.settings.check_names) - set(OF_POSITIONS):
             raise InputError(
-                f"--checks: {', '.join(self.settings.checks)}: a configuration's lengths are the model's own, so "
+                f"--checks: {', '.join(self.settings.check_names)}: a configuration's lengths are the model's own, so "
                 "nothing would be judged; expected joint-range, collision or balance"
             )
         return Verdict(
@@ -137,11 +138,11 @@ class RobotValidator:
         fit = judged.fitter.fit(targets, sequence)
         known = np.asarray(np.isfinite(targets).all(axis=(1, 2)))
         judgements: list[Judgement] = []
-        if "reach" in settings.checks:
+        if "reach" in settings.check_names:
             judgements.append(
-                judge_reach(kinematics, targets, fit.judged_residual, tolerance=settings.reach_tolerance)
+                judge_reach(kinematics, targets, fit.judged_residual, tolerance=reach_tolerance(settings))
             )
-        if "rigid-parts" in settings.checks:
+        if "rigid-parts" in settings.check_names:
             judgements.append(judge_rigid_parts(kinematics, targets, tolerance=settings.rigid_tolerance))
         judgements += _of_fits(judged, fit, seen=judged.fitter.seen(targets), complete=known)
         return Verdict(judgements, known, fit.judged_q, kinematics.names, fit.judged_residual, [judged])
@@ -164,11 +165,11 @@ def _of_configurations(judged: JudgedModel, q: Array) -> Sequence[Judgement]:
     settings = judged.settings
     judgements = judge_quickly(
         judged.subject,
-        judged.collision if "collision" in settings.checks else None,
+        judged.collision if "collision" in settings.check_names else None,
         q,
-        tolerance=settings.angle_tolerance if "joint-range" in settings.checks else None,
+        tolerance=settings.angle_tolerance if "joint-range" in settings.check_names else None,
     )
-    if "balance" in settings.checks:
+    if "balance" in settings.check_names:
         return [*judgements, judged.balance.judge(q)]
     return judgements
 
@@ -178,8 +179,8 @@ def _of_fits(judged: JudgedModel, fit: Fit, *, seen: Bools, complete: Bools) -> 
     settings, judgements = judged.settings, []
     residual = fit.judged_residual
     misfit = np.where(np.isfinite(residual), residual, 0.0).max(axis=1, initial=0.0)
-    far = misfit > settings.reach_tolerance
-    if "joint-range" in settings.checks:
+    far = misfit > reach_tolerance(settings)
+    if "joint-range" in settings.check_names:
         judgements.append(
             judge_joint_range(
                 judged.subject,
@@ -194,9 +195,9 @@ def _of_fits(judged: JudgedModel, fit: Fit, *, seen: Bools, complete: Bools) -> 
                 ),
             )
         )
-    if "collision" in settings.checks:
+    if "collision" in settings.check_names:
         judgements.append(judged.collision.judge(fit.judged_q, far | ~complete))
-    if "balance" in settings.checks:
+    if "balance" in settings.check_names:
         judgements.append(judged.balance.judge(fit.judged_q, far | ~complete))
     return judgements
 
