@@ -81,6 +81,7 @@ def follow_scaled(
         Where nobody says how noisy the image points are, or no path is asked for.
     """
     from posekit.recovery.conductor import recover
+    from posekit.recovery.scaled_sequences import AT_ONE_SCALE
     from posekit.recovery.scaled_sequences import follow_scaled as find
 
     if not paths:
@@ -94,7 +95,8 @@ def follow_scaled(
             "--follow-scale: the scale is told by what noise can explain; expected a standard deviation in pixels; "
             "give --deviation, 1 for points that are all but exact, and no --no-refine"
         )
-    refined = settings.changed(refine=True)
+    told = settings.length_deviation
+    refined = settings.changed(refine=True, length_deviation=AT_ONE_SCALE if told is None else told)
     with progress_so_far("trying scales") as done, about(path):
         return find(seen, lambda one: recover(one, refined), deviation=deviation, k=paths, progress=done)
 

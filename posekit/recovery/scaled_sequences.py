@@ -34,6 +34,9 @@ FIRST_SCALES: Final = 5
 REFINING_ROUNDS: Final = 3
 """How often the scales half-way between the best and its neighbours are tried after that."""
 
+AT_ONE_SCALE: Final = 0.01
+"""Relative deviation of lengths with which a scale is tried: with more, every scale would fit."""
+
 BEST_PATH_DEVIATION: Final = 0.01
 """How far off, relatively, scales are that the best path tells (docs, "Sequences"): what it costs says much less."""
 
@@ -142,7 +145,8 @@ def follow_scaled(
     trial = _Trials(
         view=view,
         lengths=dict(person.lengths),
-        recovering=recovering or partial(recover, figure=figure, refine=refine),
+        recovering=recovering
+        or partial(recover, figure=figure, refine=refine, length_deviation=AT_ONE_SCALE),
         deviation=deviation,
         model=model,
         progress=progress,

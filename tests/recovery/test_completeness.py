@@ -59,7 +59,7 @@ class Chunk(NamedTuple):
 
 def recovered(scene: SyntheticScene) -> Chunk:
     view = view_of(scene)
-    return Chunk(scene, view, recover(view))
+    return Chunk(scene, view, recover(view, length_deviation=0.0))
 
 
 @lru_cache(maxsize=1)

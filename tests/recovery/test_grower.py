@@ -28,7 +28,8 @@ def mixed(noisy: slice) -> View:
     image = view.image.copy()
     image[noisy] += np.random.default_rng(6).normal(0.0, 1.0, image[noisy].shape)
     assert view.truth is not None
-    return replace(view, image=image, root=view.truth[:, 0], head_image=np.full_like(view.head_image, np.nan))
+    head = np.full_like(view.head_image, np.nan)
+    return replace(view, image=image, root=view.truth[:, 0], head_image=head, length_deviation=0.0)
 
 
 def said(view: View, **options: Any) -> list[tuple[Any, ...]]:

@@ -27,7 +27,10 @@ def blind(count: int = 12, noise: float = 0.0, seed: int = 11) -> View:
     scene = random_views(FIGURE, count, rng)
     view = view_of(scene if noise == 0 else scene.with_noise(noise, rng))
     return replace(
-        view, root=np.full_like(view.root, np.nan), head_image=np.full_like(view.head_image, np.nan)
+        view,
+        root=np.full_like(view.root, np.nan),
+        head_image=np.full_like(view.head_image, np.nan),
+        length_deviation=0.0,
     )
 
 

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.body import load_figure
+from posekit.body import LengthUncertainty, load_figure
+from posekit.body.uncertainty import UNKNOWN_ADULT
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.own import View
@@ -21,8 +22,7 @@ from posekit.recovery.certified import certified_within
 from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
-from posekit.refinement import MEASURED_LENGTH_DEVIATIONS
-from posekit.settings import MEASURED_TOLERANCE, RIGID_TOLERANCE
+from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validation.validate import recovered_with
@@ -171,7 +171,8 @@ def test_every_survivor_is_valid_by_the_result_itself(
 
     def verdicts(recovery: Recovery, *, heads: bool) -> list[str]:
         judged = recovered_with(result_of(recovery)).settings
-        validator = Validator(settings=judged, ranges=ranges, rigid_tolerance=RIGID_TOLERANCE)
+        rigid = recovery.settings["refined"]["rigid"]
+        validator = Validator(settings=judged, ranges=ranges, rigid_tolerance=rigid)
         points = np.concatenate(
             [frame.batch.points[frame._rows] for frame in recovery.frames if frame.batch is not None]
         )
@@ -200,10 +201,11 @@ def test_a_rejection_after_refinement_says_what_and_by_how_much(recovery: Recove
 
 @pytest.mark.parametrize("lengths", [0.0, 0.02, 0.06])
 def test_lengths_are_allowed_what_bodies_are_or_what_is_said(lengths: float) -> None:
-    allowed = certified_within(Noise(deviation=2.0, lengths=lengths))
+    noise = Noise(deviation=2.0, lengths=LengthUncertainty.uniform(lengths))
+    allowed = certified_within(noise, FIGURE)
     assert allowed.angle == 6.0
-    assert allowed.rigid == pytest.approx(0.03 * max(1.0, lengths / 0.02))
-    assert certified_within(Noise(deviation=2.0)).rigid == 0.03
+    assert allowed.rigid == pytest.approx(max(0.03, 3 * np.sqrt(2) * lengths * max(FIGURE.lengths.values())))
+    assert certified_within(Noise(deviation=2.0), FIGURE).rigid == 0.03
 
 
 def test_exact_points_stay_exact_whatever_noise_is_said(scene: SyntheticScene) -> None:
@@ -252,15 +254,13 @@ def test_less_confident_points_are_less_certain(scene: SyntheticScene) -> None:
     view = noisy(scene)
     confidence = np.ones((FRAMES, 19))
     confidence[:, JOINT["right_wrist"]] = 0.3
-    noise = Noise.of(replace(view, confidence=confidence), None, None, asked=False)
+    noise = Noise.of(replace(view, confidence=confidence), None, LengthUncertainty(), asked=False)
     assert noise is not None
     deviation = noise.of_points(
         replace(view, confidence=confidence), np.arange(FRAMES), np.full(FRAMES, 4.0), np.full(FRAMES, 1500.0)
     )
     np.testing.assert_allclose(deviation[:, JOINT["right_wrist"]], PIXELS / np.sqrt(0.3))
     np.testing.assert_allclose(deviation[:, JOINT["left_wrist"]], PIXELS)
-    assert noise.by_segment == MEASURED_LENGTH_DEVIATIONS
-    assert set(replace(noise, lengths=0.03).by_segment.values()) == {0.03}
 
 
 def test_joints_that_are_hidden_stay_unknown_or_are_completed(scene: SyntheticScene) -> None:
@@ -313,7 +313,7 @@ def test_what_cannot_be_refined_is_refused(scene: SyntheticScene) -> None:
     with pytest.raises(InputError, match="--refine: the noise says what is tolerated"):
         recover(replace(view, root=np.full((FRAMES, 3), np.nan)), refine=True, tolerance=MEASURED_TOLERANCE)
     with pytest.raises(InputError, match=r"--length-deviation: 0\.5; expected a fraction"):
-        Noise(deviation=1.0, lengths=0.5)
+        recover(view, length_deviation=0.5)
 
 
 def test_the_command_line_refines(
@@ -325,8 +325,8 @@ def test_the_command_line_refines(
     assert command("recover", "view.json", "-o", "r.json").code == 0
     result = files.read_result("r.json")
     told = dict(result.settings["noise"])
-    assert told.pop("by_segment") == MEASURED_LENGTH_DEVIATIONS
-    assert told == {"deviation": 2.0, "offset": 0.0, "lengths": None}
+    assert told.pop("by_segment") == UNKNOWN_ADULT.own
+    assert told == {"deviation": 2.0, "offset": 0.0, "size": UNKNOWN_ADULT.common}
     assert set(result.settings["judged"]) == {"refined"}
     assert command("recover", "view.json", "-o", "n.json", "--no-refine").code == 0
     assert files.read_result("n.json").settings["noise"] is None
