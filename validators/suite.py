@@ -29,6 +29,8 @@ class Judgement:
         A negative margin is outside; NaN is undecided.
     violated : bool array (N, K)
         Where a value is outside its bounds by more than the tolerance; False where undecided.
+    by_pairs : bool
+        Whether its one place stands for all pairs of bodies, which `Report.contacts` lists.
     """
 
     check: str
@@ -39,6 +41,7 @@ class Judgement:
     upper: Array
     margin: Array
     violated: NDArray[np.bool_]
+    by_pairs: bool = False
 
     @property
     def worst(self) -> Array:

@@ -50,7 +50,7 @@ def list_postures(
     judged = [
         part
         for judgement in verdicts.judgements
-        if judgement.check != "collision" or contacts is None
+        if not judgement.by_pairs or contacts is None
         for part in _judged(judgement, rows)
     ]
     made = make_report(
@@ -93,7 +93,7 @@ def _touching(verdicts: Verdicts, contacts: Contacts | None, rows: NDArray[Any])
     findings: dict[int, list[Finding]] = {}
     if contacts is None:
         return findings
-    judgement = next(one for one in verdicts.judgements if one.check == "collision")
+    judgement = next(one for one in verdicts.judgements if one.by_pairs)
     lower = lower_margin(judgement)
     wanted = set(rows.tolist())
     for row, pair, distance, bad in zip(
@@ -106,7 +106,7 @@ def _touching(verdicts: Verdicts, contacts: Contacts | None, rows: NDArray[Any])
         if row in wanted:
             findings.setdefault(row, []).append(
                 Finding(
-                    check="collision",
+                    check=judgement.check,
                     where=contacts.names[pair],
                     value=distance,
                     lower=lower,

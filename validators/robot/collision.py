@@ -120,6 +120,7 @@ class SelfCollision:
             upper=np.broadcast_to(np.inf, value.shape),
             margin=value - self.contact_margin,
             violated=hit[:, None],
+            by_pairs=True,
         )
 
     def contacts(self, q: Array, rows: NDArray[np.intp], *, nearest: bool = False) -> Contacts:

@@ -106,7 +106,5 @@ class FigureConfigurations:
     @staticmethod
     def _under_its_names(judgement: Judgement) -> Judgement:
         """Return a judgement with the figure's names of its angles."""
-        if judgement.check != "joint_range":
-            return judgement
         dofs = {urdf_joint_name(dof): dof for dof in DOFS}
-        return replace(judgement, where=tuple(dofs[name] for name in judgement.where))
+        return replace(judgement, where=tuple(dofs.get(name, name) for name in judgement.where))

@@ -104,7 +104,7 @@ class Report:
             List the nearest pair of postures without a collision too, of all or of some; with meshes that takes long.
         """
         # The last but balance: what comes before need not be made.
-        judged = next((one for one in reversed(self.judgements) if one.check == "collision"), None)
+        judged = next((one for one in reversed(self.judgements) if one.by_pairs), None)
         if not self.colliders or judged is None:
             nothing = np.zeros(0, dtype=np.intp)
             return Contacts(

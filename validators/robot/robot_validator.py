@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -204,18 +204,13 @@ def _of_fits(judged: JudgedModel, fit: Fit, *, seen: Bools, complete: Bools) -> 
 
 def _joined(parts: list[Verdict]) -> Verdict:
     """Put the verdicts on single postures together."""
-    judgements = [
-        Judgement(
-            check=first.check,
-            where=first.where,
-            unit=first.unit,
-            **{
-                name: np.concatenate([getattr(part.judgements[k], name) for part in parts])
-                for name in ("value", "lower", "upper", "margin", "violated")
-            },
-        )
-        for k, first in enumerate(parts[0].judgements)
-    ]
+    judgements = []
+    for k, first in enumerate(parts[0].judgements):
+        numbers: dict[str, Any] = {
+            name: np.concatenate([getattr(part.judgements[k], name) for part in parts])
+            for name in ("value", "lower", "upper", "margin", "violated")
+        }
+        judgements.append(replace(first, **numbers))
     return Verdict(
         judgements=judgements,
         complete=np.concatenate([part.complete for part in parts]),

@@ -35,8 +35,8 @@ def culprit(reason: str) -> Culprit:
     >>> culprit("collision/right_forearm-torso").links
     ('right_forearm', 'torso')
     """
-    check, _, where = reason.rpartition("/")
-    if check != "collision" and where in RIGID_JOINTS:
+    _, _, where = reason.rpartition("/")
+    if where in RIGID_JOINTS:
         return Culprit(joints=RIGID_JOINTS[where])
     words = where.split(".")
     if words[-1] in ("knees", "standing_leg"):
