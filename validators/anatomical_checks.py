@@ -11,7 +11,7 @@ from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
-from posekit.skeleton import DOFS, HIPS, JOINT, TORSO
+from posekit.skeleton import DOFS, JOINT, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import judged_names, limb_walls
@@ -20,7 +20,6 @@ UNSEEN_DEGREES = 45.0
 """Degrees of tolerance from which on an axial rotation is not seen at all: it is undecided."""
 
 TORSO_POINTS = tuple(JOINT[name] for name in TORSO)
-HIPS_POINTS = tuple(JOINT[name] for name in HIPS)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,13 +71,17 @@ class AnatomicalLimb(Check):
         return self.limb[0].split("_")[1]
 
     @property
+    def _on_torso(self) -> bool:
+        return self._joint == "shoulder"
+
+    @property
     def _parent(self) -> tuple[int, ...]:
-        return TORSO_POINTS if self._joint == "shoulder" else HIPS_POINTS
+        return TORSO_POINTS if self._on_torso else self.figure.ik.hips_joints
 
     def judge(self, points: Array) -> Findings:
         """Judge the limb's angles; see `posekit.tree.Check`."""
         rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
-        R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
+        R_parent = (torso_frame if self._on_torso else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = np.degrees(self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end))
         walls = limb_walls(
@@ -111,7 +114,7 @@ class AnatomicalLimb(Check):
             self.anatomy,
             self._joint,
             self.figure.ik.limits.sign[first : first + (2 if len(self.limb) == 2 else 4)],
-            rigid=len(self._parent),
+            rigid=self.figure.ik.rigid_kind(self._parent),
             tolerance=self.tolerance,
             unseen=UNSEEN_DEGREES,
         )

@@ -35,7 +35,7 @@ def limb_numbers(
     signs : array (4,) or (2,)
         Of the angles that are known, as `posekit.body.angles.Limits` has them: all four, or the first two.
     rigid : int
-        How many points the part has that the limb hangs on.
+        The part that the limb hangs on, by `posekit.compiled.rigid_kernels.rigid_frame`.
     tolerance, unseen : float
         Degrees by which a direction may be off, and the tolerance from which on a rotation is not seen.
 

@@ -159,14 +159,17 @@ class Pelvis(Check):
     def judge(self, points: Array) -> Findings:
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0))
+        neck = points[:, 0] if self.ik.middle_pelvis else None
+        R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0), neck)
         angles = self.ik.pelvis(R_torso, R_hips)
         return _findings(self.ik, self.where, angles, self.tolerance)
 
     @cached_property
     def rule(self) -> Rule:
-        """The screen as numbers: limits and tolerance."""
-        return _rule(self.ik, self.where, kernels.OF_PELVIS, [np.radians(self.tolerance)])
+        """The screen as numbers: limits, tolerance, and whether the neck turns the hips."""
+        return _rule(
+            self.ik, self.where, kernels.OF_PELVIS, [np.radians(self.tolerance), self.ik.middle_pelvis]
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -207,8 +210,12 @@ class LimbRange(Check):
         return DOFS[first : first + 4]
 
     @property
+    def _on_torso(self) -> bool:
+        return self.limb[0].endswith("shoulder")
+
+    @property
     def _parent(self) -> tuple[int, ...]:
-        return TORSO_POINTS if self.limb[0].endswith("shoulder") else HIPS_POINTS
+        return TORSO_POINTS if self._on_torso else self.figure.ik.hips_joints
 
     @property
     def points(self) -> tuple[int, ...]:
@@ -218,7 +225,7 @@ class LimbRange(Check):
     def judge(self, points: Array) -> Findings:
         """Judge the limb's angles; see `posekit.tree.Check`."""
         rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
-        R_parent = (torso_frame if len(rigid) == 4 else hips_frame)(*rigid)
+        R_parent = (torso_frame if self._on_torso else hips_frame)(*rigid)
         end = limb[2] if len(limb) == 3 else None
         angles = self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end)
         angles = angles[:, : 2 if end is None else 4].copy()
@@ -246,6 +253,6 @@ class LimbRange(Check):
         """The screen as numbers: what the limb hangs on, whether it is whole, limits and tolerances."""
         if self.directions:
             return None  # tolerances of their own for each angle, which the screen does not know
-        sizes = len(self._parent), len(self.limb) == 3
+        sizes = self.figure.ik.rigid_kind(self._parent), len(self.limb) == 3
         more = [np.radians(self.tolerance), np.radians(UNSEEN_DEGREES), *sizes]
         return _rule(self.figure.ik, self._angles, kernels.OF_LIMB, more)

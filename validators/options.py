@@ -29,7 +29,7 @@ class CheckOptions:
         The joint ranges.
     rigid_tolerance : float or RigidTolerance
         Metres by which distances inside torso and hips may be off: all the same, or each its own.
-    rigid_mode : {"placement", "distances"}
+    rigid_mode : {"placement", "side", "distances"}
         See `posekit.validators.rigid_parts`.
     limbs : bool
         Whether the lengths of lifted segments are judged too.

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.frames import torso_frame
+from posekit.body.frames import hips_frame, torso_frame
 from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array, cross, unit
 from posekit.skeleton import HEAD, JOINT, SIDES, TORSO
@@ -35,7 +35,7 @@ def projected_angles(figure: Figure, ranges: Ranges, *, tolerance: float) -> lis
     """Make the checks of Table 1; they judge the posture itself."""
     checks: list[Check] = [
         HeadPlane(figure=figure, ranges=ranges, tolerance=tolerance),
-        HipPlane(ranges=ranges, tolerance=tolerance),
+        HipPlane(ranges=ranges, tolerance=tolerance, middle_pelvis=figure.pelvis_between_hips),
     ]
     for side in SIDES:
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
@@ -224,11 +224,13 @@ def plane_angles(normal: Array, along: Array, ranges: Ranges) -> Array:
 class HipPlane(Check):
     """Pelvis: the hips' plane against the torso's (§3.2.A iii).
 
-    Signs are the URDF's: what is above the pelvis bends and turns to the left.
+    Signs are the URDF's: what is above the pelvis bends and turns to the left. A pelvis between the hips makes no plane
+    with them: the spine stands for it (`posekit.body.frames.hips_frame`).
     """
 
     ranges: Ranges
     tolerance: float
+    middle_pelvis: bool = False
     name: str = "joint_range"
     places: tuple[Place, ...] = Place.of_angles("pelvis.flexion", "pelvis.rotation", "pelvis.bending")
     unit: str = "deg"
@@ -240,18 +242,20 @@ class HipPlane(Check):
         """Judge the pelvis; see `posekit.tree.Check`."""
         axes = paper_axes(points[:, :4])
         pelvis, right, left = points[:, 3], points[:, 4], points[:, 5]
-        middle = np.einsum("nij,nj->ni", axes, (right + left) / 2 - pelvis)
+        below = (right + left) / 2 - pelvis
+        if self.middle_pelvis:
+            below = -hips_frame(pelvis, right, left, points[:, 0])[..., 2]
+        middle = np.einsum("nij,nj->ni", axes, below)
         normal = unit(cross(middle, np.einsum("nij,nj->ni", axes, left - right)))
         angles = plane_angles(normal, middle, self.ranges) * HIP_SIGNS
         return _plane_findings("pelvis", angles, self.ranges, self.tolerance)
 
     @cached_property
     def rule(self) -> Rule:
-        """The screen as numbers: signs and bounds."""
+        """The screen as numbers: signs and bounds, and whether the neck turns the hips."""
         bounds = _plane_bounds("pelvis", self.ranges)
-        return _rule(
-            kernels.OF_HIP_PLANE, self.ranges, self.tolerance, HIP_SIGNS, bounds, wrap=ROUNDING_DEGREES
-        )
+        more = HIP_SIGNS, bounds, self.middle_pelvis
+        return _rule(kernels.OF_HIP_PLANE, self.ranges, self.tolerance, *more, wrap=ROUNDING_DEGREES)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

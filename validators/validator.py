@@ -14,7 +14,7 @@ from posekit.body import Figure, with_head
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
-from posekit.robots.scaling import segment_lengths
+from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
@@ -171,7 +171,8 @@ class Validator:
             return _report(self._robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
         figure, suite = self._figure, self._suite
         if self.lengths == "median" and len(joints):
-            figure = figure.scaled(lengths or segment_lengths(joints))
+            side = shoulders_are_behind(joints) if behind is None else behind
+            figure = figure.scaled(lengths or segment_lengths(joints), behind=side)
             suite = self._make_suite(figure)
         configurations, distance = figure.configurations(points)
         return Report(
@@ -220,7 +221,7 @@ class Validator:
         return make_checks(
             figure,
             self._chosen,
-            rigid_mode="distances",
+            rigid_mode="side",
             limbs=True,
             exact=True,
             directions=True,

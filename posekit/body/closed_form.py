@@ -29,10 +29,22 @@ class ClosedForm:
         Of all 22 angles: they choose among the branches.
     head_offsets : array (5, 3)
         From the neck to the head's points, head link's frame, metres.
+    middle_pelvis : bool
+        Whether the pelvis is between the hips, so that the neck turns them.
     """
 
     limits: Limits
     head_offsets: Array
+    middle_pelvis: bool = False
+
+    @property
+    def hips_joints(self) -> tuple[int, ...]:
+        """The joints that place the hips' frame, in the order in which `posekit.body.frames.hips_frame` takes them."""
+        return tuple(JOINT[name] for name in (*HIPS, "neck")[: 4 if self.middle_pelvis else 3])
+
+    def rigid_kind(self, joints: tuple[int, ...]) -> int:
+        """Name the rigid part of some joints as `posekit.compiled.rigid_kernels.rigid_frame` does."""
+        return -len(joints) if self.middle_pelvis and joints == self.hips_joints else len(joints)
 
     def angles(self, points: Array, R_torso: Array, alike: Alike | None = None) -> Array:
         """Find the 22 angles (N, 22) of postures (N, 19, 3) in the order of `posekit.skeleton.DOFS`, radians.
@@ -46,7 +58,7 @@ class ClosedForm:
         alike : callable, optional
             Finds postures that have some points in the same places: a limb that many share is solved once.
         """
-        R_hips = hips_frame(*(points[:, JOINT[name]] for name in HIPS))
+        R_hips = hips_frame(*(points[:, joint] for joint in self.hips_joints))
         angles = np.empty((len(points), len(DOFS)))
         trunk = tuple(JOINT[name] for name in (*TORSO, *HIPS))
         every = np.arange(len(points))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -18,10 +18,13 @@ from posekit.body.angles import Limits
 from posekit.body.axes import axis_signs
 from posekit.body.capsules import Capsule, read_capsules
 from posekit.body.closed_form import Alike, ClosedForm, with_head
+from posekit.body.closing import TORSO_LENGTHS, closed_lengths
 from posekit.body.frames import torso_frame
 from posekit.body.lengths import check_lengths
 from posekit.body.pool import collides, make_pool
+from posekit.body.side import side_is_certain
 from posekit.body.stature import lengths_from_stature
+from posekit.body.uncertainty import LengthUncertainty
 from posekit.body.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
 from posekit.errors import FigureError
 from posekit.geometry import Array, quaternion_from_rotation
@@ -57,6 +60,16 @@ LINK_OF_POINT = {
 """The URDF link whose origin is each point; points that are not listed have a link of their own name."""
 
 
+MIDDLE_PELVIS_PART: Final = 0.1
+"""Of the hips' distance: a pelvis that is nearer to the line between them counts as between them.
+
+Lengths that are off by 2 % put a pelvis there that is in the middle, and a plane from so short a way would turn by 30
+degrees with a joint that is off by a centimetre. Real pelvis joints (L5/S1, the sacrum) are half the hips' distance away.
+"""
+
+SAME_TORSO_METRES: Final = 1e-4
+"""Metres: a torso whose distances are no more other than that is the same."""
+
 NO_VELOCITY = np.arange(0)
 """No entries of v: positions alone are wanted, no Jacobian."""
 
@@ -87,6 +100,11 @@ class Figure:
         The texts; the model, the lengths, limits, capsules and checked pairs are read from them.
     source : str
         What to call it in errors.
+    side_known : bool
+        Whether it is known on which side of the line from neck to pelvis the shoulders lie: a URDF says it, lengths
+        do not.
+    moved_lengths : mapping
+        By how much lengths had to be changed so that torso and hips close, metres, by segment name.
 
     Raises
     ------
@@ -97,12 +115,15 @@ class Figure:
     urdf: str = field(repr=False)
     srdf: str = field(repr=False)
     source: str = "stick_figure.urdf"
+    side_known: bool = True
+    moved_lengths: Mapping[str, float] = field(default_factory=dict)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the texts alone: they are small, and a model is built from them in milliseconds."""
-        return _figure, (self.urdf, self.srdf, self.source)
+        return _figure, (self.urdf, self.srdf, self.source, self.side_known, dict(self.moved_lengths))
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "moved_lengths", MappingProxyType(dict(self.moved_lengths)))
         links = [link.get("name", "") for link in parse(self.urdf, self.source).findall("link")]
         names = set(self.model.names)
         missing = [urdf_joint_name(dof) for dof in DOFS if urdf_joint_name(dof) not in names]
@@ -149,6 +170,24 @@ class Figure:
         lengths = {segment_name((a, b)): float(np.linalg.norm(points[a] - points[b])) for a, b in SEGMENTS}
         return MappingProxyType(lengths)
 
+    @property
+    def shoulder_offset(self) -> float:
+        """How far the shoulders lie in front of the line from neck to pelvis, metres; negative behind it."""
+        return float(self.neutral_points[1, 0])
+
+    @property
+    def shoulder_side(self) -> Literal["front", "behind", "undecided"]:
+        """On which side of that line they are; undecided where it is not known, and of a flat torso."""
+        if not self.side_known or self.shoulder_offset == 0:
+            return "undecided"
+        return "behind" if self.shoulder_offset < 0 else "front"
+
+    @cached_property
+    def pelvis_between_hips(self) -> bool:
+        """Whether the pelvis is on the line between the hips, or so near that it makes no plane with them."""
+        pelvis, right = self.neutral_points[[JOINT["pelvis"], JOINT["right_hip"]]]
+        return bool(pelvis[2] - right[2] < MIDDLE_PELVIS_PART * self.lengths["right_hip-left_hip"])
+
     @cached_property
     def head_points(self) -> Array:
         """Neck and the five head points in the paper's head frame (6, 3): x forward, y up, z right, from the neck."""
@@ -182,7 +221,9 @@ class Figure:
     @cached_property
     def ik(self) -> ClosedForm:
         """The closed form from points to angles."""
-        return ClosedForm(limits=self.limits, head_offsets=self._head_offsets)
+        return ClosedForm(
+            limits=self.limits, head_offsets=self._head_offsets, middle_pelvis=self.pelvis_between_hips
+        )
 
     @cached_property
     def angle_index(self) -> NDArray[np.intp]:
@@ -203,9 +244,18 @@ class Figure:
         return hashlib.sha256(f"{self.urdf}\0{self.srdf}".encode()).hexdigest()
 
     def scaled(
-        self, lengths: Mapping[str, float], head_points: Mapping[str, ArrayLike] | None = None
+        self,
+        lengths: Mapping[str, float],
+        head_points: Mapping[str, ArrayLike] | None = None,
+        *,
+        behind: bool | None = None,
+        known: LengthUncertainty | None = None,
     ) -> Figure:
         """Make the same figure with other lengths; capsules grow with their part.
+
+        Lengths that miss closing are laid onto the nearest body that closes (`posekit.body.closing`), and
+        `moved_lengths` says by how much. Lengths do not tell on which side of the line from neck to pelvis the shoulders
+        lie: unless that is said, or the torso stays as it is, the new figure does not know it (`side_known`).
 
         Parameters
         ----------
@@ -213,16 +263,44 @@ class Figure:
             Metres, by segment name ``a-b``, a before b in tree order; others stay. Left and right are separate.
         head_points : mapping, optional
             Head points in the paper's head frame, metres; with ``neck`` among them, the others count from it.
+        behind : bool, optional
+            Whether the shoulders lie behind the line from neck to pelvis, where positions tell it
+            (`posekit.robots.shoulders_are_behind`).
+        known : LengthUncertainty, optional
+            How well the lengths are known: those that are known worse are changed more where they do not close.
 
         Raises
         ------
         FigureError
-            Where a length is unknown, not positive, or no torso or hips have such lengths.
+            Where a length is unknown, not positive, or no torso or hips have lengths near these.
         """
         check_lengths(lengths)
         head = self._head_in_link(head_points or {})
-        text = rewrite(self.urdf, self.capsules, self.neutral_points, {**self.lengths, **lengths}, head)
-        return Figure(urdf=text, srdf=self.srdf, source=self.source)
+        closed = closed_lengths({**self.lengths, **lengths}, known)
+        same = all(
+            abs(closed.lengths[name] - self.lengths[name]) <= SAME_TORSO_METRES for name in TORSO_LENGTHS
+        )
+        text = rewrite(
+            self.urdf,
+            self.capsules,
+            self.neutral_points,
+            closed.lengths,
+            head,
+            behind=self.shoulder_offset < 0 if behind is None else behind,
+        )
+        stale = {name: metres for name, metres in self.moved_lengths.items() if name not in lengths}
+        return replace(
+            self,
+            urdf=text,
+            side_known=behind is not None or (same and self.side_known),
+            moved_lengths={**stale, **closed.moved},
+        )
+
+    def with_side_within(self, known: LengthUncertainty) -> Figure:
+        """Return the figure as it is known within uncertain lengths: they may leave the side of the shoulders open."""
+        if not self.side_known or side_is_certain(self.lengths, known):
+            return self
+        return replace(self, side_known=False)
 
     def from_stature(self, stature: float) -> Figure:
         """Make the figure of a person of this stature (m): see `posekit.body.stature`."""
@@ -234,7 +312,7 @@ class Figure:
     def with_limits(self, limits: Mapping[str, tuple[float, float]]) -> Figure:
         """Make the same figure with other joint limits (radians), by name in `posekit.skeleton.DOFS`."""
         named = {urdf_joint_name(dof): bounds for dof, bounds in limits.items()}
-        return Figure(urdf=replace_limits(self.urdf, named), srdf=self.srdf, source=self.source)
+        return replace(self, urdf=replace_limits(self.urdf, named))
 
     def write(self, path: str | Path) -> None:
         """Write the URDF to `path` and the SRDF beside it; `posekit.load_figure` reads them again.
@@ -356,6 +434,9 @@ class Figure:
         q = pin.neutral(self.model)[None]
         lower, upper = self.limits.lower, self.limits.upper
         q[:, self.angle_index] = lower + 0.4 * (upper - lower)
+        if self.pelvis_between_hips:
+            # How far such a pelvis is flexed its joints do not tell: it is taken back as the neck turns it.
+            q[:, self.angle_index[3:6]] = 0.0
         points = self.forward_kinematics(q)
         back = self.forward_kinematics(self.inverse_kinematics(points))
         apart = np.linalg.norm(back - points, axis=-1)[0]
@@ -366,8 +447,8 @@ class Figure:
             )
 
 
-def _figure(urdf: str, srdf: str, source: str) -> Figure:
-    return Figure(urdf=urdf, srdf=srdf, source=source)
+def _figure(urdf: str, srdf: str, source: str, side_known: bool, moved: Mapping[str, float]) -> Figure:
+    return Figure(urdf=urdf, srdf=srdf, source=source, side_known=side_known, moved_lengths=moved)
 
 
 def _frame_name(point: str) -> str:

@@ -32,13 +32,18 @@ def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis
     return np.stack([cross(down, left), left, -down], axis=-1)
 
 
-def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array) -> Array:
+def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array, neck: Array | None = None) -> Array:
     """Return the hips' frame: left is the hips' line, down points from the pelvis square to it.
+
+    A pelvis between the hips has no plane with them: then down is from the neck to the pelvis, square to the hips'
+    line. This is smooth wherever the spine is not along that line; how far the pelvis is flexed it does not tell.
 
     Parameters
     ----------
     pelvis, right_hip, left_hip : array (..., 3)
         Points in the camera frame.
+    neck : array (..., 3), optional
+        Of a figure whose pelvis is between its hips (`Figure.pelvis_between_hips`).
 
     Returns
     -------
@@ -46,5 +51,5 @@ def hips_frame(pelvis: Array, right_hip: Array, left_hip: Array) -> Array:
         R_cam_hips; NaN where a point is, or where the points are on one line.
     """
     left = unit(left_hip - right_hip)
-    down = unit(perpendicular(right_hip - pelvis, left))
+    down = unit(perpendicular(right_hip - pelvis if neck is None else pelvis - neck, left))
     return np.stack([cross(down, left), left, -down], axis=-1)

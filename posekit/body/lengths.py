@@ -26,19 +26,21 @@ def check_lengths(lengths: Mapping[str, float]) -> None:
             raise FigureError(f"figure.lengths: {name} is {length:g} m; expected a positive, finite length")
 
 
-def torso_points(lengths: Mapping[str, float]) -> Array:
+def torso_points(lengths: Mapping[str, float], *, behind: bool = False) -> Array:
     r"""Place neck, right shoulder, left shoulder and pelvis by their six distances.
 
     With the neck at the origin and the pelvis straight below, each shoulder lies on a circle about that
     line: height :math:`h = (a^2 + b^2 - c^2) / 2b` below the neck and radius :math:`\sqrt{a^2 - h^2}`, for
     neck-shoulder a, neck-pelvis b, shoulder-pelvis c. The line between the shoulders gives the angle
-    between the two, and its part across the body the left axis. The distances leave the side open; the
-    shoulders are put in front.
+    between the two, and its part across the body the left axis. The distances leave the side open: the
+    shoulders are put in front, unless they are said to be `behind`.
 
     Parameters
     ----------
     lengths : mapping
         Metres, by segment name.
+    behind : bool
+        Whether the shoulders lie behind the line from neck to pelvis.
 
     Returns
     -------
@@ -50,7 +52,40 @@ def torso_points(lengths: Mapping[str, float]) -> Array:
     FigureError
         Where no such body exists: a triangle does not close, or the shoulders are too far apart or too near.
     """
-    down = lengths["neck-pelvis"]
+    right, left, forward_squared = _torso(lengths)
+    if forward_squared < -FLAT_DEPTH_SQUARED:
+        width, (z_right, r_right), (z_left, r_left) = lengths["right_shoulder-left_shoulder"], right[:2], left[:2]
+        reach = r_right + r_left
+        raise FigureError(
+            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "
+            f"it must lie between {math.hypot(r_right - r_left, z_right - z_left):g} and "
+            f"{math.hypot(reach, z_right - z_left):g} m; correct one of the torso's six lengths"
+        )
+    forward = math.sqrt(max(forward_squared, 0.0))
+    if behind:
+        forward = -forward
+    return np.array(
+        [
+            [0.0, 0.0, 0.0],
+            [forward, right[2], -right[0]],
+            [forward, left[2], -left[0]],
+            [0.0, 0.0, -lengths["neck-pelvis"]],
+        ]
+    )
+
+
+def forward_squared(lengths: Mapping[str, float]) -> float:
+    """Return the square of how far the shoulders lie beside the line from neck to pelvis, forward or back (m^2).
+
+    Negative where the six distances close in no space: how much is missing.
+    """
+    return _torso(lengths)[2]
+
+
+def _torso(
+    lengths: Mapping[str, float],
+) -> tuple[tuple[float, float, float], tuple[float, float, float], float]:
+    """Return depth, radius and place across of right and left shoulder, and the square of their place forward."""
     right = _apex("neck", "right_shoulder", "pelvis", lengths)
     left = _apex("neck", "left_shoulder", "pelvis", lengths)
     width = lengths["right_shoulder-left_shoulder"]
@@ -63,27 +98,11 @@ def torso_points(lengths: Mapping[str, float]) -> Array:
     across = math.sqrt(across_squared)
     middle = (left[1] ** 2 - right[1] ** 2) / across
     y_left, y_right = (middle + across) / 2, (middle - across) / 2
-    forward_squared = right[1] ** 2 - y_right**2
-    if forward_squared < -FLAT_DEPTH_SQUARED:
-        reach = right[1] + left[1]
-        raise FigureError(
-            f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "
-            f"it must lie between {math.hypot(right[1] - left[1], right[0] - left[0]):g} and "
-            f"{math.hypot(reach, right[0] - left[0]):g} m; correct one of the torso's six lengths"
-        )
-    forward = math.sqrt(max(forward_squared, 0.0))
-    return np.array(
-        [
-            [0.0, 0.0, 0.0],
-            [forward, y_right, -right[0]],
-            [forward, y_left, -left[0]],
-            [0.0, 0.0, -down],
-        ]
-    )
+    return (*right, y_right), (*left, y_left), right[1] ** 2 - y_right**2
 
 
 def hips_points(lengths: Mapping[str, float]) -> Array:
-    """Place pelvis, right hip and left hip by their three distances.
+    """Place pelvis, right hip and left hip by their three distances; the pelvis may lie between the hips.
 
     Returns
     -------
@@ -92,11 +111,6 @@ def hips_points(lengths: Mapping[str, float]) -> Array:
     """
     base = lengths["right_hip-left_hip"]
     offset, height = _apex("right_hip", "pelvis", "left_hip", lengths)
-    if height**2 <= FLAT_DEPTH_SQUARED:
-        raise FigureError(
-            f"figure.lengths: with right_hip-left_hip {base:g} m the pelvis lies on the line between the "
-            "hips, which have no plane then; lengthen pelvis-right_hip or pelvis-left_hip"
-        )
     return np.array([[0.0, 0.0, 0.0], [0.0, -offset, -height], [0.0, base - offset, -height]])
 
 

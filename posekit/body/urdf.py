@@ -73,7 +73,13 @@ def as_figure_error() -> Iterator[None]:
 
 
 def rewrite(
-    text: str, capsules: Sequence[Capsule], old: Array, lengths: Mapping[str, float], head: Array
+    text: str,
+    capsules: Sequence[Capsule],
+    old: Array,
+    lengths: Mapping[str, float],
+    head: Array,
+    *,
+    behind: bool = False,
 ) -> str:
     """Write the figure's URDF with other lengths and another head; capsules grow with their part.
 
@@ -92,6 +98,8 @@ def rewrite(
         All 17 lengths, metres.
     head : array (5, 3)
         The head's points in the head link's frame (x forward, y left, z up, origin the neck), metres.
+    behind : bool
+        Whether the shoulders lie behind the line from neck to pelvis.
 
     Returns
     -------
@@ -99,7 +107,7 @@ def rewrite(
         URDF text.
     """
     robot = parse(text, "stick figure")
-    torso, hips = torso_points(lengths), hips_points(lengths)
+    torso, hips = torso_points(lengths, behind=behind), hips_points(lengths)
     origins = {
         "right_shoulder_flexion": torso[1],
         "left_shoulder_flexion": torso[2],

@@ -15,7 +15,7 @@ from typing import Any
 
 from posekit.compiled.angle_kernels import direction, worst
 from posekit.compiled.frame_kernels import ROOM_AT
-from posekit.compiled.rigid_kernels import hips, torso, unknown
+from posekit.compiled.rigid_kernels import rigid_frame, unknown
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
@@ -31,7 +31,7 @@ CLEAR_SHARE = 1e-9
 AT_RIGID, AT_WHOLE, AT_ARM, AT_BRANCHES, AT_POWER, AT_LEAST, AT_CUT, AT_TOLERANCE, AT_UNSEEN = range(9)
 """What the first numbers of a check are.
 
-How many points its rigid part has; 1 for a limb of three joints; 1 for an arm, whose elevation and plane are read; how
+The kind of its rigid part; 1 for a limb of three joints; 1 for an arm, whose elevation and plane are read; how
 many branches of the ball joint differ, 0 where only the judge knows which it takes; power of the sinus, 0 without one,
 and the least of what is left of a range, to that power; the plane at which the turn is cut; tolerance, and that from
 which on a rotation is not seen: degrees.
@@ -177,14 +177,14 @@ def writing(w: Array, at: int, loose: Any, to: int) -> None:
 
 
 def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call costs as much as some of its steps
-    """Screen a limb: its rigid part (4 points of the torso or 3 of the hips), then two joints, or three of a whole one.
+    """Screen a limb: its rigid part (points of torso or hips), then two joints, or three of a whole one.
 
     Where the end is not known, nor are rotation and hinge, nor anything that depends on them.
     """
-    rigid, whole = int(w[at + AT_RIGID]), w[at + AT_WHOLE] > 0
+    rigid, whole = abs(int(w[at + AT_RIGID])), w[at + AT_WHOLE] > 0
     if unknown(w, 0, rigid + 2):
         return NO_VIOLATION  # nothing is judged
-    R = torso(w) if rigid == 4 else hips(w, 0)
+    R = rigid_frame(w, int(w[at + AT_RIGID]))
     ux, uy, uz = direction(w, rigid, rigid + 1, R)
     level = math.sqrt(ux * ux + uz * uz)
     if not (level > SINGULAR_SINE and w[at + AT_BRANCHES] > 0):

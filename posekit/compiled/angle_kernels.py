@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from posekit.compiled.frame_kernels import ROOM_AT
-from posekit.compiled.rigid_kernels import between, hips, torso, unit, unknown
+from posekit.compiled.rigid_kernels import between, hips, rigid_frame, spine_hips, torso, unit, unknown
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 from posekit.geometry.rotations import TIED_ANGLES_RADIANS
@@ -126,10 +126,11 @@ def transposed(A: Any, B: Any) -> Any:
 
 
 def pelvis(w: Array, at: int) -> Any:
-    """Screen the pelvis: the torso's four points, then both hips."""
+    """Screen the pelvis: the torso's four points, then both hips; after the tolerance, 1 where the neck turns these."""
     if unknown(w, 0, 6):
         return NO_VIOLATION
-    return ball(transposed(torso(w), hips(w, 3)), w, at)
+    R = spine_hips(w, 3, 4, 0) if w[at + 10] > 0 else hips(w, 3)
+    return ball(transposed(torso(w), R), w, at)
 
 
 def polar(w: Array) -> Any:
@@ -214,16 +215,16 @@ def direction(w: Array, a: int, b: int, R: Any) -> Any:
 
 
 def limb(w: Array, at: int) -> Any:
-    """Screen a limb: its rigid part (4 points of the torso or 3 of the hips), then two joints, or three of a whole one.
+    """Screen a limb: its rigid part (points of torso or hips), then two joints, or three of a whole one.
 
     The tolerance is followed by that from which on an axial rotation is not seen (radians), as
-    `posekit.validators.joint_range.Limb` has it; by how many points the rigid part has, and by 1 for a whole limb.
+    `posekit.validators.joint_range.Limb` has it; by the kind of the rigid part (`posekit.compiled.rigid_kernels.rigid_frame`), and by 1 for a whole limb.
     Where the end is not known the first two angles are judged alone.
     """
-    rigid, whole = int(w[at + 14]), w[at + 15] > 0
+    rigid, whole = abs(int(w[at + 14])), w[at + 15] > 0
     if unknown(w, 0, rigid + 2):
         return NO_VIOLATION  # nothing is judged
-    R = torso(w) if rigid == 4 else hips(w, 0)
+    R = rigid_frame(w, int(w[at + 14]))
     ux, uy, uz = direction(w, rigid, rigid + 1, R)
     level = ux * ux + uz * uz
     if not level > SINGULAR_SINE * SINGULAR_SINE:

@@ -22,6 +22,9 @@ from posekit.compiled.rigid_kernels import (
     distance,
     hips,  # noqa: F401 - to be compiled
     placement,
+    rigid_frame,  # noqa: F401 - to be compiled
+    side,
+    spine_hips,  # noqa: F401 - to be compiled
     torso,  # noqa: F401 - to be compiled
     unit,
     unknown,
@@ -38,6 +41,7 @@ from posekit.compiled.screen_kinds import (
     OF_PLACEMENT,
     OF_PROJECTED_BALL,
     OF_PROJECTED_HINGE,
+    OF_SIDE,
 )
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
@@ -140,6 +144,8 @@ def screen(kind: int, w: Array, at: int) -> Any:
         return distance(w, at)
     if kind == OF_ANATOMICAL_LIMB:
         return anatomical(w, at)
+    if kind == OF_SIDE:
+        return side(w, at)
     if kind == OF_PLACEMENT:
         return placement(w, at)
     if kind == OF_PROJECTED_BALL:
@@ -163,6 +169,9 @@ KERNEL_PARTS = (rigid_kernels, angle_kernels, anatomical_kernels, projected_kern
 COMPILED_TYPES = {
     "torso": "(f8[::1],)",
     "hips": "(f8[::1], i8)",
+    "spine_hips": "(f8[::1], i8, i8, i8)",
+    "rigid_frame": "(f8[::1], i8)",
+    "side": "(f8[::1], i8)",
     "distance": "(f8[::1], i8)",
     "placement": "(f8[::1], i8)",
     "clamp": "",

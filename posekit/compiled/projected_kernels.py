@@ -14,7 +14,7 @@ import math
 from typing import Any
 
 from posekit.compiled.angle_kernels import TURN_AT, laid_head
-from posekit.compiled.rigid_kernels import between, torso, unit, unknown
+from posekit.compiled.rigid_kernels import between, spine_hips, torso, unit, unknown
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
@@ -165,7 +165,7 @@ def tilted(nx: Any, ny: Any, nz: Any, ax: Any, ay: Any, az: Any, w: Array, at: i
 
 
 def hip_plane(w: Array, at: int) -> Any:
-    """Screen the pelvis: the torso's four points, then both hips."""
+    """Screen the pelvis: the torso's four points, then both hips; after the bounds, 1 where the neck turns these."""
     if unknown(w, 0, 6):
         return NO_VIOLATION
     R = torso(w)
@@ -174,6 +174,9 @@ def hip_plane(w: Array, at: int) -> Any:
         (w[13] + w[16]) / 2 - w[10],
         (w[14] + w[17]) / 2 - w[11],
     )
+    if w[at + 12] > 0:
+        H = spine_hips(w, 3, 4, 0)
+        x, y, z = -H[2], -H[5], -H[8]
     mx, my, mz = in_torso(R, x, y, z)
     x, y, z = between(w, 4, 5)
     x, y, z = in_torso(R, x, y, z)

@@ -76,6 +76,46 @@ def hips(w: Array, first: int) -> Any:
     return frame_of(lx, ly, lz, dx, dy, dz)
 
 
+def spine_hips(w: Array, pelvis: int, right: int, neck: int) -> Any:
+    """Return the frame of hips with the pelvis between them, which turn with the line from neck to pelvis."""
+    lx, ly, lz = between(w, right, right + 1)
+    lx, ly, lz = unit(lx, ly, lz)
+    ax, ay, az = between(w, neck, pelvis)
+    dx, dy, dz = square(ax, ay, az, lx, ly, lz)
+    return frame_of(lx, ly, lz, dx, dy, dz)
+
+
+def rigid_frame(w: Array, kind: int) -> Any:
+    """Return the frame of the part that a limb hangs on, the first points.
+
+    By kind: 4, the torso's four points; 3, the hips' three; -4, the hips' three and the neck, which turns them.
+    """
+    if kind == 4:
+        return torso(w)
+    if kind == 3:
+        return hips(w, 0)
+    return spine_hips(w, 0, 1, 3)
+
+
+def side(w: Array, at: int) -> Any:
+    """Screen how far the shoulders of a torso lie in front of the line from neck to pelvis.
+
+    The numbers are 1 or -1, and the least that this times the distance may be, metres.
+    """
+    if unknown(w, 0, 4):
+        return NO_VIOLATION
+    a, b, c, d, e, f, g, h, i = torso(w)
+    x, y, z = between(w, 0, 1)
+    value = w[at] * (a * x + d * y + g * z)
+    for k in range(0, 12, 3):
+        if not abs(w[k]) + abs(w[k + 1]) + abs(w[k + 2]) < FAR_METRES:
+            return NOT_CLEAR
+    beyond = w[at + 1] - value
+    if not abs(beyond) > CLEAR_PLACE * (1.0 + abs(value)):  # NaN too
+        return NOT_CLEAR
+    return 0 if beyond > 0 else NO_VIOLATION
+
+
 def distance(w: Array, at: int) -> Any:
     """Screen the distance between two points; the numbers are its lower and upper bound, metres."""
     if unknown(w, 0, 2):
@@ -121,6 +161,9 @@ COMPILED_TYPES = {
     "frame_of": "",
     "torso": "",
     "hips": "",
+    "spine_hips": "",
+    "rigid_frame": "",
+    "side": "",
     "distance": "",
     "placement": "",
 }

@@ -46,7 +46,7 @@ def suite_of(
     options = CheckOptions(
         ranges=ranges_of(settings),
         rigid_tolerance=tolerance.distances,
-        rigid_mode="placement" if tolerance.placement else "distances",
+        rigid_mode="placement" if tolerance.placement else "side",
         angle_tolerance=tolerance.angle,
         rules=tuple(settings.rules),
         thresholds=thresholds_of(settings.walkers),

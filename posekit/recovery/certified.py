@@ -39,7 +39,7 @@ def certifying_checks(figure: Figure, settings: RecoverSettings, tolerance: Tole
     options = CheckOptions(
         ranges=ranges_of(settings),
         rigid_tolerance=tolerance.distances,
-        rigid_mode="distances",
+        rigid_mode="side",
         limbs=True,
         angle_tolerance=tolerance.angle,
         directions=True,

@@ -57,7 +57,7 @@ class FigureNumbers:
     ----------
     shape : array (9,)
         Metres. Torso frame (x forward, y left, z up, from the neck): the pelvis is at (0, 0, -b), the shoulders at
-        (a, y, z); hips frame (from the pelvis): the hips at (0, y, -h). In the order b, a, right y, right z,
+        (a, y, z), with a negative where they are behind; hips frame (from the pelvis): the hips at (0, y, -h). In the order b, a, right y, right z,
         left y, left z; h, right y, left y. The nine distances determine them.
     limbs : array (4, 2)
         Lengths of upper and lower segments, metres.
@@ -65,6 +65,8 @@ class FigureNumbers:
         The head's points from the neck, head link's frame, metres.
     limb_bounds, pelvis_bounds, neck_bounds : Bounds
         (4, 4), (1, 3), (1, 3).
+    middle_pelvis : bool
+        Whether the pelvis is between the hips, which then turn with the spine (`posekit.body.frames.hips_frame`).
     """
 
     shape: Array
@@ -73,6 +75,7 @@ class FigureNumbers:
     limb_bounds: Bounds
     pelvis_bounds: Bounds
     neck_bounds: Bounds
+    middle_pelvis: bool = False
 
     @staticmethod
     def of(figure: Figure, limits: Limits | None = None) -> FigureNumbers:
@@ -107,6 +110,7 @@ class FigureNumbers:
             limb_bounds=_bounds(limits, first, 4),
             pelvis_bounds=_bounds(limits, [DOFS.index("pelvis.flexion")], 3),
             neck_bounds=_bounds(limits, [DOFS.index("neck.flexion")], 3),
+            middle_pelvis=figure.pelvis_between_hips,
         )
 
 

@@ -13,7 +13,7 @@ from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDL
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.state import PostureState, parents
+from posekit.refinement.state import PostureState, parents, turned_by_spine
 
 HANGING_AXIS = 2
 """The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
@@ -34,7 +34,7 @@ def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None)
         own = np.array([[a, right_y, right_z], [a, left_y, left_z], [0.0, 0.0, -b]])
         torso[part] = _laid(own, offsets[part, 1:4])
         torso = np.where(np.isnan(torso), np.eye(3), torso)
-    hips = hips_frame(*(postures[:, joint] for joint in range(3, 6)))
+    hips = hips_frame(*(postures[:, joint] for joint in range(3, 6)), postures[:, 0] if anatomy.middle_pelvis else None)
     part = np.isnan(hips[:, 0, 0])
     if part.any():
         own = np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]])
@@ -45,6 +45,8 @@ def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None)
         turned_head = _laid(anatomy.head, head - postures[:, :1])
         turned_head = np.where(np.isnan(turned_head), torso, turned_head)
     rotations = [_batch_last(rotation) for rotation in (torso, hips, turned_head)]
+    if anatomy.middle_pelvis:
+        rotations[1] = turned_by_spine(rotations[0], rotations[1])
     return PostureState(
         root=postures[:, 0].T.copy(),
         torso=rotations[0],

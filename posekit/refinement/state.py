@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, unit
+from posekit.geometry import Array, cross, perpendicular, unit
 from posekit.geometry.batch_last import matrix_product, matrix_vector, step_rotation
 from posekit.refinement.figure_numbers import ARM_LIMBS, LEG_LIMBS, LIMB_ENDS, LIMB_MIDDLES
 
@@ -140,6 +140,17 @@ def moved_limbs(directions: Array, lengths: Array, step: Array, tangents: Array)
         # The logarithm of a length is varied: no step makes it negative.
         lengths = lengths * np.exp(step[4:]).transpose(1, 0, 2)
     return unit(along, axis=-2), lengths
+
+
+def turned_by_spine(torso: Array, hips: Array) -> Array:
+    """Turn hips (3, 3, N) about their own line until they are upright as the torso (3, 3, N) is.
+
+    As `posekit.body.frames.hips_frame` does where the pelvis is between them; unturned where the line is upright.
+    """
+    left = hips[:, 1]
+    up = unit(perpendicular(torso[:, 2], left, axis=-2), axis=-2)
+    turned = np.stack([cross(left, up, axis=-2), left, up], axis=1)
+    return np.asarray(np.where(np.isnan(turned), hips, turned))
 
 
 def parents(state: PostureState, *, on_torso: bool = False) -> Array:

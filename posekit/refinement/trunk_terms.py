@@ -7,13 +7,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, dot
+from posekit.geometry import Array, cross, dot
 from posekit.geometry.batch_last import matrix_vector
 from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.limits import Ball, Signs
 from posekit.refinement.part_limits import pelvis_limits
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, trunk_offsets
+
+
+SPINE_TURN_DEVIATION = 1e-3
+"""Radians by which hips may be turned from where the spine has them: a hundredth of what angles are certified within."""
 
 
 class TrunkTerms(NamedTuple):
@@ -70,6 +74,10 @@ def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | 
         chi2 += cost * squared
         slack = (dot(ball.residual, ball.residual, axis=-2) - cost) * squared
         crossed = ball.crossed
+    if problem.anatomy.middle_pelvis:
+        turn, normal = _spine_turn(state)
+        _add_turn(turn[None], normal[None], SPINE_TURN_DEVIATION**-2, matrix, gradient)
+        chi2 += (turn / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
         stretch, J = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
         matrix[9:, 9:] += np.einsum("kin,kjn->ijn", J, J)
@@ -98,6 +106,8 @@ def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) 
         ball = pelvis_limits(problem, state)
         chi2 += ball.cost() / problem.limit_deviation**2
         crossed = ball.crossed
+    if problem.anatomy.middle_pelvis:
+        chi2 += (_spine_turn(state)[0] / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
         stretch, _ = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
         chi2 += np.einsum("kn,kn->n", stretch, stretch)
@@ -170,11 +180,25 @@ def _turning(x: Array, out: Array) -> None:
         out[:, i, j], out[:, j, i] = x[:, k], -x[:, k]
 
 
+def _spine_turn(state: PostureState) -> tuple[Array, Array]:
+    r"""Return how far hips are turned about their own line from where the spine has them (N,), and the normal (3, N).
+
+    With the hips' forward x and the torso's up z, :math:`r = x \cdot z`; turning the hips by w against the torso
+    changes it by :math:`w \cdot (x \times z)`.
+    """
+    forward, up = state.hips[:, 0], state.torso[:, 2]
+    return dot(forward, up, axis=-2), cross(forward, up, axis=-2)
+
+
 def _add_ball(ball: Ball, squared: float, matrix: Array, gradient: Array) -> None:
-    if ball.jacobian is None:
-        return
-    normal = np.einsum("ain,ajn->ijn", ball.jacobian, ball.jacobian) * squared
-    push = np.einsum("ain,an->in", ball.jacobian, ball.residual) * squared
+    if ball.jacobian is not None:
+        _add_turn(ball.residual, ball.jacobian, squared, matrix, gradient)
+
+
+def _add_turn(residual: Array, jacobian: Array, squared: float, matrix: Array, gradient: Array) -> None:
+    """Add residuals (A, N) of the hips' turn against the torso's, with their derivatives (A, 3, N)."""
+    normal = np.einsum("ain,ajn->ijn", jacobian, jacobian) * squared
+    push = np.einsum("ain,an->in", jacobian, residual) * squared
     torso, hips = slice(3, 6), slice(6, 9)
     matrix[torso, torso] += normal
     matrix[hips, hips] += normal

@@ -34,7 +34,7 @@ from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.start import state_of
-from posekit.refinement.state import PostureState, trunk_offsets
+from posekit.refinement.state import PostureState, trunk_offsets, turned_by_spine
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 
@@ -184,6 +184,8 @@ def find_trunks(
         + np.arange(len(known)) * order.shape[1]
     )
     turned = _reflections(first.state.take(best), one.optics.perspective)
+    if one.anatomy.middle_pelvis:
+        turned = turned._replace(hips=turned_by_spine(turned.torso, turned.hips))
     again = np.tile(np.arange(len(known)), 3)
     second = descend(one.take(again), turned, steps=MAX_STEPS, hopeless=PROMISING_CHI2)
     state = PostureState(
