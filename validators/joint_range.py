@@ -160,7 +160,7 @@ class Pelvis(Check):
         """Judge the pelvis's three angles; see `posekit.tree.Check`."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
         neck = points[:, 0] if self.ik.middle_pelvis else None
-        R_hips = hips_frame(*np.moveaxis(points[:, 3:], 1, 0), neck)
+        R_hips = hips_frame(points[:, 3], points[:, 4], points[:, 5], neck)
         angles = self.ik.pelvis(R_torso, R_hips)
         return _findings(self.ik, self.where, angles, self.tolerance)
 

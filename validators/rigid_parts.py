@@ -156,7 +156,8 @@ class TorsoSide(Check):
 class TorsoPlacement(Check):
     """The largest distance between the torso's joints and those of the figure's torso laid onto them.
 
-    Where the figure does not know on which side its shoulders lie, a torso that only its mirror image fits is undecided.
+    Where the figure does not know on which side its shoulders lie, a torso that only the mirror image fits is
+    undecided.
     """
 
     torso: Array

@@ -57,7 +57,9 @@ What adults differ in a segment beside their size has a standard deviation of 5 
 LEAST_WIDTH_PART: Final = 0.25
 """Of a breadth: how far beside the middle a point starts at least, since on the line itself no distance pulls it."""
 
-CLOSING_DAMPING: Final = Damping(initial=1e-6, smallest=1e-12, largest=1e8, growth=10.0, decay=0.1, light=1e-3)
+CLOSING_DAMPING: Final = Damping(
+    initial=1e-6, smallest=1e-12, largest=1e8, growth=10.0, decay=0.1, light=1e-3
+)
 CLOSING_STOPPING: Final = Stopping(steps=200, precision=1e-20, smallest=1e-28)
 
 
@@ -93,7 +95,8 @@ def closed_lengths(lengths: Mapping[str, float], known: LengthUncertainty | None
     FigureError
         Where a length would have to change by more than `MAX_MOVED` of it: then they are no body's.
     """
-    out, moved = dict(lengths), {}
+    out = dict(lengths)
+    moved: dict[str, float] = {}
     for names, points, axes in ((TORSO_LENGTHS, torso_points, 2), (HIPS_LENGTHS, hips_points, 1)):
         try:
             points(lengths)
@@ -119,8 +122,8 @@ def closing_line(moved: Mapping[str, float]) -> str:
         own = {name: moved[name] for name in names if name in moved}
         if own:
             most = max(own, key=lambda name: abs(own[name]))
-            parts.append(f"those of the {part} by up to {abs(own[most]) * 1000:.3g} mm ({most} {own[most] * 1000:+.3g} mm)")
-    return f"lengths do not close and were changed to the nearest body's: {' and '.join(parts)}"
+            parts.append(f"of the {part} {most} most, by {own[most] * 1000:+.3g} mm")
+    return f"lengths do not close and were changed to the nearest body's: {', '.join(parts)}"
 
 
 def _nearest(
@@ -171,7 +174,7 @@ class _FlatPart:
 
     def distances(self, unknowns: Array) -> Array:
         """Return the distances (N, K)."""
-        return np.linalg.norm(self._gaps(unknowns), axis=-1)
+        return np.asarray(np.linalg.norm(self._gaps(unknowns), axis=-1))
 
     def _gaps(self, unknowns: Array) -> Array:
         points = np.einsum("pam,nm->npa", self.places, unknowns)
@@ -192,7 +195,9 @@ class _FlatPart:
         """Return damped steps and what they promise."""
         del rows, state
         normal, gradient = normal_equations(here[1], here[2])
-        damped = normal + damping[:, None, None] * np.einsum("nii->ni", normal)[:, None] * np.eye(normal.shape[1])
+        damped = normal + damping[:, None, None] * np.einsum("nii->ni", normal)[:, None] * np.eye(
+            normal.shape[1]
+        )
         step = -solve_each(damped, gradient)
         return step, -np.einsum("ni,ni->n", step, gradient)
 
@@ -213,7 +218,14 @@ def _places(*rows: tuple[int, int, int, float], points: int, axes: int, unknowns
 _PLACES: Final = {
     # Neck, right shoulder, left shoulder, pelvis, by the pelvis's depth and the place of each shoulder.
     2: _places(
-        (1, 0, 1, 1.0), (1, 1, 2, 1.0), (2, 0, 3, 1.0), (2, 1, 4, 1.0), (3, 1, 0, -1.0), points=4, axes=2, unknowns=5
+        (1, 0, 1, 1.0),
+        (1, 1, 2, 1.0),
+        (2, 0, 3, 1.0),
+        (2, 1, 4, 1.0),
+        (3, 1, 0, -1.0),
+        points=4,
+        axes=2,
+        unknowns=5,
     ),
     # Pelvis, right hip, left hip.
     1: _places((1, 0, 0, 1.0), (2, 0, 1, 1.0), points=3, axes=1, unknowns=2),

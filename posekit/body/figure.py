@@ -64,7 +64,8 @@ MIDDLE_PELVIS_PART: Final = 0.1
 """Of the hips' distance: a pelvis that is nearer to the line between them counts as between them.
 
 Lengths that are off by 2 % put a pelvis there that is in the middle, and a plane from so short a way would turn by 30
-degrees with a joint that is off by a centimetre. Real pelvis joints (L5/S1, the sacrum) are half the hips' distance away.
+degrees with a joint that is off by a centimetre. Pelvis joints of skeletons that have one are half the hips' distance
+away.
 """
 
 SAME_TORSO_METRES: Final = 1e-4
@@ -115,8 +116,8 @@ class Figure:
     urdf: str = field(repr=False)
     srdf: str = field(repr=False)
     source: str = "stick_figure.urdf"
-    side_known: bool = True
-    moved_lengths: Mapping[str, float] = field(default_factory=dict)
+    side_known: bool = field(default=True, repr=False)
+    moved_lengths: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the texts alone: they are small, and a model is built from them in milliseconds."""
@@ -254,8 +255,8 @@ class Figure:
         """Make the same figure with other lengths; capsules grow with their part.
 
         Lengths that miss closing are laid onto the nearest body that closes (`posekit.body.closing`), and
-        `moved_lengths` says by how much. Lengths do not tell on which side of the line from neck to pelvis the shoulders
-        lie: unless that is said, or the torso stays as it is, the new figure does not know it (`side_known`).
+        `moved_lengths` says by how much. Lengths do not tell on which side of the line from neck to pelvis the
+        shoulders lie: unless that is said, or the torso stays as it is, the new figure does not know it (`side_known`).
 
         Parameters
         ----------

@@ -54,7 +54,11 @@ def torso_points(lengths: Mapping[str, float], *, behind: bool = False) -> Array
     """
     right, left, forward_squared = _torso(lengths)
     if forward_squared < -FLAT_DEPTH_SQUARED:
-        width, (z_right, r_right), (z_left, r_left) = lengths["right_shoulder-left_shoulder"], right[:2], left[:2]
+        width, (z_right, r_right), (z_left, r_left) = (
+            lengths["right_shoulder-left_shoulder"],
+            right[:2],
+            left[:2],
+        )
         reach = r_right + r_left
         raise FigureError(
             f"figure.lengths: right_shoulder-left_shoulder is {width:g} m, but with the other torso lengths "

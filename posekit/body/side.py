@@ -1,8 +1,9 @@
 r"""Whether uncertain lengths tell how far the shoulders lie beside the line from neck to pelvis.
 
-With a shoulder :math:`h` below the neck along that line, :math:`y` beside it and :math:`a` from the neck, the shoulders
-lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of it or behind. Small errors of the lengths change :math:`f^2`, and so
-the deviation of f is that of :math:`f^2` over :math:`2 f`: the flatter a torso, the less its lengths say of its sides.
+With a shoulder :math:`h` below the neck along that line, :math:`y` beside it and :math:`a` from the neck, the
+shoulders lie :math:`f = \pm\sqrt{a^2 - h^2 - y^2}` in front of it or behind. Small errors of the lengths change
+:math:`f^2`, and so the deviation of f is that of :math:`f^2` over :math:`2 f`: the flatter a torso, the less lengths
+say of its sides.
 """
 
 from __future__ import annotations
@@ -68,4 +69,6 @@ def _slope(lengths: Mapping[str, float], name: str) -> float:
     middle = forward_squared(lengths)
     if math.isnan(above):
         return (middle - below) / RELATIVE_STEP
-    return (above - (middle if math.isnan(below) else below)) / (RELATIVE_STEP * (1 if math.isnan(below) else 2))
+    return (above - (middle if math.isnan(below) else below)) / (
+        RELATIVE_STEP * (1 if math.isnan(below) else 2)
+    )

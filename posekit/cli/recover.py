@@ -243,12 +243,16 @@ def _scale_line(scaled: ScaledFollowing) -> str:
 
 def summarize(recovery: Recovery) -> None:
     """Print a line a frame: survivors, groups, the nearest to a bound, and what killed most of the rest."""
+    from posekit.body.closing import closing_line
     from posekit.formats.own import OpenCVModel
     from posekit.recovery.advice import advice_lines
     from posekit.recovery.summary import summary_lines
 
     for line in [*summary_lines(recovery), *advice_lines(recovery)]:
         typer.echo(line)
+    changed = closing_line(recovery.figure.moved_lengths)
+    if changed:
+        typer.echo(f"posekit: warning: {changed}", err=True)
     total = len(recovery.frames)
     reasons = sorted(recovery.unrecovered.items(), key=lambda pair: -len(pair[1]))
     for reason, frames in reasons[:REASONS_SHOWN]:

@@ -218,7 +218,8 @@ def limb(w: Array, at: int) -> Any:
     """Screen a limb: its rigid part (points of torso or hips), then two joints, or three of a whole one.
 
     The tolerance is followed by that from which on an axial rotation is not seen (radians), as
-    `posekit.validators.joint_range.Limb` has it; by the kind of the rigid part (`posekit.compiled.rigid_kernels.rigid_frame`), and by 1 for a whole limb.
+    `posekit.validators.joint_range.Limb` has it; by the kind of the rigid part
+    (`posekit.compiled.rigid_kernels.rigid_frame`), and by 1 for a whole limb.
     Where the end is not known the first two angles are judged alone.
     """
     rigid, whole = abs(int(w[at + 14])), w[at + 15] > 0

@@ -104,9 +104,9 @@ def side(w: Array, at: int) -> Any:
     """
     if unknown(w, 0, 4):
         return NO_VIOLATION
-    a, b, c, d, e, f, g, h, i = torso(w)
+    R = torso(w)
     x, y, z = between(w, 0, 1)
-    value = w[at] * (a * x + d * y + g * z)
+    value = w[at] * (R[0] * x + R[3] * y + R[6] * z)
     for k in range(0, 12, 3):
         if not abs(w[k]) + abs(w[k + 1]) + abs(w[k + 2]) < FAR_METRES:
             return NOT_CLEAR

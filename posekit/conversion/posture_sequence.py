@@ -25,6 +25,7 @@ from posekit.formats.recognising import Recognised
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
+from posekit.robots.stretching import shoulders_are_behind
 from posekit.skeleton import JOINTS, POINTS
 from posekit.validation.validate import recovered_with
 
@@ -390,7 +391,9 @@ def _recorded(points: Array, time: Array, up: str, says: Sequence[str] = ()) -> 
         frame=np.arange(len(points)),
         survivor=np.zeros(len(points), dtype=np.intp),
         up=up,
-        figure=load_figure().scaled(lengths_from_postures(points[:, :14]).lengths.lengths),
+        figure=load_figure().scaled(
+            lengths_from_postures(points[:, :14]).lengths.lengths, behind=shoulders_are_behind(points)
+        ),
         says=tuple(says),
         values={},
     )

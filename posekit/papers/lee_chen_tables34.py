@@ -11,7 +11,7 @@ from posekit.formats.own import View
 from posekit.papers import lee_chen_printed as printed
 from posekit.recovery.conductor import recover
 from posekit.recovery.recovery import FrameRecovery, Recovery
-from posekit.settings import Tolerance
+from posekit.settings import CheckSettings, Tolerance
 from posekit.synthesis import SyntheticScene, Walker, walker_scene
 from posekit.synthesis.walker_scene import FRAME_TIME, SEQ1_CAMERA, SEQ2_CAMERA
 from posekit.validators import ALL_CHECKS
@@ -20,6 +20,12 @@ from posekit.views.builtin import view_of
 SEQUENCE_CAMERAS = {"seq1": SEQ1_CAMERA, "seq2": SEQ2_CAMERA}
 PAPER_TOLERANCE = Tolerance(rigid=0.01, tangent=0.001, placement=False)
 """The paper compares distances and gives no number; 1 cm lets near-frontal torsos stay ambiguous, as its do."""
+
+PAPER_CHECKS = tuple(
+    CheckSettings(name=name, parameters={"rigid_mode": "distances"} if name == "rigid-parts" else {})
+    for name in ALL_CHECKS
+)
+"""All checks; of torsos the paper compares distances alone, which do not tell them from their mirror images."""
 
 GROUPING_METRES = 0.05
 """Postures are one group where no joint is farther from that of the group's representative."""
@@ -142,7 +148,7 @@ def _recover(scene: SyntheticScene, rules: tuple[int, ...]) -> Recovery:
     view = view_of(scene)
     return recover(
         view,
-        checks=ALL_CHECKS,
+        checks=PAPER_CHECKS,
         ranges="table1",
         rules=rules,
         tolerance=PAPER_TOLERANCE,

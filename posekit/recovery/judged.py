@@ -10,12 +10,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from posekit.body import Figure
+from posekit.body import Figure, LengthUncertainty
 from posekit.geometry import Array
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.upright import Up
 from posekit.recovery.body import ranges_of
-from posekit.recovery.noise import contact_under_noise
+from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.settings import (
     EXACT_TOLERANCE,
     MEASURED_TOLERANCE,
@@ -71,6 +71,8 @@ def record_of(
         "group": asked.group,
         "figure": figure.hash,
         "lengths": dict(figure.lengths),
+        "moved_lengths": dict(figure.moved_lengths),
+        "shoulders": _shoulder_side(figure, noise),
         "judged": [judged for judged, _ in frames],
         "noisy": _widest([used for judged, used in frames if judged == "noisy"]),
         "refined": _widest(
@@ -82,6 +84,12 @@ def record_of(
         "versions": {name: _version(name) for name in RECORDED_PACKAGES},
         "asked": asked.to_json(),
     }
+
+
+def _shoulder_side(figure: Figure, noise: Mapping[str, Any] | None) -> str:
+    """Say on which side the shoulders lie; undecided where refined lengths are too uncertain to tell."""
+    known = LengthUncertainty() if noise is None else Noise.from_document(noise).lengths
+    return figure.with_side_within(known).shoulder_side
 
 
 def tolerances_of(settings: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

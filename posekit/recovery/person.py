@@ -25,7 +25,7 @@ def person_of(view: View, figure: Figure) -> Figure:
         name: tuple(np.asarray(at, dtype=np.float64).tolist())
         for name, at in (view.head_points or {}).items()
     }
-    return _person(figure, view.stature, tuple(view.lengths.items()), tuple(head.items()))
+    return _person(figure, view.stature, tuple(view.lengths.items()), view.shoulders, tuple(head.items()))
 
 
 @lru_cache(maxsize=CACHED_PERSONS)
@@ -33,13 +33,15 @@ def _person(
     figure: Figure,
     stature: float | None,
     lengths: tuple[tuple[str, float], ...],
+    shoulders: str | None,
     head_points: tuple[tuple[str, tuple[float, ...]], ...],
 ) -> Figure:
     """Make the figure of a person: building one takes as long as recovering some hundred frames."""
     if stature is not None:
         figure = figure.from_stature(stature)
-    if lengths or head_points:
-        figure = figure.scaled(dict(lengths), dict(head_points))
+    if lengths or head_points or shoulders:
+        behind = None if shoulders is None else shoulders == "behind"
+        figure = figure.scaled(dict(lengths), dict(head_points), behind=behind)
     return figure
 
 

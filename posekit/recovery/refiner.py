@@ -15,6 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import Array
@@ -139,6 +140,11 @@ class Refiner:
         return asked.changed(contact_margin=contact_under_noise(asked.contact_margin))
 
     @cached_property
+    def _figure(self) -> Figure:
+        """The person's figure as it is judged by: lengths that are off may leave the side of its shoulders open."""
+        return self.grower.body.figure.with_side_within(self.noise.lengths)
+
+    @cached_property
     def tolerance(self) -> Tolerance:
         """By how much survivors may be off."""
         return certified_within(self.noise, self.grower.body.figure)
@@ -146,13 +152,13 @@ class Refiner:
     @cached_property
     def certifying(self) -> Sequence[Check]:
         """The checks that every survivor passes."""
-        made = certifying_checks(self.grower.body.figure, self.grower.settings, self.tolerance)
+        made = certifying_checks(self._figure, self.grower.settings, self.tolerance)
         return [check for check in made if self._can_be_told(check)]
 
     @cached_property
     def _measuring(self) -> Sequence[Check]:
         """The checks that tell every margin."""
-        suite = suite_of(self.settings, self.grower.body.figure, self.tolerance, exact=True)
+        suite = suite_of(self.settings, self._figure, self.tolerance, exact=True)
         return [check for check in suite if self._can_be_told(check)]
 
     @cached_property
@@ -308,7 +314,7 @@ class Refiner:
         rigid = max(ALLOWED_DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
         suite = under_noise(
-            suite_of(self.settings, body.figure, tolerance),
+            suite_of(self.settings, self._figure, tolerance),
             allowed.bound,
             perspective=isinstance(camera, PinholeCamera),
             stretch=allowed.stretch,

@@ -57,8 +57,8 @@ class FigureNumbers:
     ----------
     shape : array (9,)
         Metres. Torso frame (x forward, y left, z up, from the neck): the pelvis is at (0, 0, -b), the shoulders at
-        (a, y, z), with a negative where they are behind; hips frame (from the pelvis): the hips at (0, y, -h). In the order b, a, right y, right z,
-        left y, left z; h, right y, left y. The nine distances determine them.
+        (a, y, z), with a negative where they are behind; hips frame (from the pelvis): the hips at (0, y, -h). In the
+        order b, a, right y, right z, left y, left z; h, right y, left y. The nine distances determine them.
     limbs : array (4, 2)
         Lengths of upper and lower segments, metres.
     head : array (5, 3)

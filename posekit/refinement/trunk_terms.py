@@ -15,9 +15,8 @@ from posekit.refinement.part_limits import pelvis_limits
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, trunk_offsets
 
-
 SPINE_TURN_DEVIATION = 1e-3
-"""Radians by which hips may be turned from where the spine has them: a hundredth of what angles are certified within."""
+"""Radians by which hips may be turned from where the spine has them: a hundredth of what an angle may be off."""
 
 
 class TrunkTerms(NamedTuple):

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.body import Figure, load_figure
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.robots.stretching import shoulders_are_behind
 from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
 from posekit.synthesis.camera_sphere import CameraPlacements, CameraSphere
 from posekit.synthesis.capture import Capture
@@ -21,8 +22,8 @@ from posekit.synthesis.viewpoints import look_at, to_camera
 def clip_lengths(points: Array) -> dict[str, float]:
     """Return the median length of each of the 17 segments over frames (F, 19, 3), metres.
 
-    A segment that is never seen whole is left out. Lengths do not tell a rigid part from its mirror image:
-    the figure puts the shoulders in front of the line from neck to pelvis, wherever the clip has them.
+    A segment that is never seen whole is left out. Lengths do not tell a torso from its mirror image; points do
+    (`posekit.robots.shoulders_are_behind`).
     """
     lengths = {}
     for name, (a, b) in zip(SEGMENT_NAMES, SEGMENTS, strict=True):
@@ -70,7 +71,7 @@ def mocap_scene(
     InputError
         Where the clip is not there or has no such frames, or the person does not fit into the picture.
     FigureError
-        Where no torso or hips have the median lengths.
+        Where no torso or hips have lengths near the medians.
     """
     sphere = sphere or CameraSphere()
     index = capture.clip_index(clip)
@@ -95,7 +96,7 @@ def mocap_scene(
                 "away, lower f or take fewer frames"
             )
     return observe(
-        (figure or load_figure()).scaled(clip_lengths(points)),
+        (figure or load_figure()).scaled(clip_lengths(points), behind=shoulders_are_behind(points)),
         sphere.camera,
         points,
         CameraPlacements(
@@ -159,7 +160,9 @@ def mocap_scenes(
         placements = sphere.place(points, capture.up, rng)
         scenes.append(
             observe(
-                figure.scaled(clip_lengths(capture.points[frames])),
+                figure.scaled(
+                    clip_lengths(capture.points[frames]), behind=shoulders_are_behind(capture.points[frames])
+                ),
                 sphere.camera,
                 points,
                 placements,

@@ -154,7 +154,8 @@ def recovered_with(result: Result) -> RecoveredWith:
     figure, settings = load_figure(), result.settings
     lengths = settings.get("lengths")
     if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
-        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()})
+        side = {"front": False, "behind": True}.get(str(settings.get("shoulders")))
+        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()}, behind=side)
     return RecoveredWith(figure, _judged(settings))
 
 

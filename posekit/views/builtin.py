@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Literal
 
 import numpy as np
 
@@ -39,6 +40,7 @@ def view_of(scene: SyntheticScene) -> View:
         root=scene.root,
         truth=scene.joints_cam,
         lengths=_differences(scene.figure),
+        shoulders=_side(scene.figure),
         head_points=None if head is None else dict(zip(("neck", *HEAD_POINTS), head, strict=True)),
         unit="m" if scene.lee_chen_f is None else "cm",
     )
@@ -52,6 +54,7 @@ def forget_camera(view: View) -> View:
         image=view.image,
         truth=view.truth,
         lengths=view.lengths,
+        shoulders=view.shoulders,
         stature=view.stature,
         unit=view.unit,
     )
@@ -77,6 +80,12 @@ def _head(scene: SyntheticScene) -> Array | None:
     if scene.lee_chen_f is not None:
         return TABLE_A2.points if built_in else own + TABLE_A2.points[0]
     return None if built_in else own
+
+
+def _side(figure: Figure) -> Literal["front", "behind"] | None:
+    """Return on which side the shoulders lie, where it is known and the view has to tell it."""
+    side = figure.shoulder_side
+    return None if side == "undecided" or not _differences(figure) else side
 
 
 def _differences(figure: Figure) -> dict[str, float]:

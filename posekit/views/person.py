@@ -18,6 +18,7 @@ from posekit.body.anthropometry import (
     lengths_from_views,
     read_lengths,
 )
+from posekit.body.closing import closing_line
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, choose, read_keypoints, swap
@@ -57,7 +58,10 @@ def person(
     if lengths is not None:
         off = max(lengths.deviation.values(), default=0.0)
         uncertain = f", uncertain by up to {off * 100:.1f} cm" if off > 0 else ""
-        figure, says = figure.scaled(lengths.lengths), f"lengths: {lengths.source}{uncertain}"
+        figure = figure.scaled(lengths.lengths)
+        says = "; ".join(
+            filter(None, (f"lengths: {lengths.source}{uncertain}", closing_line(figure.moved_lengths)))
+        )
     if "neck" not in layout.landmarks:
         figure = figure.scaled(middle_neck(figure.lengths))
     return figure, says

@@ -18,7 +18,7 @@ from posekit.body.anthropometry.body import (
 )
 from posekit.body.anthropometry.independent import unlike_neighbours
 from posekit.body.anthropometry.proportions import lengths_from_proportions, spread
-from posekit.body.lengths import hips_points, torso_points
+from posekit.body.closing import closed_lengths, closing_line
 from posekit.errors import FigureError, InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, SEGMENT_NAMES, SEGMENTS, SIDES
@@ -166,24 +166,17 @@ def _completed(
     whole = completed(dimensions, np.diag(relative**2), base, "", (), stature)
     lengths, off = dict(whole.lengths), dict(whole.deviation)
     measured = tuple(name for name in SEGMENT_NAMES if name in seen)
+    changed = ""
     exact = lengths | {name: float(found[seen[name]]) for name in measured}
-    if _exists(exact):
-        lengths = exact
+    try:
+        closed = closed_lengths(exact)  # medians of noisy distances need not close
+        lengths, changed = dict(closed.lengths), closing_line(closed.moved)
         off |= {name: float(deviation[seen[name]]) for name in measured}
-    else:
+    except FigureError:
         measured = tuple(name for name in measured if name in BODY_DIMENSIONS)
     missing = [name for name in SEGMENT_NAMES if name not in measured]
     says = "a recording in space" + (
         f"; {len(missing)} of 17 from proportions ({prior.source})" if missing else ""
     )
+    says += f"; {changed}" if changed else ""
     return SegmentLengths(lengths=lengths, deviation=off, source=says, measured=measured, stature=stature)
-
-
-def _exists(lengths: Mapping[str, float]) -> bool:
-    """Tell whether torso and hips close: medians of noisy distances need not."""
-    try:
-        torso_points(lengths)
-        hips_points(lengths)
-    except FigureError:
-        return False
-    return True

@@ -36,7 +36,7 @@ def torso_suggestion(
         Metres by which the joints may be elsewhere than on the figure.
     """
     torso = image[:, TORSO_POINTS]
-    body = torso_points(figure.lengths)
+    body = torso_points(figure.lengths, behind=figure.shoulder_offset < 0)
     placed = poses(camera, body, torso, deviation[:, TORSO_POINTS], offset[TORSO_POINTS])
     seen = np.isfinite(torso).all(axis=-1).sum(axis=1)
     return suggest("torso", placed, ray, seen, 0.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,8 @@ class View:
         The true joints, OpenCV camera frame, metres.
     lengths : mapping of str to float, optional
         Lengths in metres of the segments that differ from the figure's, by `posekit.skeleton.SEGMENT_NAMES`.
+    shoulders : {"front", "behind"}, optional
+        On which side of the line from neck to pelvis the shoulders lie: lengths do not tell it.
     stature : float, optional
         Height of the person, metres.
     deviation : float, optional
@@ -78,6 +81,7 @@ class View:
     root: Array = field(default_factory=_no_frames)
     truth: Array = field(default_factory=_no_frames)
     lengths: Mapping[str, float] = field(default_factory=dict)
+    shoulders: Literal["front", "behind"] | None = None
     stature: float | None = None
     deviation: float | None = None
     length_deviation: float | None = None

@@ -71,6 +71,7 @@ def read_view(path: str | Path) -> View:
         deviation=file.deviation,
         length_deviation=file.length_deviation,
         derived=tuple(file.derived or ()),
+        shoulders=figure.shoulders if figure else None,
         stature=float(to_metres(figure.stature, unit)) if figure and figure.stature else None,
         head_points={name: to_metres(point, unit) for name, point in figure.head_points.items()}
         if figure and figure.head_points is not None
@@ -205,6 +206,8 @@ def _figure_fields(view: View, unit: Unit) -> dict[str, Any]:
     fields: dict[str, Any] = {}
     if view.lengths:
         fields["lengths"] = {name: float(from_metres(value, unit)) for name, value in view.lengths.items()}
+    if view.shoulders is not None:
+        fields["shoulders"] = view.shoulders
     if view.stature is not None:
         fields["stature"] = float(from_metres(view.stature, unit))
     if view.head_points is not None:

@@ -78,6 +78,10 @@ class FigureFields(FileModel):
     """What is known of the person's body."""
 
     lengths: Lengths | None = Field(default=None, description="Segment lengths in `unit`, named a-b.")
+    shoulders: Literal["front", "behind"] | None = Field(
+        default=None,
+        description="On which side of the line from neck to pelvis the shoulders lie: lengths do not tell it.",
+    )
     stature: Positive | None = Field(default=None, description="Height of the person, in `unit`.")
     head_points: HeadPoints | None = Field(
         default=None, description="Points of the rigid head in the head's frame, in `unit`."
@@ -108,6 +112,7 @@ class ViewFile(FileModel):
         "f": "give it in the view's unit, or write null to have it recovered from the head",
         "scale": "give it in pixels a unit, or write null where it is not known",
         "lengths": "correct it, or leave it out to take the figure's",
+        "shoulders": "say front or behind, or leave it out",
         "stature": "correct it, or leave it out",
         "head_points": "a head point is [x, y, z]; leave out one that is not known",
         "image": "an image point is [u, v]; leave out a joint that is not seen",
