@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from posekit.body import load_figure
+from posekit.body.frames import torso_frame
 from posekit.errors import InputError
 from posekit.recovery import recover
 from posekit.settings import (
@@ -44,6 +45,12 @@ def offs(joints: np.ndarray) -> np.ndarray:
     ends = np.array(RIGID_SEGMENTS)
     away = np.linalg.norm(joints[:, ends[:, 0]] - joints[:, ends[:, 1]], axis=-1)
     return np.asarray(away - [FIGURE.lengths[segment_name(segment)] for segment in RIGID_SEGMENTS])
+
+
+def ahead(joints: np.ndarray) -> np.ndarray:
+    """Measure how far the shoulders lie in front of the line from neck to pelvis (N,)."""
+    forward = torso_frame(*np.moveaxis(joints[:, :4], 1, 0))[:, :, 0]
+    return np.einsum("ni,ni->n", forward, joints[:, 1] - joints[:, 0])
 
 
 def test_all_distances_have_the_same_bound_unless_told_otherwise() -> None:
@@ -85,6 +92,7 @@ def test_the_tree_keeps_what_has_every_distance_within_its_own_bound(bent: Synth
     fewer, kept = 0, 0
     for before, after in zip(loose.frames, measured.frames, strict=True):
         inside = (np.abs(offs(before.joints)) <= bounds).all(axis=1)
+        inside &= ahead(before.joints) >= min(FIGURE.shoulder_offset - MEASURED_TOLERANCE.rigid, 0.0)
         assert [code for code, ok in zip(before.branches, inside, strict=True) if ok] == after.branches
         fewer, kept = fewer + len(before) - len(after), kept + len(after)
     assert fewer > 0
