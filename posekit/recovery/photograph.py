@@ -27,8 +27,8 @@ from posekit.recovery.hypotheses import LATERAL_DEVIATIONS, LEAST_STEP_METRES, O
 from posekit.recovery.key_point_offsets import PIXEL_DEVIATION, joint_offsets
 from posekit.recovery.noise import LEAST_CONFIDENCE, Noise
 from posekit.recovery.refiner import Lifted, Refiner
-from posekit.recovery.seen_trunk import SeenTrunk, with_trunk
-from posekit.refinement import ObservedFrames, RootPrior
+from posekit.recovery.seen_trunk import N_TRUNK_JOINTS, SeenTrunk, with_trunk
+from posekit.refinement import ObservedFrames, RootPrior, Trunks
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.settings.scale import Scale, way_of
@@ -43,6 +43,9 @@ RELIEF_METRES: Final = 0.25
 """Metres in depth by which a joint is off the body's middle, standard deviation: a forearm's or a shank's
 (`posekit.body.anthropometry.views`). What is nearer looks larger, which no scaled orthographic camera shows:
 the farther a joint is from the middle of the body's picture, the farther off it is."""
+
+OVERLAP_METRES: Final = 0.1
+"""Metres by which bodies may overlap before refinement, which puts depths where they are likely."""
 
 ANY_LENGTH: Final = Tolerance(rigid=10.0, tangent=10.0, placement=False)
 """At a scale that is given, segments may be too short for their image here: refinement weighs by how much."""
@@ -86,6 +89,12 @@ class PhotographRefiner(Refiner):
     """Grows and refines trees over the frames of a view without a calibrated camera."""
 
     @cached_property
+    def settings(self) -> RecoverSettings:
+        """The checks of the tree are asked with bodies that may overlap by as much as depths are off, metres."""
+        asked = self.grower.settings
+        return asked.changed(contact_margin=asked.contact_margin - OVERLAP_METRES)
+
+    @cached_property
     def trunk(self) -> SeenTrunk:
         """What each frame shows, with a point for each joint of the trunk."""
         return with_trunk(self.grower.view.image, self.grower.body.figure, joint_offsets())
@@ -119,6 +128,16 @@ class PhotographRefiner(Refiner):
         of_points = np.full((len(chosen), len(POINTS)), np.nan)
         of_points[:, : len(JOINTS)] = deviation
         return ObservedHypotheses(sight=sight, deviation=of_points, focal=scale, step=0.0)
+
+    def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
+        """Return which joints of leaves (N, 14) are told: not those that only their neighbours place."""
+        told = self.trunk.told[lifted.frames[lifted.frame[lifted.hypothesis]]]
+        return told | (np.arange(len(JOINTS)) >= N_TRUNK_JOINTS)
+
+    def to_complete(self, trunks: Trunks, own: NDArray[np.intp]) -> Array:
+        """Return image points (H, 14, 2): limbs are completed on trunks that are told, and else stay unknown."""
+        whole = self.trunk.told[self.fit.frame[own], :N_TRUNK_JOINTS].all(axis=1)
+        return np.where(whole[:, None, None], trunks.image, np.nan_to_num(trunks.image))
 
     def spread(self, lifted: Lifted) -> float:
         """Say how far off survivors are, metres."""

@@ -211,7 +211,7 @@ class Refiner:
             leaves, [check for check in suite if check.scope is Scope.MOTION]
         )
         leaves, completion = self.grower.complete(
-            leaves, fit.cameras(own), trunks.image, suite, tolerance, fit.frame[own]
+            leaves, fit.cameras(own), self.to_complete(trunks, own), suite, tolerance, fit.frame[own]
         )
         return Lifted(
             chosen=chosen,
@@ -235,6 +235,10 @@ class Refiner:
             self.grower.view, self.fit, chosen, camera, figure, self.noise, self._limits, self._walls
         )
 
+    def to_complete(self, trunks: Trunks, own: NDArray[np.intp]) -> Array:
+        """Return image points (H, 14, 2) of trunks, NaN where a joint is to be completed."""
+        return trunks.image
+
     def refine(self, lifted: Lifted) -> LeafOutcomes:
         """Refine leaves, reject and merge."""
         heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
@@ -245,7 +249,12 @@ class Refiner:
             lifted.hypothesis,
             lifted.frame[lifted.hypothesis],
             self.certifying,
+            self.known(lifted),
         )
+
+    def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
+        """Return which joints of leaves (N, 14) are told, where the leaves have others too."""
+        return None
 
     def _with_heads(self, lifted: Lifted) -> ObservedFrames:
         """Return what was seen, with the head.

@@ -11,6 +11,7 @@ import math
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
@@ -33,12 +34,15 @@ class SeenTrunk(NamedTuple):
         Pixels; those of limbs that were not seen stay NaN.
     offset : array (F, 14)
         Standard deviation of each coordinate from the joint, metres.
+    told : bool array (F, 14)
+        Joints that were seen, and those between two that were.
     reasons : list of str
         For each picture what is missing, or an empty text.
     """
 
     image: Array
     offset: Array
+    told: NDArray[np.bool_]
     reasons: list[str]
 
 
@@ -74,7 +78,7 @@ def with_trunk(image: Array, figure: Figure, offset: Array) -> SeenTrunk:
         nearest = np.where(seen[rows, :N_TRUNK_JOINTS], apart[joint], np.inf).argmin(axis=1)
         image[rows, joint] = image[rows, nearest]
         offsets[rows, joint] = np.hypot(offsets[rows, nearest], apart[joint, nearest] / math.sqrt(3))
-    return SeenTrunk(image, offsets, reasons)
+    return SeenTrunk(image, offsets, seen, reasons)
 
 
 def _missing(seen: list[bool]) -> str:

@@ -122,20 +122,26 @@ def refine_leaves(
     hypothesis: NDArray[np.intp],
     frame: NDArray[np.intp],
     checks: Sequence[Check],
+    known: NDArray[np.bool_] | None = None,
 ) -> LeafOutcomes:
-    """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject and merge frame by frame (N,)."""
+    """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject and merge frame by frame (N,).
+
+    Joints that are not `known` (N, 14), if it is given, are not told, though the leaves have them.
+    """
     parts = []
     hopeless = HOPELESS_CHI2 if sight.walls is None else HOPELESS_CHI2_AT_WALLS
     for rows in blocks(frame, LEAVES_AT_ONCE):
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=hopeless)
         refined = replace(refined, frame=frame[rows])
-        known = np.asarray(np.isfinite(start).all(axis=2))
+        told = np.asarray(np.isfinite(start).all(axis=2))
+        if known is not None:
+            told &= known[rows]
         explained = refined.explained()
         likely = np.flatnonzero(explained)
-        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
+        joints = np.where(told[likely, :, None], refined.joints[likely], np.nan)
         found = contradictions(checks, np.concatenate([joints, refined.head[likely]], axis=1), likely)
-        parts.append(LeafOutcomes.of(refined, known, explained, found))
+        parts.append(LeafOutcomes.of(refined, told, explained, found))
     return LeafOutcomes.joined(parts)
 
 
