@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -42,11 +42,22 @@ class End:
 
 @dataclass(frozen=True, kw_only=True)
 class AngleRange:
-    """The range of one angle, in the clinic's degrees, and where the clinic's zero is on the figure."""
+    """The range of one angle, in the clinic's degrees, and where the clinic's zero is on the figure.
+
+    Parameters
+    ----------
+    lower, upper : End
+        In the clinic's degrees.
+    zero : End
+        The figure's angle where the clinic's is zero.
+    pelvis : float
+        Metres, one standard deviation, by which skeletons put the pelvis before or behind the point that `zero` is of.
+    """
 
     lower: End
     upper: End
     zero: End = End(mean=0.0, spread=0.0)
+    pelvis: float = 0.0
 
     def end(self, side: Side) -> tuple[float, float]:
         """Return mean and spread of an end in the figure's degrees; the zero's own spread counts too."""
@@ -61,7 +72,8 @@ class Coupling:
     Parameters
     ----------
     angle : str
-        The angle that is bounded: one of `posekit.tables.angles.ANGLES`, ``shoulder.elevation``, ``shoulder.turn``.
+        The angle that is bounded: one of `posekit.tables.angles.SIDELESS_ANGLES`, ``shoulder.elevation``,
+        ``shoulder.turn``, ``elbow.valgus``, ``knee.valgus``.
     side : {"lower", "upper"}
         Which end of the range it is.
     of : str
@@ -131,6 +143,20 @@ class Anatomy:
     def limits(self) -> dict[str, tuple[float, float]]:
         """Return the limits (lower, upper), degrees, of the 22 angles of `posekit.skeleton.DOFS`, couplings aside."""
         return {dof: (self._limit(dof, "lower"), self._limit(dof, "upper")) for dof in DOFS}
+
+    def on_pelvis(self, above_hips: float) -> Anatomy:
+        """Return the ranges of a body whose pelvis is so many metres from the line between its hips.
+
+        The line from pelvis to hips is what pelvis and hips are measured by. How much it leans depends on the point
+        that a skeleton calls the pelvis, and the more so the nearer that is to the hips: where it is off by
+        :attr:`AngleRange.pelvis` at distance h, by the arc tangent of their ratio, 45 degrees at the most.
+        """
+        motions = {
+            angle: replace(one, pelvis=0.0, zero=replace(one.zero, spread=math.hypot(one.zero.spread, lean)))
+            for angle, one in self.motions.items()
+            if (lean := math.degrees(math.atan2(one.pelvis, max(above_hips, one.pelvis)))) > 0
+        }
+        return replace(self, motions={**self.motions, **motions}) if motions else self
 
     def couplings_of(self, angle: str, side: Side | None = None) -> tuple[Coupling, ...]:
         """Return the couplings that bound an angle."""

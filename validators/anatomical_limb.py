@@ -13,15 +13,21 @@ from functools import reduce
 import numpy as np
 
 from posekit.geometry import Array, other_branch, other_hinge, turned_near
-from posekit.tables.angles import DERIVED_ANGLES
+from posekit.tables.angles import DERIVED_ANGLES, SIDEWAYS_ANGLES
 from posekit.validators.anatomical import OUTWARD_SIGNS, Anatomy, Side
 from posekit.validators.anatomical_shoulder import elevation_and_plane, turn_offset
 
 BALL_ANGLES = ("flexion", "abduction", "rotation")
 HINGE_OF_BALL: Mapping[str, str] = {"shoulder": "elbow", "hip": "knee"}
 ROTATION_INDEX = BALL_ANGLES.index("rotation")
+VALGUS_SIGNS: Mapping[str, int] = {"shoulder": -1, "hip": 1}
+"""Whether a lower segment that stands off away from the body looks like an internal rotation of the ball joint."""
+
 LIMIT_SIDES: tuple[Side, Side] = ("lower", "upper")
 ELEVATION_ANGLE, PLANE_ANGLE, TURN_ANGLE = DERIVED_ANGLES
+
+RIGHT_ANGLE = np.array(90.0)
+"""The bend, degrees, at which ranges of axial rotation are measured."""
 
 LEAST_LEFT = 0.1
 """The fraction of a range that a sinus leaves at the very end of another angle: below it spreads lose their meaning."""
@@ -181,6 +187,8 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
     sinus = anatomy.sinus_of(joint)
     if sinus is not None:
         walls = _round_off(walls, columns, anatomy.spreads, sinus.power, tolerance)
+    if angles.shape[1] > ROTATION_INDEX:
+        walls = _off_plane(anatomy, joint, walls, readings)
     return LimbReadings(names=tuple(names), values=np.stack(columns, axis=-1), walls=tuple(walls))
 
 
@@ -216,6 +224,41 @@ def _round_off(
             half = np.where(off < 0, middle - below[0].limit(spreads), above[0].limit(spreads) - middle)
             used = used + (np.abs(off) / (half + tolerance)) ** power
     return rounded
+
+
+def _off_plane(anatomy: Anatomy, joint: str, walls: list[Wall], readings: Mapping[str, Array]) -> list[Wall]:
+    r"""Move the ends of the rotation outward by what a lower segment off its hinge's plane is taken for.
+
+    The rotation is read from the lower segment's direction. Where that stands off the hinge's plane by v, the reading
+    is off by :math:`\arcsin(\sin v / \sin\varepsilon)` at a bend of :math:`\varepsilon`, a right angle where the bend
+    is less than v. To an arm, valgus looks like external rotation, to a leg, which bends backward, like internal; the
+    other way round where the hinge is bent beyond straight. Ranges of rotation are measured at a right angle: what it
+    is there is in them.
+    """
+    hinge = f"{HINGE_OF_BALL[joint]}.flexion"
+    outward = {side: np.zeros(readings[hinge].shape) for side in LIMIT_SIDES}
+    bend = np.sin(np.radians(readings[hinge]))
+    for coupling in anatomy.couplings:
+        if SIDEWAYS_ANGLES.get(coupling.angle) != hinge:
+            continue
+        sign = OUTWARD_SIGNS[coupling.side]
+        off, squarely = (
+            np.radians(np.maximum(sign * mean + anatomy.spreads * spread, 0.0))
+            for mean, spread in (anatomy.coupled(coupling, at) for at in (readings[hinge], RIGHT_ANGLE))
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.degrees(np.arcsin(np.minimum(np.sin(off) / np.abs(bend), 1.0)) - squarely)
+        taken_for = sign * VALGUS_SIGNS[joint] * np.where(bend < 0, -1, 1)
+        for side in LIMIT_SIDES:
+            outward[side] += np.where(
+                taken_for == OUTWARD_SIGNS[side], np.where(off > 0, np.maximum(turn, 0.0), 0.0), 0.0
+            )
+    return [
+        replace(wall, mean=wall.mean + OUTWARD_SIGNS[wall.side] * outward[wall.side])
+        if wall.place == ROTATION_INDEX
+        else wall
+        for wall in walls
+    ]
 
 
 def _by_elevation(anatomy: Anatomy, joint: str) -> bool:

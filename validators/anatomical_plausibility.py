@@ -7,7 +7,8 @@ With :math:`z` the number of spreads by which an angle is beyond the mean of the
     \log p = -\tfrac12 z^2 - \log\left(u - l + \sqrt{\pi/2}\,(\sigma_l + \sigma_u)\right),
 
 which integrates to one over the angle, in degrees, where no coupling narrows it. Under a coupling :math:`z` counts from
-the coupled end, and the constant is left as it is. A sinus is a wall and no density: it is left out.
+the coupled end, and the constant is left as it is. A sinus is a wall and no density: it is left out, and so is the
+valgus of elbows and knees, since the axial rotation of a limb that is nearly straight counts next to nothing.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 from posekit.errors import InputError
 from posekit.geometry import Array, other_branch, turned_near
 from posekit.skeleton import DOFS, SIDES
+from posekit.tables.angles import SIDEWAYS_ANGLES
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_limb import HINGE_OF_BALL, limb_walls
 
@@ -75,7 +77,8 @@ def plausibility(angles: Array, anatomy: Anatomy) -> Array:
 
 
 def _limb_excess(anatomy: Anatomy, joint: str, angles: Array) -> Array:
-    excess = limb_walls(replace(anatomy, sinuses=()), joint, angles).excess()
+    couplings = tuple(one for one in anatomy.couplings if one.angle not in SIDEWAYS_ANGLES)
+    excess = limb_walls(replace(anatomy, sinuses=(), couplings=couplings), joint, angles).excess()
     excess[..., 0] = np.fmax.reduce(excess[..., [0, *range(4, excess.shape[2])]], axis=-1)  # the elevation
     bend = np.abs(np.sin(np.radians(angles[:, 3])))
     excess[..., 2] *= np.where(np.isnan(bend), 1.0, bend)[:, None]

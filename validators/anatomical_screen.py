@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from posekit.compiled.anatomical_kernels import AT_COUPLED, AT_JUDGED, AT_TURN, BEYOND_ALL
+from posekit.compiled.anatomical_kernels import AT_COUPLED, AT_JUDGED, AT_TURN, AT_VALGUS, BEYOND_ALL
 from posekit.geometry import Array
+from posekit.tables.angles import SIDEWAYS_ANGLES
 from posekit.validators.anatomical import OUTWARD_SIGNS, Anatomy
 from posekit.validators.anatomical_limb import (
     BALL_ANGLES,
@@ -49,7 +52,11 @@ def limb_numbers(
     readings = (*names[:count], *([""] * (4 - count)), *((ELEVATION_ANGLE, PLANE_ANGLE) if arm else ()))
     judged = judged_names(anatomy, joint, count)
     ends = _ends(anatomy, names, count, by_elevation=ELEVATION_ANGLE in judged)
-    couplings = _couplings(anatomy, (*readings, TURN_ANGLE if arm and count == 4 else ""))
+    alone = {TURN_ANGLE: AT_TURN} if arm and count == 4 else {}
+    alone |= {
+        angle: AT_VALGUS for angle, hinge in SIDEWAYS_ANGLES.items() if hinge == names[3] and count == 4
+    }
+    couplings = _couplings(anatomy, readings, alone)
     branches = 2
     if (
         ELEVATION_ANGLE in judged
@@ -92,16 +99,19 @@ def _ends(anatomy: Anatomy, names: tuple[str, ...], count: int, *, by_elevation:
     return ends
 
 
-def _couplings(anatomy: Anatomy, readings: tuple[str, ...]) -> Array:
-    """Return how many couplings bound one of some readings by another, then each with its knots, figure's degrees."""
+def _couplings(anatomy: Anatomy, readings: tuple[str, ...], alone: Mapping[str, int]) -> Array:
+    """Return how many couplings bound one of some readings by another, then each with its knots, figure's degrees.
+
+    What is bounded `alone`, without being judged itself, has a number of its own.
+    """
     rows: list[Array] = []
     for coupling in anatomy.couplings:
-        if coupling.angle not in readings or coupling.of not in readings:
+        if coupling.angle not in (*readings, *alone) or coupling.of not in readings:
             continue
         zero = anatomy.motions[coupling.of].zero.mean if coupling.of in anatomy.motions else 0.0
         at = np.array(coupling.points)[:, 0] + zero
         mean, spread = anatomy.coupled(coupling, at)
-        bounded = AT_TURN if coupling.angle == TURN_ANGLE else readings.index(coupling.angle)
+        bounded = alone[coupling.angle] if coupling.angle in alone else readings.index(coupling.angle)
         row = [
             bounded,
             readings.index(coupling.of),

@@ -20,7 +20,12 @@ def anatomy_of(table: AnatomyTable) -> Anatomy:
     """
     return Anatomy(
         motions={
-            angle: AngleRange(lower=_end(motion.lower), upper=_end(motion.upper), zero=_end(motion.zero))
+            angle: AngleRange(
+                lower=_end(motion.lower),
+                upper=_end(motion.upper),
+                zero=_end(motion.zero),
+                pelvis=motion.zero.pelvis,
+            )
             for angle, motion in table.joints.items()
         },
         couplings=tuple(

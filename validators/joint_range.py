@@ -61,8 +61,9 @@ def joint_range(
     """
     if ranges.kind == "projected":
         return projected_angles(figure, ranges, tolerance=tolerance)
-    ik = figure.ik
-    if ranges.anatomy is not None:
+    ranges = ranges.of(figure)
+    ik, anatomy = figure.ik, ranges.anatomy
+    if anatomy is not None:
         # The figure itself is left alone: to write a URDF and read it again takes as long as many frames.
         ik = _limited(ik, ranges.limits)
     elif ranges.limits:
@@ -70,7 +71,7 @@ def joint_range(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
         )
         ik = figure.ik
-    limits_alone = ranges.anatomy is None
+    limits_alone = anatomy is None
     checks: list[Check] = [
         Neck(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
         Pelvis(ik=ik, tolerance=tolerance, of_configuration=limits_alone),
@@ -79,13 +80,13 @@ def joint_range(
         for limb in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle")):
             joints = tuple(f"{side}_{joint}" for joint in limb)
             for part in (joints[:2], joints):
-                if ranges.anatomy is None:
+                if anatomy is None:
                     checks.append(
                         LimbRange(figure=figure, limb=part, tolerance=tolerance, directions=directions)
                     )
                 else:
                     checks.append(
-                        AnatomicalLimb(figure=figure, anatomy=ranges.anatomy, limb=part, tolerance=tolerance)
+                        AnatomicalLimb(figure=figure, anatomy=anatomy, limb=part, tolerance=tolerance)
                     )
     return checks
 

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from posekit.errors import InputError
+from posekit.geometry import perpendicular, unit
 from posekit.safe_io import cut, one_line, read_toml
+from posekit.skeleton import HIPS, JOINT
 from posekit.tables.built_in import built_in_document
 from posekit.validators.anatomical import Anatomy
 from posekit.validators.anatomical_table import anatomy_of
+
+if TYPE_CHECKING:
+    from posekit.body import Figure
 
 RANGES_SCHEMA = "posekit.ranges/1"
 MAX_BYTES = 1_000_000
@@ -47,6 +55,15 @@ class Ranges:
     knee_flexed: float = 5.0
     anatomy: Anatomy | None = None
 
+    def of(self, figure: Figure) -> Ranges:
+        """Return the ranges of a figure: anatomical ones depend on where its pelvis is (`Anatomy.on_pelvis`)."""
+        if self.anatomy is None:
+            return self
+        pelvis, *hips = figure.neutral_points[[JOINT[name] for name in HIPS]]
+        above_hips = float(np.linalg.norm(perpendicular(hips[0] - pelvis, unit(hips[1] - hips[0]))))
+        anatomy = self.anatomy.on_pelvis(above_hips)
+        return replace(self, limits=anatomy.limits(), anatomy=anatomy)
+
 
 URDF_RANGES = Ranges(name="urdf", kind="configuration")
 
@@ -65,7 +82,7 @@ def load_ranges(name: str) -> Ranges:
     if name == "urdf":
         return URDF_RANGES
     if name in NAMED_TABLES:
-        return _ranges(built_in_document("ranges", name), name)
+        return _named(name)
     try:
         exists = Path(name).exists()
     except (OSError, ValueError):
@@ -78,6 +95,11 @@ def load_ranges(name: str) -> Ranges:
             )
         )
     return _ranges(read_toml(name, limit=MAX_BYTES), name)
+
+
+@cache
+def _named(name: str) -> Ranges:
+    return _ranges(built_in_document("ranges", name), name)
 
 
 def _ranges(document: dict[str, Any], source: str) -> Ranges:

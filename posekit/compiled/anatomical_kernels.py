@@ -51,11 +51,14 @@ What it bounds, by which reading; -1 for a lower and 1 for an upper end; how far
 knots follow, reading and mean of each.
 """
 
-OF_ROTATION, OF_HINGE, OF_ELEVATION, OF_PLANE, AT_TURN = 2, 3, 4, 5, 6
-"""Readings after flexion and abduction, which may be bounded too; then the turn, which is bounded alone."""
+OF_ROTATION, OF_HINGE, OF_ELEVATION, OF_PLANE, AT_TURN, AT_VALGUS = 2, 3, 4, 5, 6, 7
+"""Readings after flexion and abduction, which may be bounded too; then turn and valgus, which are bounded alone."""
 
 READ_AT, LOW_AT, HIGH_AT, WORST_AT, FIRST_AT = ROOM_AT, ROOM_AT + 6, ROOM_AT + 12, ROOM_AT + 18, ROOM_AT + 22
 """Where readings and their limits are written down, and of four writings what was found."""
+
+RIGHT_ANGLE = 90.0
+"""Degrees of bend at which ranges of axial rotation are measured."""
 
 BEYOND_ALL = 1e9
 """Degrees of an end that is none."""
@@ -81,6 +84,31 @@ def coupled(w: Array, row: int, x: Any) -> Any:
             share = (x - w[k - 2]) / (w[k] - w[k - 2])
             return w[k - 1] + share * (w[k + 1] - w[k - 1])
     return w[last + 1]
+
+
+def off_plane(w: Array, at: int) -> Any:
+    """Move the limits of the rotation for valgus, as `posekit.validators.anatomical_limb` does; say if they are clear."""
+    if math.isnan(w[READ_AT + OF_ROTATION] + w[READ_AT + OF_HINGE]):
+        return True
+    row = at + AT_COUPLED + 1
+    for _ in range(int(w[at + AT_COUPLED])):
+        if w[row] == AT_VALGUS:
+            side = w[row + 2]
+            off = side * coupled(w, row, w[READ_AT + OF_HINGE]) + w[row + 3]
+            if off > 0:
+                bend = math.sin(w[READ_AT + OF_HINGE] / PER_RADIAN)
+                size, part = abs(bend), math.sin(off / PER_RADIAN)
+                if size < SINGULAR_SINE or abs(part - size) < CLEAR_SHARE:
+                    return False
+                turn = PER_RADIAN * (math.asin(part / size) if part < size else math.pi / 2)
+                turn = max(turn - max(side * coupled(w, row, RIGHT_ANGLE) + w[row + 3], 0.0), 0.0)
+                # Valgus looks like external rotation of an arm, like internal rotation of a leg.
+                if side * bend * (1.0 if w[at + AT_ARM] > 0 else -1.0) > 0:
+                    w[LOW_AT + OF_ROTATION] -= turn
+                else:
+                    w[HIGH_AT + OF_ROTATION] += turn
+        row += COUPLING_NUMBERS + 2 * int(w[row + 4])
+    return True
 
 
 def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 - all limits, in the judge's order
@@ -116,6 +144,9 @@ def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 
         k, of = int(w[row]), int(w[row + 1])
         if free and of == OF_ROTATION:
             return False
+        if k == AT_VALGUS:
+            row += COUPLING_NUMBERS + 2 * int(w[row + 4])
+            continue
         end = coupled(w, row, w[READ_AT + of])
         if k == AT_TURN:
             k, end = OF_ROTATION, end + shift
@@ -146,7 +177,7 @@ def bounds(w: Array, at: int, offset: Any, free: bool) -> Any:  # noqa: PLR0912 
                     w[at + AT_ENDS + 5 * k + 4] - centre if off >= 0 else centre - w[at + AT_ENDS + 5 * k + 2]
                 )
                 used += (abs(off) / (half + w[at + AT_TOLERANCE])) ** power
-    return True
+    return off_plane(w, at)
 
 
 def writing(w: Array, at: int, loose: Any, to: int) -> None:
@@ -267,6 +298,7 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
 COMPILED_TYPES = {
     "near": "",
     "coupled": "",
+    "off_plane": "(f8[::1], i8)",
     "bounds": "(f8[::1], i8, f8, b1)",
     "writing": "(f8[::1], i8, f8, i8)",
     "anatomical": "(f8[::1], i8)",

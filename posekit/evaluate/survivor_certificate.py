@@ -146,4 +146,5 @@ def _limited_figure(figure: Figure, limits: tuple[tuple[str, tuple[float, float]
 
 
 def _limited(figure: Figure, ranges: Ranges) -> Figure:
-    return _limited_figure(figure, tuple(ranges.limits.items())) if ranges.limits else figure
+    limits = ranges.of(figure).limits
+    return _limited_figure(figure, tuple(limits.items())) if limits else figure

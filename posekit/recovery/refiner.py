@@ -164,7 +164,8 @@ class Refiner:
     @cached_property
     def _limits(self) -> Limits:
         """The limits that refinement keeps to: those of the ranges where they are of the figure's own angles."""
-        ranges, figure = ranges_of(self.grower.settings), self.grower.body.figure
+        figure = self.grower.body.figure
+        ranges = ranges_of(self.grower.settings).of(figure)
         if ranges.kind != "configuration" or not ranges.limits:
             return figure.limits
         radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}

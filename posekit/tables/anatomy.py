@@ -9,7 +9,7 @@ from typing import Annotated, Any, ClassVar, Final, Literal, Self
 from pydantic import BeforeValidator, Field, model_validator
 
 from posekit.safe_io.refusal import cut, shown
-from posekit.tables.angles import DERIVED_ANGLES, SIDELESS_ANGLES
+from posekit.tables.angles import DERIVED_ANGLES, SIDELESS_ANGLES, SIDEWAYS_ANGLES
 from posekit.tables.fields import listed
 from posekit.tables.file_model import FileModel, refuse
 from posekit.tables.ranges import by_joint, check_angles
@@ -19,6 +19,7 @@ ELEVATION_ANGLE, PLANE_ANGLE, TURN_ANGLE = DERIVED_ANGLES
 COUPLED_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
     ELEVATION_ANGLE: (PLANE_ANGLE,),
     TURN_ANGLE: (ELEVATION_ANGLE,),
+    **{angle: (hinge,) for angle, hinge in SIDEWAYS_ANGLES.items()},
     **{
         angle: tuple(
             other
@@ -38,6 +39,7 @@ MAX_COUPLINGS: Final = 100
 MAX_POWER: Final = 100
 MAX_SPREADS: Final = 10
 FULL_TURN_DEGREES: Final = 360
+MAX_METRES: Final = 1.0
 
 
 def _positive(value: Any) -> Any:
@@ -64,6 +66,10 @@ class ZeroTable(FileModel):
 
     mean: Degrees
     spread: Annotated[Degrees, Field(ge=0)]
+    pelvis: Annotated[float, Field(ge=0, le=MAX_METRES)] = Field(
+        default=0.0,
+        description="Metres, one standard deviation, by which skeletons put the pelvis before or behind that.",
+    )
     source: Sources = Field(default=[])
 
 

@@ -24,3 +24,6 @@ SIDELESS_ANGLES: Final = tuple(
 
 DERIVED_ANGLES: Final = ("shoulder.elevation", "shoulder.plane", "shoulder.turn")
 """What `posekit.validators.anatomical_shoulder` makes of the shoulder's three angles."""
+
+SIDEWAYS_ANGLES: Final[Mapping[str, str]] = {"elbow.valgus": "elbow.flexion", "knee.valgus": "knee.flexion"}
+"""How far a lower segment stands off its hinge's plane, away from the body positive; and the hinge's angle."""

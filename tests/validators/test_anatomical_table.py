@@ -68,8 +68,8 @@ def test_the_clinics_zero_is_added_to_ends_and_couplings() -> None:
     assert pelvis.zero.mean == -hip.zero.mean > 0
     assert pelvis.end("upper")[0] == pytest.approx(pelvis.upper.mean + pelvis.zero.mean)
     (coupling,) = ANATOMY.couplings_of("hip.flexion")
-    mean, spread = ANATOMY.coupled(coupling, np.array([-5.0, 0.0, 12.0, 24.0, 200.0]))
-    np.testing.assert_allclose(mean, np.array([61.0, 61.0, 75.5, 90.0, 122.6]) + hip.zero.mean)
+    mean, spread = ANATOMY.coupled(coupling, np.array([-5.0, 0.0, 6.75, 13.5, 200.0]))
+    np.testing.assert_allclose(mean, np.array([80.0, 80.0, 86.0, 92.0, 133.0]) + hip.zero.mean)
     assert spread == pytest.approx(np.hypot(coupling.spread, hip.zero.spread))
 
 
@@ -90,10 +90,10 @@ COUPLING = 'angle = "hip.flexion"'
 WRONG = {
     "no spreads": (changed("spreads = ", "# spreads = "), "spreads: got nothing; expected this field"),
     "negative spreads": (
-        changed("spreads = 1.0", "spreads = -1.0"),
+        changed("spreads = 0.8", "spreads = -1.0"),
         "spreads: got -1.0; expected a number of at least 0",
     ),
-    "endless spreads": (changed("spreads = 1.0", "spreads = inf"), "spreads: got inf; expected a finite"),
+    "endless spreads": (changed("spreads = 0.8", "spreads = inf"), "spreads: got inf; expected a finite"),
     "a missing angle": (
         changed("[neck.flexion]", "[neck.extra]"),
         "neck.extra: got a name that is not an angle",
@@ -108,7 +108,7 @@ WRONG = {
         "neck.lower: got a name that is not an angle",
     ),
     "a joint that is no table": (
-        changed("spreads = 1.0", "spreads = 1.0\nneck2 = 3"),
+        changed("spreads = 0.8", "spreads = 0.8\nneck2 = 3"),
         "neck2: got 3; expected a table",
     ),
     "no upper": (
@@ -171,23 +171,23 @@ WRONG = {
         'coupling[0].end: got "left"',
     ),
     "a coupling of one point": (
-        changed("[[0.0, 61.0], [24.0, 90.0], [60.0, 122.6]]", "[[0.0, 61.0]]"),
+        changed("[[0.0, 80.0], [13.5, 92.0], [60.0, 133.0]]", "[[0.0, 80.0]]"),
         "coupling[0].points: got a list of 1 entries; expected at least 2 entries",
     ),
     "a point of three numbers": (
-        changed("[0.0, 61.0]", "[0.0, 61.0, 1.0]"),
-        "coupling[0].points[0]: got [0.0, 61.0, 1.0]; expected at most 2 entries",
+        changed("[0.0, 80.0]", "[0.0, 80.0, 1.0]"),
+        "coupling[0].points[0]: got [0.0, 80.0, 1.0]; expected at most 2 entries",
     ),
     "points out of order": (
-        changed("[24.0, 90.0]", "[0.0, 90.0]"),
+        changed("[13.5, 92.0]", "[0.0, 92.0]"),
         "coupling[0].points: got points out of order; expected knee.flexion to ascend",
     ),
     "a point that is text": (
-        changed("[24.0, 90.0]", '[24.0, "x"]'),
+        changed("[13.5, 92.0]", '[13.5, "x"]'),
         'coupling[0].points[1][1]: got "x"; expected a number',
     ),
     "a coupling that is no table": (
-        changed("spreads = 1.0", "spreads = 1.0\ncoupling = 3").split("[[coupling]]")[0],
+        changed("spreads = 0.8", "spreads = 0.8\ncoupling = 3").split("[[coupling]]")[0],
         "coupling: got 3; expected a list; write [[coupling]] tables",
     ),
     "too many couplings": (
@@ -199,15 +199,15 @@ WRONG = {
         'sinus[0].joint: got "shoulder"; expected',
     ),
     "a sinus sharper than a diamond": (
-        changed("power = 4.0", "power = 0.5"),
+        changed("power = 3.0", "power = 0.5"),
         "sinus[0].power: got 0.5; expected a number of at least 1",
     ),
     "a sinus without source": (
-        changed('power = 4.0\nsource = ["van_arkel", "han"]', "power = 4.0"),
+        changed('power = 3.0\nsource = ["van_arkel", "han"]', "power = 3.0"),
         "sinus[0].source: got nothing; expected this field",
     ),
     "a power that is none": (
-        changed("power = 4.0", 'power = "x"'),
+        changed("power = 3.0", 'power = "x"'),
         'sinus[0].power: got "x"; expected a number',
     ),
     "two sinuses of one joint": (

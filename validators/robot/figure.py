@@ -81,9 +81,9 @@ class FigureConfigurations:
     @cached_property
     def subject(self) -> Subject:
         """The figure's model, limits and bodies."""
-        figure = self.figure
-        if self.ranges.kind == "configuration" and self.ranges.limits:
-            limits = self.ranges.limits.items()
+        figure, ranges = self.figure, self.ranges.of(self.figure)
+        if ranges.kind == "configuration" and ranges.limits:
+            limits = ranges.limits.items()
             figure = figure.with_limits({dof: (np.radians(a), np.radians(b)) for dof, (a, b) in limits})
         model = figure.model
         return Subject(
