@@ -60,6 +60,9 @@ NOISE_PIXELS = 2.0
 NEAR_EXACT, NEAR_NOISY = 0.010, 0.035
 LEVEL_SINE = float(np.sin(np.radians(15.0)))
 FLATTEST = 0.001
+FRAMES_AT_ONCE = 12
+"""Frames of a clip whose lengths are off alike."""
+
 HELD = float(chi2.ppf(0.95, 3))
 OFF = {"5 % long": 1.05, "5 % short": 0.95, "10 % long": 1.10, "10 % short": 0.90}
 
@@ -118,7 +121,7 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True)
 class Shots:
-    """Frames of one clip, each seen by a camera of its own."""
+    """Some frames of one clip, each seen by a camera of its own."""
 
     clip: str
     frame: NDArray[np.intp]
@@ -168,9 +171,15 @@ def shots_of(capture: Capture, frames: int, seed: int) -> list[Shots]:
             for row, flat in zip(rows, level, strict=True)
         ]
         lengths = clip_lengths(capture.points[known])
-        if share:
+        for part in np.array_split(np.arange(share), -(-share // FRAMES_AT_ONCE)):
             found.append(
-                Shots(clip=capture.names[k], frame=rows, level=level, truth=np.array(truth), lengths=lengths)
+                Shots(
+                    clip=capture.names[k],
+                    frame=rows[part],
+                    level=level[part],
+                    truth=np.array(truth)[part],
+                    lengths=lengths,
+                )
             )
     return found
 
@@ -422,7 +431,9 @@ def main() -> None:
         print("Bodies that are refused\n")
         print("\n".join(bodies(capture, np.random.default_rng(given.seed))))
     shots = shots_of(capture, given.frames, given.seed)
-    print(f"\n{sum(len(one.truth) for one in shots)} frames of {len(shots)} clips, seed {given.seed}\n")
+    print(
+        f"\n{sum(len(one.truth) for one in shots)} frames of {len(capture.names)} clips, seed {given.seed}\n"
+    )
     asked = Asked(seed=given.seed, rooted=given.root == "given", rigid=given.rigid)
     chosen = [condition for condition in CONDITIONS if condition.group in groups]
     with loops("plain"):  # else the condition in which they begin to pay would pay for compiling them
