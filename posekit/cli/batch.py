@@ -17,7 +17,7 @@ from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
 from posekit.cli.noise_options import UncertainAsRecover
-from posekit.cli.options import ContactMargin, examples, signed_length
+from posekit.cli.options import ContactMargin, examples, option, signed_length
 
 if TYPE_CHECKING:
     from posekit.batch import Progress, Summary
@@ -46,29 +46,21 @@ def batch(
     ],
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="DIR",
-            help="The folder of results. A run that was stopped goes on there.",
-        ),
+        option("--output", "DIR", "The folder of results. A run that was stopped goes on there.", short="-o"),
     ],
-    jobs: Annotated[
-        int | None, typer.Option("--jobs", metavar="N", help="Processes. Default: one a core.")
-    ] = None,
+    jobs: Annotated[int | None, option("--jobs", "N", "Processes. Default: one a core.")] = None,
     shard_frames: Annotated[
-        int, typer.Option("--shard-frames", metavar="N", help="Frames of one file of results, at most.")
+        int, option("--shard-frames", "N", "Frames of one file of results, at most.")
     ] = 2000,
     retries: Annotated[
-        int,
-        typer.Option("--retries", metavar="N", help="How often a shard is tried again whose process died."),
+        int, option("--retries", "N", "How often a shard is tried again whose process died.")
     ] = 2,
     cluster: Annotated[
         str,
-        typer.Option(
+        option(
             "--cluster",
-            metavar="ADDRESS",
-            help="Work on a Ray cluster (extra ray); `local` starts one here. All machines need the same paths.",
+            "ADDRESS",
+            "Work on a Ray cluster (extra ray); `local` starts one here. All machines need the same paths.",
         ),
     ] = "",
     overwrite: Annotated[
@@ -96,9 +88,7 @@ def batch(
     judging: Judging,
     tolerances: TolerancesAsRecover,
     contact_margin: ContactMargin = "0cm",
-    scale: Annotated[
-        str, typer.Option("--scale", metavar="HOW", help="Uncalibrated views: as `posekit recover` has it.")
-    ] = "",
+    scale: Annotated[str, option("--scale", "HOW", "Uncalibrated views: as `posekit recover` has it.")] = "",
     proportions: Proportions = "figure",
     uncertain: UncertainAsRecover,
     reading: Reading,

@@ -12,7 +12,7 @@ import typer
 from posekit.cli.detector_options import Deviation, Proportions, Reading, Unit, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
-from posekit.cli.options import distinct, examples
+from posekit.cli.options import distinct, examples, option
 from posekit.errors import PosekitError
 
 CONVERT_EXAMPLES = examples(
@@ -39,46 +39,39 @@ def convert(
     ],
     to: Annotated[
         str,
-        typer.Option(
+        option(
             "--to",
-            metavar="NAME",
-            help="The format to write: view, postures, or one of motion (trc, c3d, csv, npz, parquet, mot, bvh, glb, "
+            "NAME",
+            "The format to write: view, postures, or one of motion (trc, c3d, csv, npz, parquet, mot, bvh, glb, "
             "urdf).",
         ),
     ] = "",
     posture: Annotated[
         str,
-        typer.Option(
+        option(
             "--posture",
-            metavar="WHICH",
-            help="Of a result: first (the likeliest), path (through all frames, if they were followed), a number "
+            "WHICH",
+            "Of a result: first (the likeliest), path (through all frames, if they were followed), a number "
             "from 1, or all (csv, npz, parquet, glb).",
         ),
     ] = "first",
     view: Annotated[
         Path | None,
-        typer.Option(
-            "--view",
-            metavar="VIEW",
-            help="What a result was recovered from: puts it into its camera's world.",
-        ),
+        option("--view", "VIEW", "What a result was recovered from: puts it into its camera's world."),
     ] = None,
     up: Annotated[
-        str,
-        typer.Option("--up", metavar="AXIS", help="The axis that shall point up, as +z. Default: by custom."),
+        str, option("--up", "AXIS", "The axis that shall point up, as +z. Default: by custom.")
     ] = "",
     input_up: Annotated[
         str,
-        typer.Option(
+        option(
             "--input-up",
-            metavar="AXIS",
-            help="The axis that points up in IN, where it does not say it or is wrong: of a result, in the camera's "
+            "AXIS",
+            "The axis that points up in IN, where it does not say it or is wrong: of a result, in the camera's "
             "frame (-y where the camera is level), or with --view in its world.",
         ),
     ] = "",
-    clip: Annotated[
-        str, typer.Option("--clip", metavar="NAME", help="Of motion capture with several clips: which.")
-    ] = "",
+    clip: Annotated[str, option("--clip", "NAME", "Of motion capture with several clips: which.")] = "",
     unit: Unit = "",
     reading: Reading,
     deviation: Deviation = None,

@@ -7,15 +7,13 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.options import Pictures, examples
+from posekit.cli.options import Pictures, examples, option
 
 DEMO_EXAMPLES = examples("posekit demo -o demo-results")
 
 
 def demo(
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the results.")
-    ],
+    output: Annotated[Path, option("--output", "DIR", "Where to write the results.", short="-o")],
     pictures: Pictures = True,
 ) -> None:
     """Recover the built-in views, validate what came out, and reproduce the 1985 paper's tables."""

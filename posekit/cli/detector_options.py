@@ -8,56 +8,49 @@ from typing import Annotated
 
 import typer
 
+from posekit.cli.options import option
+
 Format = Annotated[
     str,
-    typer.Option(
+    option(
         "--format",
-        metavar="NAME",
-        help="The format of what is read, where its structure does not tell: openpose, coco, mediapipe, trc, …",
+        "NAME",
+        "The format of what is read, where its structure does not tell: openpose, coco, mediapipe, trc, …",
     ),
 ]
 Skeleton = Annotated[
     str,
-    typer.Option(
+    option(
         "--skeleton",
-        metavar="NAME|FILE",
-        help="What the points are: a built-in skeleton map, as body_25b, or a posekit.skeleton_map/1 TOML.",
+        "NAME|FILE",
+        "What the points are: a built-in skeleton map, as body_25b, or a posekit.skeleton_map/1 TOML.",
     ),
 ]
 SwapSides = Annotated[
     bool, typer.Option("--swap-sides", help="Exchange left and right: the file has them the wrong way round.")
 ]
-Size = Annotated[
-    str,
-    typer.Option(
-        "--size", metavar="WxH", help="The picture's width and height, where the file does not say."
-    ),
-]
+Size = Annotated[str, option("--size", "WxH", "The picture's width and height, where the file does not say.")]
 Deviation = Annotated[
     float | None,
-    typer.Option(
+    option(
         "--deviation",
-        metavar="PX",
-        help="Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 5 "
+        "PX",
+        "Standard deviation of the image points, pixels: how far off they may be. Default: the view's, else 5 "
         "of a detector's and 2 of others.",
     ),
 ]
 Proportions = Annotated[
     str,
-    typer.Option(
+    option(
         "--proportions",
-        metavar="NAME",
-        help="By which proportions a stature gives lengths: drillis-contini, winter, de-leva, table-a1. In "
+        "NAME",
+        "By which proportions a stature gives lengths: drillis-contini, winter, de-leva, table-a1. In "
         "uncalibrated views also taylor (his 12 points, no neck and pelvis).",
     ),
 ]
 Unit = Annotated[
     str,
-    typer.Option(
-        "--unit",
-        metavar="NAME",
-        help="Of motion capture: m, cm, mm or in, where the file's is wrong or not said.",
-    ),
+    option("--unit", "NAME", "Of motion capture: m, cm, mm or in, where the file's is wrong or not said."),
 ]
 
 
@@ -69,47 +62,38 @@ class Reading:
     skeleton: Skeleton = ""
     person: Annotated[
         str,
-        typer.Option(
+        option(
             "--person",
-            metavar="WHO",
-            help="largest, surest, first, a track's number from `posekit inspect`, or all. Default: the only one, else "
+            "WHO",
+            "largest, surest, first, a track's number from `posekit inspect`, or all. Default: the only one, else "
             "largest.",
         ),
     ] = ""
     swap_sides: SwapSides = False
     camera: Annotated[
         str,
-        typer.Option(
+        option(
             "--camera",
-            metavar="FILE[:NAME]",
-            help="The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP, NPZ; or the photograph, whose EXIF "
+            "FILE[:NAME]",
+            "The calibration: OpenCV, Pose2Sim or Anipose TOML, COLMAP, NPZ; or the photograph, whose EXIF "
             "gives a guess. NAME where it has several cameras. Without any camera the view is scaled orthographic.",
         ),
     ] = ""
     fov: Annotated[
         float | None,
-        typer.Option(
-            "--fov", metavar="DEGREES", help="A guess instead of a calibration: the horizontal field of view."
-        ),
+        option("--fov", "DEGREES", "A guess instead of a calibration: the horizontal field of view."),
     ] = None
     focal35: Annotated[
-        float | None,
-        typer.Option("--focal35", metavar="MM", help="A guess: the focal length in 35 mm equivalents."),
+        float | None, option("--focal35", "MM", "A guess: the focal length in 35 mm equivalents.")
     ] = None
     size: Size = ""
     rate: Annotated[
-        float | None,
-        typer.Option(
-            "--fps", metavar="RATE", help="Frames a second, where the file does not say. Default: 30."
-        ),
+        float | None, option("--fps", "RATE", "Frames a second, where the file does not say. Default: 30.")
     ] = None
     minimum_confidence: Annotated[
         float,
-        typer.Option(
-            "--min-confidence",
-            metavar="VALUE",
-            min=0.0,
-            help="Points that are less sure than this count as not seen.",
+        option(
+            "--min-confidence", "VALUE", "Points that are less sure than this count as not seen.", min=0.0
         ),
     ] = 0.0
 
@@ -119,19 +103,17 @@ class Who:
     """Whose body it shows: what gives the lengths."""
 
     stature: Annotated[
-        str,
-        typer.Option("--stature", metavar="LENGTH", help="The person's height, as 175cm: gives the lengths."),
+        str, option("--stature", "LENGTH", "The person's height, as 175cm: gives the lengths.")
     ] = ""
     lengths: Annotated[
-        Path | None,
-        typer.Option("--lengths", metavar="FILE", help="The person's segment lengths: posekit.lengths/1."),
+        Path | None, option("--lengths", "FILE", "The person's segment lengths: posekit.lengths/1.")
     ] = None
     calibrate: Annotated[
         Path | None,
-        typer.Option(
+        option(
             "--calibrate",
-            metavar="FILE",
-            help="A recording of the same person, from which lengths are estimated: motion capture, or key points of "
+            "FILE",
+            "A recording of the same person, from which lengths are estimated: motion capture, or key points of "
             "the same camera (with --stature).",
         ),
     ] = None

@@ -13,7 +13,7 @@ from posekit.cli.detector_options import Format, Skeleton, Unit
 from posekit.cli.detector_source import pixels
 from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
-from posekit.cli.options import Seed, distinct, examples, options_given, progress, split
+from posekit.cli.options import Seed, distinct, examples, option, options_given, progress, split
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -53,49 +53,39 @@ def evaluate(
     ],
     output: Annotated[
         list[Path],
-        typer.Option(
-            "-o",
+        option(
             "--output",
-            metavar="REPORT",
-            help="The report: .json (everything), .csv (a row a condition) or .md (tables). May be repeated.",
+            "REPORT",
+            "The report: .json (everything), .csv (a row a condition) or .md (tables). May be repeated.",
+            short="-o",
         ),
     ],
     noise: Annotated[
         str,
-        typer.Option(
+        option(
             "--noise",
-            metavar="LIST",
-            help="Standard deviations of the image points, pixels, by commas. Default: 0,1,2,5,10; of a view 0.",
+            "LIST",
+            "Standard deviations of the image points, pixels, by commas. Default: 0,1,2,5,10; of a view 0.",
         ),
     ] = "",
     yaw_step: Annotated[
-        float, typer.Option("--yaw-step", metavar="DEGREES", help="Between cameras, from 0 to 180 degrees.")
+        float, option("--yaw-step", "DEGREES", "Between cameras, from 0 to 180 degrees.")
     ] = 15.0,
     heights: Annotated[
-        str, typer.Option("--heights", metavar="LIST", help="Of the cameras over the ground, as 0.5m,1.5m.")
+        str, option("--heights", "LIST", "Of the cameras over the ground, as 0.5m,1.5m.")
     ] = "0.5m,1.5m,2.5m",
-    distance: Annotated[
-        str, typer.Option("--distance", metavar="LENGTH", help="Of the cameras from the body's middle.")
-    ] = "4m",
-    f: Annotated[
-        float, typer.Option("--f", metavar="PX", help="Focal length of the cameras, pixels.")
-    ] = 1500.0,
-    size: Annotated[
-        str, typer.Option("--size", metavar="WxH", help="Size of their pictures, pixels.")
-    ] = "1920x1080",
+    distance: Annotated[str, option("--distance", "LENGTH", "Of the cameras from the body's middle.")] = "4m",
+    f: Annotated[float, option("--f", "PX", "Focal length of the cameras, pixels.")] = 1500.0,
+    size: Annotated[str, option("--size", "WxH", "Size of their pictures, pixels.")] = "1920x1080",
     frames_per_clip: Annotated[
         int | None,
-        typer.Option(
-            "--frames-per-clip",
-            metavar="N",
-            help="Evenly over each clip. Default: 10; with --sequences 60, in a row.",
+        option(
+            "--frames-per-clip", "N", "Evenly over each clip. Default: 10; with --sequences 60, in a row."
         ),
     ] = None,
-    clips: Annotated[
-        str, typer.Option("--clips", metavar="LIST", help="Only these, by commas. Default: all.")
-    ] = "",
+    clips: Annotated[str, option("--clips", "LIST", "Only these, by commas. Default: all.")] = "",
     actions: Annotated[
-        str, typer.Option("--actions", metavar="LIST", help="Only clips of these, by commas. Default: all.")
+        str, option("--actions", "LIST", "Only clips of these, by commas. Default: all.")
     ] = "",
     consecutive: Annotated[
         bool,
@@ -107,16 +97,15 @@ def evaluate(
     sequences: Annotated[
         bool,
         typer.Option(
-            "--sequences",
-            help="Follow the person through frames in a row, and tell how good the path is.",
+            "--sequences", help="Follow the person through frames in a row, and tell how good the path is."
         ),
     ] = False,
     root: Annotated[
         str,
-        typer.Option(
+        option(
             "--root",
-            metavar="HOW",
-            help="given: the neck is the true one; auto: it is placed from the image. Default: given; views stay as "
+            "HOW",
+            "given: the neck is the true one; auto: it is placed from the image. Default: given; views stay as "
             "they are.",
         ),
     ] = "",
@@ -126,13 +115,10 @@ def evaluate(
     skeleton: Skeleton = "",
     unit: Unit = "",
     up: Annotated[
-        str,
-        typer.Option(
-            "--up", metavar="AXIS", help="The axis of the motion that points up, as +z. Default: the file's."
-        ),
+        str, option("--up", "AXIS", "The axis of the motion that points up, as +z. Default: the file's.")
     ] = "",
     seed: Seed = 0,
-    jobs: Annotated[int, typer.Option("--jobs", metavar="N", help="Processes, at most one a core.")] = 1,
+    jobs: Annotated[int, option("--jobs", "N", "Processes, at most one a core.")] = 1,
     plots: Annotated[
         bool, typer.Option("--plots", help="Draw charts beside the first report: PNG, needs matplotlib.")
     ] = False,

@@ -5,9 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from posekit.cli.options import PHYSICAL_CHECKS_TEXT, AngleTolerance, Rules, as_recover, rule_numbers, split
+from posekit.cli.options import (
+    PHYSICAL_CHECKS_TEXT,
+    AngleTolerance,
+    Rules,
+    as_recover,
+    option,
+    rule_numbers,
+    split,
+)
 
 if TYPE_CHECKING:
     from posekit.settings import PartialTolerance
@@ -18,26 +24,18 @@ class Judging:
     """By what postures are judged: `recover`, `batch` and `evaluate` have it."""
 
     checks: Annotated[
-        str,
-        typer.Option(
-            "--checks",
-            metavar="LIST",
-            help="Some of rigid-parts, joint-range, collision, walking, by commas.",
-        ),
+        str, option("--checks", "LIST", "Some of rigid-parts, joint-range, collision, walking, by commas.")
     ] = PHYSICAL_CHECKS_TEXT
     ranges: Annotated[
-        str,
-        typer.Option(
-            "--ranges", metavar="NAME|FILE", help="Joint ranges: urdf, anatomical, table1, or a TOML file."
-        ),
+        str, option("--ranges", "NAME|FILE", "Joint ranges: urdf, anatomical, table1, or a TOML file.")
     ] = "urdf"
     rules: Rules = "1,2"
     walkers: Annotated[
         str,
-        typer.Option(
+        option(
             "--walkers",
-            metavar="paper|people",
-            help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
+            "paper|people",
+            "Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
         ),
     ] = "paper"
 
@@ -58,19 +56,19 @@ class Tolerances:
 
     rigid_tolerance: Annotated[
         str,
-        typer.Option(
+        option(
             "--rigid-tolerance",
-            metavar="LENGTH",
-            help="How far distances inside torso and hips may be off. Default: exact where some torso fits "
+            "LENGTH",
+            "How far distances inside torso and hips may be off. Default: exact where some torso fits "
             "exactly, else 3cm, or 10cm in an uncalibrated view. A tolerance that is given turns refinement off.",
         ),
     ] = ""
     tangent_tolerance: Annotated[
         str,
-        typer.Option(
+        option(
             "--tangent-tolerance",
-            metavar="LENGTH",
-            help="How much too short for its image a segment may be. Default: as above, 1cm or 5cm.",
+            "LENGTH",
+            "How much too short for its image a segment may be. Default: as above, 1cm or 5cm.",
         ),
     ] = ""
     angle_tolerance: AngleTolerance = None

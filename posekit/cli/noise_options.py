@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from posekit.cli.detector_options import Deviation
-from posekit.cli.options import as_recover
+from posekit.cli.options import as_recover, option
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,10 +24,10 @@ class Uncertain:
     ] = True
     root: Annotated[
         str,
-        typer.Option(
+        option(
             "--root",
-            metavar="HOW",
-            help="Calibrated views without a root: find the neck's depth by auto, head, torso or search.",
+            "HOW",
+            "Calibrated views without a root: find the neck's depth by auto, head, torso or search.",
         ),
     ] = "auto"
     deviation: Deviation = None
@@ -41,10 +41,10 @@ class Uncertain:
     ] = None
     length_deviation: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--length-deviation",
-            metavar="FRACTION",
-            help="Then: how far lengths may be off, standard deviation. Default: 0.01, from shoulder to pelvis 0.02.",
+            "FRACTION",
+            "Then: how far lengths may be off, standard deviation. Default: 0.01, from shoulder to pelvis 0.02.",
         ),
     ] = None
 

@@ -14,23 +14,22 @@ from posekit.errors import InputError, PosekitError
 
 PHYSICAL_CHECKS_TEXT = "rigid-parts,joint-range,collision"
 
-Rules = Annotated[
-    str,
-    typer.Option("--rules", metavar="LIST", help="Rules of walking, for the check `walking`: some of 1-5."),
-]
+
+def option(name: str, metavar: str | None, help: str, *, short: str = "", **more: Any) -> Any:
+    """Return an option that takes a value."""
+    return typer.Option(*([short] if short else []), name, metavar=metavar, help=help, **more)
+
+
+Rules = Annotated[str, option("--rules", "LIST", "Rules of walking, for the check `walking`: some of 1-5.")]
 ContactMargin = Annotated[
     str,
-    typer.Option(
-        "--contact-margin",
-        metavar="LENGTH",
-        help="Clearance that bodies must keep, as 1cm; negative allows penetration.",
+    option(
+        "--contact-margin", "LENGTH", "Clearance that bodies must keep, as 1cm; negative allows penetration."
     ),
 ]
 AngleTolerance = Annotated[
     float | None,
-    typer.Option(
-        "--angle-tolerance", min=0.0, metavar="DEGREES", help="How far the direction of a segment may be off."
-    ),
+    option("--angle-tolerance", "DEGREES", "How far the direction of a segment may be off.", min=0.0),
 ]
 Pictures = Annotated[
     bool, typer.Option("--pictures/--no-pictures", help="Draw the results too: plots, pages and scenes.")
@@ -39,12 +38,12 @@ Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random num
 Noise = Annotated[
     float, typer.Option("--noise", min=0.0, help="Standard deviation of the image points' noise, pixels.")
 ]
-OutputView = Annotated[Path, typer.Option("-o", "--output", metavar="VIEW", help="The view file to write.")]
+OutputView = Annotated[Path, option("--output", "VIEW", "The view file to write.", short="-o")]
 
 
 def as_recover(name: str, metavar: str | None = None, more: str = ".") -> Any:
     """Return an option that `posekit recover` explains."""
-    return typer.Option(name, metavar=metavar, help=f"As `posekit recover` has it{more}")
+    return option(name, metavar, f"As `posekit recover` has it{more}")
 
 
 def examples(*lines: str) -> str:

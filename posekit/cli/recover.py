@@ -18,6 +18,7 @@ from posekit.cli.options import (
     about,
     distinct,
     examples,
+    option,
     options_given,
     progress,
     progress_so_far,
@@ -59,77 +60,59 @@ def recover(
             help="A posekit.view/1 file, or a detector's file or folder of key points, in any format that is read.",
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("-o", "--output", metavar="RESULT", help="The result: .json or .npz.")
-    ],
+    output: Annotated[Path, option("--output", "RESULT", "The result: .json or .npz.", short="-o")],
     judging: Judging,
-    group: Annotated[
-        str, typer.Option("--group", metavar="LENGTH", help="Group survivors nearer than this, as 5cm.")
-    ] = "",
+    group: Annotated[str, option("--group", "LENGTH", "Group survivors nearer than this, as 5cm.")] = "",
     tolerances: Tolerances,
     contact_margin: ContactMargin = "0cm",
     write_urdf: Annotated[
         Path | None,
-        typer.Option(
-            "--write-urdf",
-            metavar="FILE",
-            help="Also write the person's figure: URDF, and SRDF beside it.",
-        ),
+        option("--write-urdf", "FILE", "Also write the person's figure: URDF, and SRDF beside it."),
     ] = None,
     scale: Annotated[
         str,
-        typer.Option(
+        option(
             "--scale",
-            metavar="HOW",
-            help="Uncalibrated views: min, VALUE (pixels a unit), stature:PX, or constraints: closure, coplanar, "
+            "HOW",
+            "Uncalibrated views: min, VALUE (pixels a unit), stature:PX, or constraints: closure, coplanar, "
             "perpendicular, collinear, with weights if wanted (closure:1,coplanar:0.5). Default: the view's, else min.",
         ),
     ] = "",
     proportions: Proportions = "figure",
     nearer: Annotated[
         Path | None,
-        typer.Option(
-            "--nearer",
-            metavar="FILE",
-            help="Which end of each segment is nearer, given by hand: posekit.nearer/1.",
-        ),
+        option("--nearer", "FILE", "Which end of each segment is nearer, given by hand: posekit.nearer/1."),
     ] = None,
     linkage: Annotated[
         str,
-        typer.Option(
-            "--linkage",
-            metavar="FILE|URDF|NAME",
-            help="Recover another articulated object from an uncalibrated view.",
+        option(
+            "--linkage", "FILE|URDF|NAME", "Recover another articulated object from an uncalibrated view."
         ),
     ] = "",
     uncertain: Uncertain,
     paths: Annotated[
         int,
-        typer.Option(
+        option(
             "--follow",
-            metavar="K",
+            "K",
+            "Follow the person through the frames: the K likeliest paths from survivor to survivor.",
             min=0,
             max=1000,
-            help="Follow the person through the frames: the K likeliest paths from survivor to survivor.",
         ),
     ] = 0,
     follow_scale: Annotated[
         float | None,
-        typer.Option(
+        option(
             "--follow-scale",
-            metavar="FRACTION",
-            help="Then: all lengths may be off by a common factor, with this standard deviation, as 0.05; the factor "
+            "FRACTION",
+            "Then: all lengths may be off by a common factor, with this standard deviation, as 0.05; the factor "
             "with which the frames fit and move best is applied. Where the noise is known, and the neck's place: by a "
             "root, or six points of the head.",
         ),
     ] = None,
     truth: Annotated[
         Path | None,
-        typer.Option(
-            "--truth",
-            metavar="FILE",
-            help="Motion capture of the same seconds: survivors are compared with it.",
-        ),
+        option("--truth", "FILE", "Motion capture of the same seconds: survivors are compared with it."),
     ] = None,
     reading: Reading,
     who: Who,

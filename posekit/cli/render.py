@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.given import frame_count, read_given
-from posekit.cli.options import about, examples, numbers, progress, split
+from posekit.cli.options import about, examples, numbers, option, progress, split
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
@@ -46,33 +46,24 @@ def render(
     ],
     output: Annotated[
         Path,
-        typer.Option(
-            "-o",
+        option(
             "--output",
-            metavar="FILE",
-            help="The picture: .png, .gif, .mp4; or .html: the page of all survivors, or, with --posture, --layout, "
+            "FILE",
+            "The picture: .png, .gif, .mp4; or .html: the page of all survivors, or, with --posture, --layout, "
             "--rejected or --eye, that scene alone.",
+            short="-o",
         ),
     ],
     seen: Annotated[
         Path | None,
-        typer.Option(
-            "--view", metavar="VIEW", help="What the result was recovered from: shows its camera and image."
-        ),
+        option("--view", "VIEW", "What the result was recovered from: shows its camera and image."),
     ] = None,
     frame: Annotated[
-        str,
-        typer.Option(
-            "--frame", metavar="K|A-B", help="From 1. Default: the first with a posture; all where it moves."
-        ),
+        str, option("--frame", "K|A-B", "From 1. Default: the first with a posture; all where it moves.")
     ] = "",
     posture: Annotated[
         str,
-        typer.Option(
-            "--posture",
-            metavar="LIST",
-            help="From 1, as 1,5; all; likeliest; or groups, the first of each group.",
-        ),
+        option("--posture", "LIST", "From 1, as 1,5; all; likeliest; or groups, the first of each group."),
     ] = "all",
     rejected: Annotated[
         bool,
@@ -88,15 +79,12 @@ def render(
             "--layout", help="Of several postures. Default: side-by-side; superposed where it moves."
         ),
     ] = None,
-    size: Annotated[str, typer.Option("--size", metavar="WxH", help="Pixels.")] = "1280x720",
+    size: Annotated[str, option("--size", "WxH", "Pixels.")] = "1280x720",
     supersample: Annotated[
         int, typer.Option("--supersample", min=1, max=8, help="Draw this many times larger, then scale down.")
     ] = 2,
     background: Annotated[
-        str,
-        typer.Option(
-            "--background", metavar="COLOUR", help="white, grey, black, transparent, or as #e8ebee."
-        ),
+        str, option("--background", "COLOUR", "white, grey, black, transparent, or as #e8ebee.")
     ] = "white",
     azimuth: Annotated[
         float | None,
@@ -110,12 +98,9 @@ def render(
         float | None, typer.Option("--elevation", help="Degrees above the level.", show_default=False)
     ] = None,
     eye: Annotated[
-        str,
-        typer.Option("--eye", metavar="X,Y,Z", help="Look from this point: metres, z up, the ground at 0."),
+        str, option("--eye", "X,Y,Z", "Look from this point: metres, z up, the ground at 0.")
     ] = "",
-    target: Annotated[
-        str, typer.Option("--target", metavar="X,Y,Z", help="With --eye: the point to look at.")
-    ] = "0,0,0.9",
+    target: Annotated[str, option("--target", "X,Y,Z", "With --eye: the point to look at.")] = "0,0,0.9",
     fov: Annotated[float, typer.Option("--fov", help="Vertical field of view, degrees.")] = 25.0,
     through_view: Annotated[
         bool,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from posekit.cli.options import Pictures, examples
+from posekit.cli.options import Pictures, examples, option
 from posekit.errors import InputError
 
 PAPER_NAMES = ("lee-chen", "taylor")
@@ -16,7 +16,7 @@ REPRODUCE_EXAMPLES = examples("posekit reproduce lee-chen -o tables", "posekit r
 
 def reproduce(
     paper: Annotated[str, typer.Argument(metavar="PAPER", help="lee-chen or taylor.")],
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Where to write the tables.")],
+    output: Annotated[Path, option("--output", "DIR", "Where to write the tables.", short="-o")],
     pictures: Pictures = True,
 ) -> None:
     """Write a paper's tables, reproduced, beside what it prints."""

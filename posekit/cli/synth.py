@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.options import Noise, OutputView, Seed, examples, numbers
+from posekit.cli.options import Noise, OutputView, Seed, examples, numbers, option
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,12 +39,7 @@ Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to 
 def walker(
     output: OutputView,
     camera: Annotated[
-        str,
-        typer.Option(
-            "--camera",
-            metavar="X,Y,Z",
-            help="Camera position in the head's frame, cm: x ahead, y up, z right.",
-        ),
+        str, option("--camera", "X,Y,Z", "Camera position in the head's frame, cm: x ahead, y up, z right.")
     ] = "400,0,0",
     frames: Frames = 5,
     dt: Dt = 0.2,
@@ -81,9 +76,7 @@ def walker(
 def random(
     output: OutputView,
     frames: Frames = 1,
-    distance: Annotated[
-        str, typer.Option("--distance", metavar="MIN,MAX", help="Distances of the cameras, metres.")
-    ] = "2.5,6",
+    distance: Annotated[str, option("--distance", "MIN,MAX", "Distances of the cameras, metres.")] = "2.5,6",
     noise: Noise = 0.0,
     seed: Seed = 0,
     uncalibrated: Uncalibrated = False,
@@ -112,10 +105,10 @@ def mocap(
     clip: Annotated[str, typer.Option("--clip", help="The clip, by name. Default: the first.")] = "",
     camera: Annotated[
         str,
-        typer.Option(
+        option(
             "--camera",
-            metavar="X,Y,Z",
-            help="Camera position in the file's world, metres. Default: drawn on a sphere around the person.",
+            "X,Y,Z",
+            "Camera position in the file's world, metres. Default: drawn on a sphere around the person.",
         ),
     ] = "",
     dt: Dt = 0.2,

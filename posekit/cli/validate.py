@@ -15,6 +15,7 @@ from posekit.cli.options import (
     about,
     distinct,
     examples,
+    option,
     rule_numbers,
     signed_length,
     split,
@@ -69,93 +70,81 @@ def validate(
         ),
     ],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="REPORT", help="The report: .json, .md or .csv.")
+        Path | None, option("--output", "REPORT", "The report: .json, .md or .csv.", short="-o")
     ] = None,
     urdf: Annotated[
         str,
-        typer.Option(
+        option(
             "--urdf",
-            metavar="FILE|NAME",
-            help="stick_figure, a robot of example-robot-data (human, g1, talos, …), or a URDF. Default: the stick "
+            "FILE|NAME",
+            "stick_figure, a robot of example-robot-data (human, g1, talos, …), or a URDF. Default: the stick "
             "figure; a result's own.",
         ),
     ] = "",
     checks: Annotated[
         str,
-        typer.Option(
+        option(
             "--checks",
-            metavar="LIST",
-            help="By commas. Stick figure: rigid-parts, joint-range, collision, walking (default: the first three); "
+            "LIST",
+            "By commas. Stick figure: rigid-parts, joint-range, collision, walking (default: the first three); "
             "robots: reach, rigid-parts, joint-range, collision, balance (the first four).",
         ),
     ] = "",
     ranges: Annotated[
-        str,
-        typer.Option(
-            "--ranges",
-            metavar="NAME|FILE",
-            help="Joint ranges: urdf, table1 (stick figure), or a TOML file.",
-        ),
+        str, option("--ranges", "NAME|FILE", "Joint ranges: urdf, table1 (stick figure), or a TOML file.")
     ] = "urdf",
     rules: Rules = "1,2",
     walkers: Annotated[
         str,
-        typer.Option(
+        option(
             "--walkers",
-            metavar="paper|people",
-            help="Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them. Default: paper; a "
+            "paper|people",
+            "Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them. Default: paper; a "
             "result's own.",
         ),
     ] = "",
     rigid_tolerance: Annotated[
         str,
-        typer.Option(
+        option(
             "--rigid-tolerance",
-            metavar="LENGTH",
-            help="How far distances inside rigid parts, and the fit of a robot, may be off. Default: what a result's "
+            "LENGTH",
+            "How far distances inside rigid parts, and the fit of a robot, may be off. Default: what a result's "
             "postures were recovered with, 3cm at least.",
         ),
     ] = "",
     angle_tolerance: AngleTolerance = None,
     contact_margin: Annotated[
         str,
-        typer.Option(
+        option(
             "--contact-margin",
-            metavar="LENGTH",
-            help="Clearance that bodies must keep, as 1cm; negative allows penetration. Default: 0cm; a result's own.",
+            "LENGTH",
+            "Clearance that bodies must keep, as 1cm; negative allows penetration. Default: 0cm; a result's own.",
         ),
     ] = "",
     lengths: Annotated[
         str,
-        typer.Option(
+        option(
             "--lengths",
-            metavar="model|median|each",
-            help="Whose segment lengths the model gets: none, the file's medians, each posture's own (robots, slow). "
+            "model|median|each",
+            "Whose segment lengths the model gets: none, the file's medians, each posture's own (robots, slow). "
             "Default: model for the stick figure, median for robots.",
         ),
     ] = "",
     joint_map: Annotated[
-        str,
-        typer.Option(
-            "--joint-map", metavar="FILE|NAME", help="Which frames of the robot stand for the joints."
-        ),
+        str, option("--joint-map", "FILE|NAME", "Which frames of the robot stand for the joints.")
     ] = "",
     bodies: Annotated[
         str,
-        typer.Option(
+        option(
             "--bodies",
-            metavar="auto|urdf|visual|capsules",
-            help="What collides, of a robot: its collision bodies, its visual ones, or capsules that are made up.",
+            "auto|urdf|visual|capsules",
+            "What collides, of a robot: its collision bodies, its visual ones, or capsules that are made up.",
         ),
     ] = "auto",
-    srdf: Annotated[
-        str, typer.Option("--srdf", metavar="FILE", help="The robot's SRDF: which pairs are not checked.")
-    ] = "",
+    srdf: Annotated[str, option("--srdf", "FILE", "The robot's SRDF: which pairs are not checked.")] = "",
     package_dir: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--package-dir", metavar="DIR", help="Where its meshes' packages are; may be given again."
-        ),
+        option("--package-dir", "DIR", "Where its meshes' packages are; may be given again."),
     ] = None,
     trusted: Annotated[
         bool | None,
@@ -180,20 +169,10 @@ def validate(
         ),
     ] = None,
     up: Annotated[
-        str,
-        typer.Option(
-            "--up",
-            metavar="AXIS",
-            help="Against gravity, for `balance`: +z, +y, … Default: +z, or the file's.",
-        ),
+        str, option("--up", "AXIS", "Against gravity, for `balance`: +z, +y, … Default: +z, or the file's.")
     ] = "",
     fail_over: Annotated[
-        str,
-        typer.Option(
-            "--fail-over",
-            metavar="N|P%",
-            help="How many postures, or what share, may be not valid; then exit 0.",
-        ),
+        str, option("--fail-over", "N|P%", "How many postures, or what share, may be not valid; then exit 0.")
     ] = "0",
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")

@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from posekit.cli.given import read_given
-from posekit.cli.options import about, examples
+from posekit.cli.options import about, examples, option
 from posekit.errors import InputError
 
 LAST_PORT = 65535
@@ -32,14 +32,9 @@ def view(
         ),
     ],
     seen: Annotated[
-        Path | None,
-        typer.Option(
-            "--view", metavar="VIEW", help="What the result was recovered from: shows the image too."
-        ),
+        Path | None, option("--view", "VIEW", "What the result was recovered from: shows the image too.")
     ] = None,
-    frames: Annotated[
-        str, typer.Option("--frames", metavar="A-B", help="Only these frames, from 1, as 1-100 or 7.")
-    ] = "",
+    frames: Annotated[str, option("--frames", "A-B", "Only these frames, from 1, as 1-100 or 7.")] = "",
     port: Annotated[
         int, typer.Option("--port", min=0, max=LAST_PORT, help="0: any free one.", show_default=False)
     ] = 0,
