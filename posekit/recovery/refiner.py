@@ -145,6 +145,11 @@ class Refiner:
         return self.grower.body.figure.with_side_within(self.noise.lengths)
 
     @cached_property
+    def _lifting(self) -> RecoverSettings:
+        """The same for leaves: what is lifted is off by as much again as what is refined."""
+        return self.settings.changed(contact_margin=contact_under_noise(self.settings.contact_margin))
+
+    @cached_property
     def tolerance(self) -> Tolerance:
         """By how much survivors may be off."""
         return certified_within(self.noise, self.grower.body.figure)
@@ -324,7 +329,7 @@ class Refiner:
         rigid = max(ALLOWED_DEVIATIONS * self.noise.rigid * longest, allowed.rigid)
         tolerance = Tolerance(rigid=rigid, tangent=allowed.tangent, placement=False, angle=NOISE_UNIT_DEGREES)
         suite = under_noise(
-            suite_of(self.settings, self._figure, tolerance),
+            suite_of(self._lifting, self._figure, tolerance),
             allowed.bound,
             perspective=isinstance(camera, PinholeCamera),
             stretch=allowed.stretch,

@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.refinement.refined import Refined
+from posekit.skeleton import TREE_SEGMENTS
 
 MERGE_DISTANCE_METRES = 0.005
 """Metres: survivors none of whose joints are farther apart became one, unless told otherwise."""
+
+SAME_SIDES_METRES = 0.10
+"""Metres: the same of survivors all of whose segments point to the same sides, near or far: they are one branch of the
+tree, and where lengths are uncertain its likeliest posture lies in a valley, in which searches stop here and there."""
 
 PROJECTION_AXIS = np.array([0.48, 0.6, 0.64])
 """A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
@@ -88,13 +93,31 @@ def merge(
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
-    leader = groups_of(refined.frame[rows], joints, within)
+    leader = _leaders(refined.frame[rows], joints, within)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
     number = np.full(len(rows), -1)
     number[leaders] = np.arange(len(leaders))
     group = np.full(len(refined), -1)
     group[rows] = number[leader]
     return Merged(refined=refined.select(rows[leaders]), rows=rows[leaders], group=group)
+
+
+def _leaders(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:
+    """Find which of the postures (N, 14, 3), the best of a frame first, stands for each: near, or of one branch."""
+    _, branch = np.unique(np.column_stack([frame, _code(joints)]), axis=0, return_inverse=True)
+    first = groups_of(branch.reshape(-1), joints, SAME_SIDES_METRES if within else 0.0)
+    stands = np.flatnonzero(first == np.arange(len(frame)))
+    second = groups_of(frame[stands], joints[stands], within)
+    leader = np.empty(len(frame), dtype=np.intp)
+    leader[stands] = stands[second]
+    return leader[first]
+
+
+def _code(joints: Array) -> NDArray[np.intp]:
+    """Say to which side each segment of postures (N, 14, 3) points, near or far, as the bits of a number (N,)."""
+    start, end = np.array(TREE_SEGMENTS).T
+    along = np.einsum("nsi,nsi->ns", joints[:, end] - joints[:, start], joints[:, end])
+    return np.asarray((along > 0) @ (1 << np.arange(len(start))))
 
 
 def groups_of(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:
