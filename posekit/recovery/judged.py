@@ -72,7 +72,10 @@ def record_of(
         "figure": figure.hash,
         "lengths": dict(figure.lengths),
         "moved_lengths": dict(figure.moved_lengths),
-        "shoulders": _shoulder_side(figure, noise),
+        "shoulder_offset": figure.shoulder_offset,
+        "shoulders": _shoulder_side(
+            asked, figure, noise if any(judged == "refined" for judged, _ in frames) else None
+        ),
         "judged": [judged for judged, _ in frames],
         "noisy": _widest([used for judged, used in frames if judged == "noisy"]),
         "refined": _widest(
@@ -86,8 +89,13 @@ def record_of(
     }
 
 
-def _shoulder_side(figure: Figure, noise: Mapping[str, Any] | None) -> str:
-    """Say on which side the shoulders lie; undecided where refined lengths are too uncertain to tell."""
+def _shoulder_side(asked: RecoverSettings, figure: Figure, noise: Mapping[str, Any] | None) -> str:
+    """Say on which side the shoulders lie, as frames were judged.
+
+    Undecided where the lengths of refined frames are too uncertain to tell, or distances alone were compared.
+    """
+    if any(one.parameters.get("rigid_mode") == "distances" for one in asked.checks):
+        return "undecided"
     known = LengthUncertainty() if noise is None else Noise.from_document(noise).lengths
     return figure.with_side_within(known).shoulder_side
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple
 
 import numpy as np
@@ -154,8 +154,11 @@ def recovered_with(result: Result) -> RecoveredWith:
     figure, settings = load_figure(), result.settings
     lengths = settings.get("lengths")
     if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
-        side = {"front": False, "behind": True}.get(str(settings.get("shoulders")))
-        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()}, behind=side)
+        behind = _number(settings, "shoulder_offset", 0.0) < 0
+        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()}, behind=behind)
+    # Results of earlier versions, which are mute of it, did not ask for the side.
+    if settings.get("shoulders", "undecided" if isinstance(lengths, dict) else "") == "undecided":
+        figure = replace(figure, side_known=False)
     return RecoveredWith(figure, _judged(settings))
 
 
