@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from posekit.errors import InputError
 from posekit.linkages.linkage import Linkage
-from posekit.safe_io.refusal import refusal, shown
 
 if TYPE_CHECKING:
     from posekit.tables.linkage import LinkageTable
@@ -16,10 +14,9 @@ if TYPE_CHECKING:
 
 def linkage_names() -> tuple[str, ...]:
     """Return the names of the built-in linkages."""
-    folder = resources.files("posekit.urdf") / "linkages"
-    return tuple(
-        sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    )
+    from posekit.tables.reading import built_in_names
+
+    return built_in_names("linkages")
 
 
 def load_linkage(name: str | Path) -> Linkage:
@@ -46,21 +43,9 @@ def load_linkage(name: str | Path) -> Linkage:
     (12, 11)
     """
     from posekit.tables.linkage import LinkageTable
-    from posekit.tables.reading import read_built_in, read_table
+    from posekit.tables.reading import named_table
 
-    built_in = linkage_names()
-    if str(name) in built_in:
-        return linkage_of(read_built_in("linkages", str(name), LinkageTable), str(name))
-    path = Path(name)
-    try:
-        there = bool(str(name)) and path.exists()
-    except (OSError, ValueError):  # too long for a path, or a NUL in it
-        there = False
-    if not there:
-        raise refusal(
-            "", "linkage", shown(str(name)), f"{', '.join(built_in)} or a TOML file", "correct the name"
-        )
-    return linkage_of(read_table(path, LinkageTable), path)
+    return named_table(name, LinkageTable, linkage_of, folder="linkages", what="linkage")
 
 
 def linkage_of(table: LinkageTable, source: str | Path) -> Linkage:

@@ -14,14 +14,13 @@ import pinocchio as pin
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics, find_frame, frame_index
-from posekit.safe_io import nearest, one_line, refusal, shown
+from posekit.safe_io import nearest, one_line
 from posekit.skeleton import JOINTS, POINT, POINTS
 
 if TYPE_CHECKING:
     from posekit.tables.joint_map import JointMapTable, MeanTable, SiteTable
 
 JOINT_MAP_SCHEMA: Final = "posekit.joint_map/1"
-MAX_BYTES: Final = 100_000
 
 BUILT_IN: Final = ("stick_figure", "human", "human_gazebo", "simple_humanoid", "g1", "talos")
 """The maps that come with the package, in the order in which they are tried."""
@@ -121,16 +120,9 @@ def load_joint_map(name: str | Path) -> JointMap:
         Where there is no such map, or it is not what `posekit.joint_map/1` says.
     """
     from posekit.tables.joint_map import JointMapTable
-    from posekit.tables.reading import read_built_in, read_table
+    from posekit.tables.reading import named_table
 
-    if str(name) in BUILT_IN:
-        return joint_map_of(read_built_in("joint_maps", str(name), JointMapTable), str(name))
-    path = Path(name)
-    if not path.suffix and not path.exists():
-        raise refusal(
-            "", "joint map", shown(str(name)), f"{', '.join(BUILT_IN)} or a TOML file", "choose one of them"
-        )
-    return joint_map_of(read_table(path, JointMapTable, limit=MAX_BYTES), str(path))
+    return named_table(name, JointMapTable, joint_map_of, folder="joint_maps", what="joint map")
 
 
 def find_joint_map(model: pin.Model) -> JointMap:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from functools import cache
-from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from posekit.formats.skeleton_maps.skeleton_map import LANDMARK_ORDER, SkeletonMap, plain
 from posekit.safe_io import nearest, refusal, shown
@@ -15,14 +13,14 @@ from posekit.skeleton import other_side
 if TYPE_CHECKING:
     from posekit.tables.skeleton_map import SkeletonMapTable
 
+_FOLDER: Final = "skeleton_maps"
 
-@cache
+
 def skeleton_map_names() -> tuple[str, ...]:
     """Return the names of the built-in maps."""
-    folder = resources.files("posekit.urdf") / "skeleton_maps"
-    return tuple(
-        sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    )
+    from posekit.tables.reading import built_in_names
+
+    return built_in_names(_FOLDER)
 
 
 def load_skeleton_map(name: str | Path) -> SkeletonMap:
@@ -38,29 +36,10 @@ def load_skeleton_map(name: str | Path) -> SkeletonMap:
     >>> load_skeleton_map("coco_17").landmarks["right_wrist"]
     ('right_wrist',)
     """
-    from posekit.tables.reading import read_table
+    from posekit.tables.reading import named_table
     from posekit.tables.skeleton_map import SkeletonMapTable
 
-    if str(name) in skeleton_map_names():
-        return _built_in(str(name))
-    path = Path(name)
-    if path.suffix.lower() != ".toml":
-        raise refusal(
-            "",
-            "skeleton map",
-            shown(str(name)),
-            "a built-in map or a TOML file",
-            nearest(str(name), skeleton_map_names()),
-        )
-    return skeleton_map_of(read_table(path, SkeletonMapTable), str(path))
-
-
-@cache
-def _built_in(name: str) -> SkeletonMap:
-    from posekit.tables.reading import read_built_in
-    from posekit.tables.skeleton_map import SkeletonMapTable
-
-    return skeleton_map_of(read_built_in("skeleton_maps", name, SkeletonMapTable), name)
+    return named_table(name, SkeletonMapTable, skeleton_map_of, folder=_FOLDER, what="skeleton map")
 
 
 def skeleton_map_of(table: SkeletonMapTable, name: str) -> SkeletonMap:
