@@ -102,7 +102,7 @@ class Tally:
                 best = regions
         self.kept.append(best is not None)
         if best is None:
-            self.lost[why if why.startswith("empty") else why] += 1
+            self.lost[f"{'+'.join(JOINTS[k] for k in hidden)}: {why}"] += 1
             return
         for joint in hidden:
             region = best[JOINTS[joint]]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 
 import numpy as np
 
@@ -16,8 +15,10 @@ from posekit.hidden.occlusion_pattern import JointState, OcclusionPattern
 from posekit.hidden.pattern_batch import PatternBatch
 from posekit.hidden.posture_rows import Index
 from posekit.hidden.rays import find_rays
+from posekit.hidden.measured_cores import complete_by_core
 from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.set_descriptions import describe_sets
+from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree import Check, Leaves
 
@@ -65,13 +66,43 @@ def complete(
     InputError
         Where a shape is wrong, or a survivor's neck is not known: nothing hangs on anything then.
     """
+    head = np.full((leaves.n_frames, len(POINTS) - len(JOINTS), 3), np.nan)
+    head[:, : leaves.given.shape[1]] = leaves.given[:, : head.shape[1]]
+    frame = np.asarray(leaves.frame, dtype=np.intp)
+    points = np.concatenate([leaves.postures(), head[frame]], axis=1)
+    return complete_points(
+        points, frame, camera, image, figure, checks, tolerance=tolerance, sampling=sampling
+    )
+
+
+def complete_points(
+    points: Array,
+    frame: Index,
+    camera: Camera,
+    image: Array,
+    figure: Figure,
+    checks: Sequence[Check],
+    *,
+    tolerance: float = 0.0,
+    sampling: OcclusionSampling | None = None,
+) -> CompletedSurvivors:
+    """Do what `complete` does for postures of any origin.
+
+    Parameters
+    ----------
+    points : array (N, 19, 3)
+        Joints and head points, camera frame, metres; NaN where they are not known.
+    frame : int array (N,)
+        Which row of `image` each was seen in.
+    camera, image, figure, checks, tolerance, sampling
+        See `complete`.
+    """
     sampling = sampling or OcclusionSampling()
-    expected = (leaves.n_frames, len(JOINTS), 2)
-    if image.shape != expected:
+    if image.shape[1:] != (len(JOINTS), 2) or (len(frame) and int(frame.max()) >= len(image)):
+        expected = (int(frame.max(initial=0)) + 1, len(JOINTS), 2)
         raise InputError(f"image has shape {image.shape}; expected {expected}, one row a frame of the leaves")
-    postures = leaves.postures()
-    done = CompletedSurvivors.of_exact(postures)
-    unknown = np.asarray(np.isnan(postures).any(axis=-1))
+    done = CompletedSurvivors.of_exact(points[:, : len(JOINTS)])
+    unknown = np.asarray(np.isnan(points[:, : len(JOINTS)]).any(axis=-1))
     open_ = np.flatnonzero(unknown.any(axis=1))
     if not len(open_):
         return done.frozen()
@@ -81,13 +112,10 @@ def complete(
             f"the neck of survivor {int(rootless[0])} is not known, on which all hidden joints hang; expected the "
             "root or the head of every frame with survivors"
         )
-    head = np.full((leaves.n_frames, len(POINTS) - len(JOINTS), 3), np.nan)
-    head[:, : leaves.given.shape[1]] = leaves.given[:, : head.shape[1]]
-    points = np.concatenate([postures, head[leaves.frame]], axis=1)
-    root = np.full((leaves.n_frames, 3), np.nan)
-    root[leaves.frame] = postures[:, 0]
+    root = np.full((len(image), 3), np.nan)
+    root[frame] = points[:, 0]
     rays = find_rays(camera, root, image, reach=sum(figure.lengths.values()))
-    seen = np.asarray(np.isfinite(image).all(axis=-1))[leaves.frame]
+    seen = np.asarray(np.isfinite(image).all(axis=-1))[frame]
     states = np.where(unknown, np.where(seen, JointState.SEEN, JointState.HIDDEN), JointState.EXACT)
     # Which checks can be asked when depends on the pattern of seen and hidden joints alone: survivors that share one
     # are completed together.
@@ -96,13 +124,25 @@ def complete(
         pattern = OcclusionPattern(
             states=tuple(JointState(int(state)) for state in joint_states), checks=checks
         )
-        batch_of = partial(
-            PatternBatch.of, pattern=pattern, figure=figure, rays=rays, tolerance=tolerance, sampling=sampling
-        )
         rows = open_[which.reshape(-1) == k]
-        for part in _parts(rows, pattern, sampling):
-            frame = np.asarray(leaves.frame[part], dtype=np.intp)
-            describe_sets(batch_of(points=points[part], frame=frame), done, part)
+
+        def describe(pattern: OcclusionPattern, rows: Index) -> None:
+            for part in _parts(rows, pattern, sampling):
+                batch = PatternBatch.of(
+                    points=points[part],
+                    frame=frame[part],
+                    pattern=pattern,
+                    figure=figure,
+                    rays=rays,
+                    tolerance=tolerance,
+                    sampling=sampling,
+                )
+                describe_sets(batch, done, part)
+
+        if tolerance > EXACT_WITHIN_METRES:
+            complete_by_core(pattern, points, frame, rows, done, describe)
+        else:
+            describe(pattern, rows)
     return done.frozen()
 
 

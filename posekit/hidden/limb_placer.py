@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from posekit.hidden.occlusion_pattern import JointState, LimbChain, OcclusionPat
 from posekit.hidden.posture_rows import METRES_PER_RADIAN, Index, Mask, PostureRows, judge_rows
 from posekit.hidden.rays import Rays
 from posekit.hidden.sampling import OcclusionSampling
-from posekit.hidden.trunk_placements import TrunkPlacements
+from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, TrunkPlacements
 from posekit.tree import Check
 
 N_BANDS, N_SECTORS = 8, 12
@@ -22,6 +23,10 @@ N_BANDS, N_SECTORS = 8, 12
 
 NEAR_MISS = 3.0
 """Spacings outside a bound that count as a near miss."""
+
+FEWEST_ON_A_TRUNK, FEWEST_TO_REACH, FEWEST_ENDS = 4, 24, 8
+"""Positions of a hidden joint that are tried on a measured trunk at least: also of one that reaches a ray, and of an end.
+"""
 
 N_DESCENTS = 3
 """Steps of that closer look, each half as wide as the last."""
@@ -34,6 +39,9 @@ ONTO_RAY = 1e-9
 
 INVERSE_PLASTIC_NUMBER = 0.7548776662466927
 """1 / the plastic number: turns each lattice of ends against the last (Roberts 2018)."""
+
+GOLDEN_RATIO = 0.6180339887498949
+"""Less one: shifts each lattice along its axis between the others."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,15 +85,39 @@ class LimbPlacer:
     def per_trunk(self) -> tuple[int, int]:
         """How many positions of a hidden middle, and of a hidden end about each middle, are tried on a trunk."""
         # Where a core has several trunks, they share the samples: the effort of a survivor stays about the same.
-        crowd = int(np.bincount(self.trunks.core, minlength=1).max(initial=1))
+        crowd = self._crowd
+        if self.measured:
+            reached = self.states[1] == JointState.SEEN
+            share = max(self.sampling.sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK)
+            return share, FEWEST_ENDS if self.both_hidden else share
         share = max(self.sampling.sphere // crowd, 16)
         if self.both_hidden:
             return max(share // 2, 16), self.sampling.ends if crowd == 1 else max(self.sampling.ends // 2, 8)
         return share, share
 
+    @property
+    def measured(self) -> bool:
+        """Whether points and lengths were measured: no place is looked at more closely then."""
+        return self.tolerance > EXACT_WITHIN_METRES
+
+    @cached_property
+    def _crowd(self) -> int:
+        """The most trunks that a core has."""
+        return int(np.bincount(self.trunks.core, minlength=1).max(initial=1))
+
     def spacing(self) -> Array:
-        """Return the distance of neighbours on each trunk's lattice (H,), radians; 0 where nothing is sampled."""
+        """Return the distance of neighbours on each trunk's lattice (H,), radians; 0 where nothing is sampled.
+
+        On a measured body the trunks of a core are near each other, and their lattices lie between each other: together
+        they are one. Ends about middles that are sampled themselves then fill a ball.
+        """
         n_middle, n_end = self.per_trunk()
+        if self.measured:
+            crowd = np.bincount(self.trunks.core, minlength=1)[self.trunks.core]
+            n_middle, n_end = n_middle * crowd, n_end * crowd
+            if self.both_hidden:
+                ball = np.cbrt(4.0 / 3.0 * np.pi / (n_middle * self.per_trunk()[1]))
+                return np.asarray(np.maximum(ball, sphere_spacing(n_middle)))
         _, lower, upper = self._zones()
         middle = sphere_spacing(n_middle, np.clip((upper - lower) / 2.0, 0.0, 1.0))
         hidden = [state == JointState.HIDDEN for state in self.states]
@@ -139,6 +171,8 @@ class LimbPlacer:
         ends, parent = self._ends(every, n_end)
         passed, end_miss = self._judge(ends, self.pattern.end_own[self.limb])
         placed = ends.take(passed)
+        if self.measured:
+            return placed
         if self.states == (JointState.HIDDEN, JointState.SEEN):
             # Near and far are two sets: each middle is looked at twice, also where it has no end.
             twice = np.tile(np.arange(len(rows.trunk)), 2)
@@ -206,7 +240,11 @@ class LimbPlacer:
         if state == JointState.HIDDEN:
             axis, lower, upper = self._zones()
             reached = np.flatnonzero(lower <= upper)
-            local = zone(n, lower[reached], upper[reached])
+            turn, phase = (0.0, 0.5)
+            if self.measured:
+                turn = 2.0 * np.pi * np.mod(reached * INVERSE_PLASTIC_NUMBER, 1.0)
+                phase = np.mod(reached * GOLDEN_RATIO, 1.0)
+            local = zone(n, lower[reached], upper[reached], turn, phase)
             d = np.einsum("hij,hnj->hni", frame_along(axis[reached]), local).reshape(-1, 3)
             trunk, seed = np.repeat(reached, n), np.tile(np.arange(n), len(reached))
             middle, excess = base[trunk] + self.lengths[0] * d, np.zeros(len(trunk))
@@ -241,8 +279,9 @@ class LimbPlacer:
         else:
             axis = unit(rows.middle - self.trunks.points[rows.trunk, self.limb.base])
             whole = np.ones(len(axis))
-            turn = 2.0 * np.pi * np.mod(rows.seed * INVERSE_PLASTIC_NUMBER, 1.0)
-            local = zone(n, -whole, whole, turn)
+            number = np.arange(len(axis)) if self.measured else rows.seed
+            turn = 2.0 * np.pi * np.mod(number * INVERSE_PLASTIC_NUMBER, 1.0)
+            local = zone(n, -whole, whole, turn, np.mod(number * GOLDEN_RATIO, 1.0) if self.measured else 0.5)
             f = np.einsum("sij,snj->sni", frame_along(axis), local).reshape(-1, 3)
             parent, k = np.repeat(np.arange(len(axis)), n), np.tile(np.arange(n), len(axis))
             end, far = rows.middle[parent] + self.lengths[1] * f, np.zeros(len(parent), dtype=np.intp)

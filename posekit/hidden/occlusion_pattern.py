@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -110,6 +110,14 @@ class OcclusionPattern:
     def hips_own(self) -> list[Check]:
         """Checks of the trunk that must wait for the hips."""
         return [c for c in self._of((), cross=False) if not self._reads(c) <= set(TORSO_JOINTS)]
+
+    def decided_by(self, joint: int, known: Collection[int]) -> list[Check]:
+        """Checks of the trunk that can be asked as soon as one of its joints is known, others being `known` by then."""
+        return [
+            check
+            for check in self._of((), cross=False)
+            if joint in check.points and self._reads(check) <= set(known)
+        ]
 
     @cached_property
     def trunk_cross(self) -> list[Check]:

@@ -7,20 +7,21 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.hidden.grouped_rows import pairs
 from posekit.hidden.limb_placements import LimbPlacements
 from posekit.hidden.limb_placer import LimbPlacer
+from posekit.hidden.measured_trunk import MeasuredTrunkPlacer, thinned_between_ends
 from posekit.hidden.occlusion_pattern import LimbChain, OcclusionPattern
+from posekit.hidden.completion import PositionKind
 from posekit.hidden.position_kinds import position_kinds
 from posekit.hidden.posture_rows import Index, Mask, PostureRows, judge_rows
 from posekit.hidden.rays import Rays
 from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.set_extremes import N_WALK_GOALS, seek_extremes
-from posekit.hidden.trunk_placements import TrunkPlacements
+from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, TrunkPlacements
 from posekit.hidden.trunk_placer import TrunkPlacer
 from posekit.hidden.trunk_subdivision import subdivided, thinned
 from posekit.skeleton import PARENTS, segment_name
@@ -73,6 +74,8 @@ class PatternBatch:
         The person: lengths and the shapes of the rigid parts.
     rays : Rays
         The rays of the joints that are seen, by frame.
+    tolerance : float
+        Metres by which a segment may be too short for its image.
     sampling : OcclusionSampling
         How finely hidden joints are sampled.
     points : array (N, P, 3)
@@ -92,6 +95,7 @@ class PatternBatch:
     pattern: OcclusionPattern
     figure: Figure
     rays: Rays
+    tolerance: float
     sampling: OcclusionSampling
     points: Array
     frame: Index
@@ -129,7 +133,8 @@ class PatternBatch:
                 sampling=sampling,
             )
 
-        trunk_placer = TrunkPlacer(
+        measured = tolerance > EXACT_WITHIN_METRES
+        trunk_placer = (MeasuredTrunkPlacer if measured else TrunkPlacer)(
             pattern=pattern,
             figure=figure,
             rays=rays,
@@ -138,12 +143,15 @@ class PatternBatch:
             sampling=sampling,
         )
         trunks = subdivided(pattern, trunk_placer.place(points[first]), placer)
-        if any(pattern.hidden(limb) for limb in pattern.limbs):
+        if measured:
+            trunks = thinned_between_ends(trunks, pattern.trunk_joints, sampling.trunks)
+        elif any(pattern.hidden(limb) for limb in pattern.limbs):
             trunks = thinned(trunks, sampling.trunks)
         return PatternBatch(
             pattern=pattern,
             figure=figure,
             rays=rays,
+            tolerance=tolerance,
             sampling=sampling,
             points=points,
             frame=frame,
@@ -157,12 +165,14 @@ class PatternBatch:
         """Count the survivors."""
         return len(self.points)
 
-    def kind(self, joint: int) -> NDArray[np.int8]:
-        """Return the kind of an unknown joint's set, by survivor (N,)."""
-        table = np.array(
-            [position_kinds(self.pattern, spins=spins)[joint] for spins in (False, True)], dtype=np.int8
-        )
-        return table[self.trunks.spins[self.core].astype(np.intp)]
+    def kind(self, joint: int) -> PositionKind:
+        """Return the kind of an unknown joint's set."""
+        return position_kinds(self.pattern, measured=self.measured)[joint]
+
+    @property
+    def measured(self) -> bool:
+        """Whether points and lengths were measured: then regions are described to a margin, and nothing is proven."""
+        return self.tolerance > EXACT_WITHIN_METRES
 
     @cached_property
     def even(self) -> Mask:
@@ -208,7 +218,7 @@ class PatternBatch:
         placed = placer.place()
         cores = len(self.core_frame)
         reach = np.full((2, cores, N_WALK_GOALS), -np.inf)
-        if self.pattern.hidden(placer.limb):
+        if self.pattern.hidden(placer.limb) and not self.measured:
             # Most of the ends of a survivor's sets are those of its core's: they are sought once.
             wanted = np.zeros(reach.shape, dtype=bool)
             wanted[

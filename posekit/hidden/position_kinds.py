@@ -6,15 +6,15 @@ from posekit.hidden.completion import PositionKind
 from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
 
 
-def position_kinds(pattern: OcclusionPattern, *, spins: bool = False) -> dict[int, PositionKind]:
-    """Name the kind of each unknown joint's set; `spins` where a measured torso turns about its shoulders' line.
+def position_kinds(pattern: OcclusionPattern, *, measured: bool = False) -> dict[int, PositionKind]:
+    """Name the kind of each unknown joint's set; of a `measured` trunk nothing follows from other points of it.
 
     A position that is one of finitely many does not widen what hangs on it: an elbow on either of two shoulders
     is in a part of a sphere.
     """
     found: dict[int, PositionKind] = {}
     known = [joint for joint in TORSO_JOINTS[1:] if pattern.states[joint] == JointState.EXACT]
-    few = 1 if spins else len(known)
+    few = 0 if measured else len(known)
     torso = {0: PositionKind.SPHERE_REGION, 1: PositionKind.CIRCLE}.get(few, PositionKind.POINT)
     found |= {joint: torso for joint in TORSO_JOINTS if pattern.states[joint] == JointState.HIDDEN}
     pelvis, *hips = HIP_JOINTS
@@ -24,7 +24,8 @@ def position_kinds(pattern: OcclusionPattern, *, spins: bool = False) -> dict[in
         if pattern.states[joint] == JointState.SEEN:
             found[joint] = PositionKind.DEPTH_INTERVAL
         elif pattern.states[joint] == JointState.HIDDEN:
-            free = PositionKind.CIRCLE if len(hidden) == 1 else PositionKind.SPHERE_REGION
+            one = len(hidden) == 1 and not measured
+            free = PositionKind.CIRCLE if one else PositionKind.SPHERE_REGION
             found[joint] = PositionKind.REGION if loose else free
     for limb in pattern.limbs:
         base = found.get(limb.base, PositionKind.EXACT)

@@ -21,6 +21,8 @@ class OcclusionSampling:
         Turns of a rigid part about two known points: 120 are 3 degrees apart.
     rotations : int
         Turns of a rigid part about one known point: 6000 are 14 degrees apart.
+    trunk_sphere : int
+        Positions of a hidden joint of a measured trunk about its parent: 2000 are 4.5 degrees apart.
     trunks : int
         Of those, how many limbs are placed on, at most.
     rounds : int
@@ -36,6 +38,7 @@ class OcclusionSampling:
     ends: int = 24
     circle: int = 120
     rotations: int = 6000
+    trunk_sphere: int = 2000
     trunks: int = 120
     rounds: int = 16
 
@@ -45,6 +48,7 @@ class OcclusionSampling:
             ("ends", 8),
             ("circle", 24),
             ("rotations", 256),
+            ("trunk_sphere", 64),
             ("trunks", 8),
             ("rounds", 0),
         ):

@@ -7,7 +7,7 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.hidden.completion import CompletedSurvivors, CompletionOutcome, PositionKind
 from posekit.hidden.grouped_rows import box, distinct, largest
-from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState
+from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, TRUNK_JOINTS, JointState
 from posekit.hidden.pattern_batch import LimbSets, PatternBatch
 from posekit.hidden.posture_rows import Index, Mask
 from posekit.hidden.representatives import representatives
@@ -22,6 +22,9 @@ BOX_END_STEPS, BOX_END_STEPS_FOUR_ANGLES, BOX_END_STEPS_MANY_TRUNKS = 0.125, 0.0
 
 Measured against rejection sampling: see the documentation.
 """
+
+TRUNK_LOOSENESS = 2.0
+"""By how much more than a limb's joints are those of a measured trunk off: spines and clavicles are no bones."""
 
 
 def describe_sets(batch: PatternBatch, done: CompletedSurvivors, part: Index) -> None:
@@ -39,6 +42,8 @@ def describe_sets(batch: PatternBatch, done: CompletedSurvivors, part: Index) ->
         ends = _ends(batch, limb_set, middle)
         for joint in batch.pattern.free(limb_set.limb):
             _describe_limb(batch, done, part, limb_set, joint, ends[int(joint == limb_set.limb.end)])
+    if batch.measured:
+        _widen(batch, done, part)
     lone = (done.kind[part] == PositionKind.DEPTH_INTERVAL) & (done.lower[part] == done.upper[part]).all(
         axis=-1
     )
@@ -46,10 +51,26 @@ def describe_sets(batch: PatternBatch, done: CompletedSurvivors, part: Index) ->
     done.fraction[part] = np.where(lone, 1.0, done.fraction[part])
 
 
+def _widen(batch: PatternBatch, done: CompletedSurvivors, part: Index) -> None:
+    """Widen what samples reach by half their distance, and by what a measured point may be off; to its reach at most."""
+    for joint in batch.pattern.unknown:
+        parent, reach = PARENTS[joint], batch.length(joint) + batch.tolerance
+        loose = TRUNK_LOOSENESS if joint in TRUNK_JOINTS else 1.0
+        margin = done.accuracy[part, joint] + loose * batch.tolerance
+        lower, upper = done.lower[part, joint] - margin[:, None], done.upper[part, joint] + margin[:, None]
+        done.lower[part, joint] = np.maximum(lower, done.lower[part, parent] - reach)
+        done.upper[part, joint] = np.minimum(upper, done.upper[part, parent] + reach)
+        middle = done.postures[part, joint]
+        corner = np.maximum(middle - done.lower[part, joint], done.upper[part, joint] - middle)
+        done.radius[part, joint] = np.fmin(done.radius[part, joint] + margin, np.linalg.norm(corner, axis=1))
+        done.accuracy[part, joint] = 0.0
+
+
 def _blame(batch: PatternBatch, done: CompletedSurvivors, part: Index, found: Mask) -> None:
     """Name the joint without a position, and tell where that is proven."""
     without = ~batch.allowed.any(axis=1)
-    sure = without & batch.trunks.sure[batch.core]
+    certain = batch.trunks.sure[batch.core] & (not batch.measured)
+    sure = without & certain
     blamed = np.where(
         without, batch.pattern.trunk_joints[0] if batch.pattern.trunk_joints else batch.pattern.unknown[0], -1
     )
@@ -57,12 +78,12 @@ def _blame(batch: PatternBatch, done: CompletedSurvivors, part: Index, found: Ma
         first = batch.pattern.free(limb_set.limb)[0]
         none = np.bincount(limb_set.survivor, minlength=len(batch)) == 0
         if not batch.pattern.hidden(limb_set.limb):
-            proven = none & batch.trunks.sure[batch.core]
+            proven = none & certain
         else:
             reached = np.bincount(
                 batch.trunks.core[limb_set.placer.too_short() <= 0.0], minlength=len(batch.core_frame)
             )
-            proven = none & batch.trunks.sure[batch.core] & (reached[batch.core] == 0)
+            proven = none & certain & (reached[batch.core] == 0)
         sure |= proven
         blamed = np.where(none & (blamed < 0), first, blamed)
     blamed = np.where(blamed < 0, batch.pattern.unknown[0], blamed)
@@ -98,7 +119,8 @@ def _describe_trunk(
     done.samples[part, joint] = count
     done.fraction[part, joint] = np.where(lone, 1.0, np.minimum(fraction, 1.0))
     done.spacing[part, joint] = np.where(lone, 0.0, spacing)
-    done.accuracy[part, joint] = np.where(lone, 0.0, _unsettled(batch) * length)
+    unsettled = spacing / 2.0 if batch.measured else _unsettled(batch)
+    done.accuracy[part, joint] = np.where(lone, 0.0, unsettled * length)
 
 
 def _ends(batch: PatternBatch, limb_set: LimbSets, middle: Array) -> Array:
@@ -110,7 +132,7 @@ def _ends(batch: PatternBatch, limb_set: LimbSets, middle: Array) -> Array:
         reach[joint, :, goal] = largest(
             limb_set.survivor, len(batch), np.nan_to_num(table[joint, goal], nan=-np.inf)
         )[1]
-    if batch.pattern.hidden(limb_set.limb):
+    if batch.pattern.hidden(limb_set.limb) and not batch.measured:
         # Where an end of the core's set is not among them, a known limb or the trunk cut it off: it is sought anew.
         wanted = reach < limb_set.reach[:, batch.core] - SAME_END_METRES
         wanted[:, :, -1] = True
@@ -145,6 +167,11 @@ def _describe_limb(
     spacing[who] = lattice
     done.spacing[part, joint] = spacing + of_trunk
     lever = _reach_of(batch, limb_set, joint)
+    if batch.measured:
+        # Half a step of its own, and half a step of what it hangs on.
+        own = lever if limb_set.placer.both_hidden else batch.length(joint)
+        done.accuracy[part, joint] = spacing / 2.0 * own + of_trunk / 2.0 * batch.length(limb_set.limb.base)
+        return
     crowd = np.bincount(batch.trunks.core, minlength=len(batch.core_frame))[batch.core] > 1
     attained = np.where(
         crowd,

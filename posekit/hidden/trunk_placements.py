@@ -67,8 +67,6 @@ class TrunkPlacements:
         Whether what is not here is proven impossible.
     miss : array (C,)
         How far the best place looked at is from being feasible, radians; 0 where one is.
-    spins : bool array (C,)
-        Whether the torso spins about the line of its shoulders: it was measured, and its pelvis is open.
     turn : Turn or None
         What the places differ by, where it is one turn.
     """
@@ -81,7 +79,6 @@ class TrunkPlacements:
     spacing: Array
     sure: Mask
     miss: Array
-    spins: Mask
     turn: Turn | None = None
 
     @staticmethod
@@ -97,7 +94,6 @@ class TrunkPlacements:
             spacing=np.zeros(n),
             sure=np.ones(n, dtype=bool),
             miss=np.zeros(n),
-            spins=np.zeros(n, dtype=bool),
         )
 
     def __len__(self) -> int:

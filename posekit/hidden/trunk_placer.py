@@ -87,11 +87,7 @@ class TrunkPlacer:
         if len(known) >= 2:
             R = fit_rotation(body[known], seen)
             misfit = np.linalg.norm(np.einsum("nij,pj->npi", R, body[known]) - seen, axis=-1).max(axis=1)
-            # By chance some of what was measured fits: that the rest does too is not said.
-            fits = np.asarray((misfit <= EXACT_WITHIN_METRES) & (self.tolerance <= EXACT_WITHIN_METRES))
-            placed = replace(trunks.filled(R, turn), sure=trunks.sure & fits)
-            spun = np.flatnonzero(~fits) if HIP_JOINTS[0] in turn.free else np.zeros(0, dtype=np.intp)
-            return self._spun(placed, spun, body[joints.index(HIP_JOINTS[0])]) if len(spun) else placed
+            return replace(trunks.filled(R, turn), sure=trunks.sure & (misfit <= EXACT_WITHIN_METRES))
         loose = bool((trunks.spacing > 0.0).any())
         if known:
             n = self.sampling.circle // HIP_COARSENING if loose else self.sampling.circle
@@ -120,27 +116,6 @@ class TrunkPlacer:
             sure=np.zeros(len(trunks.sure), dtype=bool),
             turn=turn if not loose and self._last(joints) else None,
         )
-
-    def _spun(self, trunks: TrunkPlacements, rows: Index, offset: Array) -> TrunkPlacements:
-        """Spin measured torsos without a pelvis about the line of their shoulders.
-
-        Neck and shoulders are almost in line, and spines bend: where points are off by a centimetre, the pelvis that
-        they give is off by ten. It is left open, for the checks and the hips to decide.
-        """
-        n, right, left = self.sampling.circle, JOINT["right_shoulder"], JOINT["left_shoulder"]
-        turn = Turn(pivot=TORSO_JOINTS[0], about=None, free=(HIP_JOINTS[0],), body=offset[None])
-        axis, first = unit(trunks.points[:, left] - trunks.points[:, right]), trunks.R
-        row = np.repeat(rows, n)
-        R = rotation_about(axis[row], np.tile(circle(n), len(rows))) @ first[row]
-        spun = trunks.take(row).filled(R, turn)
-        if self._hips_seen():
-            row, R = self._closing(trunks, turn.pivot, offset, rows, axis[rows], first[rows])
-            spun = spun.and_(trunks.take(row).uneven().filled(R, turn))
-        both = trunks.and_(spun)
-        spacing, spins = trunks.spacing.copy(), np.zeros(len(trunks.tried), dtype=bool)
-        spacing[trunks.core[rows]], spins[trunks.core[rows]] = 2.0 * np.pi / n, True
-        tried = np.bincount(both.core[both.even], minlength=len(trunks.tried)).astype(np.float64)
-        return replace(both, tried=tried, spacing=spacing, spins=spins)
 
     def _hips_seen(self) -> bool:
         return all(self.pattern.states[joint] == JointState.SEEN for joint in HIP_JOINTS[1:])

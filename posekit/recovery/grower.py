@@ -18,7 +18,7 @@ from posekit.recovery.body import FigureBody, LiftedBody, suite_of
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.trees import Batch
 from posekit.settings import EXACT_TOLERANCE, Judged, RecoverSettings, Tolerance
-from posekit.skeleton import JOINT, TORSO
+from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, TORSO
 from posekit.tree import Check, InterpretationTree, Leaves, Scope
 
 if TYPE_CHECKING:
@@ -28,8 +28,14 @@ if TYPE_CHECKING:
 MOST_HIDDEN = 1000
 """Hidden joints, over all survivors of a frame, that are inferred: each costs some ten milliseconds or more."""
 
+MOST_HIDDEN_MEASURED = 20_000
+"""The same where points were measured, and survivors that are as good as one share what is inferred."""
+
 WORTH_ASKING = 64
 """Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
+
+SPINE_SEGMENTS = tuple(segment for segment in RIGID_SEGMENTS if JOINT["pelvis"] in segment and min(segment) > 0)
+"""From the shoulders to the pelvis: the distances that a bending spine changes."""
 
 TRUNK_JOINTS = tuple(JOINT[name] for name in TORSO[1:])
 
@@ -75,18 +81,22 @@ class Grower:
                 tolerance=tolerance.tangent,
             )
         exact = np.zeros(leaves.n_frames, dtype=np.bool_)
+        told = np.ones(leaves.n_frames, dtype=np.bool_)
+        hidden = np.asarray(np.isnan(image).any(axis=2))
         if judged == "exact":
-            exact = is_exact(
-                leaves,
-                self.body,
-                {check.name for check in suite if not check.rigid},
-                fitted=self.fit.closed,
-            )
+            judged_by = {check.name for check in suite if not check.rigid}
+            exact = is_exact(leaves, self.body, judged_by, fitted=self.fit.closed, hidden=hidden.any(axis=1))
+            told = exact | self._told_by_hips(hidden)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
         leaves = tree.prune(leaves, motion)
-        leaves, completion = self.complete(leaves, camera, image, suite, tolerance, self.fit.frame[chosen])
+        known = leaves.frame
+        leaves, completion = self.complete(
+            leaves, camera, image, suite, tolerance, self.fit.frame[chosen], told
+        )
+        if judged == "exact" and completion is not None:
+            exact = _confirmed(exact, known, leaves, completion, told & ~exact, self.body)
         return Batch(
             leaves=leaves,
             physical=physical,
@@ -97,6 +107,13 @@ class Grower:
             exact=exact,
             completion=completion,
         )
+
+    def _told_by_hips(self, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Say which hypotheses (H,), of joints `hidden` (H, 14), are exact if the hips of the torso laid on them close."""
+        if not (isinstance(self.body, FigureBody) and self.body.evidence):
+            return np.zeros(len(hidden), dtype=np.bool_)
+        others = [JOINT[name] for name in (*TORSO[1:-1], *HIPS[1:])]
+        return np.asarray(hidden[:, JOINT["pelvis"]] & ~hidden[:, others].any(axis=1))
 
     def closing(self, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
         """Return those of some hypotheses that may be exact: of frames whose torso closes to rounding, or may.
@@ -137,20 +154,22 @@ class Grower:
         suite: Sequence[Check],
         tolerance: Tolerance,
         frame: NDArray[np.intp],
+        wanted: NDArray[np.bool_] | bool = True,
     ) -> tuple[Leaves, CompletedSurvivors | None]:
         """Complete survivors by the joints that were not seen, and drop those that cannot be.
 
-        `frame` is the view's frame of each hypothesis.
+        `frame` is the view's frame of each hypothesis, and `wanted` says which hypotheses are completed at all.
 
         Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
         where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
         """
         unseen = np.asarray(np.isnan(image).any(axis=2))
-        placed = (~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2
+        measured = tolerance.tangent > EXACT_TOLERANCE.tangent
+        placed = ((~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2) | measured
         hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
-        too_many = np.bincount(frame, hidden)[frame] > MOST_HIDDEN
+        too_many = np.bincount(frame, hidden)[frame] > (MOST_HIDDEN_MEASURED if measured else MOST_HIDDEN)
         self._warn_of(frame[too_many & placed])
-        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many)[leaves.frame])
+        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many & wanted)[leaves.frame])
         if not (self.settings.infer and isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
         from posekit.hidden import complete, reject
@@ -182,8 +201,36 @@ class Grower:
         return {}
 
 
+def _confirmed(
+    exact: NDArray[np.bool_],
+    before: NDArray[np.intp],
+    leaves: Leaves,
+    completion: CompletedSurvivors,
+    told: NDArray[np.bool_],
+    body: LiftedBody,
+) -> NDArray[np.bool_]:
+    """Say once more which hypotheses (H,) are exact, now that hidden joints are where exact points would have them.
+
+    Those are not in which nothing is left of the survivors `before` (frames). Of those that the hips have `told`, which
+    a pelvis that was laid on carries, those are whose hips are as far apart as they must be.
+    """
+    lost = np.zeros(len(exact), dtype=np.bool_)
+    lost[before] = True
+    lost[leaves.frame] = False
+    (a, b), length = body.evidence[-1]
+    apart = np.linalg.norm(completion.postures[:, a] - completion.postures[:, b], axis=1)
+    closed = np.zeros(len(exact), dtype=np.bool_)
+    closed[leaves.frame[np.abs(apart - length) <= EXACT_TOLERANCE.rigid]] = True
+    return np.asarray((exact & ~lost) | (told & closed))
+
+
 def is_exact(
-    leaves: Leaves, body: LiftedBody, judged_by: Collection[str], *, fitted: bool = False
+    leaves: Leaves,
+    body: LiftedBody,
+    judged_by: Collection[str],
+    *,
+    fitted: bool = False,
+    hidden: NDArray[np.bool_] | None = None,
 ) -> NDArray[np.bool_]:
     """Find hypotheses (H,) whose image points are exact: there is evidence that rounding is all that is off.
 
@@ -192,9 +239,14 @@ def is_exact(
     than those of rigid parts. Where none is visible
     there is no evidence, and a branch that happens to reach its rays must not stand for the truth. Where the scale was
     `fitted` to close them, one of them alone is no evidence either.
+
+    Where some joint is `hidden` (H,), what is left must say that the spine is rigid too: shoulders and hips are in many
+    skeletons whose spines bend. One distance from a shoulder to the pelvis says so. And something must survive: that
+    nothing does says that the frame is none.
     """
     if not body.evidence:
         return np.zeros(leaves.n_frames, dtype=bool)
+    partly = np.zeros(leaves.n_frames, dtype=bool) if hidden is None else hidden
     # Many leaves share a trunk, and stand together: one of them tells.
     depth = max(max(segment) for segment, _ in body.evidence)
     trunk = leaves.code >> (leaves.level - depth)
@@ -202,17 +254,18 @@ def is_exact(
     first[1:] = (trunk[1:] != trunk[:-1]) | (leaves.frame[1:] != leaves.frame[:-1])
     nodes = np.flatnonzero(first)
     fits = np.ones(len(nodes), dtype=bool)
-    seen = np.zeros(len(nodes), dtype=np.int8)
+    seen, spine = np.zeros(len(nodes), dtype=np.int8), np.zeros(len(nodes), dtype=bool)
     for segment, length in body.evidence:
         ends = leaves.positions(segment, nodes)
         known_length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
         known = np.isfinite(known_length)
         fits &= ~known | (np.abs(known_length - length) <= EXACT_TOLERANCE.rigid)
         seen += known
+        spine |= known & (segment in SPINE_SEGMENTS)
     exact = np.zeros(leaves.n_frames, dtype=bool)
-    exact[leaves.frame[nodes[fits & (seen > int(fitted))]]] = True
+    exact[leaves.frame[nodes[fits & (seen > int(fitted)) & (spine | ~partly[leaves.frame[nodes]])]]] = True
     empty = np.bincount(leaves.frame, minlength=leaves.n_frames) == 0
     for group in leaves.pruned:
         if group.level >= JOINT["left_hip"] and group.check in judged_by:
-            exact[group.frame[empty[group.frame]]] = True
+            exact[group.frame[(empty & ~partly)[group.frame]]] = True
     return exact
