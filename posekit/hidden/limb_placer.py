@@ -88,7 +88,7 @@ class LimbPlacer:
         crowd = self._crowd
         if self.measured:
             reached = self.states[1] == JointState.SEEN
-            share = max(self.sampling.sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK)
+            share = max(self.sampling.measured_sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK)
             return share, FEWEST_ENDS if self.both_hidden else share
         share = max(self.sampling.sphere // crowd, 16)
         if self.both_hidden:

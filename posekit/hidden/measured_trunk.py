@@ -15,8 +15,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
-from posekit.geometry import Array, rotation_about
-from posekit.hidden.hip_closure import closing_angles
+from posekit.geometry import Array, frame_along
 from posekit.hidden.lattices import GOLDEN_ANGLE, sphere_spacing, zone
 from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
 from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
@@ -27,14 +26,20 @@ from posekit.skeleton import PARENTS, segment_name
 
 PELVIS: Final = HIP_JOINTS[0]
 
-N_PELVIS_RINGS: Final = 40
-"""Rings of the sphere about the neck on which a hidden pelvis is sought: 2 cm apart on a body."""
+MOST_STARTS: Final = 240
+"""Places of the trunk of a core, at most, on which the next joint is placed."""
 
 MOST_TRUNKS: Final = 600
 """Places of the trunk of a core on which it is asked whether limbs that were seen reach their rays."""
 
-N_PELVIS_ANGLES: Final = 48
-"""Angles of each ring from which it is sought where the hips close."""
+FEWEST_AROUND, FEWEST_ABOUT = 32, 16
+"""Places of a joint about each place of its parent at least, and on a circle."""
+
+GOLDEN_RATIO: Final = 0.6180339887498949
+"""Less one: shifts lattices between each other."""
+
+TINY: Final = 1e-12
+"""Metres: stands for zero where something is divided by a length."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,102 +72,139 @@ class MeasuredTrunkPlacer:
     def place(self, points: Array) -> TrunkPlacements:
         """Place them on cores (C, P, 3) wherever the trunk's own checks pass."""
         trunks = TrunkPlacements.of(points)
-        passed = np.ones(len(points))
+        if not self.pattern.trunk_joints:
+            return trunks
+        passed, cores = np.ones(len(points)), len(points)
         known = {joint for joint in range(points.shape[1]) if joint not in self.pattern.unknown}
-        for joint in self._order():
-            known.add(joint)
-            hidden = self.pattern.states[joint] == JointState.HIDDEN
-            most = self.sampling.trunks if hidden else self.sampling.trunk_sphere
-            before = trunks.take(thinning(trunks.core, most))
-            if not hidden:
-                trunks, row = self._lifted(before, joint)
-            elif joint == PELVIS and self._hips_seen():
-                trunks, row = self._closing(before)
+        for joints in self._order():
+            known.update(joints)
+            before = trunks.take(thinning(trunks.core, MOST_STARTS))
+            hidden = self.pattern.states[joints[0]] == JointState.HIDDEN
+            if len(joints) > 1:
+                trunks, row, spacing = self._from_hips(before)
+            elif not hidden:
+                trunks, row, spacing = self._lifted(before, *joints)
+            elif joints[0] in HIP_JOINTS[1:] and sum(HIP_JOINTS) - joints[0] - PELVIS in known:
+                trunks, row, spacing = self._about_hips(before, *joints)
             else:
-                trunks, row = self._around(before, joint)
-            alive, _ = judge_rows(self.pattern.decided_by(joint, known), PostureRows.of(trunks.points))
-            trunks = trunks.take(alive)
-            tried = np.bincount(before.core[row], minlength=len(points))
-            left = np.bincount(trunks.core, minlength=len(points))
+                trunks, row, spacing = self._around(before, *joints)
+            decided = self.pattern.decided_by(joints, known)
+            alive, _ = judge_rows(decided, PostureRows.of(trunks.points))
+            tried = np.bincount(before.core[row], minlength=cores)
+            trunks = replace(trunks.take(alive), spacing=np.maximum(trunks.spacing, spacing))
+            left = np.bincount(trunks.core, minlength=cores)
             # A lift has one place near and one far: one that passes is the whole of what hangs on its trunk.
             passed *= left / np.maximum(tried if hidden else tried / 2.0, 1)
-            if hidden:
-                closed = joint == PELVIS and self._hips_seen()
-                n = N_PELVIS_RINGS**2 if closed else self._directions(before, joint)
-                spacing = float(sphere_spacing(n))
-                trunks = replace(trunks, spacing=np.maximum(trunks.spacing, spacing))
-        left = np.bincount(trunks.core, minlength=len(points))
         kept = trunks.take(thinning(trunks.core, MOST_TRUNKS))
-        count = np.bincount(kept.core, minlength=len(points))
-        open_ = bool(self.pattern.trunk_joints)
+        count = np.bincount(kept.core, minlength=cores)
         return replace(
-            kept,
-            tried=count / np.clip(passed, 1e-12, 1.0) if open_ else kept.tried,
-            sure=np.zeros(len(points), dtype=bool) if open_ else kept.sure,
+            kept, tried=count / np.clip(passed, 1e-12, 1.0), sure=np.zeros(cores, dtype=bool), turn=None
         )
 
-    def _order(self) -> list[int]:
+    def _order(self) -> list[tuple[int, ...]]:
         """Return the unknown joints in an order in which each finds its parent, and what decides most comes first."""
-        pelvis, *hips = HIP_JOINTS
-        seen = [joint for joint in hips if self.pattern.states[joint] == JointState.SEEN]
-        hidden = [joint for joint in hips if joint not in seen]
-        order = [pelvis, *seen, *TORSO_JOINTS[1:-1], *hidden]
-        return [joint for joint in order if joint in self.pattern.trunk_joints]
+        states, hips = self.pattern.states, HIP_JOINTS[1:]
+        seen = [(joint,) for joint in hips if states[joint] == JointState.SEEN]
+        hidden = [(joint,) for joint in hips if states[joint] == JointState.HIDDEN]
+        closed = states[PELVIS] == JointState.HIDDEN and len(seen) == len(hips)
+        first = [HIP_JOINTS] if closed else [(PELVIS,), *seen]
+        order = [*first, *((joint,) for joint in TORSO_JOINTS[1:-1]), *hidden]
+        return [joints for joints in order if joints[0] in self.pattern.trunk_joints]
 
-    def _hips_seen(self) -> bool:
-        return all(self.pattern.states[joint] == JointState.SEEN for joint in HIP_JOINTS[1:])
+    def _length(self, joint: int, other: int | None = None) -> float:
+        return self.figure.lengths[segment_name((PARENTS[joint] if other is None else other, joint))]
 
-    def _closing(self, trunks: TrunkPlacements) -> tuple[TrunkPlacements, Index]:
-        """Put the pelvis where both hips, lifted from it, are as far apart as they must be: no sample would meet that."""
-        length, count = self._length(PELVIS), len(trunks)
-        height = 2.0 * (np.arange(N_PELVIS_RINGS) + 0.5) / N_PELVIS_RINGS - 1.0
-        offset = np.stack([np.sqrt(1.0 - height**2), np.zeros(N_PELVIS_RINGS), height], axis=1)
-        row = np.repeat(np.arange(count), N_PELVIS_RINGS)
-        axis = np.broadcast_to([0.0, 0.0, 1.0], (len(row), 3))
-        center = trunks.points[row, PARENTS[PELVIS]]
-        offset = length * np.tile(offset, (count, 1))
-        which, angle = closing_angles(
-            self.figure, self.rays, self.frame[trunks.core[row]], center, axis, offset, N_PELVIS_ANGLES
-        )
-        order = np.argsort(which, kind="stable")
-        which, angle = which[order], angle[order]
-        placed = trunks.take(row[which])
-        turned = np.einsum("nij,nj->ni", rotation_about(axis[which], angle), offset[which])
-        placed.points[:, PELVIS] = center[which] + turned
-        return placed, row[which]
-
-    def _length(self, joint: int) -> float:
-        return self.figure.lengths[segment_name((PARENTS[joint], joint))]
-
-    def _directions(self, trunks: TrunkPlacements, joint: int) -> int:
-        """How many places are tried about each parent: fewer where a core has many."""
-        crowd = int(np.bincount(trunks.core, minlength=1).max(initial=1))
-        return max(self.sampling.trunk_sphere // crowd, 64)
-
-    def _around(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index]:
-        """Put a joint all around its parent."""
-        n, count = self._directions(trunks, joint), len(trunks)
-        whole = np.ones(count)
-        # Lattices of one core are turned against each other: together they are finer than one.
-        local = zone(n, -whole, whole, np.arange(count) * GOLDEN_ANGLE, (np.arange(count) + 0.5) / count)
-        row = np.repeat(np.arange(count), n)
+    def _around(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
+        """Put a joint all around its parent: fewer places about each where a core has many."""
+        count = len(trunks)
+        n = max(self.sampling.trunk_sphere // _most(trunks.core), FEWEST_AROUND)
+        # Lattices of one core lie between each other: together they are finer than one.
+        number, whole = np.arange(count), np.ones(count)
+        local = zone(n, -whole, whole, number * GOLDEN_ANGLE, np.mod(number * GOLDEN_RATIO + 0.5, 1.0))
+        row = np.repeat(number, n)
         placed = trunks.take(row)
         placed.points[:, joint] = placed.points[:, PARENTS[joint]] + self._length(joint) * local.reshape(-1, 3)
-        return placed, row
+        return placed, row, float(sphere_spacing(n * _most(trunks.core)))
 
-    def _lifted(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index]:
+    def _lifted(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
         """Lift a joint that was seen from its parent."""
-        lift = self.rays.lift(
-            joint,
-            self.frame[trunks.core],
-            trunks.points[:, PARENTS[joint]],
-            self._length(joint),
-            self.tolerance,
-        )
+        start = trunks.points[:, PARENTS[joint]]
+        lift = self.rays.lift(joint, self.frame[trunks.core], start, self._length(joint), self.tolerance)
         row, branch = np.nonzero(lift.valid)
         placed = trunks.take(row)
         placed.points[:, joint] = lift.points[row, branch]
-        return placed, row
+        return placed, row, 0.0
+
+    def _about_hips(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
+        """Turn a hip about pelvis and other hip: a pelvis is bone, and keeps its shape however it was measured."""
+        other = sum(HIP_JOINTS) - joint - PELVIS
+        start, end = trunks.points[:, PELVIS], trunks.points[:, other]
+        n = max(self.sampling.trunk_sphere // _most(trunks.core), FEWEST_ABOUT)
+        row = np.repeat(np.arange(len(trunks)), n)
+        angle = (np.tile(np.arange(n) / n, len(trunks)) + row * GOLDEN_RATIO) * 2.0 * np.pi
+        center, radius, across = _circle(start, end, self._length(joint), self._length(joint, other))
+        placed = trunks.take(row)
+        placed.points[:, joint] = center[row] + radius[row, None] * (
+            np.cos(angle)[:, None] * across[row, :, 0] + np.sin(angle)[:, None] * across[row, :, 1]
+        )
+        return placed, row, 2.0 * np.pi / (n * np.sqrt(_most(trunks.core)))
+
+    def _from_hips(self, trunks: TrunkPlacements) -> tuple[TrunkPlacements, Index, float]:
+        """Put a hidden pelvis on the hips that are seen, at every depth of the first.
+
+        The second is as far from it as hips are, and the pelvis on the circle about both where it is as far from the
+        neck as it must be: three distances hold, which no place that is tried of the pelvis alone would meet.
+        """
+        _, right, left = HIP_JOINTS
+        n = max(self.sampling.hip_depths // _most(trunks.core), FEWEST_ABOUT)
+        neck = trunks.points[:, PARENTS[PELVIS]]
+        foot, height = self.rays.foot(right, self.frame[trunks.core], neck)
+        reach = self._length(PELVIS) + self._length(right) + self.tolerance
+        half = np.sqrt(np.maximum(reach**2 - np.where(np.isfinite(height), height, np.inf) ** 2, 0.0))
+        row = np.repeat(np.flatnonzero(half > 0.0), n)
+        along = ((np.tile(np.arange(n) + 0.5, len(row) // n)) / n * 2.0 - 1.0) * half[row]
+        frame = self.frame[trunks.core[row]]
+        first = foot[row] + along[:, None] * self.rays.direction[frame, right]
+        lift = self.rays.lift(left, frame, first, self._length(left, right), self.tolerance)
+        which, branch = np.nonzero(lift.valid)
+        row, first, second = row[which], first[which], lift.points[which, branch]
+        center, radius, across = _circle(first, second, self._length(right), self._length(left))
+        away = neck[row] - center
+        flat = np.einsum("nij,ni->nj", across, away)
+        far = np.linalg.norm(flat, axis=1)
+        # |center + radius u - neck| is the length from neck to pelvis; the nearest u where none has it.
+        wanted = (radius**2 + (away**2).sum(axis=1) - self._length(PELVIS) ** 2) / np.maximum(
+            2.0 * radius * far, TINY
+        )
+        turn = np.arccos(np.clip(wanted, -1.0, 1.0)) * np.array([[-1.0], [1.0]])
+        angle = (np.arctan2(flat[:, 1], flat[:, 0]) + turn).reshape(-1)
+        row, first, second = (np.concatenate([each, each]) for each in (row, first, second))
+        center, radius, across = (np.concatenate([each, each]) for each in (center, radius, across))
+        pelvis = center + radius[:, None] * (
+            np.cos(angle)[:, None] * across[..., 0] + np.sin(angle)[:, None] * across[..., 1]
+        )
+        off = np.abs(np.linalg.norm(pelvis - neck[row], axis=1) - self._length(PELVIS))
+        good = np.flatnonzero(off <= self.tolerance)
+        good = good[np.argsort(row[good], kind="stable")]
+        placed = trunks.take(row[good])
+        for joint, positions in ((PELVIS, pelvis), (right, first), (left, second)):
+            placed.points[:, joint] = positions[good]
+        return placed, row[good], 2.0 * reach / n / self._length(PELVIS)
+
+
+def _circle(start: Array, end: Array, near: float, far: float) -> tuple[Array, Array, Array]:
+    """Return the circle of points at two distances from two points: centre (N, 3), radius (N,), directions (N, 3, 2)."""
+    axis = end - start
+    apart = np.maximum(np.linalg.norm(axis, axis=1), TINY)
+    axis = axis / apart[:, None]
+    along = (apart**2 + near**2 - far**2) / (2.0 * apart)
+    radius = np.sqrt(np.maximum(near**2 - along**2, 0.0))
+    return start + along[:, None] * axis, radius, frame_along(axis)[..., 1:]
+
+
+def _most(group: Index) -> int:
+    """Count the largest group, at least one."""
+    return int(np.bincount(group, minlength=1).max(initial=1))
 
 
 def thinning(group: Index, most: int) -> Index:

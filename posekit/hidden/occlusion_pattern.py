@@ -111,12 +111,12 @@ class OcclusionPattern:
         """Checks of the trunk that must wait for the hips."""
         return [c for c in self._of((), cross=False) if not self._reads(c) <= set(TORSO_JOINTS)]
 
-    def decided_by(self, joint: int, known: Collection[int]) -> list[Check]:
-        """Checks of the trunk that can be asked as soon as one of its joints is known, others being `known` by then."""
+    def decided_by(self, joints: Collection[int], known: Collection[int]) -> list[Check]:
+        """Checks of the trunk that can be asked as soon as some joints are known, others being `known` by then."""
         return [
             check
             for check in self._of((), cross=False)
-            if joint in check.points and self._reads(check) <= set(known)
+            if not set(joints).isdisjoint(check.points) and self._reads(check) <= set(known)
         ]
 
     @cached_property

@@ -21,8 +21,12 @@ class OcclusionSampling:
         Turns of a rigid part about two known points: 120 are 3 degrees apart.
     rotations : int
         Turns of a rigid part about one known point: 6000 are 14 degrees apart.
+    measured_sphere : int
+        Positions of a hidden joint of a measured limb about its parent: 1200 are 6 degrees apart.
     trunk_sphere : int
         Positions of a hidden joint of a measured trunk about its parent: 2000 are 4.5 degrees apart.
+    hip_depths : int
+        Depths of a hip that was seen, of a measured trunk whose pelvis was not.
     trunks : int
         Of those, how many limbs are placed on, at most.
     rounds : int
@@ -38,7 +42,9 @@ class OcclusionSampling:
     ends: int = 24
     circle: int = 120
     rotations: int = 6000
+    measured_sphere: int = 1200
     trunk_sphere: int = 2000
+    hip_depths: int = 160
     trunks: int = 120
     rounds: int = 16
 
@@ -48,7 +54,9 @@ class OcclusionSampling:
             ("ends", 8),
             ("circle", 24),
             ("rotations", 256),
+            ("measured_sphere", 32),
             ("trunk_sphere", 64),
+            ("hip_depths", 16),
             ("trunks", 8),
             ("rounds", 0),
         ):
