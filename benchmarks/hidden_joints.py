@@ -2,12 +2,13 @@
 
     python benchmarks/hidden_joints.py CAPTURE.npz [--frames 64] [--seed 0] [--only pelvis,leg] [--clips 3,7]
 
-The capture is an NPZ as `posekit synth mocap` reads it. Frames are drawn evenly over its clips, each seen by a camera of
-its own at 2.5 to 6 m with exact image points and the clip's median lengths; then joints are hidden at random. The truth
-is kept where some survivor has the seen joints that it places within 10 mm of the true ones, in the mean, and says of
-every other joint a region (its box and its ball) in which the true position is. The volume of a hidden joint's box is
-compared with the box of what its segments alone allow it about the nearest joint of its path that was seen. Times are of
-the processor; the ratio is to a frame that is exact, of random postures of the figure, in the same run. Prints Markdown.
+The capture is an NPZ as `posekit synth mocap` reads it. Frames are drawn evenly over its clips, each seen by a camera
+of its own at 2.5 to 6 m with exact image points and the clip's median lengths; then joints are hidden at random. The
+truth is kept where some survivor has the seen joints that it places within 10 mm of the true ones, in the mean, and
+says of every other joint a region (its box and its ball) in which the true position is. The volume of a hidden joint's
+box is compared with the box of what its segments alone allow it about the nearest joint of its path that was seen.
+Times are of the processor; the ratio is to a frame that is exact, of random postures of the figure, in the same run.
+Prints a Markdown table.
 """
 
 from __future__ import annotations
@@ -36,7 +37,19 @@ NEAR_METRES = 0.010
 SLACK_METRES = 1e-3
 """Metres beside a region that count as in it."""
 
-PATTERNS = ("nothing", "1 joint", "2 joints", "3 joints", "pelvis", "shoulder", "arm", "leg", "elbow", "wrist", "hip")
+PATTERNS = (
+    "nothing",
+    "1 joint",
+    "2 joints",
+    "3 joints",
+    "pelvis",
+    "shoulder",
+    "arm",
+    "leg",
+    "elbow",
+    "wrist",
+    "hip",
+)
 
 
 def hidden_joints(pattern: str, rng: np.random.Generator) -> list[int]:
@@ -65,7 +78,9 @@ class Tally:
     lost: Counter[str] = field(default_factory=Counter)
     seconds: float = 0.0
 
-    def add(self, frame: FrameRecovery, truth: np.ndarray, hidden: list[int], lengths: dict[str, float]) -> None:
+    def add(
+        self, frame: FrameRecovery, truth: np.ndarray, hidden: list[int], lengths: dict[str, float]
+    ) -> None:
         """Judge one frame."""
         self.survivors.append(len(frame))
         self.empty += not len(frame)
@@ -79,7 +94,9 @@ class Tally:
             outside = {
                 name: float(
                     max(
-                        np.maximum(region.lower - truth[JOINT[name]], truth[JOINT[name]] - region.upper).max(),
+                        np.maximum(
+                            region.lower - truth[JOINT[name]], truth[JOINT[name]] - region.upper
+                        ).max(),
                         np.linalg.norm(truth[JOINT[name]] - joints[JOINT[name]]) - region.radius,
                     )
                 )
@@ -98,7 +115,11 @@ class Tally:
                     if unknown
                     else f"outside {worst} {beyond.get(worst, 0.0) * 1000:.0f} mm"
                 )
-            if far <= NEAR_METRES and not unknown and all(value <= SLACK_METRES for value in outside.values()):
+            if (
+                far <= NEAR_METRES
+                and not unknown
+                and all(value <= SLACK_METRES for value in outside.values())
+            ):
                 best = regions
         self.kept.append(best is not None)
         if best is None:
@@ -118,7 +139,8 @@ class Tally:
         n = len(self.kept)
         every = [value for values in self.volume.values() for value in values]
         volumes = ", ".join(
-            f"{name} {np.median(values):.1%} ({np.quantile(values, 0.95):.0%})" for name, values in self.volume.items()
+            f"{name} {np.median(values):.1%} ({np.quantile(values, 0.95):.0%})"
+            for name, values in self.volume.items()
         )
         return [
             str(n),
@@ -178,7 +200,17 @@ def main(arguments: list[str] | None = None) -> None:
                 tally.add(frame, truth, joints, dict(recovery.figure.lengths))
         rows.append([pattern, *tally.row(exact)])
         lost.append(f"{pattern}: {dict(tally.judged)}; {dict(tally.lost.most_common(12))}")
-    head = ["hidden", "frames", "truth kept", "empty", "survivors", "volume", "by joint, median (95 %)", "ms", "x exact"]
+    head = [
+        "hidden",
+        "frames",
+        "truth kept",
+        "empty",
+        "survivors",
+        "volume",
+        "by joint, median (95 %)",
+        "ms",
+        "x exact",
+    ]
     print("\n".join(table_lines(head, rows)))
     if given.lost:
         print("\n".join(lost))

@@ -11,11 +11,11 @@ from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.hidden.completion import CompletedSurvivors
+from posekit.hidden.measured_cores import complete_by_core
 from posekit.hidden.occlusion_pattern import JointState, OcclusionPattern
 from posekit.hidden.pattern_batch import PatternBatch
 from posekit.hidden.posture_rows import Index
 from posekit.hidden.rays import find_rays
-from posekit.hidden.measured_cores import complete_by_core
 from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.set_descriptions import describe_sets
 from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES

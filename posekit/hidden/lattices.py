@@ -16,9 +16,7 @@ SPIRAL_PSI = 1.533751168755204288118041
 """The root of x^4 = x + 4: it turns the second plane of the spiral of `rotations` (Alexa 2022)."""
 
 
-def zone(
-    n: int, lower: Array, upper: Array, turn: Array | float = 0.0, phase: Array | float = 0.5
-) -> Array:
+def zone(n: int, lower: Array, upper: Array, turn: Array | float = 0.0, phase: Array | float = 0.5) -> Array:
     r"""Spread n directions evenly over zones of the unit sphere.
 
     A Fibonacci lattice: :math:`x_i = a + (b - a)(i + 1/2)/n` along the axis, turned by the golden angle from one

@@ -25,8 +25,7 @@ NEAR_MISS = 3.0
 """Spacings outside a bound that count as a near miss."""
 
 FEWEST_ON_A_TRUNK, FEWEST_TO_REACH, FEWEST_ENDS = 4, 24, 8
-"""Positions of a hidden joint that are tried on a measured trunk at least: also of one that reaches a ray, and of an end.
-"""
+"""Positions tried on a measured trunk at least: of a hidden joint, of one that reaches a ray, and of an end."""
 
 N_DESCENTS = 3
 """Steps of that closer look, each half as wide as the last."""
@@ -88,7 +87,9 @@ class LimbPlacer:
         crowd = self._crowd
         if self.measured:
             reached = self.states[1] == JointState.SEEN
-            share = max(self.sampling.measured_sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK)
+            share = max(
+                self.sampling.measured_sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK
+            )
             return share, FEWEST_ENDS if self.both_hidden else share
         share = max(self.sampling.sphere // crowd, 16)
         if self.both_hidden:
@@ -114,10 +115,11 @@ class LimbPlacer:
         n_middle, n_end = self.per_trunk()
         if self.measured:
             crowd = np.bincount(self.trunks.core, minlength=1)[self.trunks.core]
-            n_middle, n_end = n_middle * crowd, n_end * crowd
             if self.both_hidden:
-                ball = np.cbrt(4.0 / 3.0 * np.pi / (n_middle * self.per_trunk()[1]))
-                return np.asarray(np.maximum(ball, sphere_spacing(n_middle)))
+                ball = np.cbrt(4.0 / 3.0 * np.pi / (n_middle * crowd * n_end))
+                return np.asarray(np.maximum(ball, sphere_spacing(n_middle * crowd)))
+            part = self.part() if self.states[0] == JointState.HIDDEN else 1.0
+            return sphere_spacing(n_middle * crowd, part)
         _, lower, upper = self._zones()
         middle = sphere_spacing(n_middle, np.clip((upper - lower) / 2.0, 0.0, 1.0))
         hidden = [state == JointState.HIDDEN for state in self.states]

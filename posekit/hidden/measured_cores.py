@@ -1,4 +1,4 @@
-"""Completing survivors of measured points: the same trunk and limbs, as near as they were measured, are completed once."""
+"""Completing survivors of measured points: trunks and limbs that are the same, as near as was measured, once."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
 """Placing the trunk of a body that was measured: a hidden joint is wherever the checks would let a seen one be.
 
-Spines bend and clavicles move, so that three points of a torso do not give the fourth. A joint of it that was not seen is
-somewhere on the sphere about its parent, and what is asked of distances inside torso and hips, with what was measured
-allowed for, leaves a part of that. In the limit of many samples the region of a hidden joint is the set of places in
-which it could have been seen without a check being violated.
+Spines bend and clavicles move, so that three points of a torso do not give the fourth. A joint of it that was not seen
+is somewhere on the sphere about its parent, and what is asked of distances inside torso and hips, with what was
+measured allowed for, leaves a part of that. In the limit of many samples the region of a hidden joint is the set of
+places in which it could have been seen without a check being violated.
 """
 
 from __future__ import annotations
@@ -120,10 +120,14 @@ class MeasuredTrunkPlacer:
         n = max(self.sampling.trunk_sphere // _most(trunks.core), FEWEST_AROUND)
         # Lattices of one core lie between each other: together they are finer than one.
         number, whole = np.arange(count), np.ones(count)
-        local = zone(n, -whole, whole, number * GOLDEN_ANGLE, np.mod(number * GOLDEN_RATIO + 0.5, 1.0))
+        phase = np.asarray(np.mod(number * GOLDEN_RATIO + 0.5, 1.0), dtype=np.float64)
+        turn = np.asarray(number * GOLDEN_ANGLE, dtype=np.float64)
+        local = zone(n, -whole, whole, turn, phase)
         row = np.repeat(number, n)
         placed = trunks.take(row)
-        placed.points[:, joint] = placed.points[:, PARENTS[joint]] + self._length(joint) * local.reshape(-1, 3)
+        placed.points[:, joint] = placed.points[:, PARENTS[joint]] + self._length(joint) * local.reshape(
+            -1, 3
+        )
         return placed, row, float(sphere_spacing(n * _most(trunks.core)))
 
     def _lifted(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
@@ -193,7 +197,7 @@ class MeasuredTrunkPlacer:
 
 
 def _circle(start: Array, end: Array, near: float, far: float) -> tuple[Array, Array, Array]:
-    """Return the circle of points at two distances from two points: centre (N, 3), radius (N,), directions (N, 3, 2)."""
+    """Return the circles of points at distances from two points: centres (N, 3), radii (N,), directions (N, 3, 2)."""
     axis = end - start
     apart = np.maximum(np.linalg.norm(axis, axis=1), TINY)
     axis = axis / apart[:, None]

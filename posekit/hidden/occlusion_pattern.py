@@ -112,7 +112,7 @@ class OcclusionPattern:
         return [c for c in self._of((), cross=False) if not self._reads(c) <= set(TORSO_JOINTS)]
 
     def decided_by(self, joints: Collection[int], known: Collection[int]) -> list[Check]:
-        """Checks of the trunk that can be asked as soon as some joints are known, others being `known` by then."""
+        """Return the trunk's checks that can be asked once some joints are known, others being `known` by then."""
         return [
             check
             for check in self._of((), cross=False)

@@ -10,12 +10,12 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.geometry import Array
+from posekit.hidden.completion import PositionKind
 from posekit.hidden.grouped_rows import pairs
 from posekit.hidden.limb_placements import LimbPlacements
 from posekit.hidden.limb_placer import LimbPlacer
 from posekit.hidden.measured_trunk import MeasuredTrunkPlacer, thinned_between_ends
 from posekit.hidden.occlusion_pattern import LimbChain, OcclusionPattern
-from posekit.hidden.completion import PositionKind
 from posekit.hidden.position_kinds import position_kinds
 from posekit.hidden.posture_rows import Index, Mask, PostureRows, judge_rows
 from posekit.hidden.rays import Rays

@@ -52,7 +52,7 @@ def describe_sets(batch: PatternBatch, done: CompletedSurvivors, part: Index) ->
 
 
 def _widen(batch: PatternBatch, done: CompletedSurvivors, part: Index) -> None:
-    """Widen what samples reach by half their distance, and by what a measured point may be off; to its reach at most."""
+    """Widen what samples reach by half their distance, and by what measured points may be off; to the reach at most."""
     for joint in batch.pattern.unknown:
         parent, reach = PARENTS[joint], batch.length(joint) + batch.tolerance
         loose = TRUNK_LOOSENESS if joint in TRUNK_JOINTS else 1.0

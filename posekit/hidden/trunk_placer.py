@@ -15,7 +15,6 @@ from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
 from posekit.hidden.rays import Rays
 from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, TrunkPlacements, Turn
-from posekit.skeleton import JOINT
 
 N_PELVIS_RINGS = 24
 """Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""

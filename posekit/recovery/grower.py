@@ -34,7 +34,9 @@ MOST_HIDDEN_MEASURED = 20_000
 WORTH_ASKING = 64
 """Hypotheses from which it is asked whether torsos close before trees are grown, of half as many at first."""
 
-SPINE_SEGMENTS = tuple(segment for segment in RIGID_SEGMENTS if JOINT["pelvis"] in segment and min(segment) > 0)
+SPINE_SEGMENTS = tuple(
+    segment for segment in RIGID_SEGMENTS if JOINT["pelvis"] in segment and min(segment) > 0
+)
 """From the shoulders to the pelvis: the distances that a bending spine changes."""
 
 TRUNK_JOINTS = tuple(JOINT[name] for name in TORSO[1:])
@@ -85,18 +87,21 @@ class Grower:
         hidden = np.asarray(np.isnan(image).any(axis=2))
         if judged == "exact":
             judged_by = {check.name for check in suite if not check.rigid}
-            exact = is_exact(leaves, self.body, judged_by, fitted=self.fit.closed, hidden=hidden.any(axis=1))
+            exact = is_exact(
+                leaves, self.body, judged_by, fitted=self.fit.closed, hidden=np.asarray(hidden.any(axis=1))
+            )
             told = exact | self._told_by_hips(hidden)
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
         leaves = tree.prune(leaves, motion)
-        known = leaves.frame
-        leaves, completion = self.complete(
-            leaves, camera, image, suite, tolerance, self.fit.frame[chosen], told
+        wanted = told if self.settings.infer else told & ~exact & (judged == "exact")
+        left, completion = self.complete(
+            leaves, camera, image, suite, tolerance, self.fit.frame[chosen], wanted
         )
         if judged == "exact" and completion is not None:
-            exact = _confirmed(exact, known, leaves, completion, told & ~exact, self.body)
+            exact = _confirmed(exact, leaves.frame, left, completion, told & ~exact, self.body)
+        leaves, completion = (left, completion) if self.settings.infer else (leaves, None)
         return Batch(
             leaves=leaves,
             physical=physical,
@@ -109,7 +114,7 @@ class Grower:
         )
 
     def _told_by_hips(self, hidden: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Say which hypotheses (H,), of joints `hidden` (H, 14), are exact if the hips of the torso laid on them close."""
+        """Say which hypotheses, of joints `hidden` (H, 14), are exact if the hips of a torso laid on them close."""
         if not (isinstance(self.body, FigureBody) and self.body.evidence):
             return np.zeros(len(hidden), dtype=np.bool_)
         others = [JOINT[name] for name in (*TORSO[1:-1], *HIPS[1:])]
@@ -154,23 +159,25 @@ class Grower:
         suite: Sequence[Check],
         tolerance: Tolerance,
         frame: NDArray[np.intp],
-        wanted: NDArray[np.bool_] | bool = True,
+        wanted: NDArray[np.bool_] | None = None,
     ) -> tuple[Leaves, CompletedSurvivors | None]:
         """Complete survivors by the joints that were not seen, and drop those that cannot be.
 
-        `frame` is the view's frame of each hypothesis, and `wanted` says which hypotheses are completed at all.
+        `frame` is the view's frame of each hypothesis, and `wanted` says which hypotheses are completed at all; if not
+        given all, where that was asked for.
 
         Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
         where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
         """
+        asked = wanted if wanted is not None else np.full(len(image), self.settings.infer)
         unseen = np.asarray(np.isnan(image).any(axis=2))
         measured = tolerance.tangent > EXACT_TOLERANCE.tangent
         placed = ((~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2) | measured
         hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
         too_many = np.bincount(frame, hidden)[frame] > (MOST_HIDDEN_MEASURED if measured else MOST_HIDDEN)
         self._warn_of(frame[too_many & placed])
-        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many & wanted)[leaves.frame])
-        if not (self.settings.infer and isinstance(self.body, FigureBody) and worth.any()):
+        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many & asked)[leaves.frame])
+        if not (isinstance(self.body, FigureBody) and worth.any()):
             return leaves, None
         from posekit.hidden import complete, reject
 
@@ -203,7 +210,7 @@ class Grower:
 
 def _confirmed(
     exact: NDArray[np.bool_],
-    before: NDArray[np.intp],
+    before: NDArray[np.integer],
     leaves: Leaves,
     completion: CompletedSurvivors,
     told: NDArray[np.bool_],
