@@ -19,8 +19,6 @@ from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
-from posekit.validators.anatomical_checks import AnatomicalLimb
-from posekit.validators.projected_angles import projected_angles
 from posekit.validators.ranges import URDF_RANGES, Range, Ranges
 
 ANGLE_TOLERANCE = 1e-3
@@ -60,10 +58,14 @@ def joint_range(
         Whether the same follows for the first angles of shoulder and hip: see `LimbRange`.
     """
     if ranges.kind == "projected":
+        from posekit.validators.projected_angles import projected_angles
+
         return projected_angles(figure, ranges, tolerance=tolerance)
     ranges = ranges.of(figure)
     ik, anatomy = figure.ik, ranges.anatomy
     if anatomy is not None:
+        from posekit.validators.anatomical_checks import AnatomicalLimb
+
         # The figure itself is left alone: to write a URDF and read it again takes as long as many frames.
         ik = _limited(ik, ranges.limits)
     elif ranges.limits:

@@ -15,11 +15,10 @@ from posekit.geometry import perpendicular, unit
 from posekit.safe_io import cut, one_line, read_toml
 from posekit.skeleton import HIPS, JOINT
 from posekit.tables.built_in import built_in_document
-from posekit.validators.anatomical import Anatomy
-from posekit.validators.anatomical_table import anatomy_of
 
 if TYPE_CHECKING:
     from posekit.body import Figure
+    from posekit.validators.anatomical import Anatomy
 
 RANGES_SCHEMA = "posekit.ranges/1"
 MAX_BYTES = 1_000_000
@@ -108,6 +107,8 @@ def _ranges(document: dict[str, Any], source: str) -> Ranges:
     from posekit.tables.ranges import RangesTable
 
     if document.get("kind") == "anatomical":
+        from posekit.validators.anatomical_table import anatomy_of
+
         anatomy = anatomy_of(validated(AnatomyTable, document, source))
         return Ranges(name=source, kind="configuration", limits=anatomy.limits(), anatomy=anatomy)
     table = validated(RangesTable, document, source)

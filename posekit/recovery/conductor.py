@@ -118,7 +118,7 @@ def recover(
             batch = grower.grow(rows, EXACT_TOLERANCE, "exact")
             trees |= trees_of(batch, fit, rows)
             inexact = part[~np.isin(fit.frame[part], fit.frame[rows[batch.exact]])]
-        uncertain = np.unique(fit.frame[inexact])
+        uncertain = _distinct(fit.frame[inexact])
         if at_their_word:
             for rows, allowed, judged in _by_tolerance(fit, inexact, tolerance):
                 batch = grower.grow(rows, allowed, judged)
@@ -134,7 +134,7 @@ def recover(
             refiner = refiner or _refiner(grower, noise)
             trees |= refiner.grow(uncertain)
         if progress is not None:
-            progress(len(set(fit.frame[part].tolist())))  # np.unique would load masked arrays for it
+            progress(len(_distinct(fit.frame[part])))
     if photographs and noise is not None:
         # Seen with noise, or nothing is left by tolerances: a body of other lengths, or not all of a trunk is seen.
         undecided = np.array(
@@ -173,6 +173,11 @@ def recover(
         None if noise is None or unused else noise.document(),
     )
     return Recovery(figure=body.figure, fit=fit, frames=frames, settings=record, grower=grower)
+
+
+def _distinct(frames: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the numbers of frames, each once: asked for values alone, NumPy would load masked arrays first."""
+    return np.unique(frames, return_index=True)[0]
 
 
 def _fit(
