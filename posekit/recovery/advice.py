@@ -24,8 +24,16 @@ def advice_lines(recovery: Recovery) -> list[str]:
     lines = []
     if empty:
         from posekit.recovery.least_violation import least_violation
+    photographs = None
+    if empty and recovery.frames[empty[0]].family is not None:
+        from posekit.recovery.photograph_advice import photograph_line, photographs_of
+
+        photographs = photographs_of(recovery)
     for k in empty[:MAX_FRAMES_EXPLAINED]:
         frame = recovery.frames[k]
+        if photographs is not None and frame.judged == "refined":
+            lines.append(f"frame {k + 1}: no posture; {photograph_line(photographs, frame.number)}")
+            continue
         allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, frame.number, allowed)
         if found is not None and found.excesses:

@@ -13,7 +13,7 @@ from posekit.compiled.compiling import is_fast
 from posekit.compiled.verdicts import NO_VIOLATION
 from posekit.geometry import Array
 from posekit.recovery.body import ranges_of
-from posekit.recovery.noise import Noise, contact_under_noise
+from posekit.recovery.noise import Noise
 from posekit.refinement.observed_frames import LIMIT_DEVIATION
 from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
 from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
@@ -43,7 +43,7 @@ def certifying_checks(figure: Figure, settings: RecoverSettings, tolerance: Tole
         limbs=True,
         angle_tolerance=tolerance.angle,
         directions=True,
-        contact_margin=contact_under_noise(settings.contact_margin),
+        contact_margin=settings.contact_margin,
         up=LEVEL_CAMERA_UP,
     )
     made = make_checks(figure, settings.checks, options)

@@ -80,7 +80,9 @@ def record_of(
         "noisy": _widest([used for judged, used in frames if judged == "noisy"]),
         "refined": _widest(
             [used for judged, used in frames if judged == "refined"],
-            contact=contact_under_noise(asked.contact_margin),
+            contact=contact_under_noise(
+                asked.contact_margin, *(() if noise is None else (noise["overlap"],))
+            ),
         ),
         "noise": noise,
         "ranking": {"up": Up.level().says, "prior": load_prior().name},

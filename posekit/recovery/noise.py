@@ -46,11 +46,14 @@ class Noise:
         How far a detector's joints are from the figure's, standard deviation, metres.
     lengths : LengthUncertainty
         How well the person's lengths are known; exactly if not given.
+    overlap : float
+        Metres by which bodies may come nearer than they should, before refinement and after it.
     """
 
     deviation: float
     offset: float = 0.0
     lengths: LengthUncertainty = field(default_factory=LengthUncertainty)
+    overlap: float = CONTACT_UNDER_NOISE_METRES
 
     @staticmethod
     def of(
@@ -99,13 +102,15 @@ class Noise:
             "offset": self.offset,
             "size": lengths.common,
             "by_segment": dict(lengths.own),
+            "overlap": self.overlap,
         }
 
     @staticmethod
     def from_document(said: Mapping[str, Any]) -> Noise:
         """Read what `document` wrote."""
         lengths = LengthUncertainty(common=said.get("size", 0.0), own=said["by_segment"])
-        return Noise(deviation=said["deviation"], offset=said["offset"], lengths=lengths)
+        overlap = said.get("overlap", CONTACT_UNDER_NOISE_METRES)
+        return Noise(deviation=said["deviation"], offset=said["offset"], lengths=lengths, overlap=overlap)
 
     def of_points(self, view: View, frames: NDArray[np.intp], depth: Array, focal: Array) -> Array:
         """Return the standard deviations of joints and head points (F, 19), pixels.
@@ -149,6 +154,6 @@ def refuse_deviation(view: View, deviation: float | None) -> None:
         )
 
 
-def contact_under_noise(asked: float) -> float:
+def contact_under_noise(asked: float, overlap: float = CONTACT_UNDER_NOISE_METRES) -> float:
     """Return the margin (m) that bodies must keep under noise; negative allows penetration, as in `asked`."""
-    return asked - CONTACT_UNDER_NOISE_METRES
+    return asked - overlap

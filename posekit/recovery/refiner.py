@@ -137,7 +137,7 @@ class Refiner:
     def settings(self) -> RecoverSettings:
         """What the checks are asked with: bodies may overlap by as much as depths are off."""
         asked = self.grower.settings
-        return asked.changed(contact_margin=contact_under_noise(asked.contact_margin))
+        return asked.changed(contact_margin=contact_under_noise(asked.contact_margin, self.noise.overlap))
 
     @cached_property
     def _figure(self) -> Figure:
@@ -147,7 +147,8 @@ class Refiner:
     @cached_property
     def _lifting(self) -> RecoverSettings:
         """The same for leaves: what is lifted is off by as much again as what is refined."""
-        return self.settings.changed(contact_margin=contact_under_noise(self.settings.contact_margin))
+        lifted = contact_under_noise(self.settings.contact_margin, self.noise.overlap)
+        return self.settings.changed(contact_margin=lifted)
 
     @cached_property
     def tolerance(self) -> Tolerance:
@@ -157,7 +158,7 @@ class Refiner:
     @cached_property
     def certifying(self) -> Sequence[Check]:
         """The checks that every survivor passes."""
-        made = certifying_checks(self._figure, self.grower.settings, self.tolerance)
+        made = certifying_checks(self._figure, self.settings, self.tolerance)
         return [check for check in made if self._can_be_told(check)]
 
     @cached_property
