@@ -326,7 +326,7 @@ def test_the_command_line_refines(
     result = files.read_result("r.json")
     told = dict(result.settings["noise"])
     assert told.pop("by_segment") == UNKNOWN_ADULT.own
-    assert told == {"deviation": 2.0, "offset": 0.0, "size": UNKNOWN_ADULT.common}
+    assert told == {"deviation": 2.0, "offset": 0.0, "size": UNKNOWN_ADULT.common, "overlap": 0.03}
     assert set(result.settings["judged"]) == {"refined"}
     assert command("recover", "view.json", "-o", "n.json", "--no-refine").code == 0
     assert files.read_result("n.json").settings["noise"] is None
