@@ -102,7 +102,7 @@ def recover(
     lengths = uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
     noise = _noise(view, body, asked, lengths)
     photographs = uncalibrated and noise is not None
-    fit = _fit(view, body, asked, tolerance, refuse=not photographs)
+    fit = _fit(view, body, asked, tolerance, lengths, refuse=not photographs)
     fit = replace(fit, reasons=with_reasons(fit.reasons, body, bare))
 
     # Tree and refinement: as exact where that may be, then lengths at their word, then as uncertain as they are.
@@ -181,11 +181,17 @@ def _distinct(frames: NDArray[np.intp]) -> NDArray[np.intp]:
 
 
 def _fit(
-    view: View, body: LiftedBody, asked: RecoverSettings, tolerance: Tolerance | None, *, refuse: bool
+    view: View,
+    body: LiftedBody,
+    asked: RecoverSettings,
+    tolerance: Tolerance | None,
+    lengths: LengthUncertainty,
+    *,
+    refuse: bool,
 ) -> CameraFit:
     """Find the camera, and where it sees the root."""
     if not isinstance(view.camera, ScaledOrthographicModel):
-        return fit_camera(view, body.figure, asked.rooting, tolerance)
+        return fit_camera(view, body.figure, asked.rooting, tolerance, lengths)
     from posekit.recovery.fit_scale import fit_scale
 
     return fit_scale(view, body, asked.scale_for(PER_METRE[view.unit]), tolerance, refuse=refuse)

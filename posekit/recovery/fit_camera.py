@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure
+from posekit.body import Figure, LengthUncertainty
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera, lee_chen
 from posekit.compiled.compiling import n_threads
 from posekit.errors import HeadError, InputError
@@ -80,7 +81,11 @@ class CameraFit:
 
 
 def fit_camera(
-    view: View, figure: Figure, rooting: Rooting | None = None, tolerance: Tolerance | None = None
+    view: View,
+    figure: Figure,
+    rooting: Rooting | None = None,
+    tolerance: Tolerance | None = None,
+    uncertainty: LengthUncertainty | None = None,
 ) -> CameraFit:
     """Find the camera from the head (§2.1), or the head from a known camera.
 
@@ -98,6 +103,8 @@ def fit_camera(
         How to place the neck; a method other than ``auto`` is used even where six head points are seen.
     tolerance : Tolerance, optional
         What may be off, where it is not to be derived from the deviation of the image points.
+    uncertainty : LengthUncertainty, optional
+        How well the figure's lengths are known; exactly if not given.
 
     Raises
     ------
@@ -134,7 +141,11 @@ def fit_camera(
     else:
         for k in np.flatnonzero(seen & np.isnan(root).any(axis=1)).tolist():
             reasons[k] = f"frames[{k}]: {pose.reasons[k] if pose is not None else ''}"
-        placements = _placed(view, camera, figure, root, rooting, tolerance, reasons)
+
+        def places(frames: NDArray[np.intp]) -> list[NeckPlacement]:
+            return place_roots(view, camera, figure, frames, rooting, tolerance, uncertainty)
+
+        placements = _placed(view, root, places, reasons)
     if not any(placements):
         return CameraFit(camera=camera, frame=np.arange(n), root=root, head=head, pose=pose, reasons=reasons)
     necks = [root[k : k + 1] if one is None or reasons[k] else one.necks for k, one in enumerate(placements)]
@@ -190,19 +201,13 @@ def _unplaced(root: Array, pose: HeadPose | None, reasons: list[str]) -> list[Ne
 
 
 def _placed(
-    view: View,
-    camera: PinholeCamera,
-    figure: Figure,
-    root: Array,
-    rooting: Rooting,
-    tolerance: Tolerance | None,
-    reasons: list[str],
+    view: View, root: Array, places: Callable[[NDArray[np.intp]], list[NeckPlacement]], reasons: list[str]
 ) -> list[NeckPlacement | None]:
     """Place the necks that are not known by now, and say of the others that they need not be."""
     placements: list[NeckPlacement | None] = [None] * len(reasons)
     without = np.asarray(np.isnan(root).any(axis=1))
     unknown = np.flatnonzero(without & np.array([not reason for reason in reasons]))
-    found = place_roots(view, camera, figure, unknown, rooting, tolerance) if len(unknown) else []
+    found = places(unknown) if len(unknown) else []
     for k, placement in zip(unknown.tolist(), found, strict=True):
         placements[k] = placement
         if not len(placement.necks):

@@ -131,7 +131,7 @@ class Refiner:
         if given.pose is None or not np.isnan(view.root).any():
             return given
         rooting = replace(self.grower.settings.rooting, trust_head=False)
-        return fit_camera(view, self.grower.body.figure, rooting)
+        return fit_camera(view, self.grower.body.figure, rooting, uncertainty=self.noise.lengths)
 
     @cached_property
     def settings(self) -> RecoverSettings:

@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure
+from posekit.body import Figure, LengthUncertainty
 from posekit.cameras import PinholeCamera
 from posekit.formats.own import LeeChenModel, Root, View
 from posekit.settings import Rooting, Tolerance
 from posekit.settings.rooting import DETECTED_DEVIATION, DETECTED_OFFSET
+from posekit.skeleton import SEGMENTS, segment_name
 
 if TYPE_CHECKING:
     from posekit.cameras.neck import NeckPlacement
@@ -37,10 +38,12 @@ def place_roots(
     frames: NDArray[np.intp],
     rooting: Rooting,
     tolerance: Tolerance | None,
+    uncertainty: LengthUncertainty | None = None,
 ) -> list[NeckPlacement]:
     """Place the neck in some frames of a view (`posekit.cameras.neck.place`).
 
-    A view with derived joints is a detector's, whose points are farther off, of a body that gives.
+    A view with derived joints is a detector's, whose points are farther off, of a body that gives. Where lengths as
+    they are leave no place, their joints are taken to be off by as much as lengths are.
     """
     from posekit.cameras.neck import place
 
@@ -51,17 +54,30 @@ def place_roots(
     if isinstance(view.camera, LeeChenModel):
         deviation = IMAGE_PLANE_DEVIATION * float(view.camera.f or 1.0)
     K = camera.K if camera.K.ndim == 2 else camera.K[frames]
-    return place(
-        PinholeCamera(K=K, distortion=camera.distortion),
-        figure,
-        view.image[frames],
-        view.head_image[frames],
-        method=rooting.method,
-        deviation=deviation,
-        offset=DETECTED_OFFSET if detected else 0.0,
-        tolerance=None if tolerance is None else tolerance.rigid,
-        tangent=None if tolerance is None else tolerance.tangent,
-    )
+    offset = DETECTED_OFFSET if detected else 0.0
+
+    def placed(rows: NDArray[np.intp], offset: float) -> list[NeckPlacement]:
+        return place(
+            PinholeCamera(K=K if K.ndim == 2 else K[rows], distortion=camera.distortion),
+            figure,
+            view.image[frames[rows]],
+            view.head_image[frames[rows]],
+            method=rooting.method,
+            deviation=deviation,
+            offset=offset,
+            tolerance=None if tolerance is None else tolerance.rigid,
+            tangent=None if tolerance is None else tolerance.tangent,
+        )
+
+    found = placed(np.arange(len(frames)), offset)
+    nowhere = np.array([k for k, one in enumerate(found) if not len(one.necks)], dtype=np.intp)
+    if len(nowhere) and uncertainty is not None and not uncertainty.exact:
+        off = max(
+            uncertainty.own[segment_name(pair)] * figure.lengths[segment_name(pair)] for pair in SEGMENTS
+        )
+        for k, one in zip(nowhere.tolist(), placed(nowhere, math.hypot(offset, off)), strict=True):
+            found[k] = one
+    return found
 
 
 def tolerance_of(placement: NeckPlacement) -> Tolerance:
