@@ -14,7 +14,7 @@ from posekit.refinement import Merged, Refined
 
 ALL_ROWS = slice(None)
 
-SURVIVOR_ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged")
+SURVIVOR_ARRAYS = ("joints", "head", "chi2", "dof", "p", "merged", "size", "size_deviation")
 
 
 class Covariances:
@@ -85,6 +85,9 @@ class RefinedSurvivors:
         The probability that noise alone gives a chi2 as large.
     merged : int array (N,)
         How many other leaves became the same posture.
+    size, size_deviation : array (N,)
+        By what factor each body is larger than its figure, and the standard deviation of the logarithm of that, beside
+        what the covariance has of it.
     covariances : Covariances
         Of these survivors and others, found when they are read.
     rows : slice
@@ -97,6 +100,8 @@ class RefinedSurvivors:
     dof: NDArray[np.intp]
     p: Array
     merged: NDArray[np.intp]
+    size: Array
+    size_deviation: Array
     covariances: Covariances
     rows: slice
 
@@ -121,14 +126,16 @@ class RefinedSurvivors:
         chosen = merged.refined.select(order)
         joints = chosen.joints.copy()
         joints[unknown] = np.nan
-        size = np.bincount(merged.group[merged.group >= 0], minlength=len(order))[order]
+        count = np.bincount(merged.group[merged.group >= 0], minlength=len(order))[order]
         return RefinedSurvivors(
             joints=joints,
             head=chosen.head.copy(),
             chi2=chosen.chi2.copy(),
             dof=chosen.dof.copy(),
             p=chosen.p.copy(),
-            merged=size - 1,
+            merged=count - 1,
+            size=np.ones(len(order)) if chosen.size is None else chosen.size.factor.copy(),
+            size_deviation=np.zeros(len(order)) if chosen.size is None else chosen.size.deviation.copy(),
             covariances=Covariances(chosen, unknown),
             rows=ALL_ROWS,
         )

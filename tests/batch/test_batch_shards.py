@@ -188,7 +188,7 @@ def test_frames_that_cannot_be_recovered_each_have_their_own_reason(tmp_path: Pa
         tmp_path / "view.parquet",
         replace(view, image=image, head_image=np.empty(0), root=np.empty(0), truth=np.empty(0)),
     )
-    found = table(tmp_path / "view.parquet", folder, Recipe())
+    found = table(tmp_path / "view.parquet", folder, Recipe(settings=RecoverSettings(length_deviation=0.0)))
     assert found.frame.tolist() == [0, 1]
     assert (found.survivor == -1).all()
     assert all(found.reason) and not found.reason.str.startswith("frames[").any()

@@ -40,11 +40,22 @@ class Likelihoods:
         symmetric=True,
         null="row",
     )
+    size: Array | None = column(
+        "By what factor the body is larger than the lengths say, as its neck's depth tells; 1 where nothing does.",
+        null="number",
+        default=None,
+    )
+    size_deviation: Array | None = column(
+        "Standard deviation of the logarithm of that, beside what the covariance has of it.",
+        null="number",
+        default=None,
+    )
 
     def __post_init__(self) -> None:
         for name, each in columns_in(Likelihoods).items():
-            values = each.checked(getattr(self, name), len(self.chi2), "refined.")
-            object.__setattr__(self, name, values)
+            values = getattr(self, name)
+            if values is not None:
+                object.__setattr__(self, name, each.checked(values, len(self.chi2), "refined."))
 
     def __len__(self) -> int:
         """Count the survivors."""
@@ -55,7 +66,15 @@ class Likelihoods:
         """Say of some survivors that nothing is known."""
         number = np.full(count, np.nan)
         covariance = np.full((count, len(JOINTS), 3, 3), np.nan)
-        return Likelihoods(chi2=number, dof=number, p=number, merged=number, covariance=covariance)
+        return Likelihoods(
+            chi2=number,
+            dof=number,
+            p=number,
+            merged=number,
+            covariance=covariance,
+            size=number,
+            size_deviation=number,
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

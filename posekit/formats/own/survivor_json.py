@@ -96,7 +96,9 @@ def _read(column: Column, found: list[Any], unit: Unit, extent: Any) -> Any:
     if column.kind == "str":
         return found
     if column.kind == "table":
-        return column.of(**survivor_columns(column.of, found, unit, extents={}, carried=frozenset()))
+        columns = columns_in(column.of).items()
+        told = {name for name, one in columns if all(getattr(row, one.key) is not None for row in found)}
+        return column.of(**survivor_columns(column.of, found, unit, extents={}, carried=frozenset(told)))
     if column.kind == "objects":
         return [
             {name: column.of.of(one.model_dump(), unit) for name, one in (each or {}).items()}

@@ -127,7 +127,8 @@ def _tables(archive: Archive, column: Column, count: NDArray[np.int64], unit: Un
     if f"{column.name}/{names[0]}" not in archive.names:
         return None
     found = survivors_in(archive, column.of, count, unit, extents={}, within=f"{column.name}/")
-    rows = [{name: (found[name] or [])[k] for name in names} for k in range(len(count))]
+    told = [name for name in names if found[name] is not None]
+    rows = [{name: found[name][k] for name in told} for k in range(len(count))]
     return [None if np.isnan(row[names[0]]).any() else column.of(**row) for row in rows]
 
 
