@@ -252,7 +252,7 @@ def _of_rows(job: Staging, base: Path, pieces: Iterator[ImageRows]) -> StagedTab
 
 def _as_views(job: Staging, pieces: Iterator[ImageRows], seen: list[View]) -> Iterator[ImageRows]:
     """Complete pieces as views of the person, and keep a frame of each in `seen`: what is derived may differ."""
-    source, figure = job.recipe.source, None
+    source, figure, length_deviation = job.recipe.source, None, None
     if source.skeleton:
         raise InputError(
             f"--skeleton: {job.path} names its points itself; expected a detector's file; leave it out"
@@ -261,7 +261,7 @@ def _as_views(job: Staging, pieces: Iterator[ImageRows], seen: list[View]) -> It
         given = _keypoints(job.path, rows)
         sighted = sighting(in_pixels(swap(given) if source.swap_sides else given, source.size), source)
         if figure is None:
-            figure, _ = person(source, sighted.camera, given.layout, job.path)
+            figure, _, length_deviation = person(source, sighted.camera, given.layout, job.path)
         if not _shows_somebody(sighted.keypoints, sighted.camera, source.minimum_confidence):
             yield nothing_seen(rows.frame, rows.time)
             continue
@@ -271,6 +271,7 @@ def _as_views(job: Staging, pieces: Iterator[ImageRows], seen: list[View]) -> It
             figure,
             minimum_confidence=source.minimum_confidence,
             deviation=source.deviation,
+            length_deviation=length_deviation,
         )
         if not seen or view.derived not in [one.derived for one in seen]:
             seen.append(first_usable(view))

@@ -65,8 +65,8 @@ def _refined(result: Result) -> str:
     told = f"; chi2 a degree of freedom: median {np.nanmedian(chi2):.2g}" if np.isfinite(chi2).any() else ""
     deviation = noise.get("deviation") if isinstance(noise, dict) else None
     of_points = f" with a deviation of {deviation:g} px" if isinstance(deviation, int | float) else ""
-    lengths = noise.get("lengths") if isinstance(noise, dict) else None
-    of_lengths = f", of lengths {lengths:g}" if isinstance(lengths, int | float) else ""
+    size = noise.get("size") if isinstance(noise, dict) else None
+    of_lengths = f", of the body's size {size:g}" if isinstance(size, int | float) else ""
     return f"refined in {plural(len(refined), 'frame')}{of_points}{of_lengths}{told}"
 
 

@@ -216,7 +216,7 @@ def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: Length
     if asked.refine and asked.tolerance is not None:
         raise InputError("--refine: the noise says what is tolerated; leave out the tolerances, or --refine")
     if asked.refine is False or not able or asked.tolerance is not None:
-        if asked.length_deviation is not None:
+        if asked.length_deviation:
             raise InputError("--length-deviation: nothing is refined here; leave it out")
         return None
     if uncalibrated:

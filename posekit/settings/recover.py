@@ -61,10 +61,11 @@ class RecoverSettings(JudgingSettings):
         How the neck is found in a calibrated view that neither gives it nor shows a head of six points.
     refine : bool, optional
         Whether frames that are not exact are grown as their noise demands, and every survivor becomes the likeliest
-        posture near it (`posekit.refinement`). By default where the noise is known: from `rooting`, from the view, or
-        because a detector saw the points; and no tolerance is given.
+        posture near it (`posekit.refinement`). By default wherever frames are not exact and no tolerance is given, of
+        lengths that are not said to be exact or points whose noise is known.
     length_deviation : float, optional
-        Relative standard deviation of lengths, for that; by default what bodies give (`posekit.refinement`).
+        Relative standard deviation of the body's size, and of each length beside it; 0 says that lengths are exact. By
+        default what the view says, else what is known of the person (`posekit.body.uncertainty`).
 
     Raises
     ------

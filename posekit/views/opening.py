@@ -45,7 +45,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
         )
     sighted = sighting(found, source)
     people = list_people(sighted.keypoints)
-    figure, of_lengths = person(source, sighted.camera, found.layout, Path(path))
+    figure, of_lengths, length_deviation = person(source, sighted.camera, found.layout, Path(path))
     if source.person != "all":
         chosen = [choose_person(sighted.keypoints, source.person or "largest")]
     else:
@@ -61,6 +61,7 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
                 rate=source.rate,
                 minimum_confidence=source.minimum_confidence,
                 deviation=source.deviation,
+                length_deviation=length_deviation,
             )
         except InputError as error:
             if len(chosen) == 1:

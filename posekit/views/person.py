@@ -19,6 +19,7 @@ from posekit.body.anthropometry import (
     read_lengths,
 )
 from posekit.body.closing import closing_line
+from posekit.body.uncertainty import UNKNOWN_ADULT
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, choose, read_keypoints, swap
@@ -34,14 +35,22 @@ from posekit.views.source import Source
 BUILT_IN: Final = (
     "lengths of the built-in figure (Lee & Chen 1985, Table A.1), not this person's: give --stature"
 )
+UNKNOWN_PERSON_DEVIATION: Final = max(UNKNOWN_ADULT.own.values())
+"""Relative standard deviation of the built-in figure's lengths, taken for a person of whom nothing is known."""
+
+LEAST_DEVIATION: Final = 0.01
+"""The least that estimated lengths are taken to be off: joints of a detector are not quite those of a skeleton."""
+
 DEFAULT_PROPORTIONS: Final = "de-leva"
 """Of those that are built in the one whose ends are the joints' centres, where key points are too."""
 
 
 def person(
     source: Source, camera: CameraModel, layout: SkeletonMap, given: Path | None = None
-) -> tuple[Figure, str]:
-    """Make the person's figure, and say in a line where its lengths come from.
+) -> tuple[Figure, str, float | None]:
+    """Make the person's figure, and say in a line where its lengths come from, and how far they may be off.
+
+    The last is a relative standard deviation, None where nobody says.
 
     `given` is the file of the person: where it is the recording too, the same person of it is meant.
 
@@ -54,8 +63,12 @@ def person(
         Where a file cannot be read, or what it says makes no body.
     """
     lengths = _lengths(source, camera, given)
-    figure, says = load_figure(), BUILT_IN
+    figure, says, deviation = load_figure(), BUILT_IN, UNKNOWN_PERSON_DEVIATION
     if lengths is not None:
+        relative = [
+            off / lengths.lengths[name] for name, off in lengths.deviation.items() if name in lengths.lengths
+        ]
+        deviation = max(float(np.median(relative)), LEAST_DEVIATION) if relative else None
         off = max(lengths.deviation.values(), default=0.0)
         uncertain = f", uncertain by up to {off * 100:.1f} cm" if off > 0 else ""
         figure = figure.scaled(lengths.lengths)
@@ -64,7 +77,7 @@ def person(
         )
     if "neck" not in layout.landmarks:
         figure = figure.scaled(middle_neck(figure.lengths))
-    return figure, says
+    return figure, says, deviation
 
 
 def middle_neck(lengths: Mapping[str, float]) -> dict[str, float]:

@@ -29,6 +29,7 @@ def person_view(
     rate: float | None = None,
     minimum_confidence: float = 0.0,
     deviation: float | None = None,
+    length_deviation: float | None = None,
     unit: Unit = "m",
 ) -> View:
     """Make a view of one person's key points.
@@ -51,6 +52,8 @@ def person_view(
         Points that are less sure count as not seen; those without a confidence are kept.
     deviation : float, optional
         Standard deviation of each coordinate of the points, pixels.
+    length_deviation : float, optional
+        Relative standard deviation of the person's lengths.
     unit : {"m", "cm", "mm"}
         Of the view's file.
 
@@ -102,6 +105,7 @@ def person_view(
         head_image=points[kept][:, HEAD],
         confidence=confidence[kept],
         deviation=deviation,
+        length_deviation=length_deviation,
         derived=derived,
         lengths=person.lengths,
         unit=unit,
