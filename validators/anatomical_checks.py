@@ -85,7 +85,11 @@ class AnatomicalLimb(Check):
         end = limb[2] if len(limb) == 3 else None
         angles = np.degrees(self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end))
         walls = limb_walls(
-            self.anatomy, self._joint, angles if end is not None else angles[:, :2], self.tolerance
+            self.anatomy,
+            self._joint,
+            angles if end is not None else angles[:, :2],
+            self.tolerance,
+            self._turn,
         )
         lower, upper = walls.limits(self.anatomy.spreads)
         value = walls.values
@@ -105,6 +109,14 @@ class AnatomicalLimb(Check):
         return Findings(value=value, lower=lower, upper=upper, tolerance=tolerance[:, judged])
 
     @cached_property
+    def _turn(self) -> tuple[float, float]:
+        """From where to where a pelvis may be flexed that is between the hips, degrees; zeros where hips show it."""
+        if self._on_torso or not self.figure.ik.middle_pelvis:
+            return 0.0, 0.0
+        low, high = np.degrees(self.figure.ik.pelvis_turn).tolist()
+        return low, high
+
+    @cached_property
     def rule(self) -> Rule:
         """The screen as numbers: what the limb hangs on, whether it is whole, ranges, couplings and tolerances."""
         from posekit.validators.anatomical_screen import limb_numbers  # read by compiled loops alone
@@ -117,5 +129,6 @@ class AnatomicalLimb(Check):
             rigid=self.figure.ik.rigid_kind(self._parent),
             tolerance=self.tolerance,
             unseen=UNSEEN_DEGREES,
+            turn=self._turn,
         )
         return Rule(kind=kernels.OF_ANATOMICAL_LIMB, numbers=numbers)

@@ -130,7 +130,13 @@ def judged_names(anatomy: Anatomy, joint: str, count: int) -> tuple[str, ...]:
     return (*names[2:], ELEVATION_ANGLE)
 
 
-def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0.0) -> LimbReadings:
+def limb_walls(
+    anatomy: Anatomy,
+    joint: str,
+    angles: Array,
+    tolerance: float = 0.0,
+    turn: tuple[float, float] = (0.0, 0.0),
+) -> LimbReadings:
     """Set up the walls of a limb.
 
     Parameters
@@ -143,6 +149,10 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
         In one of its writings, degrees: ball joint and hinge, or the first two of the ball joint.
     tolerance : float
         Degrees by which ends are moved outward where a sinus narrows another angle's.
+    turn : tuple of 2 float
+        From where to where a pelvis between the hips may be flexed, degrees, which its joints do not tell
+        (`posekit.body.closed_form.freed`): it is flexed until the thigh is as near as can be to the middle of its
+        range, where it has most room in all other angles.
 
     Returns
     -------
@@ -162,6 +172,9 @@ def limb_walls(anatomy: Anatomy, joint: str, angles: Array, tolerance: float = 0
         turned_near(written[..., k], (ends[name, "lower"][0] + ends[name, "upper"][0]) / 2, half_turn=180.0)
         for k, name in enumerate(names)
     ]
+    first = names[0]
+    middle = (ends[first, "lower"][0] + ends[first, "upper"][0]) / 2
+    columns[0] = columns[0] - np.clip(columns[0] - middle, *turn)
     readings = dict(zip(names, columns, strict=True))
     replaced = {(name, side) for name in names[:2] for side in LIMIT_SIDES} if by_elevation else set()
     if joint == "shoulder":

@@ -25,7 +25,14 @@ from posekit.validators.anatomical_shoulder import SEAM_DEGREES
 
 
 def limb_numbers(
-    anatomy: Anatomy, joint: str, signs: Array, *, rigid: int, tolerance: float, unseen: float
+    anatomy: Anatomy,
+    joint: str,
+    signs: Array,
+    *,
+    rigid: int,
+    tolerance: float,
+    unseen: float,
+    turn: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
     """Lay out the ranges of a limb.
 
@@ -41,6 +48,8 @@ def limb_numbers(
         The part that the limb hangs on, by `posekit.compiled.rigid_kernels.rigid_frame`.
     tolerance, unseen : float
         Degrees by which a direction may be off, and the tolerance from which on a rotation is not seen.
+    turn : tuple of 2 float
+        See `posekit.validators.anatomical_limb.limb_walls`.
 
     Returns
     -------
@@ -75,6 +84,7 @@ def limb_numbers(
         [
             [rigid, count == 4, arm, branches],
             [power, LEAST_LEFT**power, SEAM_DEGREES, tolerance, unseen],
+            turn,
             np.pad(signs, (0, 4 - count)),
             np.ravel(ends),
             places,

@@ -6,13 +6,12 @@ Two kinds: the URDF's own angles (this file), or the paper's projected angles (`
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from posekit.body import Figure
-from posekit.body.angles import Limits
 from posekit.body.closed_form import ClosedForm
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.compiled import screen_kinds as kernels
@@ -95,7 +94,7 @@ def joint_range(
 
 def _limited(ik: ClosedForm, limits: Mapping[str, Range]) -> ClosedForm:
     lower, upper = np.radians(np.array([limits[dof] for dof in DOFS])).T
-    return replace(ik, limits=Limits(sign=ik.limits.sign, lower=lower, upper=upper))
+    return ik.with_limits(lower, upper)
 
 
 def _rule(ik: ClosedForm, where: tuple[str, ...], kind: int, more: Sequence[float]) -> Rule:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,8 +12,26 @@ from numpy.typing import NDArray
 from posekit.body.angles import Limits, ball_angles, direction_angles, limb_angles
 from posekit.body.frames import hips_frame
 from posekit.errors import FigureError
-from posekit.geometry import Array, fit_rotation, relative_rotation, rotate_back, unit
+from posekit.geometry import Array, fit_rotation, relative_rotation, rotate_back, rotation_about, unit
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, JOINTS, POINTS, SIDES, TORSO
+
+HIP_FLEXIONS = tuple(DOFS.index(f"{side}_hip.flexion") for side in SIDES)
+"""Where the hips' flexions stand among the angles."""
+
+
+def freed(limits: Limits) -> Limits:
+    """Return the limits of a figure whose pelvis is between its hips, whose joints tell no flexion of the pelvis.
+
+    Some flexion of it inside its range must bring a thigh inside the hip's: against the spine that range is the sum of
+    both. Turning the hips about their own line changes no other angle of a leg.
+    """
+    lower, upper, pelvis = limits.lower.copy(), limits.upper.copy(), DOFS.index("pelvis.flexion")
+    for hip in HIP_FLEXIONS:
+        ends = limits.sign[pelvis] * limits.sign[hip] * np.array([lower[pelvis], upper[pelvis]])
+        lower[hip] += ends.min()
+        upper[hip] += ends.max()
+    return Limits(sign=limits.sign, lower=lower, upper=upper)
+
 
 Alike = Callable[[Sequence[int]], tuple[NDArray[np.intp], NDArray[np.intp]]]
 """Finds postures with some points in the same places: one posture of each set, and the set of each posture."""
@@ -26,7 +44,8 @@ class ClosedForm:
     Parameters
     ----------
     limits : Limits
-        Of all 22 angles: they choose among the branches.
+        Of all 22 angles: they choose among the branches. Where the neck turns the hips, those of the hips' flexion are
+        of thighs against the spine: see `freed`.
     head_offsets : array (5, 3)
         From the neck to the head's points, head link's frame, metres.
     middle_pelvis : bool
@@ -36,6 +55,21 @@ class ClosedForm:
     limits: Limits
     head_offsets: Array
     middle_pelvis: bool = False
+
+    def with_limits(self, lower: Array, upper: Array) -> ClosedForm:
+        """Return the same with other limits (22,) of the figure's angles, radians."""
+        limits = Limits(sign=self.limits.sign, lower=lower, upper=upper)
+        return replace(self, limits=freed(limits) if self.middle_pelvis else limits)
+
+    @property
+    def pelvis_turn(self) -> tuple[float, float]:
+        """By how much the pelvis may be flexed, radians, in the sense of a hip's flexion."""
+        pelvis, sign = DOFS.index("pelvis.flexion"), self.limits.sign
+        ends = [
+            limit[pelvis] * sign[pelvis] * sign[HIP_FLEXIONS[0]]
+            for limit in (self.limits.lower, self.limits.upper)
+        ]
+        return min(ends), max(ends)
 
     @property
     def hips_joints(self) -> tuple[int, ...]:
@@ -82,7 +116,31 @@ class ClosedForm:
                     (*trunk, *joints),
                     partial(self._limb_of, f"{side}_{limb[0]}", R_parent, points, joints),
                 )
+        if self.middle_pelvis:
+            self._share_flexion(angles, R_torso, R_hips)
         return angles
+
+    def _share_flexion(self, angles: Array, R_torso: Array, R_hips: Array) -> None:
+        """Flex pelvises by the least that brings both hips inside their own limits (N, 22), where that is possible.
+
+        How far a pelvis between the hips is flexed its joints do not tell, and turning the hips about their own line
+        changes the first angle of each thigh alone.
+        """
+        low, high = self.pelvis_turn
+        least, most = np.full(len(angles), low), np.full(len(angles), high)
+        for k in HIP_FLEXIONS:
+            flexion = np.where(np.isnan(angles[:, k]), 0.0, angles[:, k])
+            least = np.maximum(least, flexion - (self.limits.upper[k] - high))
+            most = np.minimum(most, flexion - (self.limits.lower[k] - low))
+        turn = np.clip(0.0, np.minimum(least, most), np.maximum(least, most))
+        rows = np.flatnonzero(turn)
+        if not rows.size:
+            return
+        for k in HIP_FLEXIONS:
+            angles[rows, k] -= turn[rows]
+        y = np.broadcast_to(np.array([0.0, 1.0, 0.0]), (rows.size, 3))
+        turned = R_hips[rows] @ rotation_about(y, self.limits.sign[HIP_FLEXIONS[0]] * turn[rows])
+        angles[rows, 3:6] = self.pelvis(R_torso[rows], turned)
 
     def _limb_of(
         self, joint: str, R_parent: Array, points: Array, joints: tuple[int, ...], rows: NDArray[np.intp]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.body.angles import Limits
 from posekit.body.axes import axis_signs
 from posekit.body.capsules import Capsule, read_capsules
-from posekit.body.closed_form import Alike, ClosedForm, with_head
+from posekit.body.closed_form import Alike, ClosedForm, freed, with_head
 from posekit.body.closing import TORSO_LENGTHS, closed_lengths
 from posekit.body.frames import torso_frame
 from posekit.body.lengths import check_lengths
@@ -222,9 +222,9 @@ class Figure:
     @cached_property
     def ik(self) -> ClosedForm:
         """The closed form from points to angles."""
-        return ClosedForm(
-            limits=self.limits, head_offsets=self._head_offsets, middle_pelvis=self.pelvis_between_hips
-        )
+        middle = self.pelvis_between_hips
+        limits = freed(self.limits) if middle else self.limits
+        return ClosedForm(limits=limits, head_offsets=self._head_offsets, middle_pelvis=middle)
 
     @cached_property
     def angle_index(self) -> NDArray[np.intp]:

@@ -37,7 +37,10 @@ and the least of what is left of a range, to that power; the plane at which the 
 which on a rotation is not seen: degrees.
 """
 
-AT_SIGNS, AT_ENDS, AT_JUDGED, AT_COUPLED = 9, 13, 33, 40
+AT_TURN_LEAST, AT_TURN_MOST = 9, 10
+"""Then from where to where a pelvis between the hips may be flexed, of which thighs take what they need, degrees."""
+
+AT_SIGNS, AT_ENDS, AT_JUDGED, AT_COUPLED = 11, 15, 35, 42
 """Where the others begin.
 
 Signs of the four angles; five numbers of each: the middle between the means, lower mean and limit, upper mean and
@@ -268,6 +271,7 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
                 offset + 180.0,
             )
         w[READ_AT], w[READ_AT + 1] = near(flexion, w[at + AT_ENDS]), near(abduction, w[at + AT_ENDS + 5])
+        w[READ_AT] -= min(max(w[READ_AT] - w[at + AT_ENDS], w[at + AT_TURN_LEAST]), w[at + AT_TURN_MOST])
         for side in range(2 if seen else 1):
             w[READ_AT + OF_ROTATION] = near(rotation + 180.0 * side, w[at + AT_ENDS + 5 * OF_ROTATION])
             w[READ_AT + OF_HINGE] = near(hinge if side == 0 else -hinge, w[at + AT_ENDS + 5 * OF_HINGE])

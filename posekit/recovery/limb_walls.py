@@ -63,7 +63,7 @@ class LimbWalls:
             check.places[0].joint: check for check in pulling if check.places[0].joint in ("pelvis", "neck")
         }
         on_torso = any(
-            JOINT["neck"] in check.points
+            JOINT["right_shoulder"] in check.points
             for limb in range(len(LIMB_JOINTS))[LEG_LIMBS]
             for check in mine[limb]
         )
@@ -122,4 +122,5 @@ class LimbWalls:
     @cached_property
     def _hips(self) -> Array:
         """That of the hips."""
-        return np.asarray(hips_frame(*(self.figure.neutral_points[None, joint] for joint in HIPS_POINTS))[0])
+        joints = self.figure.ik.hips_joints
+        return np.asarray(hips_frame(*(self.figure.neutral_points[None, joint] for joint in joints))[0])

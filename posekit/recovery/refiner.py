@@ -173,9 +173,9 @@ class Refiner:
         figure = self.grower.body.figure
         ranges = ranges_of(self.grower.settings).of(figure)
         if ranges.kind != "configuration" or not ranges.limits:
-            return figure.limits
+            return figure.ik.limits
         radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}
-        return figure.with_limits(radians).limits
+        return figure.with_limits(radians).ik.limits
 
     @cached_property
     def _walls(self) -> LimbWalls | None:

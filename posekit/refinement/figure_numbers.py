@@ -97,7 +97,7 @@ class FigureNumbers:
             [lengths[segment_name((a, b))] for a, b in ((limb[0], limb[1]), (limb[1], limb[2]))]
             for limb in LIMB_JOINTS
         ]
-        limits = limits or figure.limits
+        limits = limits or figure.ik.limits
         first = [
             DOFS.index(f"{side}_{joint}.flexion")
             for joint in ("shoulder", "hip")

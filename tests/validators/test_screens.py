@@ -19,10 +19,23 @@ FIGURE = load_figure()
 N = 150
 
 
+MIDDLE = FIGURE.scaled({"pelvis-right_hip": 0.161, "pelvis-left_hip": 0.161})
+"""The same with the pelvis between the hips: the spine turns them."""
+
+
 def suite(tolerance: float) -> list[Check]:
     rigid = rigid_parts(FIGURE, tolerance=tolerance / 100)
+    side = rigid_parts(FIGURE, tolerance=tolerance / 100, mode="side")[-1:]
     projected = joint_range(FIGURE, load_ranges("table1"), tolerance=tolerance)
-    return [*rigid, *joint_range(FIGURE, tolerance=tolerance), *projected, *collision(FIGURE)]
+    anatomical = load_ranges("anatomical")
+    middle = [
+        check
+        for ranges in (load_ranges("urdf"), load_ranges("table1"), anatomical)
+        for check in joint_range(MIDDLE, ranges, tolerance=tolerance)
+        if check.where[0].startswith(("pelvis", "right_hip"))
+    ]
+    own = joint_range(FIGURE, tolerance=tolerance)
+    return [*rigid, *side, *own, *projected, *middle, *collision(FIGURE)]
 
 
 SUITES = {tolerance: suite(tolerance) for tolerance in (0.0, 1e-3, 3.0)}
