@@ -90,7 +90,7 @@ def coupled(w: Array, row: int, x: Any) -> Any:
 
 
 def off_plane(w: Array, at: int) -> Any:
-    """Move the limits of the rotation for valgus, as `posekit.validators.anatomical_limb` does; say if they are clear."""
+    """Move the limits of the rotation for valgus, as `posekit.validators.anatomical_limb` does; say if clear."""
     if math.isnan(w[READ_AT + OF_ROTATION] + w[READ_AT + OF_HINGE]):
         return True
     row = at + AT_COUPLED + 1

@@ -63,7 +63,8 @@ def person(
         Where a file cannot be read, or what it says makes no body.
     """
     lengths = _lengths(source, camera, given)
-    figure, says, deviation = load_figure(), BUILT_IN, UNKNOWN_PERSON_DEVIATION
+    figure, says = load_figure(), BUILT_IN
+    deviation: float | None = UNKNOWN_PERSON_DEVIATION
     if lengths is not None:
         relative = [
             off / lengths.lengths[name] for name, off in lengths.deviation.items() if name in lengths.lengths
