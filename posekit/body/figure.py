@@ -19,7 +19,7 @@ from posekit.body.axes import axis_signs
 from posekit.body.capsules import Capsule, read_capsules
 from posekit.body.closed_form import Alike, ClosedForm, freed, with_head
 from posekit.body.closing import TORSO_LENGTHS, closed_lengths
-from posekit.body.frames import torso_frame
+from posekit.body.frames import MIDDLE_PELVIS_PART, torso_frame
 from posekit.body.lengths import check_lengths
 from posekit.body.pool import collides, make_pool
 from posekit.body.side import side_is_certain
@@ -59,14 +59,6 @@ LINK_OF_POINT = {
 }
 """The URDF link whose origin is each point; points that are not listed have a link of their own name."""
 
-
-MIDDLE_PELVIS_PART: Final = 0.1
-"""Of the hips' distance: a pelvis that is nearer to the line between them counts as between them.
-
-Lengths that are off by 2 % put a pelvis there that is in the middle, and a plane from so short a way would turn by 30
-degrees with a joint that is off by a centimetre. Pelvis joints of skeletons that have one are half the hips' distance
-away.
-"""
 
 SAME_TORSO_METRES: Final = 1e-4
 """Metres: a torso whose distances are no more other than that is the same."""

@@ -6,9 +6,19 @@ torso axes (y down, z left, x forward) are the same three directions, named othe
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 
 from posekit.geometry import Array, cross, perpendicular, unit
+
+MIDDLE_PELVIS_PART: Final = 0.1
+"""Of the hips' distance: a pelvis that is nearer to the line between them counts as between them.
+
+Lengths that are off by 2 % put a pelvis there that is in the middle, and a plane from so short a way would turn by 30
+degrees with a joint that is off by a centimetre. Pelvis joints of skeletons that have one are half the hips' distance
+away.
+"""
 
 
 def torso_frame(neck: Array, right_shoulder: Array, left_shoulder: Array, pelvis: Array) -> Array:

@@ -180,6 +180,7 @@ def validate(
 ) -> None:
     """Judge postures: exit 0 if all are valid, 1 if some are not or are undecided, 2 on bad input."""
     from posekit import validation, validators
+    from posekit.body.closing import closing_line
     from posekit.formats import own as files
     from posekit.formats.own.report import columns_of
     from posekit.formats.own.report_table import summary_table
@@ -236,6 +237,9 @@ def validate(
         )
     if output is not None:
         files.write_report(output, report)
+    changed = closing_line(report.settings.get("moved_lengths", {}))
+    if changed:
+        typer.echo(f"posekit: warning: {changed}", err=True)
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)

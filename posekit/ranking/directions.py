@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.frames import MIDDLE_PELVIS_PART
 from posekit.geometry import Array, cross, dot, perpendicular, unit
 from posekit.skeleton import JOINT, SIDES, segment_name
 
@@ -80,7 +81,10 @@ def rows_of(names: tuple[str, ...]) -> NDArray[np.intp]:
 
 
 def _hips(joints: Array) -> tuple[Array, Array]:
-    """Return the hips' left, and their down square to it, (3, N)."""
+    """Return the hips' left, and their down square to it, (3, N); no down where the pelvis is between the hips."""
     pelvis, right, left = joints[JOINT["pelvis"]], joints[JOINT["right_hip"]], joints[JOINT["left_hip"]]
-    left_axis = unit(left - right, axis=-2)
-    return left_axis, unit(perpendicular(right - pelvis, left_axis, axis=-2), axis=-2)
+    line = left - right
+    left_axis = unit(line, axis=-2)
+    down = perpendicular(right - pelvis, left_axis, axis=-2)
+    flat = dot(down, down, axis=-2) < MIDDLE_PELVIS_PART**2 * dot(line, line, axis=-2)
+    return left_axis, np.where(flat, np.nan, unit(down, axis=-2))

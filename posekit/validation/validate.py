@@ -237,9 +237,16 @@ def _lengths_of(validator: Validator, given: _Given) -> dict[str, Any]:
     if given.joints is None:
         return {"given": "configurations"}
     settings: dict[str, Any] = {"given": "joint positions", "lengths_from": validator.lengths}
+    lengths: dict[str, float] = {}
     if validator.lengths == "median":
         lengths = segment_lengths(given.joints)
         settings["lengths"] = {name: round(length, 6) for name, length in lengths.items()}
+    if validator.robot is None:
+        figure = validator.figure
+        if lengths:
+            figure = figure.scaled(lengths, behind=shoulders_are_behind(given.joints))
+        settings["shoulders"] = figure.shoulder_side
+        settings["moved_lengths"] = dict(figure.moved_lengths)
     return settings
 
 

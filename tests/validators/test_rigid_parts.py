@@ -7,12 +7,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from posekit.body import load_figure
+from posekit.body import Figure, load_figure
+from posekit.body.frames import torso_frame
 from posekit.errors import InputError
 from posekit.settings import RigidTolerance
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENTS, TORSO, segment_name
 from posekit.tree import Findings
-from posekit.validators import load_ranges, make_checks, rigid_parts
+from posekit.validators import Validator, load_ranges, make_checks, rigid_parts
 from posekit.validators.rigid_parts import Mode
 
 FIGURE = load_figure()
@@ -86,6 +87,91 @@ def test_the_mirror_image_is_told_apart_by_placement_alone() -> None:
     assert torso.violated.all()
     # The shoulders lie 3.742 cm behind the spine instead of in front of it.
     np.testing.assert_allclose(torso.value, 2 * 0.037420243, rtol=0, atol=1e-8)
+
+
+BEHIND = FIGURE.scaled({}, behind=True)
+UNKNOWN = replace(FIGURE, side_known=False)
+OFFSET = FIGURE.shoulder_offset
+
+
+def side(figure: Figure, points: np.ndarray, *, tolerance: float, mode: Mode = "side") -> Findings:
+    check = rigid_parts(figure, tolerance=tolerance, mode=mode)[-1]
+    return check.judge(points[:, check.points])
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 1e-3, 0.01, 0.03, 0.07])
+def test_the_side_tells_a_mirror_image_within_any_tolerance_that_is_less_than_it(tolerance: float) -> None:
+    points = postures(50)
+    assert not side(FIGURE, points, tolerance=tolerance + 1e-12).violated.any()
+    assert side(FIGURE, points * [-1, 1, 1], tolerance=tolerance).violated.all()
+    assert side(BEHIND, points, tolerance=tolerance).violated.all()
+    assert not side(BEHIND, points * [-1, 1, 1], tolerance=tolerance + 1e-12).violated.any()
+
+
+def test_a_side_that_the_tolerance_covers_is_undecided() -> None:
+    for sign in (1, -1):
+        assert side(FIGURE, postures(5) * [sign, 1, 1], tolerance=2 * OFFSET + 1e-9).undecided.all()
+
+
+@pytest.mark.parametrize("mode", ["side", "placement"])
+def test_a_side_that_the_figure_does_not_know_is_undecided_and_rejects_nothing(mode: Mode) -> None:
+    points = postures(20)
+    mirrored = side(UNKNOWN, points * [-1, 1, 1], tolerance=1e-3, mode=mode)
+    assert mirrored.undecided.all()
+    assert not mirrored.violated.any()
+    own = side(UNKNOWN, points, tolerance=1e-3, mode=mode)
+    assert not own.violated.any()
+    assert own.undecided.all() == (mode == "side")
+    # Neither the torso nor its mirror image fits one whose pelvis is elsewhere.
+    points[:, JOINT["pelvis"]] *= 1.1
+    assert side(UNKNOWN, points, tolerance=1e-3, mode="placement").violated.all()
+
+
+@pytest.mark.parametrize("tolerance", [0.01, OFFSET, 0.06])
+def test_shoulders_may_be_behind_by_what_the_tolerance_is_more_than_their_offset(tolerance: float) -> None:
+    points = postures(20)
+    R = torso_frame(*np.moveaxis(points[:, [JOINT[name] for name in TORSO]], 1, 0))
+    least = min(OFFSET - tolerance, 0.0)
+    for beyond, rejected in ((1e-6, False), (-1e-6, True)):
+        moved = points.copy()
+        for joint in ("right_shoulder", "left_shoulder"):
+            moved[:, JOINT[joint]] += (least + beyond - OFFSET) * R[:, :, 0]
+        found = side(FIGURE, moved, tolerance=tolerance)
+        assert (found.violated == rejected).all()
+        np.testing.assert_allclose(found.value, least + beyond, rtol=0, atol=1e-12)
+
+
+def test_a_looser_tolerance_never_rejects_a_side_more(rng: np.random.Generator) -> None:
+    points = postures(200) + rng.normal(size=(200, 19, 3)) * 0.03
+    rejected = [
+        side(FIGURE, points, tolerance=tolerance).violated[:, 0] for tolerance in (0, 0.02, 0.04, 0.06, 0.08)
+    ]
+    for strict, loose in pairwise(rejected):
+        assert (strict | ~loose).all()
+    assert rejected[0].any()
+    assert not rejected[-1].any()
+
+
+def test_a_validator_rejects_the_mirror_image_of_a_measured_torso(rng: np.random.Generator) -> None:
+    measured = postures(30)[:, :14] + 1e-4 * rng.normal(size=(30, 14, 3))
+    for tolerance in (0.001, 0.01, 0.03):
+        validator = Validator(rigid_tolerance=tolerance, checks=("rigid-parts",))
+        assert validator.check(measured).valid.all()
+        report = validator.check(measured * [-1, 1, 1])
+        assert report.invalid.all()
+        assert report.fk_distance.min() > 0.07
+        assert (
+            Validator(UNKNOWN, rigid_tolerance=tolerance, checks=("rigid-parts",))
+            .check(measured * [-1, 1, 1])
+            .valid.all()
+        )
+
+
+def test_a_validator_by_medians_takes_the_side_that_positions_show(rng: np.random.Generator) -> None:
+    measured = postures(30)[:, :14] * [-1, 1, 1] + 1e-4 * rng.normal(size=(30, 14, 3))
+    report = Validator(rigid_tolerance=0.001, checks=("rigid-parts",), lengths="median").check(measured)
+    assert report.valid.all()
+    assert report.fk_distance.max() < 0.005
 
 
 def test_a_flat_torso_is_its_own_mirror_image() -> None:
