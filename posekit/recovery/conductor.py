@@ -206,8 +206,8 @@ def _noise(view: View, body: LiftedBody, asked: RecoverSettings, lengths: Length
         Where refinement is asked for that the view or a tolerance forbids, or a deviation that nothing would heed.
     """
     uncalibrated = isinstance(view.camera, ScaledOrthographicModel)
-    able = (uncalibrated or isinstance(view.camera, OpenCVModel)) and isinstance(body, FigureBody)
-    if uncalibrated and able:
+    able = isinstance(view.camera, OpenCVModel) and isinstance(body, FigureBody)
+    if uncalibrated and (isinstance(body, FigureBody) or asked.nearer is None):
         from posekit.recovery.photograph import is_photograph, photograph_noise
 
         able = is_photograph(view, asked)
@@ -245,7 +245,7 @@ def _refiner(grower: Grower, noise: Noise) -> Refiner:
     if isinstance(grower.view.camera, ScaledOrthographicModel):
         from posekit.recovery.photograph import PhotographRefiner
 
-        return PhotographRefiner(grower=grower, noise=noise)
+        return PhotographRefiner.of(grower, noise)
     from posekit.recovery.refiner import Refiner
 
     return Refiner(grower=grower, noise=noise)

@@ -21,8 +21,10 @@ from posekit.body.anthropometry.view_likelihood import USUAL_DISTANCE_METRES
 from posekit.cameras import Camera, ScaledOrthographicCamera
 from posekit.formats.own import PER_METRE, ScaledOrthographicModel, View
 from posekit.geometry import Array
+from posekit.recovery.body import FigureBody
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.fit_scale import fit_scale
+from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import LATERAL_DEVIATIONS, LEAST_STEP_METRES, ObservedHypotheses
 from posekit.recovery.key_point_offsets import PIXEL_DEVIATION, joint_offsets
 from posekit.recovery.noise import LEAST_CONFIDENCE, Noise
@@ -96,6 +98,14 @@ class PhotographRefiner(Refiner):
     """
 
     loosened: float = 1.0
+
+    @staticmethod
+    def of(grower: Grower, noise: Noise) -> PhotographRefiner:
+        """Make one; where the tree is of other points than the figure's joints, the figure's is refined."""
+        if not isinstance(grower.body, FigureBody):
+            body = FigureBody(figure=grower.body.figure, stature=grower.body.stature)
+            grower = replace(grower, body=body)
+        return PhotographRefiner(grower=grower, noise=noise)
 
     @cached_property
     def trunk(self) -> SeenTrunk:

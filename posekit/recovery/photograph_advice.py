@@ -44,7 +44,7 @@ def photographs_of(recovery: Recovery) -> PhotographRefiner | None:
     noise = recovery.settings.get("noise")
     if recovery.grower is None or noise is None:
         return None
-    return PhotographRefiner(grower=recovery.grower, noise=Noise.from_document(noise))
+    return PhotographRefiner.of(recovery.grower, Noise.from_document(noise))
 
 
 def photograph_line(refiner: PhotographRefiner, frame: int) -> str:

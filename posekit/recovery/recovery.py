@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.formats.own import Family, Inferred, Root
 from posekit.geometry import Array
+from posekit.objects.mirror import mirrored
 from posekit.ranking import Ranking, deviation_of_tolerance
 from posekit.recovery.camera_record import CameraRecords
 from posekit.recovery.grouping import group_postures
@@ -22,7 +23,7 @@ from posekit.recovery.ranked import ranked
 from posekit.recovery.rooting import root_of
 from posekit.recovery.trees import Batch
 from posekit.settings import Judged, Tolerance
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import JOINT, JOINTS, PARENTS
 
 if TYPE_CHECKING:
     from posekit.cameras.neck import NeckPlacement
@@ -30,6 +31,9 @@ if TYPE_CHECKING:
     from posekit.recovery.fit_camera import CameraFit
     from posekit.recovery.grower import Grower
     from posekit.recovery.refined import RefinedSurvivors
+
+REFINED_LEVEL_METRES: Final = 0.05
+"""Metres of depth up to which neither end of a refined segment is nearer: what photographs leave open."""
 
 
 def _inferred(completion: CompletedSurvivors, row: int) -> dict[str, Inferred]:
@@ -148,7 +152,12 @@ class FrameRecovery:
     @property
     def mirrored(self) -> int:
         """How many survivors have their mirror image among the survivors."""
-        return 0 if self.batch is None else int(self.batch.mirrored[self._rows].sum())
+        if self.batch is None:
+            return 0
+        if self.refined is None:
+            return int(self.batch.mirrored[self._rows].sum())
+        one_tree = np.zeros(len(self), dtype=np.intp)
+        return int(mirrored(self.joints[..., 2], PARENTS, one_tree, level=REFINED_LEVEL_METRES).sum())
 
     @property
     def inferred(self) -> list[dict[str, Inferred]] | None:
