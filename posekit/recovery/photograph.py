@@ -142,6 +142,10 @@ class PhotographRefiner(Refiner):
         of_points[:, : len(JOINTS)] = deviation
         return ObservedHypotheses(sight=sight, deviation=of_points, focal=scale, step=0.0)
 
+    def _with_heads(self, lifted: Lifted) -> ObservedFrames:
+        """Return what was seen without the head, whose points in a picture are not the figure's."""
+        return lifted.seen.sight
+
     def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
         """Return which joints of leaves (N, 14) are told: not those that only their neighbours place."""
         told = self.trunk.told[lifted.frames[lifted.frame[lifted.hypothesis]]]

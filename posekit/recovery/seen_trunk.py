@@ -87,4 +87,5 @@ def _missing(seen: list[bool]) -> str:
     if len(there) >= FEWEST_TRUNK_JOINTS:
         return ""
     names = ", ".join(JOINTS[:N_TRUNK_JOINTS])
-    return f"{there[0] if there else 'none'} of {names} is seen; a posture needs at least {FEWEST_TRUNK_JOINTS} of them"
+    one = f"only {there[0]}" if there else "none"
+    return f"{one} of {names} is seen; a posture needs at least {FEWEST_TRUNK_JOINTS} of them"
