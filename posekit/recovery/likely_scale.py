@@ -22,7 +22,8 @@ from posekit.recovery.key_point_offsets import LENGTH_DEVIATION, PIXEL_DEVIATION
 from posekit.skeleton import JOINT, SIDES
 
 FIRST_SHARE: Final = 0.9
-"""Of Taylor's bound, where the search begins: the longest image is usually some longer than its segment."""
+"""Of what the second longest image asks for, where the search begins: the longest may be an outlier, and both are
+usually some longer than their segments."""
 
 
 class LikelyScales(NamedTuple):
@@ -55,9 +56,10 @@ def likely_scales(image: Array, figure: Figure) -> LikelyScales:
     scale, deviation = np.full((2, len(image)), np.nan)
     dimensions = dimensions_of(figure.lengths)
     full = np.array([dimensions[name] for name in BODY_DIMENSIONS])
+    ratios = np.sort(np.nan_to_num(seen[usable] / full), axis=1)
     likelihood = ViewLikelihood(
         seen=seen[usable],
-        first=np.log(FIRST_SHARE * np.nanmax(seen[usable] / full, axis=1)),
+        first=np.log(FIRST_SHARE * np.where(ratios[:, -2] > 0, ratios[:, -2], ratios[:, -1])),
         scale_known=False,
         relief=depth_reliefs(),
         loose=np.sqrt(length_looseness() ** 2 + LENGTH_DEVIATION**2 + (_off(joint_offsets()) / full) ** 2),

@@ -49,6 +49,10 @@ the farther a joint is from the middle of the body's picture, the farther off it
 OVERLAP_METRES: Final = 0.06
 """Metres by which bodies may overlap: joints deviate by 3 to 5 cm in the picture, and by more in depth."""
 
+LIFTED_CHI2: Final = 1000.0
+"""A chi2 up to which a lifted leaf is followed: where joints are off by centimetres, angles are off by tens of degrees,
+many deviations of a limit beyond it, which the first steps mend."""
+
 ANY_LENGTH: Final = Tolerance(rigid=10.0, tangent=10.0, placement=False)
 """At a scale that is given, segments may be too short for their image here: refinement weighs by how much."""
 
@@ -110,7 +114,8 @@ class PhotographRefiner(Refiner):
     @cached_property
     def trunk(self) -> SeenTrunk:
         """What each frame shows, with a point for each joint of the trunk."""
-        return with_trunk(self.grower.view.image, self.grower.body.figure, joint_offsets())
+        view = self.grower.view
+        return with_trunk(view.image, self.grower.body.figure, joint_offsets(), view.derived)
 
     @cached_property
     def fit(self) -> CameraFit:
@@ -142,6 +147,11 @@ class PhotographRefiner(Refiner):
         of_points[:, : len(JOINTS)] = deviation
         return ObservedHypotheses(sight=sight, deviation=of_points, focal=scale, step=0.0)
 
+    @property
+    def hopeless(self) -> float:
+        """The chi2 beyond which a leaf may be given up: a lifted one may be far beyond the limits."""
+        return LIFTED_CHI2
+
     def _with_heads(self, lifted: Lifted) -> ObservedFrames:
         """Return what was seen without the head, whose points in a picture are not the figure's."""
         return lifted.seen.sight
@@ -165,7 +175,8 @@ class PhotographRefiner(Refiner):
         confidence = np.clip(
             np.nan_to_num(self.grower.view.confidence[frames, : len(JOINTS)], nan=1.0), LEAST_CONFIDENCE, 1.0
         )
-        metres = (image - np.nanmean(image, axis=1, keepdims=True)) / scale[:, None, None]
+        middle = image[:, :N_TRUNK_JOINTS].mean(axis=1, keepdims=True)
+        metres = (image - middle) / scale[:, None, None]
         aside = np.nan_to_num(np.linalg.norm(metres, axis=2))
         near = RELIEF_METRES / USUAL_DISTANCE_METRES * aside
         off = scale[:, None] * np.hypot(offset, near)

@@ -257,7 +257,13 @@ class Refiner:
             lifted.frame[lifted.hypothesis],
             self.certifying,
             self.known(lifted),
+            self.hopeless,
         )
+
+    @property
+    def hopeless(self) -> float | None:
+        """The chi2 beyond which a leaf may be given up, where it is not what is usual."""
+        return None
 
     def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
         """Return which joints of leaves (N, 14) are told, where the leaves have others too."""

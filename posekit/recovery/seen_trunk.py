@@ -1,13 +1,14 @@
 r"""Image points of a trunk of which a picture shows a part: what is not seen is where its neighbours leave it.
 
-Two shoulders have the neck between them, and the pelvis lies on the line from there to the middle of the hips. What
-neither tells hangs on the nearest joint that is seen: at the distance l in an unknown direction, so that each
-coordinate deviates from that joint's own by :math:`l / \sqrt 3`.
+Two shoulders have the neck between them, and the pelvis lies on the line from there to the middle of the hips, beside
+which the figure's own are: the waist bends. What neither tells hangs on the nearest joint that is seen. At the distance
+l in an unknown direction, each coordinate deviates by :math:`l / \sqrt 3`.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINT, JOINTS
 from posekit.views.person_view import pelvis_fraction
 
 N_TRUNK_JOINTS: Final = 6
@@ -46,7 +47,7 @@ class SeenTrunk(NamedTuple):
     reasons: list[str]
 
 
-def with_trunk(image: Array, figure: Figure, offset: Array) -> SeenTrunk:
+def with_trunk(image: Array, figure: Figure, offset: Array, derived: Collection[str] = ()) -> SeenTrunk:
     """Put the joints of the trunk that are not seen where those that are leave them.
 
     Parameters
@@ -57,22 +58,29 @@ def with_trunk(image: Array, figure: Figure, offset: Array) -> SeenTrunk:
         Whose trunk it is.
     offset : array (14,)
         Standard deviation of what is seen, metres.
+    derived : collection of str
+        Joints that were put between others by now, and are no more seen than those that are put so here.
     """
     image = image.copy()
     offsets = np.broadcast_to(offset, image.shape[:2]).copy()
     seen = np.asarray(np.isfinite(image).all(axis=2))
+    seen[:, [JOINT[name] for name in derived]] = False
     reasons = [_missing(one) for one in seen[:, :N_TRUNK_JOINTS].tolist()]
     neck, right, left, pelvis, right_hip, left_hip = range(N_TRUNK_JOINTS)
     fraction = pelvis_fraction(figure)
     shoulders = (image[:, right] + image[:, left]) / 2
     hips = (image[:, right_hip] + image[:, left_hip]) / 2
-    for joint, between in ((neck, shoulders), (pelvis, shoulders + fraction * (hips - shoulders))):
+    own = figure.neutral_points
+    for joint, between, sides in (
+        (neck, shoulders, (right, left)),
+        (pelvis, shoulders + fraction * (hips - shoulders), (right_hip, left_hip)),
+    ):
         rows = np.flatnonzero(~seen[:, joint] & np.isfinite(between).all(axis=1))
         image[rows, joint] = between[rows]
+        beside = float(np.linalg.norm(own[joint] - own[list(sides)].mean(axis=0)))
+        offsets[rows, joint] = np.hypot(offset[joint], beside / math.sqrt(3))
         seen[rows, joint] = True
-    apart = np.linalg.norm(
-        figure.neutral_points[:N_TRUNK_JOINTS, None] - figure.neutral_points[None, :N_TRUNK_JOINTS], axis=2
-    )
+    apart = np.linalg.norm(own[:N_TRUNK_JOINTS, None] - own[None, :N_TRUNK_JOINTS], axis=2)
     for joint in range(N_TRUNK_JOINTS):
         rows = np.flatnonzero(~seen[:, joint] & seen[:, :N_TRUNK_JOINTS].any(axis=1))
         nearest = np.where(seen[rows, :N_TRUNK_JOINTS], apart[joint], np.inf).argmin(axis=1)

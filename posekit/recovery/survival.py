@@ -123,13 +123,16 @@ def refine_leaves(
     frame: NDArray[np.intp],
     checks: Sequence[Check],
     known: NDArray[np.bool_] | None = None,
+    hopeless: float | None = None,
 ) -> LeafOutcomes:
     """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject and merge frame by frame (N,).
 
-    Joints that are not `known` (N, 14), if it is given, are not told, though the leaves have them.
+    Joints that are not `known` (N, 14), if it is given, are not told, though the leaves have them. A chi2 is `hopeless`
+    where nothing else is said as `HOPELESS_CHI2` says.
     """
     parts = []
-    hopeless = HOPELESS_CHI2 if sight.walls is None else HOPELESS_CHI2_AT_WALLS
+    if hopeless is None:
+        hopeless = HOPELESS_CHI2 if sight.walls is None else HOPELESS_CHI2_AT_WALLS
     for rows in blocks(frame, LEAVES_AT_ONCE):
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=hopeless)
