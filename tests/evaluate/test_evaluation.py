@@ -373,8 +373,8 @@ def test_nothing_that_can_be_recovered_is_refused(seen: View) -> None:
 def test_a_clip_without_a_body_is_left_out_and_said(tmp_path: Path) -> None:
     content = arrays()
     joints = content["joints"].copy()
-    hips = [JOINTS.index(f"{side}_hip") for side in ("right", "left")]
-    joints[20:, JOINTS.index("pelvis")] = joints[20:, hips].mean(axis=1)  # on a line: no plane of the hips
+    right, left = (JOINTS.index(f"{side}_shoulder") for side in ("right", "left"))
+    joints[20:, left] = joints[20:, right]  # no breadth
     np.savez(tmp_path / "odd.npz", **{**content, "joints": joints})
     found = evaluate(
         read_capture(tmp_path / "odd.npz"), sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,))
@@ -382,6 +382,19 @@ def test_a_clip_without_a_body_is_left_out_and_said(tmp_path: Path) -> None:
     assert len(found.frames) == 3 * len(SWEEP)
     assert found.material.left_out[0].startswith("clip fast: ")
     assert "left out: clip fast" in "\n".join(summary(found))
+
+
+def test_a_clip_with_the_pelvis_between_the_hips_is_evaluated(tmp_path: Path) -> None:
+    content = arrays()
+    joints = content["joints"].copy()
+    hips = [JOINTS.index(f"{side}_hip") for side in ("right", "left")]
+    joints[20:, JOINTS.index("pelvis")] = joints[20:, hips].mean(axis=1)
+    np.savez(tmp_path / "middle.npz", **{**content, "joints": joints})
+    found = evaluate(
+        read_capture(tmp_path / "middle.npz"), sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0,))
+    )
+    assert len(found.frames) == 6 * len(SWEEP)
+    assert not found.material.left_out
 
 
 def test_a_person_outside_the_picture_is_left_out_and_counted(capture: Capture) -> None:
