@@ -156,10 +156,10 @@ class PhotographRefiner(Refiner):
         """Return what was seen without the head, whose points in a picture are not the figure's."""
         return lifted.seen.sight
 
-    def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
-        """Return which joints of leaves (N, 14) are told: not those that only their neighbours place."""
+    def untold(self, lifted: Lifted) -> NDArray[np.bool_] | None:
+        """Return which joints of leaves (N, 14) are not told: those of a trunk that only their neighbours place."""
         told = self.trunk.told[lifted.frames[lifted.frame[lifted.hypothesis]]]
-        return told | (np.arange(len(JOINTS)) >= N_TRUNK_JOINTS)
+        return ~told & (np.arange(len(JOINTS)) < N_TRUNK_JOINTS)
 
     def to_complete(self, trunks: Trunks, own: NDArray[np.intp]) -> Array:
         """Return image points (H, 14, 2): limbs are completed on trunks that are told, and else stay unknown."""

@@ -22,6 +22,7 @@ from posekit.recovery.grouping import group_postures
 from posekit.recovery.ranked import ranked
 from posekit.recovery.rooting import root_of
 from posekit.recovery.trees import Batch
+from posekit.recovery.untold import untold_regions
 from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 
@@ -164,9 +165,15 @@ class FrameRecovery:
         """What is known of joints that were not seen, by survivor; None where all were."""
         if self.batch is None:
             return None
+        rows = range(self._rows.start, self._rows.stop)
+        found: list[dict[str, Inferred]] = [{} for _ in rows]
         if self.batch.completion is not None:
-            rows = range(self._rows.start, self._rows.stop)
-            return [_inferred(self.batch.completion, row) for row in rows]
+            found = [_inferred(self.batch.completion, row) for row in rows]
+        if self.batch.untold is not None and self.refined is not None:
+            regions = untold_regions(self.refined, self.batch.untold[self._rows])
+            found = [one | region for one, region in zip(found, regions, strict=True)]
+        if self.batch.completion is not None or any(found):
+            return found
         if not self.batch.body.inferred:
             return None
         columns = [JOINT[name] for name in self.batch.body.inferred]

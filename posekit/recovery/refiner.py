@@ -256,7 +256,6 @@ class Refiner:
             lifted.hypothesis,
             lifted.frame[lifted.hypothesis],
             self.certifying,
-            self.known(lifted),
             self.hopeless,
         )
 
@@ -265,8 +264,8 @@ class Refiner:
         """The chi2 beyond which a leaf may be given up, where it is not what is usual."""
         return None
 
-    def known(self, lifted: Lifted) -> NDArray[np.bool_] | None:
-        """Return which joints of leaves (N, 14) are told, where the leaves have others too."""
+    def untold(self, lifted: Lifted) -> NDArray[np.bool_] | None:
+        """Return which joints of leaves (N, 14) are not told by the image, though the leaves have them."""
         return None
 
     def _with_heads(self, lifted: Lifted) -> ObservedFrames:
@@ -295,6 +294,7 @@ class Refiner:
             completion=None if lifted.completion is None else lifted.completion.take(outcomes.kept),
             refined=outcomes.survivors,
             spread=self.spread(lifted),
+            untold=None if (untold := self.untold(lifted)) is None else untold[outcomes.kept],
         )
         bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
         return {

@@ -122,13 +122,11 @@ def refine_leaves(
     hypothesis: NDArray[np.intp],
     frame: NDArray[np.intp],
     checks: Sequence[Check],
-    known: NDArray[np.bool_] | None = None,
     hopeless: float | None = None,
 ) -> LeafOutcomes:
     """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject and merge frame by frame (N,).
 
-    Joints that are not `known` (N, 14), if it is given, are not told, though the leaves have them. A chi2 is `hopeless`
-    where nothing else is said as `HOPELESS_CHI2` says.
+    A chi2 is `hopeless` where nothing else is said as `HOPELESS_CHI2` says.
     """
     parts = []
     if hopeless is None:
@@ -137,14 +135,12 @@ def refine_leaves(
         start = postures[rows]
         refined = refine(sight, start, frame=hypothesis[rows], head=head[rows], hopeless=hopeless)
         refined = replace(refined, frame=frame[rows])
-        told = np.asarray(np.isfinite(start).all(axis=2))
-        if known is not None:
-            told &= known[rows]
+        known = np.asarray(np.isfinite(start).all(axis=2))
         explained = refined.explained()
         likely = np.flatnonzero(explained)
-        joints = np.where(told[likely, :, None], refined.joints[likely], np.nan)
+        joints = np.where(known[likely, :, None], refined.joints[likely], np.nan)
         found = contradictions(checks, np.concatenate([joints, refined.head[likely]], axis=1), likely)
-        parts.append(LeafOutcomes.of(refined, told, explained, found))
+        parts.append(LeafOutcomes.of(refined, known, explained, found))
     return LeafOutcomes.joined(parts)
 
 

@@ -55,6 +55,8 @@ class Batch:
         The likeliest postures near the leaves, where the noise is known.
     spread : float
         How far off these are, metres (`posekit.ranking.deviation_of_noise`).
+    untold : bool array (N, 14), optional
+        Refined joints that were not seen, and are where their neighbours leave them.
     """
 
     leaves: Leaves
@@ -67,6 +69,7 @@ class Batch:
     completion: CompletedSurvivors | None = None
     refined: RefinedSurvivors | None = None
     spread: float = 0.0
+    untold: NDArray[np.bool_] | None = None
 
     @cached_property
     def points(self) -> Array:

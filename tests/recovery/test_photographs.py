@@ -189,8 +189,18 @@ def test_a_part_of_a_body_has_a_posture_which_tells_what_is_seen(hidden: tuple[s
     recovery = recover(view_of(image), infer=False)
     for frame in recovery.frames:
         assert len(frame)
-        known = np.isfinite(frame.joints[:, TWELVE]).all(axis=(0, 2))
-        assert known.tolist() == [JOINTS[k] not in hidden for k in TWELVE]
+        assert frame.inferred is not None
+        trunk = {name for name in hidden if JOINT[name] < 6}
+        for joints, inferred in zip(frame.joints, frame.inferred, strict=True):
+            # A joint of the trunk is a region about the likeliest posture's, one of a limb is left open.
+            assert trunk <= set(inferred)
+            assert not set(inferred) & {JOINTS[k] for k in TWELVE} - trunk
+            for name in trunk:
+                region = inferred[name]
+                assert ((region.lower < joints[JOINT[name]]) & (joints[JOINT[name]] < region.upper)).all()
+                assert region.radius > 0.05
+            known = np.isfinite(joints[TWELVE]).all(axis=1)
+            assert known.tolist() == [JOINTS[k] not in set(hidden) - trunk for k in TWELVE]
 
 
 def test_what_hangs_on_the_nearest_joint_is_as_uncertain_as_it_is_far() -> None:
