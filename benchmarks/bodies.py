@@ -163,6 +163,8 @@ def shots_of(capture: Capture, frames: int, seed: int) -> list[Shots]:
     clips = [capture.frames_of(k, complete=True) for k in range(len(capture.names))]
     for k, known in enumerate(clips):
         share = min(len(known), frames // len(clips) + (k < frames % len(clips)))
+        if not share:
+            continue
         rows = known[np.round(np.linspace(0, len(known) - 1, share)).astype(np.intp)]
         ground = float((capture.points[known, : len(JOINTS)] @ capture.up).min())
         level = np.arange(share) % 2 == 0

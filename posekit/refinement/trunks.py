@@ -56,6 +56,9 @@ N_CHOICES_FOLLOWED = 2
 MAX_STEPS = 12
 """Steps of each search for a trunk: what it finds is a start, refined again with its limbs."""
 
+MAX_STEPS_IN_DOUBT = 40
+"""The same where all choices are followed, since none of the likeliest led to a trunk that the noise can explain."""
+
 SAME_TRUNK_METRES = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
 
@@ -95,6 +98,13 @@ class Trunks:
     def __len__(self) -> int:
         """Count the trunks."""
         return len(self.frame)
+
+    def joined(self, others: Trunks) -> Trunks:
+        """Put in those of other frames."""
+        order = np.argsort(np.concatenate([self.frame, others.frame]), kind="stable")
+        names = ("frame", "joints", "image", "chi2", "dof", "p")
+        both = {name: np.concatenate([getattr(self, name), getattr(others, name)])[order] for name in names}
+        return Trunks(**both)
 
     @property
     def root(self) -> Array:
@@ -158,6 +168,28 @@ def find_trunks(
     in_front = isinstance(observed.camera, ScaledOrthographicCamera) | (observed.root.mean[:, 2] > 0)
     known = np.flatnonzero(np.isfinite(observed.root.mean).all(axis=1) & in_front)
     one = observed.problem(known, observed.root.mean[known]).trunk_alone()
+    found, least = _followed(observed, known, one, (N_CHOICES_FOLLOWED, MAX_STEPS), level, within)
+    doubtful = np.flatnonzero(np.isin(known, found.frame, invert=True) & (least < PROMISING_CHI2))
+    if not len(doubtful):
+        return found
+    every = N_CHOICES, MAX_STEPS_IN_DOUBT
+    again, _ = _followed(observed, known[doubtful], one.take(doubtful), every, level, within)
+    return found.joined(again)
+
+
+def _followed(
+    observed: ObservedFrames,
+    known: NDArray[np.intp],
+    one: RefinementProblem,
+    effort: tuple[int, int],
+    level: float,
+    within: float,
+) -> tuple[Trunks, Array]:
+    """Follow the likeliest choices of frames (F,) and mirror images of the best: trunks, and each frame's least chi2.
+
+    The `effort` is how many choices, and with how many steps.
+    """
+    choices, steps = effort
     every = np.repeat(np.arange(len(known)), N_CHOICES)
     starts, chi2 = [], []
     for factor in _depth_factors(observed, known):
@@ -171,14 +203,14 @@ def find_trunks(
     # Of each near and far choice the depth that fits best, then the choices that fit best.
     depth = np.argmin(chi2, axis=0)
     best_of = np.min(chi2, axis=0).reshape(len(known), N_CHOICES)
-    order = np.argsort(best_of, axis=1, kind="stable")[:, :N_CHOICES_FOLLOWED]
+    order = np.argsort(best_of, axis=1, kind="stable")[:, :choices]
     chosen = (np.arange(len(known))[:, None] * N_CHOICES + order).reshape(-1)
     which = np.repeat(np.arange(len(known)), order.shape[1])
     begin = starts[0].take(chosen)
     for k, other in enumerate(starts[1:], start=1):
         rows = np.flatnonzero(depth[chosen] == k)
         begin.put(rows, other.take(chosen[rows]))
-    first = descend(one.take(which), begin, steps=MAX_STEPS)
+    first = descend(one.take(which), begin, steps=steps)
     best = (
         np.argmin(first.chi2.reshape(len(known), order.shape[1]), axis=1)
         + np.arange(len(known)) * order.shape[1]
@@ -187,7 +219,7 @@ def find_trunks(
     if one.anatomy.middle_pelvis:
         turned = turned._replace(hips=turned_by_spine(turned.torso, turned.hips))
     again = np.tile(np.arange(len(known)), 3)
-    second = descend(one.take(again), turned, steps=MAX_STEPS, hopeless=PROMISING_CHI2)
+    second = descend(one.take(again), turned, steps=steps, hopeless=PROMISING_CHI2)
     state = PostureState(
         *(np.concatenate(pair, axis=-1) for pair in zip(first.state, second.state, strict=True))
     )
@@ -203,7 +235,10 @@ def find_trunks(
     keep = keep[np.lexsort((value[keep], known[row[keep]]))]
     leader = groups_of(known[row[keep]], joints[keep], within)
     keep = keep[leader == np.arange(len(keep))]
-    return _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
+    least = np.full(len(known), np.inf)
+    np.minimum.at(least, row, np.where(finite, value, np.inf))
+    found = _trunks(observed, one, known[row[keep]], joints[keep], value[keep], dof[keep], p[keep], row[keep])
+    return found, least
 
 
 def _trunks(

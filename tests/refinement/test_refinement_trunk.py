@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.body import Figure, load_figure
+from posekit.body.uncertainty import STATED_LENGTHS
 from posekit.cameras import PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError
 from posekit.geometry import Array
@@ -26,7 +27,7 @@ from posekit.refinement import (
     under_noise,
 )
 from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
-from posekit.synthesis import SyntheticScene, random_views
+from posekit.synthesis import CameraSphere, SyntheticScene, random_views
 from posekit.tree import Check, InterpretationTree
 from posekit.validators import load_ranges, make_checks
 
@@ -288,3 +289,29 @@ def test_tolerances_of_nonsense_are_refused(field: str, value: float) -> None:
         tolerance_of(camera=scene().camera, figure=figure(), **given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="bound"):
         NoisyRange(inner=ranges()[0], bound=value)
+
+
+@pytest.mark.parametrize("seed", [6, 15, 17])
+def test_a_frame_whose_trunk_the_noise_explains_has_one_where_lengths_are_off(seed: int) -> None:
+    # Seen from near by, of a body with wide shoulders and a short spine: the likeliest choices lead astray.
+    rng = np.random.default_rng(seed)
+    lengths = {"neck-right_shoulder": 0.203, "neck-left_shoulder": 0.207, "neck-pelvis": 0.351}
+    lengths |= {"right_shoulder-pelvis": 0.442, "left_shoulder-pelvis": 0.449, "right_hip-left_hip": 0.184}
+    lengths |= {"pelvis-right_hip": 0.141, "pelvis-left_hip": 0.143, "right_shoulder-left_shoulder": 0.398}
+    person = figure().scaled(lengths)
+    view = random_views(person, 300, rng, sphere=CameraSphere(distance=(1.8, 2.2), f=900.0))
+    given_lengths = {name: size * (1 + 0.04 * rng.standard_normal()) for name, size in person.lengths.items()}
+    image = view.with_noise(2.0, rng).image.copy()
+    image[:, 6:] = np.nan
+    sight = ObservedFrames(
+        figure=figure().scaled(given_lengths),
+        camera=view.camera,
+        image=image,
+        deviation=2.0,
+        root=RootPrior.along_ray(view.camera, view.joints_cam[:, 0], depth=0.0),
+        length_deviation=STATED_LENGTHS.own,
+        size_deviation=STATED_LENGTHS.common,
+    )
+    explained = np.flatnonzero(refine(sight, view.joints_cam).explained())
+    assert len(explained) > 290
+    assert set(explained.tolist()) <= set(find_trunks(sight).frame.tolist())
