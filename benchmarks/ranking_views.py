@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from benchmarks.studies.prior_fitting import DEFAULT_TEMPERATURE, fit_prior
 from posekit.body import Figure
+from posekit.body.uncertainty import MEASURED_LENGTHS
 from posekit.formats.own import View
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance
 from posekit.recovery import recover
-from posekit.refinement import MEASURED_LENGTH_DEVIATIONS, ObservedFrames, RootPrior, merge, refine
+from posekit.refinement import ObservedFrames, RootPrior, merge, refine
 from posekit.settings import MEASURED_TOLERANCE, Rooting, Tolerance
 from posekit.synthesis import Capture, SyntheticScene, mocap_scenes
 from posekit.validators import load_ranges
@@ -159,7 +160,7 @@ def _refined(
         image=view.image,
         deviation=noise,
         root=root,
-        length_deviation=MEASURED_LENGTH_DEVIATIONS,
+        length_deviation=MEASURED_LENGTHS.own,
     )
     found = refine(sight, joints, frame=frame, hopeless=HOPELESS)
     kept = np.zeros(len(found), dtype=np.bool_)

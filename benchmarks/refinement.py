@@ -24,13 +24,13 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
 from posekit.body import Figure, load_figure
+from posekit.body.uncertainty import MEASURED_LENGTHS
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.recovery.noise import Noise
 from posekit.recovery.refiner import Refiner
 from posekit.recovery.result import result_of
 from posekit.refinement import (
-    MEASURED_LENGTH_DEVIATIONS,
     ObservedFrames,
     RootPrior,
     Trunks,
@@ -445,7 +445,7 @@ def real(capture: Path, frames: int) -> None:
                     image=image,
                     deviation=pixels,
                     root=root_prior(scene, 0.0, np.random.default_rng(2)),
-                    length_deviation=MEASURED_LENGTH_DEVIATIONS,
+                    length_deviation=MEASURED_LENGTHS.own,
                 )
                 total.append((len(scene), outcome(sight, fixed(sight, pixels), scene.joints_cam)))
             weight = np.array([count for count, _ in total]) / sum(count for count, _ in total)

@@ -109,6 +109,7 @@ def recover(
     at_their_word = noise is None or _lengths_may_be_right(
         view, asked, own_figure=photographs or figure is not None
     )
+    asked_trunks = noise is None or photographs
     grower = Grower(view=view, fit=fit, body=body, settings=asked, nearer=_nearer(asked, body, len(view)))
     refiner = None
     trees: dict[int, FrameTrees] = {}
@@ -119,6 +120,8 @@ def recover(
             trees |= trees_of(batch, fit, rows)
             inexact = part[~np.isin(fit.frame[part], fit.frame[rows[batch.exact]])]
         uncertain = _distinct(fit.frame[inexact])
+        if at_their_word and not asked_trunks and len(uncertain):
+            at_their_word, asked_trunks = _lengths_fit(view, fit, body), True
         if at_their_word:
             for rows, allowed, judged in _by_tolerance(fit, inexact, tolerance):
                 batch = grower.grow(rows, allowed, judged)
@@ -229,6 +232,13 @@ def _lengths_may_be_right(view: View, asked: RecoverSettings, *, own_figure: boo
     noisy = bool(view.derived) or view.deviation is not None or asked.rooting.deviation is not None
     said = asked.length_deviation if asked.length_deviation is not None else view.length_deviation
     return (own_figure or bool(view.lengths)) and not noisy and not said and not asked.refine
+
+
+def _lengths_fit(view: View, fit: CameraFit, body: LiftedBody) -> bool:
+    """Ask torsos and hips; where all frames are exact, what that needs is not even loaded."""
+    from posekit.recovery.length_evidence import lengths_fit
+
+    return lengths_fit(view, fit, body.figure)
 
 
 def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds | None:

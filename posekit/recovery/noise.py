@@ -15,7 +15,7 @@ from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.settings.rooting import DETECTED_DEVIATION
-from posekit.skeleton import RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
 JOINT_OFFSET: Final = 0.02
 """Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
@@ -25,6 +25,9 @@ LEAST_CONFIDENCE: Final = 0.25
 
 UNSTATED_DEVIATION_PIXELS: Final = 1.0
 """Standard deviation (px) of image points of which nobody says any, of a body whose lengths are not exact."""
+
+HEAD_METRES: Final = 0.2
+"""Metres from the neck to the head's points."""
 
 N_TRUNK_JOINTS: Final = 6
 """Joints of torso and hips: the first six."""
@@ -129,8 +132,11 @@ class Noise:
             Focal length, pixels.
         """
         confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
-        beside = self.offset * focal / depth
-        return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), beside[:, None]))
+        # A head is not larger where limbs are longer: its points are off by as much as its size is.
+        of_head = HEAD_METRES * math.hypot(self.lengths.common, max(self.lengths.own.values()))
+        beside = np.repeat([self.offset, math.hypot(self.offset, of_head)], [len(JOINTS), len(HEAD)])
+        off = beside * (focal / depth)[:, None]
+        return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), off))
 
 
 def noiseless_camera(view: View) -> str:

@@ -3,15 +3,14 @@
 `ObservedFrames` says what was seen and how well; `find_trunks` finds the torsos and hips that the noise allows, from
 which the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves
 into the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge`
-makes one of those that became one. `MEASURED_LENGTH_DEVIATIONS` is how much the lengths of real bodies vary; `diagnose`
-names lengths that are wrong. See docs/noise.md.
+makes one of those that became one. How well lengths are known `posekit.body.LengthUncertainty` says; `diagnose` names
+lengths that are wrong. See docs/noise.md.
 """
 
 from posekit.refinement.allowance import NoisyRange as NoisyRange
 from posekit.refinement.allowance import under_noise as under_noise
 from posekit.refinement.diagnosis import LengthDoubt as LengthDoubt
 from posekit.refinement.diagnosis import diagnose as diagnose
-from posekit.refinement.length_deviations import MEASURED_LENGTH_DEVIATIONS as MEASURED_LENGTH_DEVIATIONS
 from posekit.refinement.merging import Merged as Merged
 from posekit.refinement.merging import merge as merge
 from posekit.refinement.observed_frames import ObservedFrames as ObservedFrames
