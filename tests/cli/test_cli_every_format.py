@@ -29,14 +29,10 @@ def walks(tmp_path_factory: pytest.TempPathFactory, command: Callable[..., Any])
         assert done.code == 0, done.err
     found["postures"] = folder / "postures.npz"
     assert command("convert", found["trc"], found["postures"], "--to", "postures").code == 0
-    arrays = (
-        np.load(found["urdf"] / "configurations.npz")
-        if (found["urdf"] / "configurations.npz").exists()
-        else None
-    )
-    if arrays is not None:
+    if (found["urdf"] / "configurations.npz").exists():
         found["configurations"] = folder / "q.npz"
-        write_configurations(folder / "q.npz", arrays["q"], arrays["configuration_names"].tolist())
+        with np.load(found["urdf"] / "configurations.npz") as arrays:
+            write_configurations(folder / "q.npz", arrays["q"], arrays["configuration_names"].tolist())
     return found
 
 
