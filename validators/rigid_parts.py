@@ -175,7 +175,7 @@ class TorsoPlacement(Check):
         R = torso_frame(*np.moveaxis(points, 1, 0))
         value = self._apart(R, self.torso, points)
         if not self.side_known:
-            mirrored = self._apart(R, self.torso * MIRROR, points) <= self.tolerance
+            mirrored = self._apart(R, self.torso * MIRROR_SIGNS, points) <= self.tolerance
             value = np.where(mirrored & (value > self.tolerance), np.nan, value)
         return Findings(value=value, lower=np.array([-np.inf]), upper=np.array([self.tolerance]))
 
@@ -194,5 +194,5 @@ class TorsoPlacement(Check):
         return Rule(kind=kernels.OF_PLACEMENT, numbers=numbers)
 
 
-MIRROR: Final = np.array([-1.0, 1.0, 1.0])
+MIRROR_SIGNS: Final = np.array([-1.0, 1.0, 1.0])
 """What the torso's coordinates are times in its mirror image: front is back."""

@@ -76,8 +76,8 @@ class Tolerance:
         Metres by which a segment may be too short for its image: its end is then put at the nearest point of
         the ray, and the posture carries what is missing as its length residual.
     placement : bool
-        Whether the torso must also be the figure's own laid onto the posture, which tells it from its mirror
-        image. With centimetres of tolerance that question has no answer.
+        Whether the torso must also be the figure's own laid onto the posture. With centimetres of tolerance only
+        the side on which the shoulders lie is asked, which tells it from its mirror image.
     angle : float
         Degrees by which the direction of a segment may be off, for joint ranges.
     hips : float
