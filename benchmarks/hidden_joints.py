@@ -71,6 +71,7 @@ class Tally:
     """What became of the truth in the frames of one pattern."""
 
     kept: list[bool] = field(default_factory=list)
+    legal: list[bool] = field(default_factory=list)
     empty: int = 0
     survivors: list[int] = field(default_factory=list)
     volume: dict[str, list[float]] = field(default_factory=dict)
@@ -145,6 +146,7 @@ class Tally:
         return [
             str(n),
             f"{np.mean(self.kept):.1%}",
+            f"{np.mean(np.array(self.kept)[self.legal]):.1%}",
             f"{self.empty / n:.1%}",
             f"{np.median(self.survivors):.0f}",
             f"{np.mean(every):.1%}" if every else "-",
@@ -187,11 +189,18 @@ def main(arguments: list[str] | None = None) -> None:
     if given.clips:
         scenes = tuple(scenes[int(k)] for k in given.clips.split(","))
     exact = exact_seconds(32)
+    legal = []
+    for scene in scenes:
+        whole = Tally()
+        for frame, truth in zip(recover(view_of(scene)).frames, scene.joints_cam, strict=True):
+            whole.add(frame, truth, [], {})
+        legal.append(whole.kept)
     rows, lost = [], []
     for pattern in given.only.split(","):
         rng, tally = np.random.default_rng([given.seed, PATTERNS.index(pattern)]), Tally()
-        for scene in scenes:
+        for scene, seen in zip(scenes, legal, strict=True):
             view = view_of(scene)
+            tally.legal += seen
             hidden = [hidden_joints(pattern, rng) for _ in range(len(view))]
             begin = time.process_time()
             recovery = recover(hide(view, hidden))
@@ -204,6 +213,7 @@ def main(arguments: list[str] | None = None) -> None:
         "hidden",
         "frames",
         "truth kept",
+        "of those kept seen",
         "empty",
         "survivors",
         "volume",

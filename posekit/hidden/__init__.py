@@ -8,6 +8,7 @@ such that they pass together (`representatives`, `limb_combinations`), and the s
 """
 
 from posekit.hidden.complete import complete as complete
+from posekit.hidden.complete import complete_points as complete_points
 from posekit.hidden.completion import CompletedSurvivors as CompletedSurvivors
 from posekit.hidden.completion import CompletionOutcome as CompletionOutcome
 from posekit.hidden.completion import PositionKind as PositionKind

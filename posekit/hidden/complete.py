@@ -126,8 +126,9 @@ def complete_points(
         )
         rows = open_[which.reshape(-1) == k]
 
-        def describe(pattern: OcclusionPattern, rows: Index) -> None:
-            for part in _parts(rows, pattern, sampling):
+        def describe(pattern: OcclusionPattern, rows: Index, coarse: OcclusionSampling | None = None) -> None:
+            finely = coarse or sampling
+            for part in _parts(rows, pattern, finely):
                 batch = PatternBatch.of(
                     points=points[part],
                     frame=frame[part],
@@ -135,12 +136,12 @@ def complete_points(
                     figure=figure,
                     rays=rays,
                     tolerance=tolerance,
-                    sampling=sampling,
+                    sampling=finely,
                 )
                 describe_sets(batch, done, part)
 
         if tolerance > EXACT_WITHIN_METRES:
-            complete_by_core(pattern, points, frame, rows, done, describe)
+            complete_by_core(pattern, points, frame, rows, done, describe, within=tolerance)
         else:
             describe(pattern, rows)
     return done.frozen()

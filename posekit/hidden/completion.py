@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
 
 import numpy as np
@@ -160,10 +160,28 @@ class CompletedSurvivors:
             getattr(whole, field.name)[rows] = getattr(self, field.name)
         return whole.frozen()
 
+    def scaled(self, size: Array, margin: Array) -> CompletedSurvivors:
+        """Make bodies so many times larger (N,) about the camera, and regions wider by a margin (N, 14, 3), metres."""
+        wide = np.where(self.inferred[..., None], margin, 0.0)
+        by = size[:, None, None]
+        return replace(
+            self,
+            postures=self.postures * by,
+            lower=self.lower * by - wide,
+            upper=self.upper * by + wide,
+            radius=self.radius * size[:, None] + np.linalg.norm(wide, axis=2),
+            accuracy=self.accuracy * size[:, None],
+        ).frozen()
+
     @property
     def inferred(self) -> Mask:
         """Which joints (N, 14) were not placed by the image."""
         return np.asarray(self.kind != PositionKind.EXACT)
+
+    @property
+    def decided(self) -> Mask:
+        """Which survivors (N,) have a place for every joint that was asked for."""
+        return np.asarray(self.outcome <= CompletionOutcome.COMPLETED)
 
     @property
     def impossible(self) -> Mask:

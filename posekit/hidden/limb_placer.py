@@ -24,7 +24,7 @@ N_BANDS, N_SECTORS = 8, 12
 NEAR_MISS = 3.0
 """Spacings outside a bound that count as a near miss."""
 
-FEWEST_ON_A_TRUNK, FEWEST_TO_REACH, FEWEST_ENDS = 4, 24, 8
+FEWEST_ON_A_TRUNK, FEWEST_TO_REACH, FEWEST_ENDS = 4, 24, 6
 """Positions tried on a measured trunk at least: of a hidden joint, of one that reaches a ray, and of an end."""
 
 N_DESCENTS = 3
@@ -87,9 +87,8 @@ class LimbPlacer:
         crowd = self._crowd
         if self.measured:
             reached = self.states[1] == JointState.SEEN
-            share = max(
-                self.sampling.measured_sphere // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK
-            )
+            every = self.sampling.measured_sphere // (2 if self.both_hidden else 1)
+            share = max(every // crowd, FEWEST_TO_REACH if reached else FEWEST_ON_A_TRUNK)
             return share, FEWEST_ENDS if self.both_hidden else share
         share = max(self.sampling.sphere // crowd, 16)
         if self.both_hidden:

@@ -12,10 +12,11 @@ from posekit.geometry import Array
 from posekit.hidden.completion import CompletedSurvivors, CompletionOutcome
 from posekit.hidden.occlusion_pattern import LIMB_CHAINS, JointState, OcclusionPattern
 from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
+from posekit.hidden.sampling import OcclusionSampling
 from posekit.skeleton import PARENTS
 
-SAME_CORE_METRES: Final = 0.01
-"""Metres between joints that count as one where points were measured: less than those are known by."""
+FEW_SAMPLES: Final = OcclusionSampling(measured_sphere=120, trunk_sphere=500, hip_depths=60, trunks=12)
+"""Enough to find a posture whose limbs do not meet, of which the set is known."""
 
 
 def complete_by_core(
@@ -24,7 +25,9 @@ def complete_by_core(
     frame: Index,
     rows: Index,
     done: CompletedSurvivors,
-    describe: Callable[[OcclusionPattern, Index], None],
+    describe: Callable[[OcclusionPattern, Index, OcclusionSampling | None], None],
+    *,
+    within: float,
 ) -> None:
     """Complete survivors with one pattern: one of each core, then the others as that one.
 
@@ -44,21 +47,34 @@ def complete_by_core(
     done : CompletedSurvivors
         What is written to.
     describe : callable
-        Completes some survivors as a pattern says.
+        Completes some survivors as a pattern says, if not told otherwise with the sampling that was asked for.
+    within : float
+        Metres between joints that count as one.
     """
-    leader = _leaders(frame[rows], points[rows][:, list(pattern.core)])
+    leader = _leaders(frame[rows], points[rows][:, list(pattern.core)], within)
     first = np.flatnonzero(leader == np.arange(len(rows)))
     known = {joint for limb in LIMB_CHAINS if limb not in pattern.limbs for joint in limb.free}
     own = replace(pattern, checks=[check for check in pattern.checks if not known & set(check.points)])
-    describe(own, rows[first])
+    describe(own, rows[first], None)
     others = np.flatnonzero(leader != np.arange(len(rows)))
     _copy(pattern, points, done, rows[leader[others]], rows[others])
     completed = rows[done.outcome[rows] == CompletionOutcome.COMPLETED]
     whole = points[completed].copy()
     whole[:, list(pattern.unknown)] = done.postures[completed][:, list(pattern.unknown)]
     passed, _ = judge_rows(pattern.relevant_checks, PostureRows.of(whole))
-    if not passed.all():
-        describe(pattern, completed[~passed])
+    left = completed[~passed]
+    for sampling in (FEW_SAMPLES, None):
+        if len(left):
+            joints = np.ix_(left, pattern.unknown)
+            lower, upper = done.lower[joints], done.upper[joints]
+            describe(pattern, left, sampling)
+            done.lower[joints] = np.fmin(lower, done.lower[joints])
+            done.upper[joints] = np.fmax(upper, done.upper[joints])
+            middle = done.postures[joints]
+            done.radius[joints] = np.linalg.norm(
+                np.maximum(middle - done.lower[joints], done.upper[joints] - middle), axis=-1
+            )
+            left = left[done.outcome[left] != CompletionOutcome.COMPLETED]
 
 
 def _copy(
@@ -83,7 +99,7 @@ def _copy(
             places[target, joint] += shift
 
 
-def _leaders(frame: Index, core: Array) -> Index:
+def _leaders(frame: Index, core: Array, within: float) -> Index:
     """Return of each survivor (N,) the first of its frame whose core (N, J, 3) is the same."""
     n = len(frame)
     leader = np.full(n, -1)
@@ -92,5 +108,5 @@ def _leaders(frame: Index, core: Array) -> Index:
             continue
         near = np.flatnonzero((frame == frame[row]) & (leader < 0))
         apart = np.abs(core[near] - core[row]).max(axis=(1, 2), initial=0.0)
-        leader[near[apart <= SAME_CORE_METRES]] = row
+        leader[near[apart <= within]] = row
     return leader

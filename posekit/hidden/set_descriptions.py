@@ -23,8 +23,14 @@ BOX_END_STEPS, BOX_END_STEPS_FOUR_ANGLES, BOX_END_STEPS_MANY_TRUNKS = 0.125, 0.0
 Measured against rejection sampling: see the documentation.
 """
 
+PLACED_WITHIN_METRES = 0.01
+"""Metres by which a joint that was measured is off, where nothing else is said."""
+
 TRUNK_LOOSENESS = 2.0
 """By how much more than a limb's joints are those of a measured trunk off: spines and clavicles are no bones."""
+
+SEEN_LOOSENESS = 3.0
+"""The same of joints that were seen, beyond hidden ones: where a ray is nearly tangent, depth is off by more."""
 
 
 def describe_sets(batch: PatternBatch, done: CompletedSurvivors, part: Index) -> None:
@@ -55,8 +61,9 @@ def _widen(batch: PatternBatch, done: CompletedSurvivors, part: Index) -> None:
     """Widen what samples reach by half their distance, and by what measured points may be off; to the reach at most."""
     for joint in batch.pattern.unknown:
         parent, reach = PARENTS[joint], batch.length(joint) + batch.tolerance
-        loose = TRUNK_LOOSENESS if joint in TRUNK_JOINTS else 1.0
-        margin = done.accuracy[part, joint] + loose * batch.tolerance
+        seen = batch.pattern.states[joint] == JointState.SEEN
+        loose = SEEN_LOOSENESS if seen else TRUNK_LOOSENESS if joint in TRUNK_JOINTS else 1.0
+        margin = done.accuracy[part, joint] + loose * min(batch.tolerance, PLACED_WITHIN_METRES)
         lower, upper = done.lower[part, joint] - margin[:, None], done.upper[part, joint] + margin[:, None]
         done.lower[part, joint] = np.maximum(lower, done.lower[part, parent] - reach)
         done.upper[part, joint] = np.minimum(upper, done.upper[part, parent] + reach)

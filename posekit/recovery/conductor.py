@@ -135,7 +135,12 @@ def recover(
                 uncertain = uncertain[empty]
         if noise is not None and not photographs and len(uncertain):
             refiner = refiner or _refiner(grower, noise)
-            trees |= refiner.grow(uncertain)
+            # Survivors without a place for what was not seen are still more than none.
+            trees |= {
+                k: one
+                for k, one in refiner.grow(uncertain).items()
+                if one.survivors or not _grown(trees.get(k))
+            }
         if progress is not None:
             progress(len(_distinct(fit.frame[part])))
     if photographs and noise is not None:
@@ -298,6 +303,11 @@ def _parts(fit: CameraFit) -> Iterator[NDArray[np.intp]]:
         if k == len(first) or following - start > most:
             yield usable[start:end]
             start = end
+
+
+def _grown(trees: FrameTrees | None) -> bool:
+    """Whether anything survives in a frame's trees."""
+    return trees is not None and trees.rows.stop > trees.rows.start
 
 
 def _refuse_impossible(frames: Sequence[FrameRecovery]) -> None:

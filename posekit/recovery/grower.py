@@ -169,21 +169,36 @@ class Grower:
         Where less than two of shoulders and pelvis are seen, the trunk could be nearly anywhere: nothing is said. Nor
         where too much is hidden in too many survivors (`MOST_HIDDEN`), which is warned of.
         """
-        asked = wanted if wanted is not None else np.full(len(image), self.settings.infer)
-        unseen = np.asarray(np.isnan(image).any(axis=2))
-        measured = tolerance.tangent > EXACT_TOLERANCE.tangent
-        placed = ((~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2) | measured
-        hidden = np.bincount(leaves.frame, minlength=len(image)) * unseen.sum(axis=1)
-        too_many = np.bincount(frame, hidden)[frame] > (MOST_HIDDEN_MEASURED if measured else MOST_HIDDEN)
-        self._warn_of(frame[too_many & placed])
-        worth = np.asarray((unseen.any(axis=1) & placed & ~too_many & asked)[leaves.frame])
-        if not (isinstance(self.body, FigureBody) and worth.any()):
+        worth = self.worth_completing(leaves.frame, image, frame, tolerance, wanted)
+        if not worth.any():
             return leaves, None
         from posekit.hidden import complete, reject
 
         part = leaves.keep(worth, leaves.frame, leaves.code, leaves.level, leaves.pruned)
         done = complete(part, camera, image, self.body.figure, suite, tolerance=tolerance.tangent)
         return reject(leaves, done.among(leaves.postures(), worth))
+
+    def worth_completing(
+        self,
+        hypothesis: NDArray[np.integer],
+        image: Array,
+        frame: NDArray[np.intp],
+        tolerance: Tolerance,
+        wanted: NDArray[np.bool_] | None = None,
+    ) -> NDArray[np.bool_]:
+        """Tell which survivors (N,), of these hypotheses, are completed by joints that were not seen.
+
+        See `complete`.
+        """
+        asked = wanted if wanted is not None else np.full(len(image), self.settings.infer)
+        unseen = np.asarray(np.isnan(image).any(axis=2))
+        measured = tolerance.tangent > EXACT_TOLERANCE.tangent
+        placed = ((~unseen[:, TRUNK_JOINTS]).sum(axis=1) >= 2) | measured
+        hidden = np.bincount(hypothesis, minlength=len(image)) * unseen.sum(axis=1)
+        too_many = np.bincount(frame, hidden)[frame] > (MOST_HIDDEN_MEASURED if measured else MOST_HIDDEN)
+        self._warn_of(frame[too_many & placed])
+        worth = unseen.any(axis=1) & placed & ~too_many & asked & isinstance(self.body, FigureBody)
+        return np.asarray(worth[hypothesis])
 
     def _warn_of(self, frames: NDArray[np.intp]) -> None:
         """Say of which frames nothing is inferred."""

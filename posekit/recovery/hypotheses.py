@@ -19,7 +19,7 @@ from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.noise import Noise
 from posekit.refinement import ObservedFrames, RootPrior
 from posekit.refinement.walls import Walls
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINTS, PARENTS
 
 LATERAL_DEVIATIONS: Final = 10.0
 """Deviations of an image point within which a placed neck may lie beside its ray: its image point says the rest."""
@@ -78,7 +78,7 @@ class ObservedHypotheses:
         sight = ObservedFrames(
             figure=figure,
             camera=camera,
-            image=view.image[frames],
+            image=connected(view.image[frames]),
             deviation=deviation[:, : len(JOINTS)],
             root=necks,
             length_deviation=noise.lengths.own,
@@ -87,6 +87,15 @@ class ObservedHypotheses:
             walls=walls,
         )
         return ObservedHypotheses(sight=sight, deviation=deviation, focal=focal, step=step)
+
+
+def connected(image: Array) -> Array:
+    """Return image points (H, 14, 2) without those that hang on a joint that was not seen: they tell no place."""
+    out = image.copy()
+    for joint, parent in enumerate(PARENTS):
+        if joint:
+            out[np.isnan(out[:, parent]).any(axis=1), joint] = np.nan
+    return out
 
 
 def neck_priors(

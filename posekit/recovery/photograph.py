@@ -25,12 +25,17 @@ from posekit.recovery.body import FigureBody
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.fit_scale import fit_scale
 from posekit.recovery.grower import Grower
-from posekit.recovery.hypotheses import LATERAL_DEVIATIONS, LEAST_STEP_METRES, ObservedHypotheses
+from posekit.recovery.hypotheses import (
+    LATERAL_DEVIATIONS,
+    LEAST_STEP_METRES,
+    ObservedHypotheses,
+    connected,
+)
 from posekit.recovery.key_point_offsets import PIXEL_DEVIATION, joint_offsets
 from posekit.recovery.noise import LEAST_CONFIDENCE, Noise
 from posekit.recovery.refiner import Lifted, Refiner
 from posekit.recovery.seen_trunk import N_TRUNK_JOINTS, SeenTrunk, with_trunk
-from posekit.refinement import ObservedFrames, RootPrior, Trunks
+from posekit.refinement import ObservedFrames, RootPrior
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.settings.scale import Scale, way_of
@@ -136,7 +141,7 @@ class PhotographRefiner(Refiner):
         sight = ObservedFrames(
             figure=self.grower.body.figure,
             camera=camera,
-            image=image,
+            image=connected(image),
             deviation=deviation,
             root=RootPrior.along_ray(camera, self.fit.root[chosen], depth=LEAST_STEP_METRES, lateral=lateral),
             length_deviation=self.noise.lengths.own,
@@ -161,10 +166,12 @@ class PhotographRefiner(Refiner):
         told = self.trunk.told[lifted.frames[lifted.frame[lifted.hypothesis]]]
         return ~told & (np.arange(len(JOINTS)) < N_TRUNK_JOINTS)
 
-    def to_complete(self, trunks: Trunks, own: NDArray[np.intp]) -> Array:
+    def to_complete(self, chosen: NDArray[np.intp]) -> Array:
         """Return image points (H, 14, 2): limbs are completed on trunks that are told, and else stay unknown."""
-        whole = np.asarray(self.trunk.told[self.fit.frame[own], :N_TRUNK_JOINTS].all(axis=1))
-        return np.where(whole[:, None, None], trunks.image, np.nan_to_num(trunks.image))
+        frames = self.fit.frame[chosen]
+        whole = np.asarray(self.trunk.told[frames, :N_TRUNK_JOINTS].all(axis=1))
+        image = self.trunk.image[frames]
+        return np.where(whole[:, None, None], image, np.nan_to_num(image))
 
     def spread(self, lifted: Lifted) -> float:
         """Say how far off survivors are, metres."""

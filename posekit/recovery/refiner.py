@@ -19,7 +19,6 @@ from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.geometry import Array
-from posekit.hidden import CompletedSurvivors
 from posekit.ranking import deviation_of_noise
 from posekit.recovery.body import ranges_of, suite_of
 from posekit.recovery.certified import Contradiction, certified_within, certifying_checks
@@ -28,6 +27,7 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.recovery.noise import Noise, contact_under_noise
+from posekit.recovery.refined_completion import RefinedCompletion
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
@@ -64,8 +64,6 @@ class Lifted:
         On them.
     physical : int array
         Survivors by level, before the motion model.
-    completion : CompletedSurvivors or None
-        The joints that were not seen.
     """
 
     chosen: NDArray[np.intp]
@@ -75,7 +73,6 @@ class Lifted:
     trunks: Trunks
     leaves: Leaves
     physical: NDArray[np.int64]
-    completion: CompletedSurvivors | None
 
     @property
     def own(self) -> NDArray[np.intp]:
@@ -86,13 +83,6 @@ class Lifted:
     def hypothesis(self) -> NDArray[np.intp]:
         """The hypothesis of each leaf, counted from 0."""
         return self.trunks.frame[self.leaves.frame]
-
-    def postures(self) -> Array:
-        """Place the leaves (N, 14, 3), completed where that was possible."""
-        postures = self.leaves.postures()
-        if self.completion is None:
-            return postures
-        return np.where(np.isnan(postures), self.completion.postures, postures)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,9 +207,6 @@ class Refiner:
         leaves = self.grower.body.tree.prune(
             leaves, [check for check in suite if check.scope is Scope.MOTION]
         )
-        leaves, completion = self.grower.complete(
-            leaves, fit.cameras(own), self.to_complete(trunks, own), suite, tolerance, fit.frame[own]
-        )
         return Lifted(
             chosen=chosen,
             frame=frame.reshape(-1),
@@ -228,7 +215,6 @@ class Refiner:
             trunks=trunks,
             leaves=leaves,
             physical=physical,
-            completion=completion,
         )
 
     def observe(self, chosen: NDArray[np.intp], camera: Camera) -> ObservedHypotheses:
@@ -242,16 +228,16 @@ class Refiner:
             self.grower.view, self.fit, chosen, camera, figure, self.noise, self._limits, self._walls
         )
 
-    def to_complete(self, trunks: Trunks, own: NDArray[np.intp]) -> Array:
-        """Return image points (H, 14, 2) of trunks, NaN where a joint is to be completed."""
-        return trunks.image
+    def to_complete(self, chosen: NDArray[np.intp]) -> Array:
+        """Return image points (H, 14, 2) of some hypotheses of the fit, NaN where a joint is to be completed."""
+        return self.grower.view.image[self.fit.frame[chosen]]
 
     def refine(self, lifted: Lifted) -> LeafOutcomes:
         """Refine leaves, reject and merge."""
         heads = self.fit.head[lifted.own] + (lifted.trunks.root - self.fit.root[lifted.own])[:, None]
         return refine_leaves(
             self._with_heads(lifted),
-            lifted.postures(),
+            lifted.leaves.postures(),
             heads[lifted.leaves.frame],
             lifted.hypothesis,
             lifted.frame[lifted.hypothesis],
@@ -283,6 +269,9 @@ class Refiner:
     def _trees(self, lifted: Lifted, outcomes: LeafOutcomes) -> dict[int, FrameTrees]:
         """Gather what is left of each frame."""
         leaves, fit = outcomes.prune(lifted.leaves), self.fit
+        completing = RefinedCompletion(
+            grower=self.grower, noise=self.noise, tolerance=self.tolerance, checks=self._can_be_told
+        )
         batch = Batch(
             leaves=leaves,
             physical=lifted.physical,
@@ -291,7 +280,13 @@ class Refiner:
             tolerance=self.tolerance,
             judged="refined",
             exact=np.zeros(leaves.n_frames, dtype=np.bool_),
-            completion=None if lifted.completion is None else lifted.completion.take(outcomes.kept),
+            completion=completing.complete(
+                outcomes.survivors,
+                lifted.hypothesis[outcomes.kept],
+                fit.cameras(lifted.chosen),
+                self.to_complete(lifted.chosen),
+                fit.frame[lifted.chosen],
+            ),
             refined=outcomes.survivors,
             spread=self.spread(lifted),
             untold=None if (untold := self.untold(lifted)) is None else untold[outcomes.kept],

@@ -75,8 +75,9 @@ class Batch:
     def points(self) -> Array:
         """All survivors with their heads (N, 19, 3), camera frame, metres."""
         if self.refined is not None:
-            return np.concatenate([self.refined.joints, self.refined.head], axis=1)
-        points = self.body.points(self.leaves)
+            points = np.concatenate([self.refined.joints, self.refined.head], axis=1)
+        else:
+            points = self.body.points(self.leaves)
         if self.completion is not None:
             filled = self.completion.postures
             joints = points[:, : len(JOINTS)]
@@ -169,12 +170,20 @@ class FrameTrees:
     fit: CameraFit
 
     @property
-    def survivors(self) -> int:
-        """Count the postures that are left."""
+    def rows(self) -> slice:
+        """Which of the batch's postures are left of the frame."""
         if self.batch is None:
-            return 0
+            return slice(0, 0)
         offsets = self.batch.offsets
-        return int(offsets[self.index + self.hypotheses] - offsets[self.index])
+        return slice(int(offsets[self.index]), int(offsets[self.index + self.hypotheses]))
+
+    @property
+    def survivors(self) -> int:
+        """Count the postures that are left, those apart of whose hidden joints no place was found."""
+        if self.batch is not None and self.batch.completion is not None:
+            return int(self.batch.completion.decided[self.rows].sum())
+        rows = self.rows
+        return int(rows.stop) - int(rows.start)
 
     @property
     def undecided(self) -> bool:
