@@ -18,6 +18,7 @@ from posekit.recovery.recovery import Recovery
 from posekit.recovery.refined import Covariances
 from posekit.recovery.result import result_of
 from posekit.refinement import covariance, refined
+from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
 from posekit.tree import Leaves
 from posekit.views.builtin import view_of
@@ -68,8 +69,13 @@ def run(view: View) -> Recorded:
     return Recorded(view)
 
 
-def test_covariances_are_found_when_they_are_read_and_once(run: Recorded) -> None:
-    assert run.asked_by_frames[0] == 0
+def test_covariances_are_not_found_before_they_are_read(view: View) -> None:
+    seen = replace(view, image=np.where(np.isnan(view.image), view.image[1], view.image))
+    assert Recorded(seen).asked_by_frames[0] == 0
+
+
+def test_covariances_are_found_once(run: Recorded) -> None:
+    assert run.asked_by_frames[0] == 1  # by the region of the joint that was not seen
     assert run.asked_by_frames[1] > 0
     assert run.asked == 1
     total = 0
@@ -79,7 +85,9 @@ def test_covariances_are_found_when_they_are_read_and_once(run: Recorded) -> Non
         own = frame.refined.covariance
         assert own.shape == (len(frame), 14, 3, 3)
         np.testing.assert_array_equal(own, written.refined.covariance)
-        unknown = np.isnan(frame.joints).any(axis=2)
+        unknown = np.asarray(np.isnan(frame.joints).any(axis=2))
+        for row, regions in enumerate(frame.inferred or []):
+            unknown[row, [JOINT[name] for name in regions]] = True
         np.testing.assert_array_equal(np.isnan(own).any(axis=(2, 3)), unknown)
         total += len(own)
     assert np.shares_memory(run.covariance, run.first.covariances.read())
