@@ -77,6 +77,7 @@ class Validator:
         if isinstance(subject, Robot):
             own = robot_settings(asked)
             self.checks, self.lengths = own.check_names, own.lengths
+            self.settings = asked.changed(ranges=own.ranges)
             self._robot = RobotValidator(robot=subject, settings=own)
             _ = self._robot.models.limits
             return

@@ -166,11 +166,12 @@ class ClosedForm:
         limits = self._limits_of(f"{joint}.flexion", 4)
         upper = rotate_back(R_parent, unit(middle - start))
         angles = np.full((len(start), 4), np.nan)
-        angles[:, :2] = direction_angles(upper, limits)
+        known = np.zeros(len(start), dtype=bool) if end is None else np.isfinite(end).all(axis=1)
+        if not known.all():
+            angles[~known, :2] = direction_angles(upper[~known], limits)
         if end is not None:
-            known = np.isfinite(end).all(axis=1)
-            lower = rotate_back(R_parent, unit(end - middle))
-            angles[known] = limb_angles(upper[known], lower[known], limits)
+            lower = rotate_back(R_parent[known], unit(end[known] - middle[known]))
+            angles[known] = limb_angles(upper[known], lower, limits)
         return angles
 
     def _limits_of(self, first: str, count: int) -> Limits:

@@ -91,8 +91,14 @@ def validate(
         ),
     ] = "",
     ranges: Annotated[
-        str, option("--ranges", "NAME|FILE", "Joint ranges: urdf, table1 (stick figure), or a TOML file.")
-    ] = "urdf",
+        str,
+        option(
+            "--ranges",
+            "NAME|FILE",
+            "Joint ranges: anatomical, urdf, table1, or a TOML file. Default: a result's own, else anatomical; "
+            "a robot's own limits.",
+        ),
+    ] = "",
     rules: Rules = "1,2",
     walkers: Annotated[
         str,
@@ -184,7 +190,7 @@ def validate(
     from posekit.formats import own as files
     from posekit.formats.own.report import columns_of
     from posekit.formats.own.report_table import summary_table
-    from posekit.settings import ValidateSettings
+    from posekit.settings import DEFAULT_RANGES, ValidateSettings
 
     if output is not None:
         distinct(postures, output)
@@ -201,7 +207,8 @@ def validate(
             figure = urdf or own
     if urdf not in ("", "stick_figure"):
         # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
-        judged = judged.changed(contact_margin=0.0)
+        own_limits = "urdf" if judged.ranges == "urdf" else DEFAULT_RANGES
+        judged = judged.changed(contact_margin=0.0, ranges=own_limits)
     asked: dict[str, Any] = {
         "checks": split(checks) if checks else None,
         "walkers": walkers or None,
@@ -210,6 +217,7 @@ def validate(
         else None,
         "angle_tolerance": angle_tolerance,
         "contact_margin": signed_length(contact_margin, "--contact-margin") if contact_margin else None,
+        "ranges": ranges or None,
         "lengths": lengths or None,
         "joint_map": joint_map or None,
         "srdf": srdf or None,
@@ -217,7 +225,6 @@ def validate(
         "up": _direction(up) if up else None,
     }
     settings = judged.changed(
-        ranges=ranges,
         rules=rule_numbers(rules),
         bodies=bodies,
         package_dirs=package_dir or (),

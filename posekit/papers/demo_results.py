@@ -43,7 +43,9 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     pictures : bool
         Whether to draw the results too.
     """
-    random = view_of(random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(DEMO_SEED)))
+    random = view_of(
+        random_views(load_figure(), RANDOM_VIEWS, np.random.default_rng(DEMO_SEED), ranges="urdf")
+    )
     jobs = (
         ("seq1", builtin_view("seq1"), PHYSICAL_CHECKS),
         ("seq2", builtin_view("seq2"), PHYSICAL_CHECKS),
@@ -53,7 +55,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     rows = []
     for name, view, checks in jobs:
         write_view(folder / f"{name}.view.json", view)
-        recovery = recover(view, checks=checks, group=0.05)
+        recovery = recover(view, checks=checks, ranges="urdf", group=0.05)
         result = result_of(recovery, unit=view.unit, explain=True)
         write_result(folder / f"{name}.result.json", result)
         if pictures:
@@ -71,7 +73,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     )
     table = ["# posekit demo", "", *table_lines(head, rows)]
     given = read_postures(folder / "seq1.result.json")
-    report = validate(Validator(), given)
+    report = validate(Validator(ranges="urdf"), given)
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
     table += [

@@ -133,7 +133,7 @@ def synthetic_study(pictures: int = 300, seed: int = 0) -> Study:
         Of postures, cameras and noise.
     """
     person = load_figure().from_stature(STATURE_METRES)
-    scenes = (random_views(person, pictures, np.random.default_rng(seed), CAMERA_SPHERE),)
+    scenes = (random_views(person, pictures, np.random.default_rng(seed), CAMERA_SPHERE, "urdf"),)
     human = taylor_human()
     return Study(
         title="Synthetic: random legal postures",

@@ -54,7 +54,7 @@ class LimbWalls:
         """Gather those of some checks that refinement keeps to; None where there are none."""
         pulling = [check for check in checks if check.pulls]
         mine = {
-            limb: [check for check in pulling if joints[1] in check.points]
+            limb: _last([check for check in pulling if joints[1] in check.points])
             for limb, joints in enumerate(LIMB_JOINTS)
         }
         if not any(mine.values()):
@@ -124,3 +124,13 @@ class LimbWalls:
         """That of the hips."""
         joints = self.figure.ik.hips_joints
         return np.asarray(hips_frame(*(self.figure.neutral_points[None, joint] for joint in joints))[0])
+
+
+
+def _last(checks: Sequence[Check]) -> Sequence[Check]:
+    """Leave out checks all of whose places a later one judges again."""
+    return [
+        check
+        for k, check in enumerate(checks)
+        if not any(set(check.where) <= set(later.where) for later in checks[k + 1 :])
+    ]

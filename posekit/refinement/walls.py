@@ -170,17 +170,20 @@ def wall_rows(walls: Walls, found: Beyond, parent: Array, directions: Array, tan
     k, m = found.limb, found.row
     along = tangents[k, :, :, :, m]  # (M, 2, 2, 3)
     rows = np.zeros((4, 7, len(k)))
+    # All four at once: a call of a judge costs more than the limbs in it.
+    moved = np.repeat(found.local[:, None], 4, axis=1)  # (2, 4, M, 3)
+    for segment in range(2):
+        turned = moved[segment, 2 * segment : 2 * segment + 2]
+        turned += STEP_RADIANS * np.einsum("mij,mti->tmj", parent[k, :, :, m], along[:, segment])
+        turned /= np.sqrt(np.einsum("tmi,tmi->tm", turned, turned))[..., None]
+    asked = _asked(walls, found, moved)
     for segment in range(2):
         outward = directions[k, segment, :, m]
         for tangent in range(2):
-            t = along[:, segment, tangent]
-            moved = found.local.copy()
-            moved[segment] += STEP_RADIANS * np.einsum("mij,mi->mj", parent[k, :, :, m], t)
-            moved[segment] /= np.sqrt(np.einsum("mi,mi->m", moved[segment], moved[segment]))[:, None]
-            slope = (_asked(walls, found, moved) - found.over) / STEP_RADIANS
+            slope = (asked[:, 2 * segment + tangent] - found.over) / STEP_RADIANS
             slope = np.where((found.side != 0) & (np.abs(slope) < MAX_SLOPE), slope, 0.0)
             rows[:, 2 * segment + tangent] = slope
-            rows[:, 4:] -= slope[:, None] * cross(outward.T, t.T, axis=-2)
+            rows[:, 4:] -= slope[:, None] * cross(outward.T, along[:, segment, tangent].T, axis=-2)
     return rows
 
 
@@ -191,11 +194,13 @@ def _watched(crossed: Signs, watch: Signs, above: Array, below: Array) -> Signs:
 
 
 def _asked(walls: Walls, found: Beyond, local: Array) -> Array:
-    """Ask about the same limits of the same limbs, their segments turned (4, M)."""
-    out = np.zeros_like(found.over)
+    """Ask about the same limits of the same limbs, their segments (2, T, M, 3) turned in T ways (4, T, M)."""
+    ways = local.shape[1]
+    out = np.zeros((len(found.over), ways, len(found.limb)))
     for limb in range(4):
         own = np.flatnonzero(found.limb == limb)
         if own.size:
-            above, below = walls.beyond(limb, local[0, own], local[1, own])
-            out[:, own] = np.where(found.side[:, own] > 0, above, -below)
+            above, below = walls.beyond(limb, *local[:, :, own].reshape(2, -1, 3))
+            upper = np.tile(found.side[:, own] > 0, ways)
+            out[:, :, own] = np.where(upper, above, -below).reshape(-1, ways, len(own))
     return out

@@ -1,6 +1,7 @@
 """What a run was asked: made once, handed down whole, and written into every result."""
 
 from posekit.settings.check import CheckSettings as CheckSettings
+from posekit.settings.judging import DEFAULT_RANGES as DEFAULT_RANGES
 from posekit.settings.judging import DEFAULT_RULES as DEFAULT_RULES
 from posekit.settings.judging import RangeTable as RangeTable
 from posekit.settings.recover import DEFAULT_CHECKS as DEFAULT_CHECKS

@@ -14,6 +14,9 @@ from posekit.settings.check import CheckSettings, check_settings
 DEFAULT_RULES: Final = (1, 2)
 """Rules of walking that are asked where ``walking`` is."""
 
+DEFAULT_RANGES: Final = "anatomical"
+"""The table of joint ranges by which people are judged unless told otherwise (docs, "Anatomical ranges")."""
+
 WALKING_RULES: Final = (1, 2, 3, 4, 5)
 WALKERS_NAMES: Final = ("paper", "people")
 
@@ -41,7 +44,7 @@ class JudgingSettings:
     checks : sequence of str, CheckSettings or check, optional
         What postures are judged by; the usual where they are not given.
     ranges : str or Ranges
-        Joint ranges: ``urdf`` (the default), ``table1``, ``anatomical``, the path of a TOML table, or loaded ranges.
+        Joint ranges: ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges.
     rules : sequence of int
         Rules of walking, 1 to 5, used where ``walking`` is among the checks. By default 1 and 2.
     walkers : {"paper", "people"}
@@ -56,7 +59,7 @@ class JudgingSettings:
     """
 
     checks: Sequence[Any] | None = None  # a tuple of CheckSettings, once they are made
-    ranges: str | RangeTable = "urdf"
+    ranges: str | RangeTable = DEFAULT_RANGES
     rules: Sequence[int] = DEFAULT_RULES
     walkers: str = "paper"
     contact_margin: float = 0.0

@@ -34,7 +34,7 @@ class RecoverSettings(JudgingSettings):
         What postures are judged by: some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, and checks of
         your own. By default the first three.
     ranges : str or Ranges
-        Joint ranges: ``urdf`` (the default), ``table1``, ``anatomical``, the path of a TOML table, or loaded ranges.
+        Joint ranges: ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges.
     rules : sequence of int
         Rules of walking, 1 to 5, used where ``walking`` is among the checks. By default 1 and 2.
     walkers : {"paper", "people"}

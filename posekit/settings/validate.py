@@ -30,7 +30,8 @@ class ValidateSettings(JudgingSettings):
         otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
         first four.
     ranges : str or Ranges
-        ``urdf``, ``table1`` and ``anatomical`` (figures alone), the path of a TOML table, or loaded ranges.
+        ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges. Of a robot its
+        own limits unless the path of a table is given.
     rules : sequence of int
         Rules of walking, 1 to 5. By default 1 and 2.
     walkers : {"paper", "people"}

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.settings import DEFAULT_RANGES
 from posekit.synthesis.camera_sphere import CameraSphere
 from posekit.synthesis.observe import observe
 from posekit.synthesis.synthetic_scene import SyntheticScene
+from posekit.tree import Check
+from posekit.validators.joint_range import joint_range
+from posekit.validators.ranges import URDF_RANGES, Ranges, load_ranges
 
 UP_TORSO = np.array([0.0, 0.0, 1.0])
 """Up in the torso's frame at which the postures stand."""
@@ -19,8 +26,10 @@ LEAST_ACCEPTED = 1e-3
 """Fraction of draws free of collision below which it is said that the limits leave nothing to draw."""
 
 
-def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
-    """Draw configurations uniform inside all limits of the figure, rejected until free of collision.
+def random_postures(
+    figure: Figure, n: int, rng: np.random.Generator, ranges: str | Ranges = DEFAULT_RANGES
+) -> Array:
+    """Draw configurations uniform inside all limits of the figure, rejected until legal and free of collision.
 
     Parameters
     ----------
@@ -30,6 +39,8 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
         How many postures are drawn.
     rng : Generator
         The same seed gives the same postures.
+    ranges : str or Ranges
+        The joint ranges that they keep to beside the figure's limits: with ``urdf`` those are all.
 
     Returns
     -------
@@ -39,11 +50,13 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
     Raises
     ------
     InputError
-        Where n is not positive, or hardly any posture inside the limits is free of collision.
+        Where n is not positive, or hardly any posture inside the limits is legal and free of collision.
     """
     if n < 1:
         raise InputError(f"{n} postures were asked for; ask for one or more")
     lower, upper = figure.limits.lower, figure.limits.upper
+    table = load_ranges(ranges) if isinstance(ranges, str) else ranges
+    checks = [] if table is URDF_RANGES else joint_range(figure, table, tolerance=0.0)
     kept: list[Array] = []
     found = drawn = 0
     while found < n:
@@ -52,19 +65,33 @@ def random_postures(figure: Figure, n: int, rng: np.random.Generator) -> Array:
         count = int(missing / rate * 1.1) + 16
         q = np.tile(pin.neutral(figure.model), (count, 1))
         q[:, figure.angle_index] = rng.uniform(lower, upper, (count, len(lower)))
+        q = q[_legal(figure, checks, q)]
         kept.append(q[~figure.collides(q)])
         found += len(kept[-1])
         drawn += count
         if found < LEAST_ACCEPTED * drawn and drawn > 10 / LEAST_ACCEPTED:
             raise InputError(
-                f"{found} of {drawn} random postures inside the limits are free of collision; expected more "
+                f"{found} of {drawn} random postures inside the limits are legal and free of collision; expected more "
                 f"than {LEAST_ACCEPTED:g} of them; widen the limits or thin the capsules"
             )
     return np.concatenate(kept)[:n]
 
 
+def _legal(figure: Figure, checks: Sequence[Check], q: Array) -> NDArray[np.bool_]:
+    """Tell which configurations (N, nq) no check rejects (N,)."""
+    points = figure.forward_kinematics(q)
+    legal = np.ones(len(q), dtype=bool)
+    for check in checks:
+        legal[legal] = ~check.judge(points[legal][:, list(check.points)]).violated.any(axis=1)
+    return legal
+
+
 def random_views(
-    figure: Figure, n: int, rng: np.random.Generator, sphere: CameraSphere | None = None
+    figure: Figure,
+    n: int,
+    rng: np.random.Generator,
+    sphere: CameraSphere | None = None,
+    ranges: str | Ranges = DEFAULT_RANGES,
 ) -> SyntheticScene:
     """Draw random legal postures, each seen by its own camera.
 
@@ -78,6 +105,8 @@ def random_views(
         The same seed gives the same views.
     sphere : CameraSphere, optional
         Where cameras may stand, and what they are.
+    ranges : str or Ranges
+        See `random_postures`.
 
     Returns
     -------
@@ -90,7 +119,7 @@ def random_views(
         See `random_postures` and `CameraSphere.place`.
     """
     sphere = sphere or CameraSphere()
-    q = random_postures(figure, n, rng)
+    q = random_postures(figure, n, rng, ranges)
     points = figure.forward_kinematics(q)
     placements = sphere.place(points, UP_TORSO, rng)
     return observe(figure, sphere.camera, points, placements, q=q, size=sphere.size)

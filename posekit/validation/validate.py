@@ -23,6 +23,7 @@ from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
 from posekit.validators import Validator
+from posekit.validators.ranges import NAMED_TABLES
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
 from posekit.validators.walking import THRESHOLDS_BY_WALKERS
@@ -174,7 +175,7 @@ def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
             rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
             angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
             margins.append(_number(said, "contact", asked, within=within))
-    walkers = settings.get("walkers", "paper")
+    walkers, ranges = settings.get("walkers", "paper"), settings.get("ranges")
     if not (isinstance(walkers, str) and walkers in THRESHOLDS_BY_WALKERS):
         raise refusal(
             "result",
@@ -188,6 +189,7 @@ def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
         angle_tolerance=max(angles),
         contact_margin=min(margins),
         walkers=walkers,
+        **({"ranges": ranges} if ranges in ("urdf", *NAMED_TABLES) else {}),
     )
 
 

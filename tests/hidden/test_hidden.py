@@ -79,7 +79,7 @@ def hide(
 ) -> Hidden:
     """Grow the trees of random views without some joints, the same in all frames or some for each."""
     rng = np.random.default_rng(seed)
-    scene = random_views(FIGURE, n, rng)
+    scene = random_views(FIGURE, n, rng, ranges="urdf")
     if noise:
         scene = scene.with_noise(noise, rng)
     image = scene.image.copy()

@@ -73,7 +73,7 @@ def test_frames_and_shortest_rotations(numbers: list[float]) -> None:
     np.testing.assert_allclose(rotation_between(a, -a) @ a, -a, rtol=0, atol=1e-12)
 
 
-SCENE = random_views(FIGURE, 5, np.random.default_rng(1))
+SCENE = random_views(FIGURE, 5, np.random.default_rng(1), ranges="urdf")
 PINHOLE = SCENE.camera
 LENS = PinholeCamera(K=PINHOLE.K, distortion=np.array([-0.2, 0.05, 0.001, -0.001, 0.0]))
 EACH = PinholeCamera(K=np.stack([PINHOLE.K * [[k], [k], [1.0]] for k in (1.0, 1.1, 0.9, 1.2, 0.8)]))

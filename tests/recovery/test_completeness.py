@@ -59,12 +59,14 @@ class Chunk(NamedTuple):
 
 def recovered(scene: SyntheticScene) -> Chunk:
     view = view_of(scene)
-    return Chunk(scene, view, recover(view, length_deviation=0.0))
+    return Chunk(scene, view, recover(view, length_deviation=0.0, ranges="urdf"))
 
 
 @lru_cache(maxsize=1)
 def chunk_of(index: int) -> Chunk:
-    return recovered(random_views(FIGURE, VIEWS // CHUNKS, np.random.default_rng([1985, index])))
+    return recovered(
+        random_views(FIGURE, VIEWS // CHUNKS, np.random.default_rng([1985, index]), ranges="urdf")
+    )
 
 
 @pytest.fixture(scope="module", params=range(CHUNKS))
@@ -190,7 +192,7 @@ def hit(q: np.ndarray) -> np.ndarray:
 )
 def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int) -> None:
     """All 8192 leaves, each lifted and judged on its own; collision once more by Pinocchio, on q."""
-    scene = random_views(FIGURE, count, np.random.default_rng([2000, index]))
+    scene = random_views(FIGURE, count, np.random.default_rng([2000, index]), ranges="urdf")
     view = view_of(scene)
     recovery = recover(view, ranges=ranges, tolerance=EXACT_TOLERANCE)
     lengths = np.array([0.0, *(FIGURE.lengths[segment_name(segment)] for segment in TREE_SEGMENTS)])
@@ -223,7 +225,7 @@ def test_survivors_are_those_of_brute_force(ranges: str, index: int, count: int)
 
 
 def test_a_check_less_never_loses_a_survivor() -> None:
-    view = view_of(random_views(FIGURE, 50, np.random.default_rng(11)))
+    view = view_of(random_views(FIGURE, 50, np.random.default_rng(11), ranges="urdf"))
     for ranges in ("urdf", "table1"):
         all_three, two, one = (
             recover(view, checks=("rigid-parts", "joint-range", "collision")[:count], ranges=ranges).frames

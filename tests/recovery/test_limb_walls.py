@@ -33,7 +33,7 @@ def figure() -> Figure:
 
 @cache
 def scene() -> SyntheticScene:
-    return random_views(figure(), N, np.random.default_rng(3))
+    return random_views(figure(), N, np.random.default_rng(3), ranges="urdf")
 
 
 def walls_of(name: str) -> LimbWalls:

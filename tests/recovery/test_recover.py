@@ -281,7 +281,7 @@ def test_ranges_from_a_file_narrow_the_limits(tmp_path: Any) -> None:
         encoding="utf-8",
     )
     view = view_of(random_views(FIGURE, 20, np.random.default_rng(5)))
-    stiff, free = recover(view, ranges=str(path)), recover(view)
+    stiff, free = recover(view, ranges=str(path)), recover(view, ranges="urdf")
     assert_fewer(stiff, free)
     assert 0 < sum(counts(stiff)) < sum(counts(free))
     column = FIGURE.configuration_names.index("right_elbow_flexion")

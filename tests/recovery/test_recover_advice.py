@@ -23,7 +23,7 @@ TRUNK = tuple(
 
 def rootless(factors: dict[str, float], noise: float = 2.0) -> View:
     """See eight postures without a root or a head, their lengths stated wrongly by some factors."""
-    scene = random_views(FIGURE, 8, np.random.default_rng(5))
+    scene = random_views(FIGURE, 8, np.random.default_rng(5), ranges="urdf")
     view = view_of(scene.with_noise(noise, np.random.default_rng(1)) if noise else scene)
     lengths = {name: FIGURE.lengths[name] * factor for name, factor in factors.items()}
     return replace(view, lengths=lengths, root=np.empty(0), head_image=np.empty(0), deviation=noise or None)
@@ -31,7 +31,7 @@ def rootless(factors: dict[str, float], noise: float = 2.0) -> View:
 
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 def test_arms_that_are_too_short_are_named_where_no_root_is_given(noise: float) -> None:
-    recovery = recover(rootless(dict.fromkeys(UPPER_ARMS, 0.7), noise), infer=False)
+    recovery = recover(rootless(dict.fromkeys(UPPER_ARMS, 0.7), noise), infer=False, ranges="urdf")
     assert sum(not len(frame) for frame in recovery.frames) > 4
     # The torso is blamed frame by frame, though its lengths are right: the arms hold the person too near.
     assert any("the rigid parts close at no depth" in frame.reason for frame in recovery.frames)
@@ -45,7 +45,7 @@ def test_arms_that_are_too_short_are_named_where_no_root_is_given(noise: float) 
 
 
 def test_a_trunk_that_is_too_large_is_not_laid_upon_one_limb() -> None:
-    recovery = recover(rootless(dict.fromkeys(TRUNK, 1.3)), infer=False)
+    recovery = recover(rootless(dict.fromkeys(TRUNK, 1.3)), infer=False, ranges="urdf")
     assert sum(not len(frame) for frame in recovery.frames) > 4
     lines = advice_lines(recovery)
     assert not any("is stated as" in line for line in lines)
@@ -58,6 +58,6 @@ def test_right_lengths_are_not_doubted_where_points_are_worse_than_is_said(root:
     view = replace(rootless({}, 8.0), deviation=1.0)
     if root:
         view = replace(view, root=view.truth[:, 0])
-    recovery = recover(view, infer=False, length_deviation=0.02)
+    recovery = recover(view, infer=False, length_deviation=0.02, ranges="urdf")
     assert sum(not len(frame) for frame in recovery.frames) > 4
     assert not any("is stated as" in line for line in advice_lines(recovery))

@@ -103,7 +103,7 @@ def test_the_example_runs() -> None:
     run = subprocess.run(
         [sys.executable, EXAMPLES / "own_check.py"], capture_output=True, text=True, check=True
     )
-    assert "frame 1: 16 postures, 8 with feet above the ground; 8 leaves were rejected" in run.stdout
+    assert "frame 1: 24 postures, 12 with feet above the ground; 12 leaves were rejected" in run.stdout
 
 
 @pytest.mark.parametrize("path", ["plain", "fast"])

@@ -91,11 +91,11 @@ def test_the_tolerance_of_a_limit_is_a_thousandth_of_a_degree(beyond: float, ver
 
 def test_a_figures_configurations_are_judged_under_its_own_names() -> None:
     q = random_postures(FIGURE, 100, np.random.default_rng(2))
-    report = Validator().check(q=q)
+    report = Validator(ranges="urdf").check(q=q)
     assert report.verdicts == ["valid"] * 100
     assert set(of(report, "joint_range").where) == set(DOFS)
     q[0, FIGURE.configuration_names.index("pelvis_flexion")] = np.radians(100)
-    report = Validator().check(q=q)
+    report = Validator(ranges="urdf").check(q=q)
     assert report.verdicts[:2] == ["invalid", "valid"]
     k = of(report, "joint_range").where.index("pelvis.flexion")
     assert of(report, "joint_range").value[0, k] == pytest.approx(100.0)

@@ -130,7 +130,7 @@ def test_table1_rejects_an_elbow_bent_backward_at_the_elbow() -> None:
     ("dof", "angle"), [("pelvis.flexion", 100.0), ("pelvis.rotation", -45.0), ("left_hip.flexion", -80.0)]
 )
 def test_a_range_that_is_broken_is_named_with_its_value(dof: str, angle: float) -> None:
-    report = Validator().check(posed(**{dof.replace(".", "_"): angle})[:, :14])
+    report = Validator(ranges="urdf").check(posed(**{dof.replace(".", "_"): angle})[:, :14])
     assert report.verdicts == ["invalid"]
     assert f"joint_range/{dof}" in rejected_at(report)
     assert finding(report, f"joint_range/{dof}")[0] == pytest.approx(angle, abs=1e-6)
@@ -152,7 +152,9 @@ def test_the_limit_itself_is_inside(beyond: float, verdict: str) -> None:
     """A hundredth of a degree: ten times the tolerance for rounding."""
     index = FIGURE.configuration_names.index("pelvis_bending")
     limit = float(np.degrees(FIGURE.model.upperPositionLimit[index]))
-    report = Validator(checks=("joint-range",)).check(posed(pelvis_bending=limit + beyond)[:, :14])
+    report = Validator(checks=("joint-range",), ranges="urdf").check(
+        posed(pelvis_bending=limit + beyond)[:, :14]
+    )
     assert report.verdicts == [verdict]
     value, _, upper, margin, unit = finding(report, "joint_range/pelvis.bending")
     assert value == pytest.approx(limit + beyond, abs=1e-6)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Final
 
 from posekit.errors import InputError
-from posekit.settings import ValidateSettings
+from posekit.settings import DEFAULT_RANGES, ValidateSettings
 
 ROBOT_CHECKS: Final = ("reach", "rigid-parts", "joint-range", "collision", "balance")
 ROBOT_DEFAULT: Final = ROBOT_CHECKS[:4]
@@ -24,7 +24,7 @@ LEAST_REACH: Final = 1e-3
 
 
 def robot_settings(asked: ValidateSettings) -> ValidateSettings:
-    """Fill in what is usual for robots: four checks, and the lengths of the postures.
+    """Fill in what is usual for robots: four checks, the lengths of the postures, and limits of their own.
 
     Raises
     ------
@@ -34,6 +34,7 @@ def robot_settings(asked: ValidateSettings) -> ValidateSettings:
     return asked.changed(
         checks=check_robot_names(ROBOT_DEFAULT if asked.checks is None else asked.check_names),
         lengths=asked.lengths or "median",
+        ranges="urdf" if asked.ranges == DEFAULT_RANGES else asked.ranges,
     )
 
 
