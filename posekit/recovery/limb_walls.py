@@ -126,7 +126,6 @@ class LimbWalls:
         return np.asarray(hips_frame(*(self.figure.neutral_points[None, joint] for joint in joints))[0])
 
 
-
 def _last(checks: Sequence[Check]) -> Sequence[Check]:
     """Leave out checks all of whose places a later one judges again."""
     return [
