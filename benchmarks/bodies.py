@@ -9,13 +9,15 @@ have exactly these; the neck is given unless told otherwise. Nothing is fitted h
 of as many people as the capture has.
 
 *Empty* frames have no survivor; *lost* ones have none within 35 mm (10 mm where points are exact) of the truth, after
-alignment by a similarity where lengths are off (a common size shows in depth alone). The *true branch* is the likeliest
-survivor whose segments all point to or from the camera as the true ones do, those within 15 degrees of the image plane
-left out. Its joints' stated 95 % ellipsoids, no flatter than a millimetre and the neck's left out, should hold the
-truth for 95 % of joints: as they are; *scaled* about the camera until the neck is as far away as the true one, and
-what that common size had in the covariance, taken from the neck's, subtracted (where the neck is given both are one);
-and *aligned* by the similarity, the covariance turned and scaled with the joints. The last is no fair one: the
-similarity spreads an arm's error over joints that are known to millimetres, which a joint's own covariance cannot say.
+alignment by a similarity where lengths are off (a common size shows in depth alone). The *true branch* are survivors
+whose segments all point to or from the camera as the true ones do, those within 15 degrees of the image plane left out
+(where noise turns a segment over, it may be gone without a loss). Its nearest survivor's stated 95 % ellipsoids, no
+flatter than a millimetre and the neck's left out, should hold the truth for 95 % of joints; those of its *likeliest* do
+where the branch has one posture. They are taken as they are; *scaled* about the camera until the neck is as far away as
+the true one, what that common size had in the covariance, taken from the neck's, subtracted (where the neck is given
+both are one); and *aligned* by the similarity, the covariance turned and scaled with the joints. The last is no fair
+measure: the similarity spreads an arm's error over joints that are known to millimetres, which a joint's own covariance
+cannot say.
 
 CPU time is in units of the first condition's, in one run. Prints Markdown tables; `--rows` writes a line a frame.
 """
@@ -150,6 +152,7 @@ class Row:
     pa: float = np.inf
     branch: float = np.inf
     inside: float = np.nan
+    inside_likeliest: float = np.nan
     inside_scaled: float = np.nan
     inside_aligned: float = np.nan
     judged: str = ""
@@ -258,7 +261,7 @@ def compared(row: Row, frame: FrameRecovery, truth: np.ndarray) -> Row:
     refined = frame.refined
     if refined is None:
         return replace(told, branch=float(pa[of_branch].min()))
-    one = of_branch[np.argmin(refined.chi2[of_branch])]
+    likeliest, one = of_branch[np.argmin(refined.chi2[of_branch])], of_branch[np.argmin(best[of_branch])]
     C, x, y = refined.covariance[one, 1:], joints[one, 1:], truth[1:]
     turn = fitted.scale[one] * fitted.rotation[one]
     ratio = float(np.linalg.norm(truth[0]) / np.linalg.norm(joints[one, 0]))
@@ -267,6 +270,7 @@ def compared(row: Row, frame: FrameRecovery, truth: np.ndarray) -> Row:
         told,
         branch=float(pa[one]),
         inside=holds(x - y, C),
+        inside_likeliest=holds(joints[likeliest, 1:] - y, refined.covariance[likeliest, 1:]),
         inside_scaled=holds(ratio * x - y, ratio**2 * less(C, common * x[:, :, None] * x[:, None, :])),
         inside_aligned=holds(aligned[one, 1:] - y, turn @ C @ turn.T),
     )
@@ -349,7 +353,7 @@ def line(rows: list[Row], condition: Condition, cost: float, base: float) -> lis
 
     inside = [
         np.array([getattr(row, name) for row in rows])
-        for name in ("inside", "inside_scaled", "inside_aligned")
+        for name in ("inside", "inside_likeliest", "inside_scaled", "inside_aligned")
     ]
     return [
         condition.name,
@@ -377,6 +381,7 @@ HEAD = (
     "survivors, median (mean)",
     "true branch gone",
     "truth in 95 % ellipsoid",
+    "likeliest",
     "scaled",
     "aligned",
     "CPU",
