@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from posekit.body import LengthUncertainty
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
+from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
 from posekit.settings.rooting import DETECTED_DEVIATION
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
@@ -25,6 +26,9 @@ LEAST_CONFIDENCE: Final = 0.25
 
 UNSTATED_DEVIATION_PIXELS: Final = 1.0
 """Standard deviation (px) of image points of which nobody says any, of a body whose lengths are not exact."""
+
+FOREARM_METRES: Final = 0.24
+"""Metres: a forearm, which is in front of other parts more often than any other."""
 
 HEAD_METRES: Final = 0.2
 """Metres from the neck to the head's points."""
@@ -70,11 +74,14 @@ class Noise:
         known = deviation or view.deviation or (DETECTED_DEVIATION if detected else None)
         if known is None and lengths.exact and not asked:
             return None
-        return Noise(
+        noise = Noise(
             deviation=known or (DETECTED_DEVIATION if lengths.exact else UNSTATED_DEVIATION_PIXELS),
             offset=JOINT_OFFSET if detected else 0.0,
             lengths=lengths,
         )
+        # What lies in the image plane is off in depth by as much as its length: a forearm before a torso, say.
+        by_lengths = ALLOWED_DEVIATIONS * noise.limb * FOREARM_METRES
+        return replace(noise, overlap=CONTACT_UNDER_NOISE_METRES + by_lengths)
 
     @property
     def limb(self) -> float:

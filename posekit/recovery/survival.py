@@ -13,6 +13,7 @@ from posekit.geometry import Array
 from posekit.recovery.certified import Contradiction, contradictions
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.refinement import ObservedFrames, Refined, merge, refine
+from posekit.refinement.merging import INDISTINCT_SQUARE
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check, Leaves
 from posekit.tree.leaves import Pruned
@@ -63,7 +64,7 @@ class LeafOutcomes:
         legal = explained.copy()
         for one in contradicted:
             legal[one.row] = False
-        merged = merge(refined, keep=legal)
+        merged = merge(refined, keep=legal, indistinct=0.0 if refined.size is None else INDISTINCT_SQUARE)
         kept = np.zeros(len(refined), dtype=np.bool_)
         kept[merged.rows] = True
         return LeafOutcomes(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,9 @@ MERGE_DISTANCE_METRES = 0.005
 SAME_SIDES_METRES = 0.10
 """Metres: the same of survivors all of whose segments point to the same sides, near or far: they are one branch of the
 tree, and where lengths are uncertain its likeliest posture lies in a valley, in which searches stop here and there."""
+
+ROUNDING_SQUARE_METRES = 1e-8
+"""Square metres that are added to every variance: a neck that is known exactly has none."""
 
 PROJECTION_AXIS = np.array([0.48, 0.6, 0.64])
 """A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
@@ -59,8 +63,17 @@ class Merged:
         return [[branches[int(row)] for row in rows] for rows in self.members()]
 
 
+INDISTINCT_SQUARE = 2.366
+"""Chi-square of three degrees of freedom that half of all draws are below: a joint within it is in the ellipsoid that
+holds the truth as often as not."""
+
+
 def merge(
-    refined: Refined, *, within: float = MERGE_DISTANCE_METRES, keep: NDArray[np.bool_] | None = None
+    refined: Refined,
+    *,
+    within: float = MERGE_DISTANCE_METRES,
+    keep: NDArray[np.bool_] | None = None,
+    indistinct: float = 0.0,
 ) -> Merged:
     """Merge survivors of a frame that became one: all joints within a distance of those of a likelier one.
 
@@ -75,6 +88,9 @@ def merge(
         Metres that no joint may be apart.
     keep : bool array (N,), optional
         Which survivors are looked at: those that the noise explains (`Refined.explained`).
+    indistinct : float
+        Squared Mahalanobis distance, by the covariance of the likelier one, within which all joints are one too: a
+        valley of postures that lengths or noise leave is told by one of them with its ellipsoids.
 
     Raises
     ------
@@ -94,6 +110,8 @@ def merge(
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
     leader = _leaders(refined.frame[rows], joints, within)
+    if indistinct and len(rows):
+        leader = _indistinct(refined, rows, leader, indistinct)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
     number = np.full(len(rows), -1)
     number[leaders] = np.arange(len(leaders))
@@ -111,6 +129,29 @@ def _leaders(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[n
     leader = np.empty(len(frame), dtype=np.intp)
     leader[stands] = stands[second]
     return leader[first]
+
+
+def _indistinct(
+    refined: Refined, rows: NDArray[np.intp], leader: NDArray[np.intp], square: float
+) -> NDArray[np.intp]:
+    """Let leaders stand for those of their frame, less likely, whose joints all lie in their ellipsoids."""
+    stands = np.flatnonzero(leader == np.arange(len(rows)))
+    some = refined.select(rows[stands])
+    information = np.linalg.inv(some.covariance + ROUNDING_SQUARE_METRES * np.eye(3))
+    taken_by = np.arange(len(stands))
+    begins = np.flatnonzero(np.diff(some.frame, prepend=-1))
+    for begin, end in pairwise([*begins.tolist(), len(stands)]):
+        open_ = np.arange(begin, end)
+        while len(open_) > 1:
+            first, rest = open_[0], open_[1:]
+            apart = some.joints[rest] - some.joints[first]
+            off = np.einsum("npi,pij,npj->np", apart, information[first], apart).max(axis=1)
+            near = off < square
+            taken_by[rest[near]] = first
+            open_ = rest[~near]
+    onto = np.arange(len(rows))
+    onto[stands] = stands[taken_by]
+    return onto[leader]
 
 
 def _code(joints: Array) -> NDArray[np.intp]:
