@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from real_motion import CHECKS, Tally, true_code  # type: ignore[import-not-found]  # the script beside this one
+from real_motion import CHECK_NAMES, Tally, true_code  # type: ignore[import-not-found]  # the script beside this one
 
 from posekit.body import Figure, load_figure
 from posekit.body.frames import hips_frame
@@ -92,7 +92,7 @@ def evaluate(
 ) -> Tally:
     tally = Tally()
     for scene in scenes:
-        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=tolerance)
+        recovery = recover(view_of(scene), checks=CHECK_NAMES, ranges=ranges, tolerance=tolerance)
         for label, frame, truth in zip(scene.labels, recovery.frames, scene.joints_cam, strict=True):
             tally.add(label, frame, truth)
     return tally
@@ -250,7 +250,7 @@ def ranking(scenes: Sequence[SyntheticScene]) -> None:
     above: list[float] = []
     first: dict[str, list[float]] = defaultdict(list)
     for scene in scenes:
-        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED_TOLERANCE)
+        recovery = recover(view_of(scene), checks=CHECK_NAMES, ranges=ranges, tolerance=MEASURED_TOLERANCE)
         for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
             code = true_code(frame, truth)
             if code not in frame.branches:
@@ -299,7 +299,7 @@ def tree_speed(scenes: Sequence[SyntheticScene]) -> None:
                 for name in RANGE_TABLES:
                     start = time.process_time()
                     for view in views:
-                        recover(view, checks=CHECKS, ranges=name, tolerance=MEASURED_TOLERANCE)
+                        recover(view, checks=CHECK_NAMES, ranges=name, tolerance=MEASURED_TOLERANCE)
                     best[name] = min(best.get(name, np.inf), time.process_time() - start)
         print(f"Time of recovery, {way} path, urdf = 1: ", end="")
         print(", ".join(f"{name} {best[name] / best['urdf']:.2f}" for name in RANGE_TABLES))
