@@ -69,7 +69,7 @@ def capture(tmp_path_factory: pytest.TempPathFactory) -> Capture:
 
 @pytest.fixture(scope="module")
 def exact(capture: Capture) -> Any:
-    return evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0, 2.0)))
+    return evaluate(capture, sampling=FEW, sweep=SWEEP, method=Method(noise=(0.0, 2.0), settings=RecoverSettings(ranges="urdf")))
 
 
 def of(evaluation: Any, **key: Any) -> dict[str, Any]:
