@@ -13,7 +13,7 @@ CHECKS = joint_range(FIGURE, load_ranges("anatomical"))
 STANDING = {"pelvis.flexion": 13.5, "hip.flexion": -13.5}
 """The figure's angles where the clinic's are zero: the hips lie before the pelvis (docs, "Anatomical ranges")."""
 
-POSTURES = {
+POSTURES: dict[str, dict[str, float]] = {
     "standing": {},
     # Hemmerich et al. 2006, J Orthop Res 24:770, 30 adults: squatting with heels up, kneeling, sitting cross-legged.
     "squatting with heels up": {"hip.flexion": 115, "hip.abduction": 15, "knee.flexion": 157, "pelvis.flexion": 30},
@@ -54,7 +54,7 @@ POSTURES = {
 }  # fmt: skip
 """In the clinic's degrees, both sides alike unless one is named."""
 
-IMPOSSIBLE = {
+IMPOSSIBLE: dict[str, dict[str, float]] = {
     "an elbow bent backward": {"elbow.flexion": -40},
     "a knee bent backward": {"knee.flexion": -20},
     "a knee bent forward with the thigh turned": {"hip.rotation": 90, "knee.flexion": 40},

@@ -240,3 +240,19 @@ def test_a_table_without_couplings_or_sources_is_a_table(tmp_path: Path) -> None
     assert table.anatomy is not None
     assert table.anatomy.couplings == ()
     assert table.anatomy.sinuses == ()
+
+
+def test_the_nearer_the_pelvis_to_the_hips_the_less_is_known_of_how_it_leans() -> None:
+    limits = [ANATOMY.on_pelvis(metres).limits() for metres in (1.0, 0.1, 0.03, 0.0)]
+    for dof in DOFS:
+        widths = [upper - lower for lower, upper in (each[dof] for each in limits)]
+        if dof.endswith(("pelvis.flexion", "hip.flexion")):
+            assert (np.diff(widths) > 0).all()
+        else:
+            assert np.ptp(widths) == 0
+    here = ANATOMY.on_pelvis(0.1)
+    assert here.on_pelvis(0.01) is here  # it is known by then where the pelvis is
+    between_the_hips = ANATOMY.on_pelvis(0.0).motions["hip.flexion"].zero
+    assert between_the_hips.spread == pytest.approx(
+        np.hypot(45.0, ANATOMY.motions["hip.flexion"].zero.spread)
+    )
