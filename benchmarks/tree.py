@@ -81,7 +81,7 @@ class Job:
             ("rigid-parts", "joint-range", "collision"),
             ranges=load_ranges("urdf"),
             rigid_tolerance=self.tolerance.rigid,
-            rigid_mode="placement" if self.tolerance.placement else "distances",
+            rigid_mode="placement" if self.tolerance.placement else "side",
             angle_tolerance=self.tolerance.angle,
         )
 

@@ -41,7 +41,7 @@ def physical_checks(figure: Figure, tolerance: Tolerance = EXACT_TOLERANCE) -> l
         ("rigid-parts", "joint-range", "collision"),
         ranges=load_ranges("urdf"),
         rigid_tolerance=tolerance.rigid,
-        rigid_mode="placement" if tolerance.placement else "distances",
+        rigid_mode="placement" if tolerance.placement else "side",
         angle_tolerance=tolerance.angle,
     )
 
