@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
+from posekit.body import LengthUncertainty
 from posekit.recovery.recovery import Recovery
 from posekit.settings import MEASURED_TOLERANCE
 
@@ -20,8 +21,8 @@ def advice_lines(recovery: Recovery) -> list[str]:
     grower = recovery.grower
     if grower is None:
         return []
+    lines = _of_one_body(recovery)
     empty = [k for k, frame in enumerate(recovery.frames) if not len(frame) and not frame.reason]
-    lines = []
     if empty:
         from posekit.recovery.least_violation import least_violation
     photographs = None
@@ -55,3 +56,15 @@ def advice_lines(recovery: Recovery) -> list[str]:
 
         lines += length_diagnosis_lines(recovery, grower, lost)
     return lines
+
+
+def _of_one_body(recovery: Recovery) -> list[str]:
+    """Name the lengths of a clip that were found to be others than they were stated."""
+    said = recovery.settings.get("one_body")
+    if said is None:
+        return []
+    from posekit.recovery.clip_body import MAX_LENGTHS_NAMED, changed_lengths
+
+    known = LengthUncertainty(common=said["size_deviation"], own=said["deviation"])
+    lines = changed_lengths(said["start"], said["lengths"], known, sized=said["sized"])
+    return [f"lengths: {line}" for line in lines[:MAX_LENGTHS_NAMED]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -46,6 +46,9 @@ LEAST_DOUBTS, DOUBTED_SHARE = 3, 0.15
 Of real motion and lengths that are right some 3 % of frames do, with 3 % off each 46 % (docs, "How long a person's
 segments are").
 """
+
+FEWEST_CLIP_FRAMES = 10
+"""Frames from which one body is found for all of them, if its lengths are not exact."""
 
 OPEN_HYPOTHESES_AT_ONCE = 250
 """Hypotheses grown together where depth or scale is open: each may have thousands of leaves."""
@@ -111,7 +114,7 @@ def recover(
     )
     asked_trunks = noise is None or photographs
     grower = Grower(view=view, fit=fit, body=body, settings=asked, nearer=_nearer(asked, body, len(view)))
-    refiner = None
+    refiner: Refiner | None = None
     trees: dict[int, FrameTrees] = {}
     for part in _parts(fit):
         inexact = part
@@ -134,7 +137,9 @@ def recover(
             if empty.sum() < max(LEAST_DOUBTS, DOUBTED_SHARE * len(uncertain)):
                 uncertain = uncertain[empty]
         if noise is not None and not photographs and len(uncertain):
-            refiner = refiner or _refiner(grower, noise)
+            if refiner is None:
+                most = 2 * len(uncertain) > len(_distinct(fit.frame[part]))
+                refiner = _refiner(grower, noise, one_body=most)
             # Survivors without a place for what was not seen are still more than none.
             trees |= {
                 k: one
@@ -143,6 +148,9 @@ def recover(
             }
         if progress is not None:
             progress(len(_distinct(fit.frame[part])))
+    if refiner is not None:
+        noise, grower, body = refiner.noise, refiner.grower, refiner.grower.body
+        trees |= _found_again(refiner, fit)
     if photographs and noise is not None:
         # Seen with noise, or nothing is left by tolerances: a body of other lengths, or not all of a trunk is seen.
         undecided = np.array(
@@ -152,6 +160,28 @@ def recover(
             trees |= _refiner(grower, noise).grow(undecided)
 
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
+    frames = _frames(view, trees, fit, asked.group, list(zip(without_neck, bare, strict=True)))
+    _refuse_impossible(frames)
+    unused = photographs and all(frame.judged != "refined" for frame in frames)
+    record = record_of(
+        asked,
+        tolerance,
+        body.figure,
+        [(frame.judged, frame.tolerance) for frame in frames],
+        None if noise is None or unused else noise.document(),
+    )
+    record |= {} if refiner is None or refiner.clip is None else {"one_body": refiner.clip.document()}
+    return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower)
+
+
+def _frames(
+    view: View,
+    trees: Mapping[int, FrameTrees],
+    fit: CameraFit,
+    group: float | None,
+    lacking: Sequence[tuple[np.bool_, np.bool_]],
+) -> list[FrameRecovery]:
+    """Say what is left of each frame; `lacking` is whether it shows no neck, and too little of a trunk."""
     frames = []
     cameras = CameraRecords(view=view, fit=fit)
     for k, time in enumerate(view.time.tolist()):
@@ -165,22 +195,19 @@ def recover(
                 family=None if one.fit.families is None else one.fit.families[k],
                 placement=None if one.fit.placements is None else one.fit.placements[k],
                 reason=one.fit.reasons[k],
-                lost_to=lost_to(bool(without_neck[k]), bool(bare[k])),
-                group_within=asked.group,
+                lost_to=lost_to(*map(bool, lacking[k])),
+                group_within=group,
                 number=k,
                 cameras=cameras,
             )
         )
-    _refuse_impossible(frames)
-    unused = photographs and all(frame.judged != "refined" for frame in frames)
-    record = record_of(
-        asked,
-        tolerance,
-        body.figure,
-        [(frame.judged, frame.tolerance) for frame in frames],
-        None if noise is None or unused else noise.document(),
-    )
-    return Recovery(figure=body.figure, fit=fit, frames=frames, settings=record, grower=grower)
+    return frames
+
+
+def _found_again(refiner: Refiner, fit: CameraFit) -> dict[int, FrameTrees]:
+    """Grow frames whose necks could not be placed by the lengths that were given, but can by those that were found."""
+    found = [k for k, why in enumerate(fit.reasons) if why and not refiner.fit.reasons[k]]
+    return refiner.grow(np.array(found, dtype=np.intp)) if found and refiner.clip is not None else {}
 
 
 def _distinct(frames: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -255,15 +282,25 @@ def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds 
     return NearerEnds.of(asked.nearer, body.linkage, count)
 
 
-def _refiner(grower: Grower, noise: Noise) -> Refiner:
-    """Make what grows frames as their noise demands; where all are exact, what that needs is not even loaded."""
+def _refiner(grower: Grower, noise: Noise, *, one_body: bool = False) -> Refiner:
+    """Make what grows frames as their noise demands; where all are exact, what that needs is not even loaded.
+
+    Where most frames are not, `one_body` is found for all of them first, if they are enough.
+    """
     if isinstance(grower.view.camera, ScaledOrthographicModel):
         from posekit.recovery.photograph import PhotographRefiner
 
         return PhotographRefiner.of(grower, noise)
     from posekit.recovery.refiner import Refiner
 
-    return Refiner(grower=grower, noise=noise)
+    clip = None
+    if one_body and len(grower.view) >= FEWEST_CLIP_FRAMES and not noise.lengths.exact:
+        from posekit.recovery.clip_body import body_of_clip, with_body
+
+        clip = body_of_clip(grower, noise)
+        if clip is not None:
+            grower, noise = with_body(grower, clip), replace(noise, lengths=clip.varying)
+    return Refiner(grower=grower, noise=noise, clip=clip)
 
 
 def _by_tolerance(

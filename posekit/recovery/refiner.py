@@ -10,7 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +36,9 @@ from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, Loosening, Scope
+
+if TYPE_CHECKING:
+    from posekit.recovery.clip_body import ClipBody
 
 NOISE_UNIT_DEGREES: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
@@ -95,10 +98,13 @@ class Refiner:
         What grows the trees of the view.
     noise : Noise
         How far image points and lengths may be off.
+    clip : ClipBody, optional
+        The one body that was found for all frames, whose lengths these are.
     """
 
     grower: Grower
     noise: Noise
+    clip: ClipBody | None = None
 
     def grow(self, frames: NDArray[np.intp]) -> dict[int, FrameTrees]:
         """Grow the trees of some frames of the view, and refine their leaves: hypotheses are trunks, maybe none."""

@@ -78,7 +78,7 @@ def trunk_terms(problem: RefinementProblem, state: PostureState, watch: Signs | 
         _add_turn(turn[None], normal[None], SPINE_TURN_DEVIATION**-2, matrix, gradient)
         chi2 += (turn / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
-        stretch, J = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
+        stretch, J = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape)
         matrix[9:, 9:] += np.einsum("kin,kjn->ijn", J, J)
         gradient[9:] += np.einsum("kin,kn->in", J, stretch)
         chi2 += np.einsum("kn,kn->n", stretch, stretch)
@@ -108,7 +108,7 @@ def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) 
     if problem.anatomy.middle_pelvis:
         chi2 += (_spine_turn(state)[0] / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
-        stretch, _ = _distances(problem.shape_weight, problem.anatomy.shape, state.shape)
+        stretch, _ = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape)
         chi2 += np.einsum("kn,kn->n", stretch, stretch)
     return chi2, crossed
 
@@ -223,7 +223,7 @@ def shape_jacobian(state: PostureState) -> Array:
     return jacobian
 
 
-def _distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
+def shape_distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
     """Return the residuals (9, N) of the trunk's distances and their derivative (9, 9, N) along the shape."""
     points, mine = np.einsum("jis,sn->jin", _PLACES, shape), _PLACES @ own
     residual, J = np.empty_like(shape), np.empty((9, *shape.shape))
