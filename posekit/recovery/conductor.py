@@ -137,9 +137,7 @@ def recover(
             if empty.sum() < max(LEAST_DOUBTS, DOUBTED_SHARE * len(uncertain)):
                 uncertain = uncertain[empty]
         if noise is not None and not photographs and len(uncertain):
-            if refiner is None:
-                most = 2 * len(uncertain) > len(_distinct(fit.frame[part]))
-                refiner = _refiner(grower, noise, one_body=most)
+            refiner = refiner or _refiner(grower, noise, most=_share(uncertain, fit.frame[part]) > 0.5)
             # Survivors without a place for what was not seen are still more than none.
             trees |= {
                 k: one
@@ -162,14 +160,7 @@ def recover(
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = _frames(view, trees, fit, asked.group, list(zip(without_neck, bare, strict=True)))
     _refuse_impossible(frames)
-    unused = photographs and all(frame.judged != "refined" for frame in frames)
-    record = record_of(
-        asked,
-        tolerance,
-        body.figure,
-        [(frame.judged, frame.tolerance) for frame in frames],
-        None if noise is None or unused else noise.document(),
-    )
+    record = _record(asked, tolerance, body.figure, frames, noise)
     record |= {} if refiner is None or refiner.clip is None else {"one_body": refiner.clip.document()}
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower)
 
@@ -202,6 +193,30 @@ def _frames(
             )
         )
     return frames
+
+
+def _record(
+    asked: RecoverSettings,
+    tolerance: Tolerance | None,
+    figure: Figure,
+    frames: Sequence[FrameRecovery],
+    noise: Noise | None,
+) -> dict[str, Any]:
+    """Gather what decided the result; the noise of photographs only where one was refined with it."""
+    photographs = any(frame.family is not None for frame in frames)
+    unused = photographs and all(frame.judged != "refined" for frame in frames)
+    return record_of(
+        asked,
+        tolerance,
+        figure,
+        [(frame.judged, frame.tolerance) for frame in frames],
+        None if noise is None or unused else noise.document(),
+    )
+
+
+def _share(some: NDArray[np.intp], frames: NDArray[np.intp]) -> float:
+    """Return which share of different frames some are."""
+    return len(some) / max(len(_distinct(frames)), 1)
 
 
 def _found_again(refiner: Refiner, fit: CameraFit) -> dict[int, FrameTrees]:
@@ -282,10 +297,10 @@ def _nearer(asked: RecoverSettings, body: LiftedBody, count: int) -> NearerEnds 
     return NearerEnds.of(asked.nearer, body.linkage, count)
 
 
-def _refiner(grower: Grower, noise: Noise, *, one_body: bool = False) -> Refiner:
+def _refiner(grower: Grower, noise: Noise, *, most: bool = False) -> Refiner:
     """Make what grows frames as their noise demands; where all are exact, what that needs is not even loaded.
 
-    Where most frames are not, `one_body` is found for all of them first, if they are enough.
+    Where `most` frames are not, one body is found for all of them first, if they are enough.
     """
     if isinstance(grower.view.camera, ScaledOrthographicModel):
         from posekit.recovery.photograph import PhotographRefiner
@@ -294,7 +309,7 @@ def _refiner(grower: Grower, noise: Noise, *, one_body: bool = False) -> Refiner
     from posekit.recovery.refiner import Refiner
 
     clip = None
-    if one_body and len(grower.view) >= FEWEST_CLIP_FRAMES and not noise.lengths.exact:
+    if most and len(grower.view) >= FEWEST_CLIP_FRAMES and not noise.lengths.exact:
         from posekit.recovery.clip_body import body_of_clip, with_body
 
         clip = body_of_clip(grower, noise)

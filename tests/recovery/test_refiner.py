@@ -170,9 +170,9 @@ def test_every_survivor_is_valid_by_the_result_itself(
     recovery = recover(view, ranges=ranges)
 
     def verdicts(recovery: Recovery, *, heads: bool) -> list[str]:
-        judged = recovered_with(result_of(recovery)).settings
+        said = recovered_with(result_of(recovery))
         rigid = recovery.settings["refined"]["rigid"]
-        validator = Validator(settings=judged, ranges=ranges, rigid_tolerance=rigid)
+        validator = Validator(said.figure, settings=said.settings, ranges=ranges, rigid_tolerance=rigid)
         points = np.concatenate(
             [frame.batch.points[frame._rows] for frame in recovery.frames if frame.batch is not None]
         )
