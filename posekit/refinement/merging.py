@@ -90,7 +90,8 @@ def merge(
         Which survivors are looked at: those that the noise explains (`Refined.explained`).
     indistinct : float
         Squared Mahalanobis distance, by the covariance of the likelier one, within which all joints are one too: a
-        valley of postures that lengths or noise leave is told by one of them with its ellipsoids.
+        valley of postures that uncertain lengths leave is told by one of them with its ellipsoids. With it, survivors
+        of one branch (`SAME_SIDES_METRES`) are one, too.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def merge(
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
-    leader = _leaders(refined.frame[rows], joints, within)
+    leader = _leaders(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
     if indistinct and len(rows):
         leader = _indistinct(refined, rows, leader, indistinct)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
@@ -120,10 +121,12 @@ def merge(
     return Merged(refined=refined.select(rows[leaders]), rows=rows[leaders], group=group)
 
 
-def _leaders(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:
+def _leaders(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
     """Find which of the postures (N, 14, 3), the best of a frame first, stands for each: near, or of one branch."""
+    if not of_branch:
+        return groups_of(frame, joints, within)
     _, branch = np.unique(np.column_stack([frame, _code(joints)]), axis=0, return_inverse=True)
-    first = groups_of(branch.reshape(-1), joints, SAME_SIDES_METRES if within else 0.0)
+    first = groups_of(branch.reshape(-1), joints, of_branch)
     stands = np.flatnonzero(first == np.arange(len(frame)))
     second = groups_of(frame[stands], joints[stands], within)
     leader = np.empty(len(frame), dtype=np.intp)
