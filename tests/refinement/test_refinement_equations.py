@@ -31,7 +31,7 @@ def figure() -> Figure:
 
 @cache
 def scene() -> SyntheticScene:
-    return random_views(figure(), N, np.random.default_rng(7))
+    return random_views(figure(), N, np.random.default_rng(7), ranges="urdf")
 
 
 def sight_of(

@@ -29,7 +29,7 @@ def figure() -> Figure:
 
 @cache
 def scene(n: int = 120) -> SyntheticScene:
-    return random_views(figure(), n, np.random.default_rng(11))
+    return random_views(figure(), n, np.random.default_rng(11), ranges="urdf")
 
 
 def known_root(view: SyntheticScene, deviation: float = 0.0) -> RootPrior:
@@ -320,7 +320,7 @@ def test_lengths_are_refined_where_their_deviation_is_given() -> None:
     long = figure().scaled(
         {"right_elbow-right_wrist": 0.29, "left_shoulder-pelvis": 0.53, "neck-pelvis": 0.48}
     )
-    view = random_views(long, 60, np.random.default_rng(2))
+    view = random_views(long, 60, np.random.default_rng(2), ranges="urdf")
     sight = sight_of(view, 0.5, root=known_root(view))
     held = refine(sight, view.joints_cam)
     varied = refine(replace(sight, length_deviation=0.05), view.joints_cam)
