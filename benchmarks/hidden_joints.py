@@ -14,6 +14,7 @@ Prints a Markdown table.
 from __future__ import annotations
 
 import argparse
+import sys
 import time
 import warnings
 from collections import Counter
@@ -208,6 +209,7 @@ def main(arguments: list[str] | None = None) -> None:
             for frame, truth, joints in zip(recovery.frames, scene.joints_cam, hidden, strict=True):
                 tally.add(frame, truth, joints, dict(recovery.figure.lengths))
         rows.append([pattern, *tally.row(exact)])
+        print(*rows[-1], file=sys.stderr, flush=True)
         lost.append(f"{pattern}: {dict(tally.judged)}; {dict(tally.lost.most_common(12))}")
     head = [
         "hidden",

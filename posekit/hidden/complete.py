@@ -22,6 +22,9 @@ from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES
 from posekit.skeleton import JOINTS, POINTS
 from posekit.tree import Check, Leaves
 
+SAME_CORE_METRES = 0.03
+"""Metres between joints that were measured, at most, that count as one."""
+
 ROWS_AT_ONCE = 250_000
 """Placements of a limb judged together: enough to spread NumPy's overhead, few enough for the memory."""
 
@@ -141,7 +144,9 @@ def complete_points(
                 describe_sets(batch, done, part)
 
         if tolerance > EXACT_WITHIN_METRES:
-            complete_by_core(pattern, points, frame, rows, done, describe, within=tolerance)
+            complete_by_core(
+                pattern, points, frame, rows, done, describe, within=min(tolerance, SAME_CORE_METRES)
+            )
         else:
             describe(pattern, rows)
     return done.frozen()

@@ -15,6 +15,9 @@ from posekit.refinement.optics import Optics
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, parents, turned_by_spine
 
+TORSO_PULL_METRES = 0.01
+"""Metres: the arm with which hips of which a joint is not known are pulled to the torso's frame."""
+
 HANGING_AXIS = 2
 """The axis of a part along which its limbs hang, downward: where a limb that is not known is put."""
 
@@ -38,8 +41,10 @@ def state_of(anatomy: FigureNumbers, postures: Array, head: Array | None = None)
     hips = hips_frame(pelvis, right, left, postures[:, 0] if anatomy.middle_pelvis else None)
     part = np.isnan(hips[:, 0, 0])
     if part.any():
-        own = np.array([[0.0, hip_right, -h], [0.0, hip_left, -h]])
-        hips[part] = _laid(own, offsets[part, 4:6] - offsets[part, 3:4])
+        # What one hip leaves open is as the torso has it: a start that is turned at random may be beyond all limits.
+        own = np.concatenate([[[0.0, hip_right, -h], [0.0, hip_left, -h]], TORSO_PULL_METRES * np.eye(3)])
+        along = TORSO_PULL_METRES * torso[part].transpose(0, 2, 1)
+        hips[part] = _laid(own, np.concatenate([offsets[part, 4:6] - offsets[part, 3:4], along], axis=1))
         hips = np.where(np.isnan(hips), torso, hips)
     turned_head = torso
     if head is not None:
