@@ -23,7 +23,7 @@ FRAMES = 12
 
 @pytest.fixture(scope="module")
 def scene() -> SyntheticScene:
-    return random_views(FIGURE, FRAMES, np.random.default_rng(15))
+    return random_views(FIGURE, FRAMES, np.random.default_rng(15), ranges="urdf")
 
 
 def sight(scene: SyntheticScene, size: float, own: float = 0.01) -> ObservedFrames:
@@ -117,7 +117,7 @@ def test_lengths_that_are_off_empty_no_frame(scene: SyntheticScene, factor: floa
     view = dataclasses.replace(
         view_of(seen), root=scene.joints_cam[:, 0], lengths=lengths, deviation=pixels or None
     )
-    recovery = recover(view)
+    recovery = recover(view, ranges="urdf")
     assert min(map(len, recovery.frames)) > 0
     best = [
         np.linalg.norm(frame.joints - truth, axis=2).mean(axis=1).min()
@@ -125,13 +125,16 @@ def test_lengths_that_are_off_empty_no_frame(scene: SyntheticScene, factor: floa
     ]
     assert np.median(best) < 0.05
     if factor < 1 and pixels:
-        held = recover(view, length_deviation=0.0)
+        held = recover(view, length_deviation=0.0, ranges="urdf")
         assert sum(not len(frame) for frame in held.frames) > FRAMES / 2
 
 
 def test_a_view_that_says_exact_is_taken_at_its_word(scene: SyntheticScene) -> None:
     view = dataclasses.replace(view_of(scene), root=scene.joints_cam[:, 0])
-    plain, said = recover(view), recover(dataclasses.replace(view, length_deviation=0.0))
+    plain, said = (
+        recover(view, ranges="urdf"),
+        recover(dataclasses.replace(view, length_deviation=0.0), ranges="urdf"),
+    )
     for a, b in zip(plain.frames, said.frames, strict=True):
         assert a.judged == b.judged == "exact"
         np.testing.assert_array_equal(a.joints, b.joints)
