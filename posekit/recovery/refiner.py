@@ -320,9 +320,8 @@ class Refiner:
             camera,
             self.grower.body.figure,
             float(self.fit.root[chosen, 2].max()),
-            length_deviation=self.noise.limb,
+            length_deviation=math.hypot(self.noise.limb, self.noise.scale),
             root_depth_deviation=seen.step,
-            size_deviation=self.noise.scale,
             trunks=True,
         )
 

@@ -67,7 +67,6 @@ def tolerance_of(
     deviations: float = ALLOWED_DEVIATIONS,
     length_deviation: float = 0.0,
     root_depth_deviation: float = 0.0,
-    size_deviation: float = 0.0,
     trunks: bool = False,
 ) -> NoiseTolerance:
     r"""Derive tolerances from the noise of key points.
@@ -85,11 +84,9 @@ def tolerance_of(
     deviations : float
         How many standard deviations are allowed for.
     length_deviation : float
-        Relative standard deviation of segment lengths.
+        Relative standard deviation of segment lengths, beside the trunk that limbs are put on.
     root_depth_deviation : float
         Standard deviation of the root's depth, metres: to first order it scales all that is lifted.
-    size_deviation : float
-        Relative standard deviation of the size of the trunk that limbs are put on.
     trunks : bool
         Whether the tree is grown on trunks that `posekit.refinement.find_trunks` found: then the rigid parts are
         exact, and the trunk is off by no more than one point's noise.
@@ -109,7 +106,6 @@ def tolerance_of(
         ("deviations", deviations),
         ("length_deviation", length_deviation),
         ("root_depth_deviation", root_depth_deviation),
-        ("size_deviation", size_deviation),
     ):
         if not (math.isfinite(value) and value >= 0):
             raise InputError(f"tolerance_of: {name} is {value!r}; expected zero or a positive, finite number")
@@ -118,8 +114,9 @@ def tolerance_of(
     scale = depth / focal if optics.perspective else 1.0 / focal
     bound = deviations * deviation / focal
     beside = deviations * deviation * scale
-    vague = math.hypot(length_deviation, size_deviation)
-    stretch = deviations * math.hypot(vague, root_depth_deviation / depth if root_depth_deviation else 0.0)
+    stretch = deviations * math.hypot(
+        length_deviation, root_depth_deviation / depth if root_depth_deviation else 0.0
+    )
     lengths = {joint: figure.lengths[segment_name(pair)] for joint, pair in enumerate(TREE_SEGMENTS, start=1)}
     # Both ends of a segment are off beside their rays, and its length by its own deviation.
     excess = {joint: math.hypot(math.sqrt(2) * beside, stretch * length) for joint, length in lengths.items()}
@@ -144,7 +141,7 @@ def tolerance_of(
         angle=min(math.degrees(math.hypot(limb, trunk)), 180.0),
         contact=contact,
         bound=bound,
-        stretch=deviations * vague,
+        stretch=deviations * length_deviation,
     )
 
 
