@@ -38,6 +38,7 @@ class DirectionDensity(NamedTuple):
     Attributes
     ----------
     mean : array (d,)
+        The middle of the distribution.
     whitening : array (d, d)
         W with W' W the inverse of the scale.
     dof : float

@@ -32,14 +32,14 @@ from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.trunk_evidence import TRUNK_NAMES, TrunkEvidence
 from posekit.skeleton import SEGMENT_NAMES, other_side, segment_name
 
-ASYMMETRY: Final = 0.02
+SIDE_ASYMMETRY: Final = 0.02
 """Standard deviation of the logarithm of one side's length over the other's.
 
 Sides of bones differ by 1 % or less in most people (Auerbach & Ruff 2006, J. Human Evolution 50:203: medians of length
 0.1 to 1.3 %); joints as they are tracked by as much again.
 """
 
-GRID: Final = np.sinh(3.0 * np.linspace(-1.0, 1.0, 17)) / np.sinh(3.0)
+LENGTH_GRID: Final = np.sinh(3.0 * np.linspace(-1.0, 1.0, 17)) / np.sinh(3.0)
 """Lengths of a limb segment that are tried, as shares of the widest: denser where it is."""
 
 GRID_WIDTHS: Final = (0.25, 0.25, 0.2, 0.15, 0.15, 0.15)
@@ -158,7 +158,7 @@ def find_body(
         for segment, values in round_.limbs(x, width):
             cavity = max(1 / covariance[segment, segment] - sites[segment, 0], LEAST_PRECISION)
             middle = (x[segment] / covariance[segment, segment] - sites[segment, 1]) / cavity
-            sites[segment] = _site(values, x[segment] + width * GRID, cavity, middle)
+            sites[segment] = _site(values, x[segment] + width * LENGTH_GRID, cavity, middle)
         slope, curvature = round_.trunk()
         precision = prior + np.diag(sites[:, 0])
         right = pull + sites[:, 1]
@@ -184,7 +184,7 @@ def _sides_alike() -> Array:
         if mirrored in SEGMENT_NAMES and mirrored != name:
             apart = np.zeros(len(SEGMENT_NAMES))
             apart[one], apart[SEGMENT_NAMES.index(mirrored)] = 1.0, -1.0
-            out += np.outer(apart, apart) / (2 * ASYMMETRY**2)  # each pair comes twice
+            out += np.outer(apart, apart) / (2 * SIDE_ASYMMETRY**2)  # each pair comes twice
     return out
 
 
@@ -247,10 +247,10 @@ class _Round:
         upper, lower = [], []
         for limb, density in zip(range(4), directions.limbs, strict=True):
             found = _limb(observed, evidence, limb, density)
-            one, two = (lengths[segment] * np.exp(width * GRID) for segment in _LIMBS[limb])
+            one, two = (lengths[segment] * np.exp(width * LENGTH_GRID) for segment in _LIMBS[limb])
             upper.append(found.of_upper(one))
             lower.append(found.of_lower(upper[-1].max(axis=2), two, float(lengths[_LIMBS[limb][0]])))
-        middle = len(GRID) // 2
+        middle = len(LENGTH_GRID) // 2
         each = [_summed(a[:, :, middle] + b[:, :, middle]) for a, b in zip(upper, lower, strict=True)]
         return _Round(
             evidence=evidence, deviation=of_trunk, upper=upper, lower=lower, each=np.reshape(each, (4, -1))
@@ -268,7 +268,7 @@ class _Round:
 
     def limbs(self, x: Array, width: float) -> list[tuple[int, Array]]:
         """Return for each limb segment its place in the body, and log-likelihoods (G,) of lengths on the grid."""
-        middle = len(GRID) // 2
+        middle = len(LENGTH_GRID) // 2
         out = []
         for limb, (first, second) in enumerate(_LIMBS):
             upper, lower = self.upper[limb], self.lower[limb]
