@@ -24,7 +24,7 @@ from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.trunk_placements import TrunkPlacements
 from posekit.skeleton import PARENTS, segment_name
 
-PELVIS: Final = HIP_JOINTS[0]
+PELVIS_JOINT: Final = HIP_JOINTS[0]
 
 MOST_STARTS: Final = 240
 """Places of the trunk of a core, at most, on which the next joint is placed."""
@@ -38,7 +38,7 @@ FEWEST_AROUND, FEWEST_ABOUT = 32, 16
 GOLDEN_RATIO: Final = 0.6180339887498949
 """Less one: shifts lattices between each other."""
 
-TINY: Final = 1e-12
+TINY_METRES: Final = 1e-12
 """Metres: stands for zero where something is divided by a length."""
 
 
@@ -84,7 +84,7 @@ class MeasuredTrunkPlacer:
                 trunks, row, spacing = self._from_hips(before)
             elif not hidden:
                 trunks, row, spacing = self._lifted(before, *joints)
-            elif joints[0] in HIP_JOINTS[1:] and sum(HIP_JOINTS) - joints[0] - PELVIS in known:
+            elif joints[0] in HIP_JOINTS[1:] and sum(HIP_JOINTS) - joints[0] - PELVIS_JOINT in known:
                 trunks, row, spacing = self._about_hips(before, *joints)
             else:
                 trunks, row, spacing = self._around(before, *joints)
@@ -106,8 +106,8 @@ class MeasuredTrunkPlacer:
         states, hips = self.pattern.states, HIP_JOINTS[1:]
         seen = [(joint,) for joint in hips if states[joint] == JointState.SEEN]
         hidden = [(joint,) for joint in hips if states[joint] == JointState.HIDDEN]
-        closed = states[PELVIS] == JointState.HIDDEN and len(seen) == len(hips)
-        first = [HIP_JOINTS] if closed else [(PELVIS,), *seen]
+        closed = states[PELVIS_JOINT] == JointState.HIDDEN and len(seen) == len(hips)
+        first = [HIP_JOINTS] if closed else [(PELVIS_JOINT,), *seen]
         order = [*first, *((joint,) for joint in TORSO_JOINTS[1:-1]), *hidden]
         return [joints for joints in order if joints[0] in self.pattern.trunk_joints]
 
@@ -141,8 +141,8 @@ class MeasuredTrunkPlacer:
 
     def _about_hips(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
         """Turn a hip about pelvis and other hip: a pelvis is bone, and keeps its shape however it was measured."""
-        other = sum(HIP_JOINTS) - joint - PELVIS
-        start, end = trunks.points[:, PELVIS], trunks.points[:, other]
+        other = sum(HIP_JOINTS) - joint - PELVIS_JOINT
+        start, end = trunks.points[:, PELVIS_JOINT], trunks.points[:, other]
         n = max(self.sampling.trunk_sphere // _most(trunks.core), FEWEST_ABOUT)
         row = np.repeat(np.arange(len(trunks)), n)
         angle = (np.tile(np.arange(n) / n, len(trunks)) + row * GOLDEN_RATIO) * 2.0 * np.pi
@@ -161,9 +161,9 @@ class MeasuredTrunkPlacer:
         """
         _, right, left = HIP_JOINTS
         n = max(self.sampling.hip_depths // _most(trunks.core), FEWEST_ABOUT)
-        neck = trunks.points[:, PARENTS[PELVIS]]
+        neck = trunks.points[:, PARENTS[PELVIS_JOINT]]
         foot, height = self.rays.foot(right, self.frame[trunks.core], neck)
-        reach = self._length(PELVIS) + self._length(right) + self.tolerance
+        reach = self._length(PELVIS_JOINT) + self._length(right) + self.tolerance
         half = np.sqrt(np.maximum(reach**2 - np.where(np.isfinite(height), height, np.inf) ** 2, 0.0))
         row = np.repeat(np.flatnonzero(half > 0.0), n)
         along = ((np.tile(np.arange(n) + 0.5, len(row) // n)) / n * 2.0 - 1.0) * half[row]
@@ -177,8 +177,8 @@ class MeasuredTrunkPlacer:
         flat = np.einsum("nij,ni->nj", across, away)
         far = np.linalg.norm(flat, axis=1)
         # |center + radius u - neck| is the length from neck to pelvis; the nearest u where none has it.
-        wanted = (radius**2 + (away**2).sum(axis=1) - self._length(PELVIS) ** 2) / np.maximum(
-            2.0 * radius * far, TINY
+        wanted = (radius**2 + (away**2).sum(axis=1) - self._length(PELVIS_JOINT) ** 2) / np.maximum(
+            2.0 * radius * far, TINY_METRES
         )
         turn = np.arccos(np.clip(wanted, -1.0, 1.0)) * np.array([[-1.0], [1.0]])
         angle = (np.arctan2(flat[:, 1], flat[:, 0]) + turn).reshape(-1)
@@ -187,19 +187,19 @@ class MeasuredTrunkPlacer:
         pelvis = center + radius[:, None] * (
             np.cos(angle)[:, None] * across[..., 0] + np.sin(angle)[:, None] * across[..., 1]
         )
-        off = np.abs(np.linalg.norm(pelvis - neck[row], axis=1) - self._length(PELVIS))
+        off = np.abs(np.linalg.norm(pelvis - neck[row], axis=1) - self._length(PELVIS_JOINT))
         good = np.flatnonzero(off <= self.tolerance)
         good = good[np.argsort(row[good], kind="stable")]
         placed = trunks.take(row[good])
-        for joint, positions in ((PELVIS, pelvis), (right, first), (left, second)):
+        for joint, positions in ((PELVIS_JOINT, pelvis), (right, first), (left, second)):
             placed.points[:, joint] = positions[good]
-        return placed, row[good], 2.0 * reach / n / self._length(PELVIS)
+        return placed, row[good], 2.0 * reach / n / self._length(PELVIS_JOINT)
 
 
 def _circle(start: Array, end: Array, near: float, far: float) -> tuple[Array, Array, Array]:
     """Return the circles of points at distances from two points: centres (N, 3), radii (N,), directions (N, 3, 2)."""
     axis = end - start
-    apart = np.maximum(np.linalg.norm(axis, axis=1), TINY)
+    apart = np.maximum(np.linalg.norm(axis, axis=1), TINY_METRES)
     axis = axis / apart[:, None]
     along = (apart**2 + near**2 - far**2) / (2.0 * apart)
     radius = np.sqrt(np.maximum(near**2 - along**2, 0.0))

@@ -66,7 +66,9 @@ def labelled(figure: Figure) -> Labelled:
 @pytest.fixture(scope="module")
 def judged(figure: Figure, labelled: Labelled, held: Path) -> tuple[Report, Report]:
     human = Validator(HUMAN_NAME, ranges=str(held))
-    return Validator(figure).check(labelled.joints), human.check(labelled.joints, lengths=figure.lengths)
+    return Validator(figure, ranges="urdf").check(labelled.joints), human.check(
+        labelled.joints, lengths=figure.lengths
+    )
 
 
 def configuration(figure: Figure, **angles: float) -> np.ndarray:

@@ -68,7 +68,7 @@ def test_a_rigid_recording_gives_its_lengths_back(seed: int) -> None:
 
 def test_noise_and_outliers_are_allowed_for(rng: np.random.Generator) -> None:
     figure, _ = somebody(3)
-    scene = random_views(figure, 400, rng)
+    scene = random_views(figure, 400, rng, ranges="urdf")
     noisy = scene.joints_cam + 0.03 * rng.normal(size=scene.joints_cam.shape)
     noisy[::25, JOINT["left_wrist"]] += 5.0
     noisy[rng.random(noisy.shape[:2]) < 0.1] = np.nan

@@ -1,6 +1,7 @@
 """What is said of frames without a posture whose neck had to be placed: the lengths that are wrong, and no other."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +14,8 @@ from posekit.synthesis import random_views
 from posekit.views.builtin import view_of
 
 FIGURE = load_figure()
+HELD: dict[str, Any] = {"infer": False, "ranges": "urdf", "length_deviation": 0.0}
+"""Lengths at their word, however wrong: where they may vary, most frames have a posture."""
 UPPER_ARMS = ("right_shoulder-right_elbow", "left_shoulder-left_elbow")
 TRUNK = tuple(
     name
@@ -31,7 +34,7 @@ def rootless(factors: dict[str, float], noise: float = 2.0) -> View:
 
 @pytest.mark.parametrize("noise", [0.0, 2.0])
 def test_arms_that_are_too_short_are_named_where_no_root_is_given(noise: float) -> None:
-    recovery = recover(rootless(dict.fromkeys(UPPER_ARMS, 0.7), noise), infer=False, ranges="urdf")
+    recovery = recover(rootless(dict.fromkeys(UPPER_ARMS, 0.7), noise), **HELD)
     assert sum(not len(frame) for frame in recovery.frames) > 4
     # The torso is blamed frame by frame, though its lengths are right: the arms hold the person too near.
     assert any("the rigid parts close at no depth" in frame.reason for frame in recovery.frames)
@@ -45,7 +48,7 @@ def test_arms_that_are_too_short_are_named_where_no_root_is_given(noise: float) 
 
 
 def test_a_trunk_that_is_too_large_is_not_laid_upon_one_limb() -> None:
-    recovery = recover(rootless(dict.fromkeys(TRUNK, 1.3)), infer=False, ranges="urdf")
+    recovery = recover(rootless(dict.fromkeys(TRUNK, 1.3)), **HELD)
     assert sum(not len(frame) for frame in recovery.frames) > 4
     lines = advice_lines(recovery)
     assert not any("is stated as" in line for line in lines)

@@ -53,7 +53,7 @@ class Recorded:
 
         with mock.patch.object(refiner, "_without_twins", twins):
             with mock.patch.object(refined, "covariances", covariances):
-                self.recovery: Recovery = recover(view)
+                self.recovery: Recovery = recover(view, length_deviation=0.0)
                 self.asked_by_frames = self.asked, sum(len(frame) for frame in self.recovery.frames)
                 self.first = next(
                     frame.refined

@@ -26,7 +26,8 @@ TURNTABLE = """<robot name="turntable"><link name="a"/><link name="b"/>
 
 @lru_cache
 def validator(name: str) -> Validator:
-    return Validator(None if name == "stick_figure" else name, checks=("joint-range", "collision"))
+    figure = name == "stick_figure"
+    return Validator(None if figure else name, checks=("joint-range", "collision"), ranges="urdf")
 
 
 @lru_cache

@@ -444,7 +444,16 @@ def test_survivors_are_compared_with_a_truth_in_other_axes(
         motion = replace(motion, points=motion.points[..., [2, 0, 1]], up="+z")
     write_motion(tmp_path / "truth.npz", motion)
     done = command(
-        "recover", path, "-o", tmp_path / "r.npz", "--camera", calibration, "--truth", tmp_path / "truth.npz"
+        "recover",
+        path,
+        "-o",
+        tmp_path / "r.npz",
+        "--camera",
+        calibration,
+        "--truth",
+        tmp_path / "truth.npz",
+        "--length-deviation",
+        "0",
     )
     assert done.code == 0, done.err
     assert "2 of 2 frames; its axes" in done.out
