@@ -13,7 +13,7 @@ from posekit.cli.detector_options import Format, Skeleton, Unit
 from posekit.cli.detector_source import pixels
 from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
-from posekit.cli.options import Seed, distinct, examples, option, options_given, progress, split
+from posekit.cli.options import Seed, as_recover, distinct, examples, option, options_given, progress, split
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,6 +109,7 @@ def evaluate(
             "they are.",
         ),
     ] = "",
+    length_deviation: Annotated[float | None, as_recover("--length-deviation", "FRACTION")] = None,
     judging: Judging,
     tolerances: TolerancesAsRecover,
     format: Format = "",
@@ -152,7 +153,7 @@ def evaluate(
     )
     options: dict[str, Any] = {
         "root": root or None,
-        "settings": settings_of(judging, tolerances),
+        "settings": settings_of(judging, tolerances).changed(length_deviation=length_deviation),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,
     }

@@ -41,6 +41,9 @@ class EvaluationSettingsFields(FileModel):
     root: Literal["given", "auto"] | None = Field(
         description="Whether the neck is the true one, or placed from the image; null: as the view has it."
     )
+    length_deviation: NotNegative | None = Field(
+        default=None, description="How far lengths were said to be off; null: as is usual for the view."
+    )
     checks: list[str]
     ranges: str
     rules: list[int]
