@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_distribution
 
-from posekit.body import Figure, load_figure
+from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.body.uncertainty import MEASURED_LENGTHS
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
@@ -219,9 +219,10 @@ def by_refiner(scene: SyntheticScene, image: np.ndarray, pixels: float, lengths:
     )
     grower = recover(view, figure=scene.figure, length_deviation=lengths).grower
     assert grower is not None
-    refiner = Refiner(grower=grower, noise=Noise(deviation=pixels, lengths=lengths))
+    known = MEASURED_LENGTHS if lengths is None else LengthUncertainty.uniform(lengths)
+    refiner = Refiner(grower=grower, noise=Noise(deviation=pixels, lengths=known))
     lifted = refiner.lift(np.arange(len(view)))
-    frame, postures, truth = lifted.frame[lifted.hypothesis], lifted.postures(), scene.joints_cam
+    frame, postures, truth = lifted.frame[lifted.hypothesis], lifted.leaves.postures(), scene.joints_cam
     refined = refine(lifted.seen.sight, postures, frame=lifted.hypothesis, hopeless=HOPELESS_CHI2)
     sifted = refiner.refine(lifted)
     kept = frame[sifted.kept], sifted.survivors.joints

@@ -50,7 +50,7 @@ def offs(joints: np.ndarray) -> np.ndarray:
 def ahead(joints: np.ndarray) -> np.ndarray:
     """Measure how far the shoulders lie in front of the line from neck to pelvis (N,)."""
     forward = torso_frame(*np.moveaxis(joints[:, :4], 1, 0))[:, :, 0]
-    return np.einsum("ni,ni->n", forward, joints[:, 1] - joints[:, 0])
+    return np.asarray(np.einsum("ni,ni->n", forward, joints[:, 1] - joints[:, 0]))
 
 
 def test_all_distances_have_the_same_bound_unless_told_otherwise() -> None:
