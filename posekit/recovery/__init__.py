@@ -2,11 +2,12 @@
 
 `conductor` is `posekit.recover`, and calls the others one after the other:
 
-1. Root: `person` (whose body it is), `body` (what is lifted, and the checks that settings ask for), `observed` (which
+1. Root: `person` (whose body it is, and how well its lengths are known), `body` (what is lifted, and the checks that settings ask for), `observed` (which
    frames show enough), `fit_camera` and `fit_scale` (where the camera sees the root), `rooting` (where the neck is put
    that nobody gives).
 2. Tree: `grower` grows and prunes the trees of some hypotheses, `trees` is what comes of them.
-3. Refine, where the noise is known: `noise`, `hypotheses` (what was observed, and how far it may be off), `refiner`
+3. Refine, where points or lengths are uncertain: `length_evidence` (whether lengths may be taken at their word),
+   `clip_body` (one body for all frames), `noise`, `hypotheses` (what was observed, and how far it may be off), `refiner`
    (trees on trunks), `limb_walls` (limits of limbs), `survival` (what became of each leaf), `refined` (the likeliest
    postures).
 4. Certify: `certified`, the checks that every refined posture passes; `judged`, what a result says of that.

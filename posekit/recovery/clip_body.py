@@ -17,12 +17,12 @@ from posekit.ranking.posture_prior import Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.upright import Up
 from posekit.recovery.body import FigureBody
-from posekit.recovery.conductor import FEWEST_CLIP_FRAMES
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
 from posekit.recovery.noise import Noise
 from posekit.recovery.observed import trunkless, with_reasons
+from posekit.recovery.person import FEWEST_CLIP_FRAMES
 from posekit.refinement import RootPrior
 from posekit.refinement.figure_numbers import LIMB_JOINTS
 from posekit.refinement.limb_evidence import DirectionDensity

@@ -20,7 +20,7 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.judged import record_of
 from posekit.recovery.noise import Noise
 from posekit.recovery.observed import lost_to, neckless, trunkless, with_reasons
-from posekit.recovery.person import body_of, refuse_settings, uncertainty_of
+from posekit.recovery.person import FEWEST_CLIP_FRAMES, body_of, refuse_settings, uncertainty_of
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.rooting import tolerance_of
 from posekit.recovery.trees import FrameTrees, trees_of
@@ -46,9 +46,6 @@ LEAST_DOUBTS, DOUBTED_SHARE = 3, 0.15
 Of real motion and lengths that are right some 3 % of frames do, with 3 % off each 46 % (docs, "How long a person's
 segments are").
 """
-
-FEWEST_CLIP_FRAMES = 10
-"""Frames from which one body is found for all of them, if its lengths are not exact."""
 
 OPEN_HYPOTHESES_AT_ONCE = 250
 """Hypotheses grown together where depth or scale is open: each may have thousands of leaves."""

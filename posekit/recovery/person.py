@@ -15,6 +15,9 @@ from posekit.recovery.body import FigureBody, LiftedBody
 from posekit.settings import RecoverSettings, Rooting
 from posekit.skeleton import SEGMENT_NAMES
 
+FEWEST_CLIP_FRAMES = 10
+"""Frames from which one body is found for all of them, if its lengths are not exact."""
+
 CACHED_PERSONS = 32
 """Figures of persons that are kept: clips and shards of the same person follow each other."""
 
