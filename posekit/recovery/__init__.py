@@ -2,14 +2,14 @@
 
 `conductor` is `posekit.recover`, and calls the others one after the other:
 
-1. Root: `person` (whose body it is, and how well its lengths are known), `body` (what is lifted, and the checks that settings ask for), `observed` (which
-   frames show enough), `fit_camera` and `fit_scale` (where the camera sees the root), `rooting` (where the neck is put
-   that nobody gives).
+1. Root: `person` (whose body it is, and how well its lengths are known), `body` (what is lifted, and the checks that
+   settings ask for), `observed` (which frames show enough), `fit_camera` and `fit_scale` (where the camera sees the
+   root), `rooting` (where the neck is put that nobody gives).
 2. Tree: `grower` grows and prunes the trees of some hypotheses, `trees` is what comes of them.
 3. Refine, where points or lengths are uncertain: `length_evidence` (whether lengths may be taken at their word),
-   `clip_body` (one body for all frames), `noise`, `hypotheses` (what was observed, and how far it may be off), `refiner`
-   (trees on trunks), `limb_walls` (limits of limbs), `survival` (what became of each leaf), `refined` (the likeliest
-   postures).
+   `clip_body` (one body for all frames), `noise`, `hypotheses` (what was observed, and how far it may be off),
+   `refiner` (trees on trunks), `limb_walls` (limits of limbs), `survival` (what became of each leaf), `refined` (the
+   likeliest postures), `refined_completion` (joints that were not seen); `photograph` without a camera.
 4. Certify: `certified`, the checks that every refined posture passes; `judged`, what a result says of that.
 5. Rank: `ranked`, the probability of every survivor; `grouping`, those that are alike.
 6. Answer: `recovery` (what is returned), `camera_record`, `result` (what is written), `summary` and `advice` (what is
