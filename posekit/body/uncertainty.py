@@ -76,6 +76,11 @@ class LengthUncertainty:
         """Say of a body that its size, and each length beside it, are off by the same relative deviation."""
         return LengthUncertainty(common=deviation, own=dict.fromkeys(SEGMENT_NAMES, deviation))
 
+    def widened(self, times: float) -> LengthUncertainty:
+        """Return the same with deviations that are so many times as large, as far as they are taken for one."""
+        own = {name: min(times * one, MAX_LENGTH_DEVIATION) for name, one in self.own.items()}
+        return LengthUncertainty(common=min(times * self.common, MAX_LENGTH_DEVIATION), own=own)
+
     @property
     def exact(self) -> bool:
         """Whether all lengths are known exactly."""

@@ -135,12 +135,7 @@ def recover(
                 uncertain = uncertain[empty]
         if noise is not None and not photographs and len(uncertain):
             refiner = refiner or _refiner(grower, noise, most=_share(uncertain, fit.frame[part]) > 0.5)
-            # Survivors without a place for what was not seen are still more than none.
-            trees |= {
-                k: one
-                for k, one in refiner.grow(uncertain).items()
-                if one.survivors or not _grown(trees.get(k))
-            }
+            trees |= _refined(refiner, uncertain, trees)
         if progress is not None:
             progress(len(_distinct(fit.frame[part])))
     if refiner is not None:
@@ -160,6 +155,19 @@ def recover(
     record = _record(asked, tolerance, body.figure, frames, noise)
     record |= {} if refiner is None or refiner.clip is None else {"one_body": refiner.clip.document()}
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower)
+
+
+def _refined(
+    refiner: Refiner, frames: NDArray[np.intp], trees: Mapping[int, FrameTrees]
+) -> dict[int, FrameTrees]:
+    """Refine some frames; those of which nothing is left once more, where nobody says how well lengths are known."""
+    found, view, asked = refiner.grow(frames), refiner.grower.view, refiner.grower.settings
+    said = asked.length_deviation is not None or view.length_deviation is not None
+    lost = np.array([k for k in frames.tolist() if not found[k].survivors], dtype=np.intp)
+    if len(lost) and not said:
+        found |= {k: one for k, one in refiner.less_sure().grow(lost).items() if one.survivors}
+    # Survivors without a place for what was not seen are still more than none.
+    return {k: one for k, one in found.items() if one.survivors or not _grown(trees.get(k))}
 
 
 def _frames(

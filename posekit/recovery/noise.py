@@ -30,6 +30,10 @@ UNSTATED_DEVIATION_PIXELS: Final = 1.0
 FOREARM_METRES: Final = 0.24
 """Metres: a forearm, which is in front of other parts more often than any other."""
 
+HEAD_OFFSET_METRES: Final = 0.08
+"""Metres: standard deviation of the points of a head that nobody measured from the figure's. Heads are alike to 2 cm;
+but conventions put the neck, on which they hang, at the seventh vertebra, the throat, or between the shoulders."""
+
 HEAD_METRES: Final = 0.2
 """Metres from the neck to the head's points."""
 
@@ -139,8 +143,10 @@ class Noise:
             Focal length, pixels.
         """
         confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
-        # A head is not larger where limbs are longer: its points are off by as much as its size is.
+        # A head is not larger where limbs are longer; and one that nobody measured has its nose and neck elsewhere.
         of_head = HEAD_METRES * math.hypot(self.lengths.common, max(self.lengths.own.values()))
+        if view.head_points is None and not self.lengths.exact:
+            of_head = math.hypot(of_head, HEAD_OFFSET_METRES)
         beside = np.repeat([self.offset, math.hypot(self.offset, of_head)], [len(JOINTS), len(HEAD)])
         off = beside * (focal / depth)[:, None]
         return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), off))

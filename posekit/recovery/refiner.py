@@ -43,6 +43,9 @@ if TYPE_CHECKING:
 NOISE_UNIT_DEGREES: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
 
+LOOSENED: Final = 2.0
+"""By how many times lengths may be farther off than is usual, in frames that have no posture otherwise."""
+
 HYPOTHESES_AT_ONCE: Final = 250
 """Hypotheses whose trees are grown together: each may have thousands of leaves."""
 
@@ -128,6 +131,10 @@ class Refiner:
             return given
         rooting = replace(self.grower.settings.rooting, trust_head=False)
         return fit_camera(view, self.grower.body.figure, rooting, uncertainty=self.noise.lengths)
+
+    def less_sure(self) -> Refiner:
+        """Return the same for a body of which less is known: of frames that nothing explains otherwise."""
+        return replace(self, noise=replace(self.noise, lengths=self.noise.lengths.widened(LOOSENED)))
 
     @cached_property
     def settings(self) -> RecoverSettings:

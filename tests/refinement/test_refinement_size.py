@@ -129,6 +129,23 @@ def test_lengths_that_are_off_empty_no_frame(scene: SyntheticScene, factor: floa
         assert sum(not len(frame) for frame in held.frames) > FRAMES / 2
 
 
+@pytest.mark.filterwarnings("ignore:frames.*root is:UserWarning", "ignore:head point neck does not fit")
+@pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
+@pytest.mark.parametrize("seen", [1, 5])
+def test_a_head_that_nobody_measured_empties_no_frame(
+    scene: SyntheticScene, factor: float, seen: int
+) -> None:
+    """A stranger's nose is not where the figure's is, nor is the neck on which it hangs."""
+    head = scene.head_cam + np.array([0.04, -0.05, 0.04])
+    points = scene.with_noise(1.0, np.random.default_rng(2))
+    image = np.full((FRAMES, 5, 2), np.nan)
+    image[:, :seen] = scene.camera.project(head)[:, :seen]
+    lengths = {name: length * factor for name, length in FIGURE.lengths.items()}
+    root = scene.joints_cam[:, 0]
+    view = dataclasses.replace(view_of(points), root=root, lengths=lengths, head_image=image)
+    assert min(map(len, recover(view, ranges="urdf").frames)) > 0
+
+
 def test_a_view_that_says_exact_is_taken_at_its_word(scene: SyntheticScene) -> None:
     view = dataclasses.replace(view_of(scene), root=scene.joints_cam[:, 0])
     plain, said = (
