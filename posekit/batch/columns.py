@@ -271,21 +271,26 @@ def _survivors(frames: Sequence[FrameRecovery], recipe: Recipe) -> tuple[Array, 
     if not grown:
         return np.empty((0, len(JOINTS), 3)), np.empty((0, len(JOINTS) - 1), dtype=np.uint8), {}
     owner, joints, branches = [], [], []
-    values: dict[str, list[Array]] = {}
+    values: list[dict[str, Array]] = []
     for batch, members in grown.values():
         rows, of_frame = _rows(batch, [frames[k] for k in members])
         owner.append(np.array(members)[of_frame])
         joints.append(batch.points[rows, : len(JOINTS)])
         branches.append(_codes(batch, rows))
-        for name, column in _values(batch, [frames[k] for k in members], rows, recipe).items():
-            values.setdefault(name, []).append(column)
+        values.append(_values(batch, [frames[k] for k in members], rows, recipe))
     if len(grown) == 1:
-        return joints[0], branches[0], {name: columns[0] for name, columns in values.items()}
+        return joints[0], branches[0], values[0]
+    names = dict.fromkeys(name for each in values for name in each)
+    # Frames of one batch may have what those of another have not: chi2, of which an exact frame knows nothing.
+    columns = {
+        name: [each.get(name, np.full(len(part), np.nan)) for each, part in zip(values, joints, strict=True)]
+        for name in names
+    }
     order = np.argsort(np.concatenate(owner), kind="stable")
     return (
         np.concatenate(joints)[order],
         np.concatenate(branches)[order],
-        {name: np.concatenate(columns)[order] for name, columns in values.items()},
+        {name: np.concatenate(parts)[order] for name, parts in columns.items()},
     )
 
 
