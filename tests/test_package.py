@@ -70,6 +70,19 @@ def test_cameras_and_tree_are_numpy_alone(heavy: str) -> None:
     assert run_python(code) == "False"
 
 
+def test_exact_frames_load_nothing_of_refinement() -> None:
+    code = (
+        "import sys, numpy, posekit\n"
+        "from posekit.synthesis import random_views\n"
+        "from posekit.views.builtin import view_of\n"
+        "scene = random_views(posekit.load_figure(), 2, numpy.random.default_rng(0))\n"
+        "frames = posekit.recover(view_of(scene)).frames\n"
+        "loaded = any(name.startswith('posekit.refinement') for name in sys.modules)\n"
+        "print({frame.judged for frame in frames}, loaded)"
+    )
+    assert run_python(code) == "{'exact'} False"
+
+
 def test_unknown_attribute_is_an_attribute_error() -> None:
     import posekit
 

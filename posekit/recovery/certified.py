@@ -15,8 +15,7 @@ from posekit.geometry import Array
 from posekit.recovery.body import ranges_of
 from posekit.recovery.noise import Noise
 from posekit.refinement.observed_frames import LIMIT_DEVIATION
-from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
-from posekit.settings import RIGID_TOLERANCE, RecoverSettings, Tolerance
+from posekit.settings import ALLOWED_DEVIATIONS, RIGID_TOLERANCE, RecoverSettings, Tolerance
 from posekit.tree import Check, Scope, screened
 from posekit.validators import CheckOptions, Judgement, judge, make_checks
 from posekit.validators.options import LEVEL_CAMERA_UP

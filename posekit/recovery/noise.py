@@ -14,7 +14,7 @@ from posekit.body import LengthUncertainty
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
-from posekit.refinement.tolerance import ALLOWED_DEVIATIONS
+from posekit.settings import ALLOWED_DEVIATIONS
 from posekit.settings.rooting import DETECTED_DEVIATION
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
@@ -28,7 +28,8 @@ UNSTATED_DEVIATION_PIXELS: Final = 1.0
 """Standard deviation (px) of image points of which nobody says any, of a body whose lengths are not exact."""
 
 FOREARM_METRES: Final = 0.24
-"""Metres: a forearm, which is in front of other parts more often than any other."""
+"""Metres: a forearm. It is in front of other parts more often than any other segment, and turned most by what its ends
+are off."""
 
 HEAD_OFFSET_METRES: Final = 0.08
 """Metres: standard deviation of the points of a head that nobody measured from the figure's. Heads are alike to 2 cm;

@@ -32,9 +32,9 @@ from posekit.recovery.hypotheses import (
     connected,
 )
 from posekit.recovery.key_point_offsets import PIXEL_DEVIATION, joint_offsets
-from posekit.recovery.noise import LEAST_CONFIDENCE, Noise
+from posekit.recovery.noise import LEAST_CONFIDENCE, N_TRUNK_JOINTS, Noise
 from posekit.recovery.refiner import Lifted, Refiner
-from posekit.recovery.seen_trunk import N_TRUNK_JOINTS, SeenTrunk, with_trunk
+from posekit.recovery.seen_trunk import SeenTrunk, with_trunk
 from posekit.refinement import ObservedFrames, RootPrior
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.settings.recover import MAX_LENGTH_DEVIATION

@@ -31,9 +31,9 @@ from posekit.recovery.refined_completion import RefinedCompletion
 from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
-from posekit.refinement.tolerance import ALLOWED_DEVIATIONS, NoiseTolerance
+from posekit.refinement.tolerance import NoiseTolerance
 from posekit.refinement.trunks import N_TRUNK_JOINTS
-from posekit.settings import RecoverSettings, Tolerance
+from posekit.settings import ALLOWED_DEVIATIONS, RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, Loosening, Scope
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, LengthUncertainty
 from posekit.cameras import PinholeCamera
 from posekit.formats.own import LeeChenModel, Root, View
+from posekit.recovery.noise import FOREARM_METRES
 from posekit.settings import Rooting, Tolerance
 from posekit.settings.rooting import DETECTED_DEVIATION, DETECTED_OFFSET
 from posekit.skeleton import SEGMENTS, segment_name
@@ -26,9 +27,6 @@ IMAGE_PLANE_DEVIATION: Final = 1e-3
 
 TOLERANCE_STEP_METRES: Final = 0.02
 """Metres to which tolerances are rounded up, so that frames of nearly the same are grown together."""
-
-FOREARM_METRES: Final = 0.24
-"""Metres: a forearm. A segment of this length is turned most by what its ends are off."""
 
 
 def place_roots(

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
+from posekit.recovery.noise import N_TRUNK_JOINTS
 from posekit.skeleton import JOINT, JOINTS
 from posekit.views.person_view import pelvis_fraction
-
-N_TRUNK_JOINTS: Final = 6
-"""Joints of torso and hips: the first six."""
 
 FEWEST_TRUNK_JOINTS: Final = 2
 """Of the trunk's joints that have to be seen: one alone says nothing of how the body stands."""

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own import Inferred
-from posekit.recovery.refined import RefinedSurvivors
 from posekit.skeleton import JOINTS
+
+if TYPE_CHECKING:
+    from posekit.recovery.refined import RefinedSurvivors
 
 WITHIN_DEVIATIONS: Final = 2.8
 """Standard deviations within which a point of three dimensions is with 95 %: the root of chi-square's 7.81."""

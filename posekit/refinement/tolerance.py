@@ -18,10 +18,8 @@ from posekit.body import Figure
 from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.refinement.optics import optics_of
+from posekit.settings import ALLOWED_DEVIATIONS
 from posekit.skeleton import PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
-
-ALLOWED_DEVIATIONS = 3.0
-"""Standard deviations that are allowed for, unless told otherwise: beyond them is one point in 370."""
 
 ROUNDING_METRES = 1e-6
 """Metres that the distances inside a found trunk may be off: they come from its own projections."""

@@ -8,6 +8,7 @@ from posekit.settings.recover import DEFAULT_CHECKS as DEFAULT_CHECKS
 from posekit.settings.recover import RecoverSettings as RecoverSettings
 from posekit.settings.rooting import Rooting as Rooting
 from posekit.settings.scale import Scale as Scale
+from posekit.settings.tolerance import ALLOWED_DEVIATIONS as ALLOWED_DEVIATIONS
 from posekit.settings.tolerance import EXACT_TOLERANCE as EXACT_TOLERANCE
 from posekit.settings.tolerance import MEASURED_TOLERANCE as MEASURED_TOLERANCE
 from posekit.settings.tolerance import PHOTOGRAPH_TOLERANCE as PHOTOGRAPH_TOLERANCE

@@ -9,6 +9,9 @@ from typing import Final, Literal
 from posekit.errors import InputError
 from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS
 
+ALLOWED_DEVIATIONS: Final = 3.0
+"""Standard deviations that are allowed for, unless told otherwise: beyond them is one point in 370."""
+
 Judged = Literal["exact", "measured", "photograph", "noisy", "refined", "given"]
 """How a frame was judged.
 
