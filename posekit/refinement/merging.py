@@ -111,14 +111,18 @@ def merge(
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
     leader = _leaders(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
-    if indistinct and len(rows):
-        leader = _indistinct(refined, rows, leader, indistinct)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
+    some = refined.select(rows[leaders])
+    if indistinct and len(rows):
+        onto = _indistinct(some, indistinct)
+        leader = leaders[onto][np.searchsorted(leaders, leader)]
+        stands = np.flatnonzero(onto == np.arange(len(leaders)))
+        leaders, some = leaders[stands], some.select(stands)
     number = np.full(len(rows), -1)
     number[leaders] = np.arange(len(leaders))
     group = np.full(len(refined), -1)
     group[rows] = number[leader]
-    return Merged(refined=refined.select(rows[leaders]), rows=rows[leaders], group=group)
+    return Merged(refined=some, rows=rows[leaders], group=group)
 
 
 def _leaders(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
@@ -134,16 +138,12 @@ def _leaders(frame: NDArray[np.intp], joints: Array, within: float, of_branch: f
     return leader[first]
 
 
-def _indistinct(
-    refined: Refined, rows: NDArray[np.intp], leader: NDArray[np.intp], square: float
-) -> NDArray[np.intp]:
-    """Let leaders stand for those of their frame, less likely, whose joints all lie in their ellipsoids."""
-    stands = np.flatnonzero(leader == np.arange(len(rows)))
-    some = refined.select(rows[stands])
+def _indistinct(some: Refined, square: float) -> NDArray[np.intp]:
+    """Find for each survivor, the best of a frame first, the first whose ellipsoids hold all its joints, or itself."""
     information = np.linalg.inv(some.covariance + ROUNDING_SQUARE_METRES * np.eye(3))
-    taken_by = np.arange(len(stands))
+    taken_by = np.arange(len(some))
     begins = np.flatnonzero(np.diff(some.frame, prepend=-1))
-    for begin, end in pairwise([*begins.tolist(), len(stands)]):
+    for begin, end in pairwise([*begins.tolist(), len(some)]):
         open_ = np.arange(begin, end)
         while len(open_) > 1:
             first, rest = open_[0], open_[1:]
@@ -152,9 +152,7 @@ def _indistinct(
             near = off < square
             taken_by[rest[near]] = first
             open_ = rest[~near]
-    onto = np.arange(len(rows))
-    onto[stands] = stands[taken_by]
-    return onto[leader]
+    return taken_by
 
 
 def _code(joints: Array) -> NDArray[np.intp]:

@@ -85,7 +85,10 @@ class Refined:
             if isinstance(getattr(self, item.name), np.ndarray)
         }
         size = None if self.size is None else self.size.take(chosen)
-        return replace(self, problem=self.problem.take(chosen), size=size, **arrays)
+        out = replace(self, problem=self.problem.take(chosen), size=size, **arrays)
+        if "covariance" in vars(self):  # found by now, and as much work as anything before
+            vars(out)["covariance"] = self.covariance[chosen]
+        return out
 
     @cached_property
     def p(self) -> Array:

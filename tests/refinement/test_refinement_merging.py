@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,7 +14,8 @@ from hypothesis import strategies as st
 from posekit.body import load_figure
 from posekit.errors import InputError
 from posekit.refinement import Merged, ObservedFrames, Refined, RootPrior, merge, refine
-from posekit.refinement.merging import groups_of
+from posekit.refinement.covariance import covariances
+from posekit.refinement.merging import INDISTINCT_SQUARE, groups_of
 from posekit.synthesis import random_views
 
 
@@ -107,3 +110,12 @@ def test_a_distance_that_is_none_is_refused(within: float) -> None:
 def test_codes_must_be_one_each() -> None:
     with pytest.raises(InputError, match="3 branch codes for 100"):
         merge(survivors()).codes(["a", "b", "c"])
+
+
+def test_covariances_that_merging_asked_for_are_not_found_again() -> None:
+    some = survivors().select(np.arange(20))
+    with mock.patch("posekit.refinement.refined.covariances", wraps=covariances) as asked:
+        merged = merge(some, indistinct=INDISTINCT_SQUARE).refined
+        carried = merged.covariance
+        assert asked.call_count == 1
+    np.testing.assert_allclose(carried, replace(merged).covariance, rtol=1e-9, atol=1e-15)
