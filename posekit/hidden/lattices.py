@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike
 
 from posekit.geometry import Array, rotation_from_quaternion
 
+GOLDEN_RATIO = 0.6180339887498949
+"""Less one: shifts lattices between each other."""
+
 GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 """Radians from one point of a Fibonacci lattice to the next."""
 

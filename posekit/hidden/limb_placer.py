@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from posekit.geometry import Array, frame_along, unit
-from posekit.hidden.lattices import GOLDEN_ANGLE, sphere_spacing, zone
+from posekit.hidden.lattices import GOLDEN_ANGLE, GOLDEN_RATIO, sphere_spacing, zone
 from posekit.hidden.limb_placements import LimbPlacements
 from posekit.hidden.occlusion_pattern import JointState, LimbChain, OcclusionPattern
 from posekit.hidden.posture_rows import METRES_PER_RADIAN, Index, Mask, PostureRows, judge_rows
@@ -38,9 +38,6 @@ ONTO_RAY = 1e-9
 
 INVERSE_PLASTIC_NUMBER = 0.7548776662466927
 """1 / the plastic number: turns each lattice of ends against the last (Roberts 2018)."""
-
-GOLDEN_RATIO = 0.6180339887498949
-"""Less one: shifts each lattice along its axis between the others."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

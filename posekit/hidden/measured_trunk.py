@@ -14,14 +14,12 @@ from typing import Final
 
 import numpy as np
 
-from posekit.body import Figure
 from posekit.geometry import Array, frame_along
-from posekit.hidden.lattices import GOLDEN_ANGLE, sphere_spacing, zone
-from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
+from posekit.hidden.lattices import GOLDEN_ANGLE, GOLDEN_RATIO, sphere_spacing, zone
+from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState
 from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
-from posekit.hidden.rays import Rays
-from posekit.hidden.sampling import OcclusionSampling
-from posekit.hidden.trunk_placements import TrunkPlacements
+from posekit.hidden.trunk_placements import TrunkPlacements, thinning
+from posekit.hidden.trunk_search import TrunkSearch
 from posekit.skeleton import PARENTS, segment_name
 
 PELVIS_JOINT: Final = HIP_JOINTS[0]
@@ -35,39 +33,13 @@ MOST_TRUNKS: Final = 600
 FEWEST_AROUND, FEWEST_ABOUT = 32, 16
 """Places of a joint about each place of its parent at least, and on a circle."""
 
-GOLDEN_RATIO: Final = 0.6180339887498949
-"""Less one: shifts lattices between each other."""
-
 TINY_METRES: Final = 1e-12
 """Metres: stands for zero where something is divided by a length."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeasuredTrunkPlacer:
-    """Places the unknown joints of torso and hips one after the other, in tree order.
-
-    Parameters
-    ----------
-    pattern : OcclusionPattern
-        Which joints are seen and hidden, and the checks that read them.
-    figure : Figure
-        The person.
-    rays : Rays
-        The rays of the joints that are seen.
-    frame : int array (C,)
-        The frame of each core: which row of the rays.
-    tolerance : float
-        Metres by which a segment may be too short for its image.
-    sampling : OcclusionSampling
-        How finely spheres are sampled.
-    """
-
-    pattern: OcclusionPattern
-    figure: Figure
-    rays: Rays
-    frame: Index
-    tolerance: float
-    sampling: OcclusionSampling
+class MeasuredTrunkPlacer(TrunkSearch):
+    """Places the unknown joints of torso and hips one after the other, in tree order."""
 
     def place(self, points: Array) -> TrunkPlacements:
         """Place them on cores (C, P, 3) wherever the trunk's own checks pass."""
@@ -132,12 +104,7 @@ class MeasuredTrunkPlacer:
 
     def _lifted(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
         """Lift a joint that was seen from its parent."""
-        start = trunks.points[:, PARENTS[joint]]
-        lift = self.rays.lift(joint, self.frame[trunks.core], start, self._length(joint), self.tolerance)
-        row, branch = np.nonzero(lift.valid)
-        placed = trunks.take(row)
-        placed.points[:, joint] = lift.points[row, branch]
-        return placed, row, 0.0
+        return *self.lifted_from(trunks, PARENTS[joint], joint, self._length(joint)), 0.0
 
     def _about_hips(self, trunks: TrunkPlacements, joint: int) -> tuple[TrunkPlacements, Index, float]:
         """Turn a hip about pelvis and other hip: a pelvis is bone, and keeps its shape however it was measured."""
@@ -148,9 +115,7 @@ class MeasuredTrunkPlacer:
         angle = (np.tile(np.arange(n) / n, len(trunks)) + row * GOLDEN_RATIO) * 2.0 * np.pi
         center, radius, across = _circle(start, end, self._length(joint), self._length(joint, other))
         placed = trunks.take(row)
-        placed.points[:, joint] = center[row] + radius[row, None] * (
-            np.cos(angle)[:, None] * across[row, :, 0] + np.sin(angle)[:, None] * across[row, :, 1]
-        )
+        placed.points[:, joint] = _on_circle(center[row], radius[row], across[row], angle)
         return placed, row, 2.0 * np.pi / (n * np.sqrt(_most(trunks.core)))
 
     def _from_hips(self, trunks: TrunkPlacements) -> tuple[TrunkPlacements, Index, float]:
@@ -184,9 +149,7 @@ class MeasuredTrunkPlacer:
         angle = (np.arctan2(flat[:, 1], flat[:, 0]) + turn).reshape(-1)
         row, first, second = (np.concatenate([each, each]) for each in (row, first, second))
         center, radius, across = (np.concatenate([each, each]) for each in (center, radius, across))
-        pelvis = center + radius[:, None] * (
-            np.cos(angle)[:, None] * across[..., 0] + np.sin(angle)[:, None] * across[..., 1]
-        )
+        pelvis = _on_circle(center, radius, across, angle)
         off = np.abs(np.linalg.norm(pelvis - neck[row], axis=1) - self._length(PELVIS_JOINT))
         good = np.flatnonzero(off <= self.tolerance)
         good = good[np.argsort(row[good], kind="stable")]
@@ -206,18 +169,15 @@ def _circle(start: Array, end: Array, near: float, far: float) -> tuple[Array, A
     return start + along[:, None] * axis, radius, frame_along(axis)[..., 1:]
 
 
+def _on_circle(center: Array, radius: Array, across: Array, angle: Array) -> Array:
+    """Return the points (N, 3) at angles on the circles of `_circle`."""
+    turned = np.cos(angle)[:, None] * across[..., 0] + np.sin(angle)[:, None] * across[..., 1]
+    return np.asarray(center + radius[:, None] * turned)
+
+
 def _most(group: Index) -> int:
     """Count the largest group, at least one."""
     return int(np.bincount(group, minlength=1).max(initial=1))
-
-
-def thinning(group: Index, most: int) -> Index:
-    """Choose at most so many rows of each group, evenly; `group` is in order."""
-    count = np.bincount(group, minlength=1)
-    first = np.cumsum(count) - count
-    rank: Index = np.arange(len(group)) - first[group]
-    many = np.maximum(count, 1)[group]
-    return np.flatnonzero((many <= most) | ((rank + 1) * most // many > rank * most // many))
 
 
 def thinned_between_ends(trunks: TrunkPlacements, joints: Sequence[int], most: int) -> TrunkPlacements:

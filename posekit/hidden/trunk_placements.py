@@ -148,3 +148,12 @@ class TrunkPlacements:
             vector = np.tile(CUBE_CORNERS, (len(rows), 1)) * width[parent, None]
             axis, angle = unit(vector), np.linalg.norm(vector, axis=1)
         return each.filled(rotation_about(axis, angle) @ each.R, self.turn), parent
+
+
+def thinning(group: Index, most: int) -> Index:
+    """Choose at most so many rows of each group, evenly; `group` is in order."""
+    count = np.bincount(group, minlength=1)
+    first = np.cumsum(count) - count
+    rank: Index = np.arange(len(group)) - first[group]
+    many = np.maximum(count, 1)[group]
+    return np.flatnonzero((many <= most) | ((rank + 1) * most // many > rank * most // many))

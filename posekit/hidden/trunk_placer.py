@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from posekit.body import Figure
 from posekit.geometry import Array, fit_rotation, rotation_about, rotation_between, unit
 from posekit.hidden.hip_closure import closing_angles
 from posekit.hidden.lattices import circle, rotation_spacing, rotations
-from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState, OcclusionPattern
+from posekit.hidden.occlusion_pattern import HIP_JOINTS, TORSO_JOINTS, JointState
 from posekit.hidden.posture_rows import Index, PostureRows, judge_rows
-from posekit.hidden.rays import Rays
-from posekit.hidden.sampling import OcclusionSampling
 from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, TrunkPlacements, Turn
+from posekit.hidden.trunk_search import TrunkSearch
 
 N_PELVIS_RINGS = 24
 """Rings of pelvis positions about the neck, and spins of the torso about each of their roots."""
@@ -24,31 +22,8 @@ HIP_COARSENING = 6
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TrunkPlacer:
-    """Places the unknown joints of torso and hips.
-
-    Parameters
-    ----------
-    pattern : OcclusionPattern
-        Which joints are seen and hidden, and the checks that read them.
-    figure : Figure
-        The person, whose rigid torso and hips are laid onto known points.
-    rays : Rays
-        The rays of the joints that are seen.
-    frame : int array (C,)
-        The frame of each core: which row of the rays.
-    tolerance : float
-        Metres by which a segment may be too short for its image.
-    sampling : OcclusionSampling
-        How finely the turns of a rigid part are sampled.
-    """
-
-    pattern: OcclusionPattern
-    figure: Figure
-    rays: Rays
-    frame: Index
-    tolerance: float
-    sampling: OcclusionSampling
+class TrunkPlacer(TrunkSearch):
+    """Places the unknown joints of torso and hips."""
 
     def place(self, points: Array) -> TrunkPlacements:
         """Place them in every way that the rigid parts allow, on cores (C, P, 3); evenly where they turn."""
@@ -176,14 +151,5 @@ class TrunkPlacer:
     def _lifted(self, trunks: TrunkPlacements, pelvis: int, joint: int) -> TrunkPlacements:
         """Lift a hip that is seen from the pelvis."""
         offset = self.figure.neutral_points[joint] - self.figure.neutral_points[pelvis]
-        lift = self.rays.lift(
-            joint,
-            self.frame[trunks.core],
-            trunks.points[:, pelvis],
-            float(np.linalg.norm(offset)),
-            self.tolerance,
-        )
-        row, branch = np.nonzero(lift.valid)
-        placed = trunks.take(row)
-        placed.points[:, joint] = lift.points[row, branch]
+        placed, _ = self.lifted_from(trunks, pelvis, joint, float(np.linalg.norm(offset)))
         return replace(placed, tried=np.bincount(placed.core, minlength=len(trunks.tried)).astype(np.float64))

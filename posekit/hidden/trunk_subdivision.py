@@ -11,7 +11,7 @@ from posekit.geometry import Array
 from posekit.hidden.limb_placer import NEAR_MISS, LimbPlacer
 from posekit.hidden.occlusion_pattern import LimbChain, OcclusionPattern
 from posekit.hidden.posture_rows import Index, Mask, PostureRows, judge_rows
-from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, N_SUBSAMPLES, TrunkPlacements
+from posekit.hidden.trunk_placements import EXACT_WITHIN_METRES, N_SUBSAMPLES, TrunkPlacements, thinning
 
 N_BEST_MISSES = 6
 """Near misses of a core that are looked into once more while nothing feasible is found."""
@@ -96,15 +96,14 @@ def _edges_and_dips(trunks: TrunkPlacements, miss: Array) -> tuple[Mask, Mask]:
 def thinned(trunks: TrunkPlacements, most: int) -> TrunkPlacements:
     """Keep at most so many even places a core, evenly, and those found by a closer look: the ends of arcs."""
     count = np.bincount(trunks.core[trunks.even], minlength=len(trunks.tried))
-    before: Index = np.cumsum(trunks.even) - trunks.even
-    rank: Index = before - before[np.searchsorted(trunks.core, trunks.core)]
-    many = np.maximum(count, 1)[trunks.core]
-    step = (many <= most) | ((rank + 1) * most // many > rank * most // many)
+    even = np.flatnonzero(trunks.even)
+    step = ~trunks.even
+    step[even[thinning(trunks.core[even], most)]] = True
     # Each then stands for so much more of the circle or of the rotations.
     fewer = np.maximum(count / most, 1.0)
     # On a circle spacing grows with what each sample stands for, among rotations with its cube root.
     power = 1.0 if trunks.turn is not None and trunks.turn.about is not None else 1.0 / 3.0
-    kept = trunks.take(np.asarray(step | ~trunks.even))
+    kept = trunks.take(step)
     return replace(kept, tried=kept.tried / fewer, spacing=kept.spacing * fewer**power)
 
 
