@@ -70,6 +70,13 @@ RIGID_SEGMENTS: Final = (
 
 SEGMENTS: Final = TREE_SEGMENTS + RIGID_SEGMENTS
 
+LIMB_JOINTS: Final = tuple(
+    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{middle}"], JOINT[f"{side}_{end}"])
+    for start, middle, end in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
+    for side in SIDES
+)
+"""Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
+
 
 def segment_name(segment: tuple[int, int]) -> str:
     """Name a segment as files do: `a-b`, with a before b in tree order."""

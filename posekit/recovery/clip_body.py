@@ -24,10 +24,9 @@ from posekit.recovery.noise import Noise
 from posekit.recovery.observed import trunkless, with_reasons
 from posekit.recovery.person import FEWEST_CLIP_FRAMES
 from posekit.refinement import RootPrior
-from posekit.refinement.figure_numbers import LIMB_JOINTS
 from posekit.refinement.limb_evidence import DirectionDensity
 from posekit.refinement.one_body import BodyEstimate, PostureDirections, find_body
-from posekit.skeleton import SEGMENT_NAMES, segment_name
+from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, segment_name
 
 MOST_FRAMES: Final = 40
 """Frames that are used, spread evenly: more of one clip tell little more."""

@@ -12,8 +12,8 @@ import numpy as np
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array
-from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_JOINTS
-from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, TORSO
+from posekit.refinement.figure_numbers import LEG_LIMBS
+from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, LIMB_JOINTS, TORSO
 from posekit.tree import Check
 
 MAX_ANGLES: Final = 4

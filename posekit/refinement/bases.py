@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import evaluate
-from posekit.refinement.factors import Rows
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
 from posekit.refinement.joint_step import (
     LimbTables,
@@ -24,6 +23,7 @@ from posekit.refinement.joint_step import (
 from posekit.refinement.limb_fitting import Bases, LimbsOnBases, SearchSettings
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import moved
+from posekit.tree.factors import Rows
 
 LAST_STEP_GAIN_RATIO = 20.0
 """Times the precision that a further step may gain where a joint step is taken for the last.

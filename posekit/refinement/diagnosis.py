@@ -22,13 +22,7 @@ from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.errors import InputError, PosekitError
 from posekit.refinement.descent import CHI2_PRECISION
-from posekit.refinement.figure_numbers import (
-    LIMB_ENDS,
-    LIMB_JOINTS,
-    LIMB_MIDDLES,
-    LIMB_STARTS,
-    TRUNK_SEGMENTS,
-)
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS, TRUNK_SEGMENTS
 from posekit.refinement.limb_descent import fit_limbs
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.observed_frames import ObservedFrames
@@ -38,7 +32,7 @@ from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.start import limb_directions, relift, state_of
 from posekit.refinement.state import parents
 from posekit.refinement.trunks import Trunks, find_trunks
-from posekit.skeleton import SEGMENT_NAMES, segment_name
+from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, segment_name
 
 MOST_FRAMES: Final = 16
 """Frames that are looked at, evenly chosen."""

@@ -10,19 +10,12 @@ import numpy as np
 from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.geometry import Array
-from posekit.skeleton import DOFS, HEAD, JOINT, segment_name
+from posekit.skeleton import DOFS, HEAD, JOINT, LIMB_JOINTS, segment_name
 
 TRUNK_JOINTS: Final = tuple(
     JOINT[name] for name in ("neck", "right_shoulder", "left_shoulder", "pelvis", "right_hip", "left_hip")
 )
 """The joints of torso and hips: the first six of the tree."""
-
-LIMB_JOINTS: Final = tuple(
-    (JOINT[f"{side}_{start}"], JOINT[f"{side}_{middle}"], JOINT[f"{side}_{end}"])
-    for start, middle, end in (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
-    for side in ("right", "left")
-)
-"""Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
 
 LIMB_STARTS, LIMB_MIDDLES, LIMB_ENDS = (tuple(limb[k] for limb in LIMB_JOINTS) for k in range(3))
 

@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.figure_numbers import LIMB_JOINTS, TRUNK_SEGMENTS
+from posekit.refinement.figure_numbers import TRUNK_SEGMENTS
 from posekit.refinement.prior import RootPrior
-from posekit.skeleton import SEGMENT_NAMES, segment_name
+from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, segment_name
 
 MIN_DEVIATION_PIXELS = 1e-9
 """Pixels: the least standard deviation of a key point."""

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult
 from posekit.refinement.equations import chains_of
-from posekit.refinement.factors import LimbColumns, Rows, columns_of
 from posekit.refinement.limb_descent import fit_limbs
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import relift
+from posekit.tree.factors import LimbColumns, Rows, columns_of
 
 MAX_LIMB_STEPS = 6
 """The most steps of a limb alone: it goes on together with its trunk."""

@@ -25,12 +25,11 @@ from posekit.body import LengthUncertainty
 from posekit.body.uncertainty import MEASURED_LENGTHS
 from posekit.errors import PosekitError
 from posekit.geometry import Array
-from posekit.refinement.figure_numbers import LIMB_JOINTS
 from posekit.refinement.inputs import EXACT_DISTANCE_DEVIATION
 from posekit.refinement.limb_evidence import DirectionDensity, LimbEvidence
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.trunk_evidence import TRUNK_NAMES, TrunkEvidence
-from posekit.skeleton import SEGMENT_NAMES, other_side, segment_name
+from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, other_side, segment_name
 
 SIDE_ASYMMETRY: Final = 0.02
 """Standard deviation of the logarithm of one side's length over the other's.

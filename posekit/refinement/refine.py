@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 from posekit.body import Figure
 from posekit.geometry import Array
 from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
-from posekit.refinement.factors import factor_postures
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.inputs import frames_of, numbers
 from posekit.refinement.observed_frames import ObservedFrames
@@ -18,6 +17,7 @@ from posekit.refinement.shared_search import SearchResult, search
 from posekit.refinement.size import BodySize, size_of
 from posekit.refinement.state import head_points, place
 from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.tree.factors import factor_postures
 
 MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a survivor is not refined."""

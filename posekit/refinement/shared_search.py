@@ -16,12 +16,12 @@ from posekit.geometry import Array
 from posekit.refinement.bases import BaseTables, assemble
 from posekit.refinement.descent import BLOCK_POSTURES, DescentResult, descend
 from posekit.refinement.equations import chains_of, evaluate
-from posekit.refinement.factors import Factors, LimbColumns, Rows, columns_of
 from posekit.refinement.limb_fitting import Bases, InitialLimbs, LimbsOnBases, SearchSettings, fit_on_bases
 from posekit.refinement.limb_terms import Chains, limb_chi2
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.start import limb_directions, sides, state_of
 from posekit.refinement.state import PostureState
+from posekit.tree.factors import Factors, LimbColumns, Rows, columns_of
 
 MAX_PULLING_ROUNDS = 3
 """Times that limbs which turn out to pull are taken in, before survivors go on one by one."""

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from posekit.body.frames import hips_frame, torso_frame
 from posekit.geometry import Array, dot, fit_rotation
-from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_JOINTS, LIMB_MIDDLES, FigureNumbers
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, FigureNumbers
 from posekit.refinement.limb_terms import Chains
 from posekit.refinement.optics import Optics
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, parents, turned_by_spine
+from posekit.skeleton import LIMB_JOINTS
 
 TORSO_PULL_METRES = 0.01
 """Metres: the arm with which hips of which a joint is not known are pulled to the torso's frame."""

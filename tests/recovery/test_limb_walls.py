@@ -13,11 +13,10 @@ from posekit.geometry import unit
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.refinement import ObservedFrames
 from posekit.refinement.equations import evaluate, linearise
-from posekit.refinement.figure_numbers import LIMB_JOINTS
 from posekit.refinement.start import limb_directions, state_of
 from posekit.refinement.state import PostureStep, moved
 from posekit.refinement.trunk_terms import start_jacobian
-from posekit.skeleton import HIPS, JOINT, TORSO
+from posekit.skeleton import HIPS, JOINT, LIMB_JOINTS, TORSO
 from posekit.synthesis import SyntheticScene, random_views
 from posekit.validators import judge, load_ranges
 from posekit.validators.joint_range import joint_range

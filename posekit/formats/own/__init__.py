@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from posekit.formats.own.object_view import ObjectView as ObjectView
     from posekit.formats.own.object_view import read_object_view as read_object_view
     from posekit.formats.own.object_view import write_object_view as write_object_view
+    from posekit.formats.own.posture_set import PostureSet as PostureSet
     from posekit.formats.own.postures import Postures as Postures
     from posekit.formats.own.postures import read_postures as read_postures
     from posekit.formats.own.postures import write_postures as write_postures
@@ -74,6 +75,7 @@ else:
                 "read_object_view",
                 "write_object_view",
             ),
+            "posture_set": ("PostureSet",),
             "postures": (
                 "Postures",
                 "read_postures",

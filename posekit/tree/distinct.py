@@ -22,7 +22,8 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         The kind of each row.
     """
     filled = np.where(np.isnan(table), NAN_SUBSTITUTE, table)
-    mixture = filled @ np.random.default_rng(0).standard_normal(table.shape[1])
+    # Not a product of matrices: that adds up some rows in another order than others, so that equal rows would differ.
+    mixture = (filled * np.random.default_rng(0).standard_normal(table.shape[1])).sum(axis=1)
     _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     if (filled[one[which]] == filled).all():

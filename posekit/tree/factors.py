@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.distinct import distinct
-from posekit.refinement.figure_numbers import LIMB_JOINTS
+from posekit.skeleton import LIMB_JOINTS
+from posekit.tree.distinct import distinct
 
 Rows = NDArray[np.intp]
 
