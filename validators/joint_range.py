@@ -5,7 +5,7 @@ Two kinds: the URDF's own angles (this file), or the paper's projected angles (`
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,7 +18,7 @@ from posekit.compiled import screen_kinds as kernels
 from posekit.geometry import Array
 from posekit.skeleton import DOFS, HEAD, HIPS, JOINT, SIDES, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
-from posekit.validators.ranges import URDF_RANGES, Range, Ranges
+from posekit.validators.ranges import URDF_RANGES, Ranges
 
 ANGLE_TOLERANCE = 1e-3
 """Degrees outside a limit that rounding may leave: a thousandth, some 5 um at a wrist."""
@@ -66,7 +66,7 @@ def joint_range(
         from posekit.validators.anatomical_checks import AnatomicalLimb
 
         # The figure itself is left alone: to write a URDF and read it again takes as long as many frames.
-        ik = _limited(ik, ranges.limits)
+        ik = limited(figure, ranges)
     elif ranges.limits:
         figure = figure.with_limits(
             {dof: (np.radians(a), np.radians(b)) for dof, (a, b) in ranges.limits.items()}
@@ -92,9 +92,12 @@ def joint_range(
     return checks
 
 
-def _limited(ik: ClosedForm, limits: Mapping[str, Range]) -> ClosedForm:
-    lower, upper = np.radians(np.array([limits[dof] for dof in DOFS])).T
-    return ik.with_limits(lower, upper)
+def limited(figure: Figure, ranges: Ranges) -> ClosedForm:
+    """Return the closed form of a figure within its own `ranges`; angles that these do not list keep its limits."""
+    lower, upper = figure.limits.lower.copy(), figure.limits.upper.copy()
+    for dof, ends in ranges.limits.items():
+        lower[DOFS.index(dof)], upper[DOFS.index(dof)] = np.radians(ends)
+    return figure.ik.with_limits(lower, upper)
 
 
 def _rule(ik: ClosedForm, where: tuple[str, ...], kind: int, more: Sequence[float]) -> Rule:

@@ -54,6 +54,9 @@ class Ranges:
     knee_flexed: float = 5.0
     anatomy: Anatomy | None = None
 
+    def __hash__(self) -> int:
+        return hash((self.name, self.kind, frozenset(self.limits.items())))
+
     def of(self, figure: Figure) -> Ranges:
         """Return the ranges of a figure: anatomical ones depend on where its pelvis is (`Anatomy.on_pelvis`)."""
         if self.anatomy is None:

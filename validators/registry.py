@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from typing import Any, Final
@@ -32,6 +33,8 @@ ENTRY_POINTS: Final = "posekit.checks"
 """The entry-point group of other packages' checks: a subclass of `posekit.tree.Check`, or a function that makes one or
 several of a figure and parameters."""
 
+CACHED_SUITES: Final = 64
+"""Kinds of checks of one figure and its options that are kept: a frame is judged by some fifteen."""
 
 CHECK_NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 """What a check may be called: files have columns and members of that name."""
@@ -127,14 +130,21 @@ def make_checks(
     options = replace(options or CheckOptions(), **changes)
     made: list[Check] = []
     for settings in chosen_checks(checks):
-        kind = CHECK_KINDS.get(settings.name)
-        made += (
-            _made(figure, settings)
-            if kind is None
-            else kind.make(figure, options.with_parameters(settings.name, settings.parameters))
-        )
+        if settings.name not in CHECK_KINDS:
+            made += _made(figure, settings)
+        elif settings.parameters:
+            own = options.with_parameters(settings.name, settings.parameters)
+            made += CHECK_KINDS[settings.name].make(figure, own)
+        else:
+            made += _built_in(settings.name, figure, options)
     up = np.array(options.up)
     return [check.oriented(up) if check.scope is Scope.VIEW else check for check in made]
+
+
+@lru_cache(maxsize=CACHED_SUITES)
+def _built_in(name: str, figure: Figure, options: CheckOptions) -> tuple[Check, ...]:
+    """Make the checks of a kind once: they never change, and a single frame takes little longer than making them."""
+    return tuple(CHECK_KINDS[name].make(figure, options))
 
 
 def _made(figure: Figure, settings: CheckSettings) -> Sequence[Check]:

@@ -293,6 +293,10 @@ class Figure:
         """Return the figure as it is known within uncertain lengths: they may leave the side of the shoulders open."""
         if not self.side_known or side_is_certain(self.lengths, known):
             return self
+        return self._of_unknown_side
+
+    @cached_property
+    def _of_unknown_side(self) -> Figure:
         return replace(self, side_known=False)
 
     def from_stature(self, stature: float) -> Figure:

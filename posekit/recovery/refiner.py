@@ -36,6 +36,7 @@ from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import ALLOWED_DEVIATIONS, RecoverSettings, Tolerance
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, Loosening, Scope
+from posekit.validators.joint_range import limited
 
 if TYPE_CHECKING:
     from posekit.recovery.clip_body import ClipBody
@@ -177,8 +178,7 @@ class Refiner:
         ranges = ranges_of(self.grower.settings).of(figure)
         if ranges.kind != "configuration" or not ranges.limits:
             return figure.ik.limits
-        radians = {dof: (math.radians(low), math.radians(high)) for dof, (low, high) in ranges.limits.items()}
-        return figure.with_limits(radians).ik.limits
+        return limited(figure, ranges).limits
 
     @cached_property
     def _walls(self) -> LimbWalls | None:
