@@ -5,8 +5,9 @@ the types it takes (none: it is compiled into its callers), and those of other m
 compiled as copies that know each other; the module itself needs no Numba. Machine code is kept on disk in Numba's own
 cache, under names that carry a hash of the source and its constants: old code is never run for new sources.
 
-What runs compiled gives what runs uncompiled, so it may be switched at any moment. Importing Numba and loading the code
-take about as long as growing some thousand trees without them: they are loaded when so many have been grown.
+Trees that are grown compiled are those that are grown uncompiled, so it may be switched at any moment. Importing Numba
+and loading the code take about as long as growing some thousand trees without them: they are loaded when so many have
+been grown. What is refined differs in rounding: there compiled loops run wherever Numba is installed (`is_installed`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any, Literal
@@ -65,6 +67,14 @@ def is_fast(frames: int) -> bool:
         return _State.chosen == "fast"
     _State.grown += frames
     return _State.grown > PAYS_FROM and _numba() is not None
+
+
+def is_installed() -> bool:
+    """Say whether what is refined uses compiled loops: wherever Numba is installed, from the first frame on.
+
+    It is the same to rounding only, so it depends on nothing that a process did or chose before.
+    """
+    return find_spec("numba") is not None and _numba() is not None
 
 
 @contextmanager

@@ -11,6 +11,9 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
+from posekit.compiled import limb_kernels
+from posekit.compiled.compiling import compiled, is_installed
+from posekit.compiled.screen_kinds import OF_ANATOMICAL_LIMB
 from posekit.geometry import Array
 from posekit.refinement.figure_numbers import LEG_LIMBS
 from posekit.skeleton import HEAD, HIPS, JOINT, JOINTS, LIMB_JOINTS, TORSO
@@ -71,6 +74,25 @@ class LimbWalls:
 
     def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
         """Say how far limbs are beyond their limits; see `posekit.refinement.walls.Walls`."""
+        found = self.looped(limb, upper, lower) if is_installed() else None
+        return self.judged(limb, upper, lower) if found is None else found
+
+    def looped(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array] | None:
+        """Say it by a compiled loop; None where none knows the checks."""
+        numbers = self._numbers[limb]
+        if numbers is None:
+            return None
+        above, below = np.full((2, len(upper), MAX_ANGLES), -np.inf)
+        unclear = np.zeros(len(upper), dtype=np.bool_)
+        directions = np.ascontiguousarray(upper), np.ascontiguousarray(lower)
+        compiled(limb_kernels).limbs_beyond(*directions, self._ends[limb], numbers, above, below, unclear)
+        if unclear.any():
+            rows = np.flatnonzero(unclear)
+            above[rows], below[rows] = (each.T for each in self.judged(limb, upper[rows], lower[rows]))
+        return above.T, below.T
+
+    def judged(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
+        """Say it by the checks themselves."""
         start, middle, end = LIMB_JOINTS[limb]
         part = self._torso if limb < LEG_LIMBS.start or self.on_torso else self._hips
         points = np.repeat(self.figure.neutral_points[None, : len(JOINTS)], len(upper), axis=0)
@@ -111,6 +133,20 @@ class LimbWalls:
             for off in (value - findings.upper, findings.lower - value)
         )
         return above, below
+
+    @cached_property
+    def _numbers(self) -> list[Array | None]:
+        """What loops take for each limb, where a single check with anatomical ranges judges it whole."""
+        rules = [checks[0].rule if len(checks) == 1 else None for checks in self.checks.values()]
+        whole = [rule is not None and rule.kind == OF_ANATOMICAL_LIMB for rule in rules]
+        return [rule.numbers if rule and one else None for rule, one in zip(rules, whole, strict=True)]
+
+    @cached_property
+    def _ends(self) -> Array:
+        """The figure's own limits of limbs (4, 4, 2), degrees: of ways to write a limb they choose the first."""
+        limits, firsts = self.figure.ik.limits, range(6, 22, 4)
+        both = np.degrees(np.stack([limits.lower, limits.upper], axis=-1))
+        return np.stack([both[first : first + 4] for first in firsts])
 
     @cached_property
     def _torso(self) -> Array:

@@ -75,6 +75,26 @@ def test_they_are_beyond_where_the_checks_say_so(name: str) -> None:
     assert 0.05 < outside.mean() < 0.95
 
 
+@pytest.mark.parametrize("limb", range(4))
+def test_the_compiled_loop_finds_what_the_checks_say(limb: int, rng: np.random.Generator) -> None:
+    """Also near singular places: straight limbs, and upper segments along the axis of abduction or straight up."""
+    walls = walls_of("anatomical")
+    upper, lower = unit(rng.standard_normal((2, 4000, 3)))
+    near = 10.0 ** rng.uniform(-9, 0, (1000, 1)) * rng.standard_normal((1000, 3))
+    axis = rng.choice([-1.0, 1.0], (1000, 1)) * np.eye(3)[rng.integers(1, 3, 1000)]
+    lower[:1000] = unit(upper[:1000] + near)
+    upper[1000:2000] = unit(axis + near)
+    loop = walls.looped(limb, upper, lower)
+    assert loop is not None
+    for compiled, judged in zip(loop, walls.judged(limb, upper, lower), strict=True):
+        np.testing.assert_array_equal(np.isfinite(compiled), np.isfinite(judged))
+        np.testing.assert_allclose(compiled, judged, rtol=0, atol=1e-9)
+
+
+def test_limbs_that_other_checks_judge_have_no_loop() -> None:
+    assert walls_of("table1").looped(0, np.eye(3), np.eye(3)) is None
+
+
 @pytest.mark.parametrize("name", RANGES)
 def test_the_gradient_is_that_of_finite_differences(name: str, rng: np.random.Generator) -> None:
     view = scene()
