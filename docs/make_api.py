@@ -35,6 +35,7 @@ SECTIONS: Final = (
     ("Refinement", "posekit.refinement"),
     ("Ranking", "posekit.ranking"),
     ("Paths through frames", "posekit.following"),
+    ("Answers", "posekit.answers"),
     ("Validators", "posekit.validators"),
     ("Viewer", "posekit.viewer"),
     ("Articulated objects", "posekit.objects"),

@@ -12,8 +12,9 @@
    likeliest postures), `refined_completion` (joints that were not seen); `photograph` without a camera.
 4. Certify: `certified`, the checks that every refined posture passes; `judged`, what a result says of that.
 5. Rank: `ranked`, the probability of every survivor; `grouping`, those that are alike.
-6. Answer: `recovery` (what is returned), `camera_record`, `result` (what is written), `summary` and `advice` (what is
-   printed), `least_violation` and `length_diagnosis` (what is wrong where no posture was found).
+6. Answer: `recovery` (what is returned), `answered` (what is said of each frame), `camera_record`, `result` (what is
+   written), `summary` and `advice` (what is printed), `least_violation` and `length_diagnosis` (what is wrong where no
+   posture was found).
 
 `sequences` and `scaled_sequences` follow a person through what was recovered. `taylor_figure` is another body: the
 twelve points of Taylor (2000).

@@ -27,6 +27,7 @@ from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 
 if TYPE_CHECKING:
+    from posekit.answers import Answer
     from posekit.cameras.neck import NeckPlacement
     from posekit.hidden import CompletedSurvivors
     from posekit.recovery.fit_camera import CameraFit
@@ -362,3 +363,10 @@ class Recovery:
     def probability(self) -> list[Array]:
         """The probability of the survivors of each frame."""
         return np.split(self.ranking.probability, np.cumsum([len(frame) for frame in self.frames])[:-1])
+
+    @cached_property
+    def answers(self) -> list[Answer]:
+        """What is to be said of each frame: its likeliest posture, how sure it is, and what else it can be."""
+        from posekit.recovery.answered import answered
+
+        return answered(self.frames, self.probability, [frame.spread for frame in self.frames])

@@ -1,0 +1,52 @@
+"""Choosing few postures, or places of a joint, that stand for many."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+
+
+def cover(
+    points: Array, group: NDArray[np.intp], weight: Array, *, within: float, hold: float
+) -> NDArray[np.intp]:
+    """Let the likeliest of each group stand for all that are near it, then the likeliest of the others, and so on.
+
+    All groups are covered at once: a round costs what is left in them.
+
+    Parameters
+    ----------
+    points : array (N, P, 3)
+        Metres; NaN where a point is not known, which is then nowhere apart.
+    group : int array (N,)
+        Whose it is, zero or more.
+    weight : array (N,)
+        Probabilities; over a group they sum to one.
+    within : float
+        Metres: as far apart may a point of two be of which one stands for the other.
+    hold : float
+        A group is done when so much of its probability is covered.
+
+    Returns
+    -------
+    int array (N,)
+        Who stands for each, a row; -1 for those that were left when the group was done.
+    """
+    stands = np.full(len(points), -1, dtype=np.intp)
+    if not len(points):
+        return stands
+    missing = np.zeros(int(group.max()) + 1)
+    np.add.at(missing, group, weight)
+    enough = (1.0 - hold) * missing
+    left = np.lexsort((-weight, group))
+    while len(left):
+        own = group[left]
+        first = np.flatnonzero(np.diff(own, prepend=-1))
+        centre = np.repeat(left[first], np.diff(first, append=len(left)))
+        apart = ((points[left] - points[centre]) ** 2).sum(axis=-1)
+        near = np.fmax.reduce(apart, axis=1, initial=0.0) <= within**2
+        stands[left[near]] = centre[near]
+        np.subtract.at(missing, own[near], weight[left[near]])
+        left = left[~near & (missing[own] > enough[own])]
+    return stands
