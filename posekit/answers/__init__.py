@@ -1,11 +1,11 @@
 """What is to be said of a frame: the likeliest posture, how sure it is, and what else it can be.
 
-`answers_of` makes an `Answer` a frame of the bodies that a frame lists and their probabilities, `path_answers` of paths
-through frames.
+`answers_of` makes an `Answer` a frame of `ListedBodies`, the bodies that it can be with their probabilities.
 """
 
 from posekit.answers.answer import Answer as Answer
 from posekit.answers.answer import answers_of as answers_of
 from posekit.answers.depth_order import ANSWER_SEGMENTS as ANSWER_SEGMENTS
 from posekit.answers.depth_order import DepthOrder as DepthOrder
+from posekit.answers.listed_bodies import ListedBodies as ListedBodies
 from posekit.answers.regions import JointRegions as JointRegions

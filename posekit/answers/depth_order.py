@@ -62,7 +62,7 @@ class DepthOrder:
 
 
 def depth_orders(
-    joints: Array, covariance: Array, frame: NDArray[np.intp], probability: Array, frames: int
+    depth: Array, variance: Array, frame: NDArray[np.intp], probability: Array, frames: int
 ) -> list[DepthOrder]:
     r"""Find the probabilities of near and far of every frame.
 
@@ -72,10 +72,10 @@ def depth_orders(
 
     Parameters
     ----------
-    joints : array (N, 14, 3)
-        Of all bodies of all frames, camera frame, metres.
-    covariance : array (N, 14, 3, 3)
-        Square metres; NaN where it is not known, and neither are then the segments that end there.
+    depth : array (N, 14)
+        Of the joints of all bodies of all frames, metres.
+    variance : array (N, 14)
+        Of each depth, square metres; NaN where it is not known, and neither are then the segments that end there.
     frame : int array (N,)
         The frame of each body.
     probability : array (N,)
@@ -84,7 +84,6 @@ def depth_orders(
         How many there are.
     """
     start, end = np.array(ANSWER_SEGMENTS).T
-    depth, variance = joints[..., 2], covariance[..., 2, 2]
     gap = depth[:, end] - depth[:, start]
     own = np.abs(variance[:, end] - variance[:, start])
     middle = np.array(PARENTS)[start]

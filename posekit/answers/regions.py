@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.answers.cover import cover
+from posekit.answers.listed_bodies import ListedBodies
 from posekit.geometry import Array
 
 REGION_PROBABILITY: Final = 0.95
@@ -83,31 +84,16 @@ class JointRegions:
         return np.sqrt(2.0 * np.maximum(np.where(np.isnan(peak), 0.0, peak), 0.0))
 
 
-def joint_regions(
-    joints: Array, covariance: Array, frame: NDArray[np.intp], probability: Array, frames: int
-) -> list[JointRegions]:
-    """Find the regions of every frame.
-
-    Parameters
-    ----------
-    joints : array (N, 14, 3)
-        Of all bodies of all frames, camera frame, metres; NaN where a joint is not known.
-    covariance : array (N, 14, 3, 3)
-        Square metres, of full rank; NaN where it is not known.
-    frame : int array (N,)
-        The frame of each body.
-    probability : array (N,)
-        Of each body in its frame.
-    frames : int
-        How many there are.
-    """
+def joint_regions(bodies: ListedBodies) -> JointRegions:
+    """Find the regions of a frame."""
+    joints, covariance = bodies.joints, bodies.covariance
     J = joints.shape[1]
     known = np.isfinite(joints).all(axis=-1) & np.isfinite(covariance).all(axis=(-2, -1))
     body, joint = np.nonzero(known)
-    x, S, p, row = joints[known], covariance[known], probability[body], frame[body] * J + joint
-    stands = cover(x[:, None], row, p, within=MODE_METRES, hold=MODES_HOLD)
+    x, S, p = joints[known], covariance[known], bodies.probability[body]
+    stands = cover(x[:, None], joint, p, within=MODE_METRES, hold=MODES_HOLD)
     kept = stands >= 0
-    x, S, p, row = x[kept], S[kept], p[kept], row[kept]
+    x, S, p, joint = x[kept], S[kept], p[kept], joint[kept]
     centre, mode = np.unique(stands[kept], return_inverse=True)
     weight = _summed(p, mode, len(centre))
     share = p / np.maximum(weight, np.finfo(float).tiny)[mode]
@@ -115,70 +101,43 @@ def joint_regions(
     off = x - mean[mode]
     spread = _summed(share[:, None, None] * (S + off[:, :, None] * off[:, None, :]), mode, len(centre))
     owner = np.empty(len(centre), dtype=np.intp)
-    owner[mode] = row
-    means, covariances, weights = _rows(mean, spread, weight, owner, frames * J)
-    count = np.bincount(owner, minlength=frames * J)
-    drawn = _drawn(joints, covariance, frame, probability, frames)
-    level = np.full(frames * J, np.nan)
-    for m in np.unique(count[count > 0]).tolist():
-        some = np.flatnonzero(count == m)
-        level[some] = _levels(drawn[some], means[some, :m], covariances[some, :m], weights[some, :m])
-    most = count.reshape(frames, J).max(axis=1, initial=0)
-    return [
-        JointRegions(
-            mean=means[k * J : (k + 1) * J, : most[k]].copy(),
-            covariance=covariances[k * J : (k + 1) * J, : most[k]].copy(),
-            probability=weights[k * J : (k + 1) * J, : most[k]].copy(),
-            level=level[k * J : (k + 1) * J].copy(),
-        )
-        for k in range(frames)
-    ]
-
-
-def _rows(
-    mean: Array, covariance: Array, weight: Array, owner: NDArray[np.intp], rows: int
-) -> tuple[Array, Array, Array]:
-    """Put modes into rows, a row a joint of a frame, the likeliest first."""
+    owner[mode] = joint
     order = np.lexsort((-weight, owner))
-    count = np.bincount(owner, minlength=rows)
-    place = np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
-    row, M = owner[order], int(count.max(initial=0))
-    means, covariances = np.full((rows, M, 3), np.nan), np.full((rows, M, 3, 3), np.nan)
-    weights = np.zeros((rows, M))
-    means[row, place], covariances[row, place] = mean[order], covariance[order]
+    count = np.bincount(owner, minlength=J)
+    row, place = owner[order], np.arange(len(order)) - np.repeat(np.cumsum(count) - count, count)
+    M = int(count.max(initial=0))
+    means, covariances = np.full((J, M, 3), np.nan), np.full((J, M, 3, 3), np.nan)
+    weights = np.zeros((J, M))
+    means[row, place], covariances[row, place] = mean[order], spread[order]
     weights[row, place] = weight[order]
     weights /= np.maximum(weights.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-    return means, covariances, weights
+    density = _log_density(_drawn(bodies), means, covariances, weights)
+    return JointRegions(mean=means, covariance=covariances, probability=weights, level=_levels(density))
 
 
-def _drawn(
-    joints: Array, covariance: Array, frame: NDArray[np.intp], probability: Array, frames: int
-) -> Array:
-    """Draw points (F * 14, S, 3) of the mixtures of all bodies, evenly, without chance; NaN where one is not known."""
-    unit, at = even_normal(POINTS_OF_REGION), (np.arange(POINTS_OF_REGION) + 0.5) / POINTS_OF_REGION
-    drawn = np.full((frames, joints.shape[1], POINTS_OF_REGION, 3), np.nan)
-    order = np.argsort(frame, kind="stable")
-    starts = np.searchsorted(frame[order], np.arange(frames + 1))
-    for k in range(frames):
-        rows = order[starts[k] : starts[k + 1]]
-        if len(rows):
-            below = np.cumsum(probability[rows])
-            body, which = np.unique(
-                rows[np.minimum(np.searchsorted(below, at * below[-1]), len(rows) - 1)], return_inverse=True
-            )
-            root = np.linalg.cholesky(_filled(covariance[body]))[which]
-            drawn[k] = (joints[body][which] + np.einsum("sjab,sb->sja", root, unit)).swapaxes(0, 1)
-    return drawn.reshape(-1, POINTS_OF_REGION, 3)
+def _drawn(bodies: ListedBodies) -> Array:
+    """Draw points (14, S, 3) of the mixture of all bodies, evenly, without chance; NaN where one is not known."""
+    below = np.cumsum(bodies.probability)
+    if not len(below):
+        return np.full((14, POINTS_OF_REGION, 3), np.nan)
+    at = below[-1] * (np.arange(POINTS_OF_REGION) + 0.5) / POINTS_OF_REGION
+    drawn, which = np.unique(np.searchsorted(below, at), return_inverse=True)
+    covariance = bodies.covariance[drawn]
+    root = np.linalg.cholesky(_filled(covariance))
+    root[np.isnan(covariance).any(axis=(-2, -1))] = np.nan
+    points = bodies.joints[drawn][which] + np.einsum(
+        "sjab,sb->sja", root[which], even_normal(POINTS_OF_REGION)
+    )
+    return np.asarray(points.swapaxes(0, 1))
 
 
-def _levels(drawn: Array, mean: Array, covariance: Array, weight: Array) -> Array:
-    """Find the log density (G,) of mixtures (G, M) above which 95 % of the points (G, S, 3) are that are known."""
-    density = -np.sort(-_log_density(drawn, mean, covariance, weight), axis=1)  # NaN comes last
+def _levels(density: Array) -> Array:
+    """Find the log density (G,) above which 95 % of the points (G, S) are that are known; NaN where none is."""
+    density = -np.sort(-density, axis=1)  # NaN comes last
     place = REGION_PROBABILITY * np.isfinite(density).sum(axis=1) - 0.5
     low = np.maximum(place.astype(np.intp), 0)
-    at = np.take_along_axis(
-        density, np.stack([low, np.minimum(low + 1, density.shape[1] - 1)], axis=1), axis=1
-    )
+    ends = np.stack([low, np.minimum(low + 1, density.shape[1] - 1)], axis=1)
+    at = np.take_along_axis(density, ends, axis=1)
     return np.asarray(at[:, 0] + (place - low) * (at[:, 1] - at[:, 0]))
 
 
@@ -203,13 +162,15 @@ def even_normal(count: int) -> Array:
 
 
 def _log_density(x: Array, mean: Array, covariance: Array, weight: Array) -> Array:
-    """Return log densities (G, S) of points (G, S, 3) in mixtures (G, M); modes of no weight have no part in them."""
+    """Return log densities (G, S) of points (G, S, 3) in mixtures (G, M); NaN where no mode has any weight."""
     S = _filled(covariance)
     off = x[:, :, None] - np.nan_to_num(mean)[:, None]
     distance = np.einsum("gsmi,gmij,gsmj->gsm", off, np.linalg.inv(S), off, optimize=True)
     parts = _log_peaks(S, weight)[:, None] - 0.5 * distance
     top = parts.max(axis=-1, initial=LEAST_LOG_DENSITY)
-    return np.asarray(top + np.log(np.exp(parts - top[..., None]).sum(axis=-1) + np.exp(LEAST_LOG_DENSITY)))
+    found = np.asarray(top + np.log(np.exp(parts - top[..., None]).sum(axis=-1) + np.exp(LEAST_LOG_DENSITY)))
+    found[weight.sum(axis=-1) == 0.0] = np.nan
+    return found
 
 
 def _log_peaks(covariance: Array, weight: Array) -> Array:

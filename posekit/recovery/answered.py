@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.answers import Answer, answers_of
+from posekit.answers import Answer, ListedBodies, answers_of
 from posekit.errors import InputError
 from posekit.formats.own import Inferred, Result
 from posekit.geometry import Array
@@ -60,8 +60,12 @@ def answered(
         Metres that the survivors of a frame are off which was not refined.
     """
     off = np.broadcast_to(np.asarray(deviation, dtype=np.float64), (len(frames),))
-    covariance = [_covariance(frame, d) for frame, d in zip(frames, off, strict=True)]
-    return answers_of([frame.joints for frame in frames], probability, covariance)
+    return answers_of(
+        [
+            ListedBodies(joints=frame.joints, probability=p, uncertainty=_uncertainty(frame, d))
+            for frame, p, d in zip(frames, probability, off.tolist(), strict=True)
+        ]
+    )
 
 
 def result_answers(result: Result) -> list[Answer]:
@@ -82,11 +86,13 @@ def result_answers(result: Result) -> list[Answer]:
     )
 
 
-def _covariance(frame: ListedFrame, deviation: float) -> Array:
-    """Return the covariances of a frame's survivors; NaN of joints that were not seen."""
+def _uncertainty(frame: ListedFrame, deviation: float) -> Array | float:
+    """Return the covariances of a frame's survivors, NaN of joints that were not seen; one deviation if all were."""
     if frame.refined is not None:
         return frame.refined.covariance
+    if frame.inferred is None:
+        return deviation
     covariance = np.tile(np.eye(3) * deviation**2, (len(frame.joints), 14, 1, 1))
-    for row, joints in enumerate(frame.inferred or ()):
+    for row, joints in enumerate(frame.inferred):
         covariance[row, [JOINT[name] for name in joints]] = np.nan
     return covariance

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from posekit.answers import ANSWER_SEGMENTS, Answer, answers_of
+from posekit.answers import ANSWER_SEGMENTS, Answer, ListedBodies, answers_of
 from posekit.answers.answer import DISTINCT_METRES, REPRESENTED_PROBABILITY
 from posekit.answers.depth_order import LEVEL_METRES
 from posekit.answers.regions import even_normal
@@ -25,8 +25,8 @@ def bodies(rng: np.random.Generator, count: int, places: int = 3) -> tuple[Array
     return joints, probability, root @ root.transpose(0, 1, 3, 2) + np.eye(3) * 0.005**2
 
 
-def answer(joints: Array, probability: Array, covariance: Array | None, deviation: float = 0.0) -> Answer:
-    return answers_of([joints], [probability], [covariance], deviation)[0]
+def answer(joints: Array, probability: Array, uncertainty: Array | float = 0.0) -> Answer:
+    return answers_of([ListedBodies(joints=joints, probability=probability, uncertainty=uncertainty)])[0]
 
 
 def drawn(rng: np.random.Generator, given: tuple[Array, Array, Array], count: int) -> Array:
@@ -98,7 +98,7 @@ def test_depth_orders_sum_to_one_and_know_near_from_far():
     elbow = JOINT["right_elbow"]
     joints[0, elbow, 2] -= 0.2
     joints[1, elbow, 2] += 0.2
-    depth = answer(joints, np.array([0.75, 0.25]), None, DEVIATION).depth
+    depth = answer(joints, np.array([0.75, 0.25]), DEVIATION).depth
     arm = ANSWER_SEGMENTS.index((JOINT["right_shoulder"], elbow))
     assert depth.near[arm] == pytest.approx(0.75)
     assert depth.far[arm] == pytest.approx(0.25)
@@ -110,7 +110,7 @@ def test_depth_orders_sum_to_one_and_know_near_from_far():
 def test_a_segment_at_the_edge_of_level_is_near_as_often_as_not():
     joints = np.full((1, 14, 3), 4.0)
     joints[0, JOINT["right_wrist"], 2] -= LEVEL_METRES
-    depth = answer(joints, np.ones(1), None, DEVIATION).depth
+    depth = answer(joints, np.ones(1), DEVIATION).depth
     forearm = ANSWER_SEGMENTS.index((JOINT["right_elbow"], JOINT["right_wrist"]))
     assert depth.near[forearm] == pytest.approx(0.5)
 
@@ -134,7 +134,7 @@ def test_what_is_not_known_stays_so(rng):
 def test_frames_do_not_depend_on_each_other(rng):
     frames = [bodies(rng, count) for count in (12, 1, 30)]
     frames.insert(1, tuple(values[:0] for values in frames[0]))
-    together = answers_of(*zip(*frames, strict=True))
+    together = answers_of([ListedBodies(joints=J, probability=p, uncertainty=S) for J, p, S in frames])
     for given, found in zip(frames, together, strict=True):
         alone = answer(*given)
         np.testing.assert_array_equal(alone.rows, found.rows)
@@ -143,8 +143,8 @@ def test_frames_do_not_depend_on_each_other(rng):
 
 
 def test_a_frame_without_bodies_has_an_empty_answer():
-    found = answers_of([np.empty((0, 14, 3))], [np.empty(0)], [None])[0]
-    assert (found.bodies, len(found)) == (0, 0)
+    found = answer(np.empty((0, 14, 3)), np.empty(0))
+    assert (len(found.bodies), len(found)) == (0, 0)
     assert np.isnan(found.sure)
     assert np.isnan(found.posture).all()
     assert np.isnan(found.depth.near).all()
@@ -152,12 +152,12 @@ def test_a_frame_without_bodies_has_an_empty_answer():
 
 
 def test_no_frames_have_no_answers():
-    assert answers_of([], [], []) == []
+    assert answers_of([]) == []
 
 
 def test_what_does_not_fit_together_is_refused(rng):
     joints, probability, covariance = bodies(rng, 5)
-    with pytest.raises(InputError, match="frame 0 has 5 bodies and 4 probabilities"):
-        answers_of([joints], [probability[:4]], [covariance])
-    with pytest.raises(InputError, match="covariances of 0 frames"):
-        answers_of([joints], [probability], [])
+    with pytest.raises(InputError, match=r"probability has shape \(4,\); expected \(5,\)"):
+        answer(joints, probability[:4], covariance)
+    with pytest.raises(InputError, match="uncertainty has shape"):
+        answer(joints, probability, covariance[0])
