@@ -107,6 +107,7 @@ class Recipe:
             "root": asked.rooting.method,
             "refine": asked.refine,
             "length_deviation": asked.length_deviation,
+            "coverage": asked.coverage,
             "rank": self.rank,
             "q": self.q,
             "margins": self.margins,

@@ -41,6 +41,7 @@ def settings_of(
             "rooting": Rooting(method=uncertain.root, deviation=uncertain.deviation),  # type: ignore[arg-type]
             "refine": uncertain.refine,
             "length_deviation": uncertain.length_deviation,
+            "coverage": uncertain.coverage,
         }
     asked = RecoverSettings(
         checks=judging.names,

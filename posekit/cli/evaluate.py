@@ -110,6 +110,7 @@ def evaluate(
         ),
     ] = "",
     length_deviation: Annotated[float | None, as_recover("--length-deviation", "FRACTION")] = None,
+    coverage: Annotated[float, as_recover("--coverage", "SHARE")] = 0.99,
     judging: Judging,
     tolerances: TolerancesAsRecover,
     format: Format = "",
@@ -153,7 +154,7 @@ def evaluate(
     )
     options: dict[str, Any] = {
         "root": root or None,
-        "settings": settings_of(judging, tolerances).changed(length_deviation=length_deviation),
+        "settings": settings_of(judging, tolerances, length_deviation=length_deviation, coverage=coverage),
         "seed": seed,
         "choose": evaluation.by_path if sequences else None,
     }

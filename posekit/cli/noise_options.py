@@ -48,6 +48,15 @@ class Uncertain:
             "known of the person: of lengths that are given 0.05 and 0.03.",
         ),
     ] = None
+    coverage: Annotated[
+        float,
+        option(
+            "--coverage",
+            "SHARE",
+            "Under noise, list the likeliest postures that hold this share of the probability; 1: all. What is not "
+            "listed is counted and bounded.",
+        ),
+    ] = 0.99
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,3 +69,4 @@ class UncertainAsRecover(Uncertain):
     root: Annotated[str, as_recover("--root", "HOW", ": auto, head, torso, search.")] = "auto"
     refine: Annotated[bool | None, as_recover("--refine/--no-refine")] = None
     length_deviation: Annotated[float | None, as_recover("--length-deviation", "FRACTION")] = None
+    coverage: Annotated[float, as_recover("--coverage", "SHARE")] = 0.99

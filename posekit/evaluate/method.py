@@ -100,6 +100,7 @@ class Method:
             "noise_px": list(self.noise),
             "root": self.root,
             "length_deviation": asked.length_deviation,
+            "coverage": asked.coverage,
             "checks": list(asked.check_names),
             "ranges": ranges_of(asked).name,
             "rules": list(asked.rules) if "walking" in asked.check_names else [],

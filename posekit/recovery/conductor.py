@@ -195,6 +195,8 @@ def _frames(
                 group_within=group,
                 number=k,
                 cameras=cameras,
+                unlisted=one.unlisted,
+                unlisted_probability=one.unlisted_probability,
             )
         )
     return frames

@@ -58,7 +58,12 @@ def ranked(frames: Sequence[Survivors], lengths: Mapping[str, float], deviation:
         ]
     )
     parts = [
-        (rows, _rank(joints[rows], lengths, frame[rows], residual[rows], chi2[rows] if known else None, off))
+        (
+            rows,
+            rank_postures(
+                joints[rows], lengths, frame[rows], residual[rows], chi2[rows] if known else None, off
+            ),
+        )
         for known in (False, True)
         if (rows := np.flatnonzero(refined == known)).size or not known
     ]
@@ -71,14 +76,15 @@ def ranked(frames: Sequence[Survivors], lengths: Mapping[str, float], deviation:
     return Ranking(probability=probability, frame=frame, terms=terms, up=parts[0][1].up)
 
 
-def _rank(
+def rank_postures(
     joints: Array,
     lengths: Mapping[str, float],
     frame: NDArray[np.intp],
-    length_residual: Array,
+    length_residual: Array | None,
     chi2: Array | None,
     deviation: Array,
 ) -> Ranking:
+    """Rank postures (N, 14, 3) of frames (N,), with what `RankingEvidence.of` takes, of a camera held level."""
     return rank(
         RankingEvidence.of(
             joints,

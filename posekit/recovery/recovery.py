@@ -106,6 +106,10 @@ class FrameRecovery:
         Which frame of the view that was recovered it is.
     cameras : CameraRecords, optional
         Of all frames of the view.
+    unlisted : int
+        How many postures that were not ruled out are not listed for being too unlikely, at most (`coverage`).
+    unlisted_probability : float
+        Which share of the frame's probability they have at most.
     """
 
     time: float
@@ -119,6 +123,8 @@ class FrameRecovery:
     group_within: float | None = None
     number: int = 0
     cameras: CameraRecords | None = None
+    unlisted: int = 0
+    unlisted_probability: float = 0.0
 
     @cached_property
     def _rows(self) -> slice:

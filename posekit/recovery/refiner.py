@@ -25,10 +25,13 @@ from posekit.recovery.certified import Contradiction, certified_within, certifyi
 from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
+from posekit.recovery.leaf_search import blocks, refine_leaves
 from posekit.recovery.limb_walls import LimbWalls
+from posekit.recovery.listing import Listing
 from posekit.recovery.noise import Noise, contact_under_noise
+from posekit.recovery.ranked import rank_postures
 from posekit.recovery.refined_completion import RefinedCompletion
-from posekit.recovery.survival import LeafOutcomes, blocks, drop, refine_leaves
+from posekit.recovery.survival import LeafOutcomes, drop
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import NoiseTolerance
@@ -255,8 +258,19 @@ class Refiner:
             lifted.hypothesis,
             lifted.frame[lifted.hypothesis],
             self.certifying,
+            self.listing(lifted),
             self.hopeless,
         )
+
+    def listing(self, lifted: Lifted) -> Listing:
+        """Say how much is listed, and how likely postures are."""
+        lengths, spread = self.grower.body.figure.lengths, self.spread(lifted)
+
+        def score(joints: Array, chi2: Array, frame: NDArray[np.intp]) -> Array:
+            ranking = rank_postures(joints, lengths, frame, None, chi2, np.full(len(lifted.frames), spread))
+            return np.asarray(np.sum(list(ranking.terms.values()), axis=0))
+
+        return Listing(coverage=self.grower.settings.coverage, score=score)
 
     @property
     def hopeless(self) -> float | None:
@@ -304,10 +318,21 @@ class Refiner:
             spread=self.spread(lifted),
             untold=None if (untold := self.untold(lifted)) is None else untold[outcomes.kept],
         )
-        bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(len(lifted.frames) + 1))
+        count = len(lifted.frames)
+        bounds = np.searchsorted(lifted.frame[lifted.trunks.frame], np.arange(count + 1))
+        of_leaf = lifted.frame[lifted.hypothesis]
+        unlisted = np.bincount(of_leaf, outcomes.unlisted, count)
+        missing = np.bincount(of_leaf, np.where(outcomes.unlisted, outcomes.share, 0.0), count)
         return {
-            frame: FrameTrees(batch=batch, index=int(start), hypotheses=int(end - start), fit=fit)
-            for frame, start, end in zip(lifted.frames.tolist(), bounds[:-1], bounds[1:], strict=True)
+            int(frame): FrameTrees(
+                batch=batch,
+                index=int(bounds[k]),
+                hypotheses=int(bounds[k + 1] - bounds[k]),
+                fit=fit,
+                unlisted=int(unlisted[k]),
+                unlisted_probability=float(missing[k]),
+            )
+            for k, frame in enumerate(lifted.frames)
         }
 
     def spread(self, lifted: Lifted) -> float:

@@ -162,12 +162,18 @@ class FrameTrees:
         The place in the batch of the frame's first hypothesis, and how many there are.
     fit : CameraFit
         Where the necks came from.
+    unlisted : int
+        How many postures are not listed for being too unlikely.
+    unlisted_probability : float
+        Which share of the frame's probability they have at most.
     """
 
     batch: Batch | None
     index: int
     hypotheses: int
     fit: CameraFit
+    unlisted: int = 0
+    unlisted_probability: float = 0.0
 
     @property
     def rows(self) -> slice:

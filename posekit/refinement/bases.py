@@ -64,6 +64,15 @@ class BaseTables(NamedTuple):
             out[kind, rows] = bases.found.chi2[base[rows]] + fitted.pulling.chi2[kind, rows] - gain
         return out
 
+    def gain(self, base: Rows, slots: Rows) -> Array:
+        """Return the decrease of chi2 that trunks (G,) with limbs in some slots (4, G), -1 for none, promise (G,)."""
+        matrix, gradient = self.trunks.matrix[base], self.trunks.gradient[base]
+        for kind in range(4):
+            rows = np.flatnonzero(slots[kind] >= 0)
+            matrix[rows] += self.limbs.matrix[kind, slots[kind, rows]]
+            gradient[rows] += self.limbs.gradient[kind, slots[kind, rows]]
+        return gain_of(matrix, gradient)
+
 
 def assemble(
     problem: RefinementProblem,

@@ -54,6 +54,12 @@ class Merged:
         order = order[np.searchsorted(self.group[order], 0) :]
         return np.split(order, np.cumsum(np.bincount(self.group[order], minlength=len(self.rows)))[:-1])
 
+    def take(self, chosen: NDArray[np.intp]) -> Merged:
+        """Return some of them (K,), in an order that ascends; survivors of the others count as left out."""
+        number = np.full(len(self.rows) + 1, -1)
+        number[chosen] = np.arange(len(chosen))
+        return Merged(refined=self.refined.select(chosen), rows=self.rows[chosen], group=number[self.group])
+
     def codes(self, branches: Sequence[str]) -> list[list[str]]:
         """List for each of them the branch codes that it stands for, of all survivors' codes (N)."""
         if len(branches) != len(self.group):
@@ -110,7 +116,7 @@ def merge(
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
-    leader = _leaders(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
+    leader = leaders_of(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
     some = refined.select(rows[leaders])
     if indistinct and len(rows):
@@ -125,8 +131,18 @@ def merge(
     return Merged(refined=some, rows=rows[leaders], group=group)
 
 
-def _leaders(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
-    """Find which of the postures (N, 14, 3), the best of a frame first, stands for each: near, or of one branch."""
+def leaders_of(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
+    """Find which of the postures (N, 14, 3), the best of a frame first, stands for each: near, or of one branch.
+
+    Parameters
+    ----------
+    frame : int array (N,)
+        Ascending.
+    joints : array (N, 14, 3)
+        Camera frame, metres.
+    within, of_branch : float
+        Metres that no joint may be apart, and the same of postures all of whose segments point to the same sides.
+    """
     if not of_branch:
         return groups_of(frame, joints, within)
     _, branch = np.unique(np.column_stack([frame, _code(joints)]), axis=0, return_inverse=True)

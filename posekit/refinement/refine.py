@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -10,14 +13,16 @@ from posekit.geometry import Array
 from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.inputs import frames_of, numbers
+from posekit.refinement.limb_fitting import SearchSettings
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.refined import Refined
-from posekit.refinement.shared_search import SearchResult, search
+from posekit.refinement.shared_search import SearchResult, SharedSearch
 from posekit.refinement.size import BodySize, size_of
-from posekit.refinement.state import head_points, place
-from posekit.skeleton import HEAD_POINTS, JOINTS
-from posekit.tree.factors import factor_postures
+from posekit.refinement.state import head_points, place, place_limbs, trunk_offsets
+from posekit.refinement.survival import chi2_survival
+from posekit.skeleton import HEAD_POINTS, JOINTS, LIMB_JOINTS
+from posekit.tree.factors import Factors, factor_postures
 
 MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a survivor is not refined."""
@@ -76,6 +81,26 @@ def refine(
     InputError
         Where a shape is wrong, a deviation is not positive, or a name is unknown.
     """
+    return begin_refinement(
+        observed, postures, frame=frame, head=head, settings=SearchSettings(steps, precision, hopeless)
+    ).finish()
+
+
+def begin_refinement(
+    observed: ObservedFrames,
+    postures: ArrayLike,
+    *,
+    frame: ArrayLike | None = None,
+    head: ArrayLike | None = None,
+    settings: SearchSettings,
+) -> BegunRefinement:
+    """Refine the trunks and the limbs of survivors by themselves; parameters are those of `refine`.
+
+    Raises
+    ------
+    InputError
+        Where a shape is wrong, a deviation is not positive, or a name is unknown.
+    """
     given = np.asarray(postures, dtype=np.float64)
     figure = observed.figure
     if given.ndim == 2 and given.shape[1] == figure.model.nq:
@@ -90,13 +115,105 @@ def refine(
     heads = None if head is None else _heads(head, count, frames)
     factors = factor_postures(frames, positions)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of joints at the very lens
-        found = search(
-            problem, positions, heads, factors, steps=steps, precision=precision, hopeless=hopeless
+        search = SharedSearch(problem, positions, heads, factors, settings)
+    return BegunRefinement(
+        observed=observed, frame=frames, placeable=placeable, factors=factors, search=search
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BegunRefinement:
+    """Survivors (N) whose trunks and limbs are refined by themselves, before any is refined as a whole.
+
+    Parameters
+    ----------
+    observed : ObservedFrames
+        What was seen.
+    frame : int array (N,)
+        The frame of each survivor.
+    placeable : bool array (N,)
+        Which can be refined.
+    factors : Factors
+        Their trunks and limbs.
+    search : SharedSearch
+        How far each is.
+    """
+
+    observed: ObservedFrames
+    frame: NDArray[np.intp]
+    placeable: NDArray[np.bool_]
+    factors: Factors
+    search: SharedSearch
+
+    @cached_property
+    def promised(self) -> Array:
+        """What chi2 comes down to, to second order (N,); NaN where a survivor cannot be refined."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.where(self.placeable, self.search.promised, np.nan)
+
+    @property
+    def promised_p(self) -> Array:
+        """The probability that noise alone gives a chi2 as large as is promised (N,)."""
+        known = np.isfinite(self.promised)
+        dof = degrees_of_freedom(self.search.problem) + self.search.promised_dof
+        return np.where(known, chi2_survival(np.where(known, self.promised, 0.0), dof), 0.0)
+
+    @cached_property
+    def trunks(self) -> Array:
+        """The trunks (T, 6, 3), each refined by itself, camera frame, metres."""
+        state = self.search.bases.found.state
+        return np.asarray(
+            (state.root + trunk_offsets(state)).transpose(2, 0, 1) * self._factor[:, None, None]
         )
-    size = None
-    if observed.size_deviation and observed.root is not None:
-        size = size_of(found.descent.state.root.T, observed.root, frames, observed.size_deviation)
-    return _refined(figure, problem, frames, found, placeable, size)
+
+    @cached_property
+    def limbs(self) -> tuple[Array, ...]:
+        """By kind the limbs (L, 2, 3), each refined by itself on its trunk, camera frame, metres."""
+        chains, columns = self.search.fitted.chains, self.search.columns
+        points = np.empty((8, 3, chains.start.shape[2]))
+        place_limbs(chains.start, chains.directions, chains.lengths, points)
+        made = []
+        for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
+            own = columns.of[kind]
+            at = points[[middle - 6, end - 6]][..., own].transpose(2, 0, 1)
+            made.append(at * self._factor[columns.base[own], None, None])
+        return tuple(made)
+
+    @property
+    def limb_chi2(self) -> tuple[Array, ...]:
+        """By kind what each limb adds to the chi2 of its trunk (L,), before either gives way."""
+        return tuple(self.search.fitted.chi2[kind, own] for kind, own in enumerate(self.search.columns.of))
+
+    @property
+    def joints(self) -> Array:
+        """Survivors (N, 14, 3) put together from these; NaN where one cannot be refined."""
+        joints = np.empty((len(self.frame), len(JOINTS), 3))
+        joints[:, :6] = self.trunks[self.factors.trunk_of]
+        for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
+            joints[:, [middle, end]] = self.limbs[kind][self.factors.limb_of[kind]]
+        joints[~self.placeable] = np.nan
+        return joints
+
+    @cached_property
+    def _factor(self) -> Array:
+        """By what factor the body of each trunk is larger than its figure (T,)."""
+        root, prior = self.search.bases.found.state.root.T, self.observed.root
+        if not self.observed.size_deviation or prior is None:
+            return np.ones(len(root))
+        frames = self.frame[self.factors.trunk]
+        return size_of(root, prior, frames, self.observed.size_deviation).factor
+
+    def finish(self, rows: NDArray[np.intp] | None = None) -> Refined:
+        """Refine survivors, or some of them, to the end."""
+        rows = np.arange(len(self.frame)) if rows is None else rows
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of joints at the very lens
+            found = self.search.finish(rows)
+        size = None
+        frames, observed = self.frame[rows], self.observed
+        if observed.size_deviation and observed.root is not None:
+            size = size_of(found.descent.state.root.T, observed.root, frames, observed.size_deviation)
+        problem = self.search.problem.take(rows)
+        return _refined(observed.figure, problem, frames, found, self.placeable[rows], size)
 
 
 def _refined(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,6 +77,18 @@ class Refined:
     def __len__(self) -> int:
         """Count the survivors."""
         return len(self.frame)
+
+    @staticmethod
+    def joined(parts: Sequence[Refined], problem: RefinementProblem) -> Refined:
+        """Put the survivors of one part behind those of the last; `problem` is that of all."""
+        arrays: dict[str, Any] = {
+            item.name: np.concatenate([getattr(part, item.name) for part in parts])
+            for item in fields(parts[0])
+            if isinstance(getattr(parts[0], item.name), np.ndarray)
+        }
+        sizes = [part.size for part in parts if part.size is not None]
+        size = BodySize(*map(np.concatenate, zip(*sizes, strict=True))) if sizes else None
+        return replace(parts[0], problem=problem, size=size, **arrays)
 
     def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Refined:
         """Return some survivors, by index or mask."""

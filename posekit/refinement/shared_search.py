@@ -7,6 +7,7 @@ rays from where it ends (`limb_fitting`). One that no longer can be joins those 
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,100 +35,151 @@ class SearchResult(NamedTuple):
     first: Array
 
 
-def search(
-    problem: RefinementProblem,
-    postures: Array,
-    head: Array | None,
-    factors: Factors,
-    *,
-    steps: int,
-    precision: float,
-    hopeless: float,
-) -> SearchResult:
-    """Refine postures (N, 14, 3) and heads (N, 5, 3); chi2 is never more than it was."""
-    settings = SearchSettings(steps, precision, hopeless)
-    one = factors.trunk
-    begin = state_of(problem.anatomy, postures[one], None if head is None else head[one])
-    own = np.repeat(one[None], 4, axis=0)
-    begin = begin._replace(directions=limb_directions(postures, own, begin))
-    alone = problem.take(one).trunk_alone()
-    columns = columns_of([factors.trunk_of[limb] for limb in factors.limb], len(one))
-    whose = np.repeat(one[columns.base][None], 4, axis=0)
-    for kind in range(4):
-        whose[kind, columns.of[kind]] = factors.limb[kind]
-    origin = np.stack([columns.of[kind][factors.limb_of[kind]] for kind in range(4)])
-    on_columns = begin.take(columns.base)
-    rows = problem.take(one[columns.base])
-    given = chains_of(rows, on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
-    first = _first(alone, rows, begin, given, factors.trunk_of, origin)
-    limbs = InitialLimbs(given.directions, sides(rows.optics, given))
-    trunks = descend(alone, begin, steps=steps, precision=precision)
-    found, late = _grow(
-        problem,
-        Bases(trunks, one, np.zeros((4, len(one)), dtype=np.bool_)),
-        limbs,
-        factors.trunk_of,
-        columns,
-        origin,
-        settings,
-    )
-    # What trunk and limbs shared may have ended higher than a survivor began: it goes on by itself from its start.
-    worse = ~(found.chi2 <= first)
-    if worse.any():
-        back = np.flatnonzero(worse)
-        start = begin.take(factors.trunk_of[back])
-        found.state.put(back, start._replace(directions=limbs.gather(origin[:, back]).directions))
-        found.chi2[back] = first[back]
-    worse[late] = True
-    rest = np.flatnonzero(worse & (found.chi2 <= hopeless))
-    if rest.size:
-        found.put(rest, descend(problem.take(rest), found.state.take(rest), **settings._asdict()))
-    return SearchResult(found, first)
+class SharedSearch:
+    """The search over postures (N, 14, 3) and heads (N, 5, 3), begun: trunks alone, and limbs alone on them.
 
-
-def _grow(
-    problem: RefinementProblem,
-    bases: Bases,
-    limbs: InitialLimbs,
-    base_of: Rows,
-    columns: LimbColumns,
-    origin: Rows,
-    settings: SearchSettings,
-) -> tuple[DescentResult, Rows]:
-    """Refine survivors (N,) from their bases outward, round by round; their limbs are `limbs` at `origin` (4, N).
-
-    Return them, and which have limbs that pull after the last round.
+    Parameters
+    ----------
+    problem : RefinementProblem
+        Of all N.
+    postures, head : array
+        Where the search starts.
+    factors : Factors
+        What the postures are made of.
+    settings : SearchSettings
+        How far it goes.
     """
-    n = len(base_of)
-    found = DescentResult.nothing(bases.found.state, n)
-    leaves, column, late = np.arange(n), origin, np.arange(0)
-    which = np.repeat(np.arange(len(columns.base))[None], 4, axis=0)
-    for turn in range(MAX_PULLING_ROUNDS + 1):
-        fitted = fit_on_bases(problem, bases, columns, limbs.gather(which), settings)
-        each = _at(fitted.chi2, column, 0.0)
-        pull = each > settings.precision
-        total = bases.found.chi2[base_of] + each.sum(axis=0)
-        over = ~np.isfinite(total) | ~bases.open(settings)[base_of]
-        tables = None
-        if turn == 0 and pull.any():
-            tables = BaseTables.of(problem, bases, fitted)
-            least = _at(tables.least(bases, fitted), _at(fitted.place, np.where(pull, column, -1), -1), 0.0)
-            over |= (least > settings.hopeless).any(axis=0)
-        going = pull.any(axis=0) & ~over
-        if turn == MAX_PULLING_ROUNDS:
-            late, going = leaves[going], np.zeros_like(going)
-        done = np.flatnonzero(~going)
-        _write(found, leaves[done], bases, base_of[done], fitted, column[:, done], total[done])
-        found.settled[leaves[done]] &= ~pull[:, done].any(axis=0)
-        left = np.flatnonzero(going)
-        if not left.size:
-            break
-        leaves, base_of, column, pull = leaves[left], base_of[left], column[:, left], pull[:, left]
-        group, one, slots = _groups(base_of, column, pull, fitted)
-        bases = assemble(problem, bases, base_of[one], leaves[one], fitted, slots, settings, tables)
-        base_of = group
-        columns, column, which = _columns(np.where(pull, -1, column), origin[:, leaves], base_of, len(one))
-    return found, late
+
+    def __init__(
+        self,
+        problem: RefinementProblem,
+        postures: Array,
+        head: Array | None,
+        factors: Factors,
+        settings: SearchSettings,
+    ) -> None:
+        self.problem, self.settings = problem, settings
+        one = factors.trunk
+        begin = state_of(problem.anatomy, postures[one], None if head is None else head[one])
+        own = np.repeat(one[None], 4, axis=0)
+        begin = begin._replace(directions=limb_directions(postures, own, begin))
+        alone = problem.take(one).trunk_alone()
+        columns = columns_of([factors.trunk_of[limb] for limb in factors.limb], len(one))
+        whose = np.repeat(one[columns.base][None], 4, axis=0)
+        for kind in range(4):
+            whose[kind, columns.of[kind]] = factors.limb[kind]
+        self.column = np.stack([columns.of[kind][factors.limb_of[kind]] for kind in range(4)])
+        on_columns = begin.take(columns.base)
+        rows = problem.take(one[columns.base])
+        given = chains_of(rows, on_columns._replace(directions=limb_directions(postures, whose, on_columns)))
+        self.first = _first(alone, rows, begin, given, factors.trunk_of, self.column)
+        self.limbs = InitialLimbs(given.directions, sides(rows.optics, given))
+        self.begin, self.columns, self.trunk_of = begin, columns, factors.trunk_of
+        trunks = descend(alone, begin, steps=settings.steps, precision=settings.precision)
+        self.bases = Bases(trunks, one, np.zeros((4, len(one)), dtype=np.bool_))
+        which = np.repeat(np.arange(len(columns.base))[None], 4, axis=0)
+        self.fitted = fit_on_bases(problem, self.bases, columns, self.limbs.gather(which), settings)
+        self.pull = _at(self.fitted.chi2, self.column, 0.0) > settings.precision
+        self.tables = BaseTables.of(problem, self.bases, self.fitted) if self.pull.any() else None
+
+    @cached_property
+    def promised(self) -> Array:
+        """What chi2 of each posture (N,) comes down to, to second order: of its trunk with the limbs that pull."""
+        fitted = self.fitted
+        chi2 = self.bases.found.chi2[self.trunk_of] + _at(fitted.chi2, self.column, 0.0).sum(axis=0)
+        pulled = np.flatnonzero(self.pull.any(axis=0))
+        if self.tables is not None and len(pulled):
+            group, one, slots = _groups(
+                self.trunk_of[pulled], self.column[:, pulled], self.pull[:, pulled], fitted
+            )
+            gain = self.tables.gain(self.trunk_of[pulled[one]], slots)
+            chi2[pulled] -= gain[group]
+        return np.asarray(chi2)
+
+    @property
+    def least(self) -> Array:
+        """What chi2 of each posture (N,) cannot come below: that of its trunk alone."""
+        return np.asarray(self.bases.found.chi2[self.trunk_of])
+
+    @cached_property
+    def hopeless(self) -> NDArray[np.bool_]:
+        """Which postures (N,) have a trunk, or a limb on it, whose chi2 is hopeless even when both give way."""
+        over = ~np.isfinite(self.least) | ~self.bases.open(self.settings)[self.trunk_of]
+        if self.tables is not None:
+            slots = _at(self.fitted.place, np.where(self.pull, self.column, -1), -1)
+            least = _at(self.tables.least(self.bases, self.fitted), slots, 0.0)
+            over |= (least > self.settings.hopeless).any(axis=0)
+        return over
+
+    @property
+    def promised_dof(self) -> Rows:
+        """How many limits and folds each posture (N,) feels then."""
+        found = self.bases.found
+        felt = (found.active + found.folds)[self.trunk_of]
+        if self.tables is None:
+            return felt
+        slots = _at(self.fitted.place, np.where(self.pull, self.column, -1), -1)
+        limbs = self.tables.limbs
+        return np.asarray(felt + _at(limbs.active + limbs.folds, slots, 0).sum(axis=0))
+
+    def finish(self, rows: Rows) -> SearchResult:
+        """Refine some of the postures (M,) to the end; chi2 is never more than it was."""
+        first, settings = self.first[rows], self.settings
+        found, late = self._grow(rows)
+        # What trunk and limbs shared may have ended higher than a survivor began: it goes on by itself from its start.
+        worse = ~(found.chi2 <= first)
+        if worse.any():
+            back = np.flatnonzero(worse)
+            start = self.begin.take(self.trunk_of[rows[back]])
+            directions = self.limbs.gather(self.column[:, rows[back]]).directions
+            found.state.put(back, start._replace(directions=directions))
+            found.chi2[back] = first[back]
+        worse[late] = True
+        rest = np.flatnonzero(worse & (found.chi2 <= settings.hopeless))
+        if rest.size:
+            part = self.problem.take(rows[rest])
+            found.put(rest, descend(part, found.state.take(rest), **settings._asdict()))
+        return SearchResult(found, first)
+
+    def _grow(self, chosen: Rows) -> tuple[DescentResult, Rows]:
+        """Refine some postures (M,) from their bases outward, round by round.
+
+        Return them, and which have limbs that pull after the last round.
+        """
+        problem, settings, fitted, bases = self.problem, self.settings, self.fitted, self.bases
+        n = len(chosen)
+        found = DescentResult.nothing(bases.found.state, n)
+        leaves, late = np.arange(n), np.arange(0)
+        base_of, column, pull = self.trunk_of[chosen], self.column[:, chosen], self.pull[:, chosen]
+        origin = column
+        for turn in range(MAX_PULLING_ROUNDS + 1):
+            each = _at(fitted.chi2, column, 0.0)
+            total = bases.found.chi2[base_of] + each.sum(axis=0)
+            over = ~np.isfinite(total) | ~bases.open(settings)[base_of]
+            tables = None
+            if turn == 0:
+                tables, over = self.tables, over | self.hopeless[chosen]
+            going = pull.any(axis=0) & ~over
+            if turn == MAX_PULLING_ROUNDS:
+                late, going = leaves[going], np.zeros_like(going)
+            done = np.flatnonzero(~going)
+            _write(found, leaves[done], bases, base_of[done], fitted, column[:, done], total[done])
+            found.settled[leaves[done]] &= ~pull[:, done].any(axis=0)
+            left = np.flatnonzero(going)
+            if not left.size:
+                break
+            leaves, base_of, column, pull = leaves[left], base_of[left], column[:, left], pull[:, left]
+            group, one, slots = _groups(base_of, column, pull, fitted)
+            bases = assemble(
+                problem, bases, base_of[one], chosen[leaves[one]], fitted, slots, settings, tables
+            )
+            base_of = group
+            columns, column, which = _columns(
+                np.where(pull, -1, column), origin[:, leaves], base_of, len(one)
+            )
+            fitted = fit_on_bases(problem, bases, columns, self.limbs.gather(which), settings)
+            pull = _at(fitted.chi2, column, 0.0) > settings.precision
+        return found, late
 
 
 def _groups(

@@ -66,6 +66,9 @@ class RecoverSettings(JudgingSettings):
     length_deviation : float, optional
         Relative standard deviation of the body's size, and of each length beside it; 0 says that lengths are exact. By
         default what the view says, else what is known of the person (`posekit.body.uncertainty`).
+    coverage : float
+        Which share of the probability the listed postures of a refined frame hold at least, likeliest first; what is
+        not listed is counted and bounded. By default 0.99; 1 lists all. Frames that are exact list all.
 
     Raises
     ------
@@ -88,6 +91,7 @@ class RecoverSettings(JudgingSettings):
     rooting: Rooting = field(default_factory=Rooting)
     refine: bool | None = None
     length_deviation: float | None = None
+    coverage: float = 0.99
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -107,6 +111,10 @@ class RecoverSettings(JudgingSettings):
             raise InputError(
                 f"--length-deviation: {self.length_deviation!r}; expected a fraction of the length, 0 to "
                 f"{MAX_LENGTH_DEVIATION:g}"
+            )
+        if not (math.isfinite(self.coverage) and 0 < self.coverage <= 1):
+            raise InputError(
+                f"--coverage: {self.coverage!r}; expected a share of the probability, above 0, up to 1"
             )
 
     def tolerance_for(self, usual: Tolerance) -> Tolerance | None:
