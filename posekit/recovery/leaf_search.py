@@ -18,7 +18,12 @@ from posekit.recovery.survival import LeafOutcomes
 from posekit.refinement import ObservedFrames, Refined, merge
 from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.limb_fitting import SearchSettings
-from posekit.refinement.merging import INDISTINCT_SQUARE, SAME_SIDES_METRES, leaders_of
+from posekit.refinement.merging import (
+    INDISTINCT_SQUARE,
+    MERGE_DISTANCE_METRES,
+    SAME_SIDES_METRES,
+    leaders_of,
+)
 from posekit.refinement.refine import BegunRefinement, begin_refinement
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check
@@ -81,43 +86,37 @@ class _LeafSearch:
         self.begun, self.frame, self.known = begun, frame, known
         self.checks, self.listing = checks, listing
         self.p, self.group = begun.promised_p.copy(), np.unique(frame, return_inverse=True)[1].reshape(-1)
-        self.explained, self.legal, self.done = (np.zeros(count, dtype=np.bool_) for _ in range(3))
+        self.row, self.refined = np.arange(0), replace(begun.finish(np.arange(0)), frame=np.arange(0))
+        self.explained, self.done, self.leads = (np.zeros(count, dtype=np.bool_) for _ in range(3))
         self.contradicted: list[Contradiction] = []
-        self.score = np.where(np.isfinite(begun.promised) & ~begun.search.hopeless, 0.0, -np.inf)
-        self.twin = np.arange(count)
+        possible = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
+        self.score = np.where(possible, 0.0, -np.inf)
         if not listing.all:
-            self._foretell()
+            self.joints = begun.joints
+            self._rate(np.flatnonzero(possible), begun.promised[possible])
 
     def outcomes(self) -> LeafOutcomes:
         """Refine, reject, merge and list."""
-        rows, parts = [np.arange(0)], []
         for turn in range(MAX_LISTING_ROUNDS + 1):
             chosen = self._chosen(every=turn == MAX_LISTING_ROUNDS)
             if not (len(chosen) or turn == 0):
                 break
-            rows.append(chosen)
-            parts.append(self._refine(chosen))
-        row = np.concatenate(rows)
-        refined = Refined.joined(parts, self.begun.search.problem.take(row))
-        order = np.argsort(row)
-        row, refined = row[order], refined.select(order)
-        merged = merge(
-            refined, keep=self.legal[row], indistinct=INDISTINCT_SQUARE if self._uncertain else 0.0
-        )
-        waiting = ~self.done & np.isfinite(self.score)
-        listed, unlisted, share = self._listed(row[merged.rows], waiting)
-        merged = merged.take(np.flatnonzero(listed[row[merged.rows]]))
-        kept = np.zeros(len(self.frame), dtype=np.bool_)
-        kept[row[merged.rows]] = True
+            self._refine(chosen)
+            self._merge()
+        listed, share = self._listed(self.row[self.merged.rows])
+        merged = self.merged.take(np.flatnonzero(listed[self.row[self.merged.rows]]))
+        legal = np.isfinite(self.score)
+        unlisted = legal.copy()
+        unlisted[self.row[merged.group >= 0]] = False
         return LeafOutcomes(
             p=self.p,
             contradicted=tuple(self.contradicted),
-            explained=self.explained,
-            kept=kept,
+            explained=self.explained | legal,
+            kept=listed,
             unlisted=unlisted,
             share=share,
-            survivors=RefinedSurvivors.of(merged, self.known[row]),
-            made_of=(FactoredLeaves.of(self.begun, self.frame, self.legal | waiting),),
+            survivors=RefinedSurvivors.of(merged, self.known[self.row]),
+            made_of=(FactoredLeaves.of(self.begun, self.frame, legal),),
         )
 
     @property
@@ -125,80 +124,86 @@ class _LeafSearch:
         """Whether lengths are, so that one branch may have a valley of postures."""
         return bool(self.begun.observed.size_deviation) and self.begun.observed.root is not None
 
-    def _foretell(self) -> None:
-        """Score leaves by what is foretold of them; what one more step does not explain, by its trunk alone."""
-        open_ = np.flatnonzero(np.isfinite(self.score))
-        begun = self.begun
-        chi2 = np.where(self.p >= REJECTION_PROBABILITY, begun.promised, begun.search.least)[open_]
-        joints = begun.joints[open_]
-        self.score[open_] = self.listing.score(joints, chi2, self.frame[open_])
+    def _rate(self, rows: NDArray[np.intp], chi2: Array) -> None:
+        """Score some leaves as they are now."""
+        self.score[rows] = self.listing.score(self.joints[rows], chi2, self.frame[rows])
+
+    def _merge(self) -> None:
+        """Make one of what became one, of all leaves that passed so far."""
+        indistinct = INDISTINCT_SQUARE if self._uncertain else 0.0
+        self.merged = merge(self.refined, indistinct=indistinct)
+        self.leads[self.done] = False
+        self.leads[self.row[self.merged.rows]] = True
+
+    def _lead(self) -> None:
+        """Find which of the leaves that are not refined stand for themselves: others would become one with these."""
+        self.leads[~self.done] = np.isfinite(self.score[~self.done])
         if self._uncertain:
-            order = np.lexsort((-self.score[open_], self.frame[open_]))
-            leader = leaders_of(self.frame[open_][order], joints[order], 0.0, SAME_SIDES_METRES)
-            self.twin[open_[order]] = open_[order][leader]
-            self.explained[self.twin != np.arange(len(self.twin))] = True
+            rows = np.flatnonzero(self.leads)
+            rows = rows[np.lexsort((-self.score[rows], ~self.done[rows], self.frame[rows]))]
+            leader = leaders_of(self.frame[rows], self.joints[rows], MERGE_DISTANCE_METRES, SAME_SIDES_METRES)
+            self.leads[:] = False
+            self.leads[rows[leader]] = True
 
     def _chosen(self, *, every: bool) -> NDArray[np.intp]:
         """Return the leaves to be refined next; all that are left of frames which lack some, if `every`."""
-        own = self.twin == np.arange(len(self.twin))
-        waiting = ~self.done & np.isfinite(self.score) & own
         if self.listing.all:
-            return np.flatnonzero(waiting)
-        mass, group = masses(np.where(self.done & ~self.legal | ~own, -np.inf, self.score), self.group)
+            return np.flatnonzero(np.isfinite(self.score) & ~self.done)
+        self._lead()
+        waiting = ~self.done & self.leads
+        mass, group = masses(np.where(self.leads, self.score, -np.inf), self.group)
         total = np.bincount(group, mass)
         left = np.bincount(group, np.where(waiting, mass, 0.0), len(total))
         # Half of what may be left out is for those that are never looked at: of the rest the likeliest are listed.
         spare = np.asarray(0.5 * (1.0 - self.listing.coverage) * total)
-        short = left > spare
-        wanted = waiting & short[group]
+        wanted = waiting & (left > spare)[group]
         return np.flatnonzero(wanted if every else likeliest(np.where(wanted, mass, 0.0), group, spare))
 
-    def _refine(self, chosen: NDArray[np.intp]) -> Refined:
+    def _refine(self, chosen: NDArray[np.intp]) -> None:
         """Refine some leaves as whole bodies, and judge them."""
         part = replace(self.begun.finish(chosen), frame=self.frame[chosen])
         likely = part.explained()
-        self.done[chosen], self.p[chosen] = True, part.p
-        self.explained[chosen] = self.legal[chosen] = likely
+        self.done[chosen], self.p[chosen], self.explained[chosen] = True, part.p, likely
         rows = chosen[likely]
         joints = np.where(self.known[rows, :, None], part.joints[likely], np.nan)
         found = contradictions(self.checks, np.concatenate([joints, part.head[likely]], axis=1), rows)
+        legal = np.zeros(len(self.frame), dtype=np.bool_)
+        legal[rows] = True
         for one in found:
-            self.legal[one.row] = False
+            legal[one.row] = False
         self.contradicted += found
-        legal = self.legal[chosen]
+        own = legal[chosen]
+        self.score[chosen[~own]] = -np.inf
+        part = part.select(own)
+        row = np.concatenate([self.row, chosen[own]])
+        joined = Refined.joined([self.refined, part], self.begun.search.problem.take(row))
+        order = np.argsort(row)
+        self.row, self.refined = row[order], joined.select(order)
         if not self.listing.all:
-            rows = chosen[legal]
-            self.score[rows] = self.listing.score(part.joints[legal], part.chi2[legal], self.frame[rows])
-            # What would have become one with a body that fails is looked at by itself.
-            alone = self.done[self.twin] & ~self.legal[self.twin] & ~self.done
-            self.twin[alone] = np.flatnonzero(alone)
-            self.explained[alone] = False
-        return part
+            self.joints[chosen[own]] = part.joints
+            self._rate(chosen[own], part.chi2)
 
-    def _listed(
-        self, rows: NDArray[np.intp], waiting: NDArray[np.bool_]
-    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Array]:
-        """Choose those of the merged leaves, at `rows`, that are listed; others are `waiting` (N,) to be refined.
+    def _listed(self, rows: NDArray[np.intp]) -> tuple[NDArray[np.bool_], Array]:
+        """Choose those of the merged leaves, at `rows`, that are listed.
 
         Returns
         -------
-        listed, unlisted : bool array (N,)
-            Those, and those that might have been.
-        share : array (N,)
-            What share of its frame's probability each of both has, as far as is known.
+        bool array (N,)
+            Those.
+        array (N,)
+            What share of its frame's probability each leaf has that is listed, or leads others that are not.
         """
         listed = np.zeros(len(self.frame), dtype=np.bool_)
         listed[rows] = True
         if self.listing.all:
-            return listed, np.zeros_like(listed), np.zeros(len(listed))
-        waiting = waiting & (self.twin == np.arange(len(self.twin)))
+            return listed, np.zeros(len(listed))
+        waiting = ~self.done & self.leads
         mass, group = masses(np.where(listed | waiting, self.score, -np.inf), self.group)
         total = np.bincount(group, mass)
         left = np.bincount(group, np.where(waiting, mass, 0.0), len(total))
         spare = np.maximum((1.0 - self.listing.coverage) * total - left, 0.0)
-        first = likeliest(np.where(listed, mass, 0.0), group, spare)
         share = mass / np.maximum(total, np.finfo(float).tiny)[group]
-        return first, (listed | waiting) & ~first, share
+        return likeliest(np.where(listed, mass, 0.0), group, spare), share
 
 
 def blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:

@@ -33,7 +33,7 @@ class LeafOutcomes:
     explained, kept : bool array (N,)
         Those that the noise explains, and of those that no check contradicts the likeliest that became one.
     unlisted : bool array (N,)
-        Those that are too unlikely to be listed, and may be explained.
+        Those that are too unlikely to be listed, and may be explained, or become one with another.
     share : array (N,)
         What share of its frame's probability each of these, or of those kept, has as far as is known.
     survivors : RefinedSurvivors

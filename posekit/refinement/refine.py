@@ -16,7 +16,7 @@ from posekit.refinement.inputs import frames_of, numbers
 from posekit.refinement.limb_fitting import SearchSettings
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.problem import RefinementProblem
-from posekit.refinement.refined import Refined
+from posekit.refinement.refined import REJECTION_PROBABILITY, Refined
 from posekit.refinement.shared_search import SearchResult, SharedSearch
 from posekit.refinement.size import BodySize, size_of
 from posekit.refinement.state import head_points, place, place_limbs, trunk_offsets
@@ -147,16 +147,28 @@ class BegunRefinement:
 
     @cached_property
     def promised(self) -> Array:
-        """What chi2 comes down to, to second order (N,); NaN where a survivor cannot be refined."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.where(self.placeable, self.search.promised, np.nan)
+        """What chi2 comes down to (N,); NaN where a survivor cannot be refined.
 
-    @property
+        To second order; where noise would not explain that, what it cannot come below.
+        """
+        search = self.search
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = np.where(self.placeable, search.promised, np.nan)
+            doubtful = self._p(found) < REJECTION_PROBABILITY
+            return np.where(doubtful & self.placeable, search.least, found)
+
+    @cached_property
     def promised_p(self) -> Array:
         """The probability that noise alone gives a chi2 as large as is promised (N,)."""
-        known = np.isfinite(self.promised)
-        dof = degrees_of_freedom(self.search.problem) + self.search.promised_dof
-        return np.where(known, chi2_survival(np.where(known, self.promised, 0.0), dof), 0.0)
+        return self._p(self.promised)
+
+    def _p(self, chi2: Array) -> Array:
+        known = np.isfinite(chi2)
+        return np.where(known, chi2_survival(np.where(known, chi2, 0.0), self._dof), 0.0)
+
+    @cached_property
+    def _dof(self) -> NDArray[np.intp]:
+        return degrees_of_freedom(self.search.problem) + self.search.promised_dof
 
     @cached_property
     def trunks(self) -> Array:

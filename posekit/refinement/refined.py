@@ -18,7 +18,7 @@ from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.size import BodySize
 from posekit.refinement.start import measured_state
 from posekit.refinement.survival import chi2_survival
-from posekit.skeleton import SEGMENTS
+from posekit.skeleton import JOINTS, SEGMENTS
 
 REJECTION_PROBABILITY = 1e-3
 """Probability with which noise alone gives a posture that is rejected."""
@@ -88,7 +88,12 @@ class Refined:
         }
         sizes = [part.size for part in parts if part.size is not None]
         size = BodySize(*map(np.concatenate, zip(*sizes, strict=True))) if sizes else None
-        return replace(parts[0], problem=problem, size=size, **arrays)
+        out = replace(parts[0], problem=problem, size=size, **arrays)
+        if any(
+            "covariance" in vars(part) for part in parts
+        ):  # found by now of some, and as much work as anything
+            vars(out)["covariance"] = np.concatenate([part.covariance for part in parts])
+        return out
 
     def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Refined:
         """Return some survivors, by index or mask."""

@@ -27,6 +27,9 @@ from posekit.tree.factors import Factors, LimbColumns, Rows, columns_of
 MAX_PULLING_ROUNDS = 3
 """Times that limbs which turn out to pull are taken in, before survivors go on one by one."""
 
+MUCH_CHI2 = 9.0
+"""A promised chi2 of a trunk with one limb that is not taken at its word."""
+
 
 class SearchResult(NamedTuple):
     """Where the search ended, and the chi2 (N,) with which it began."""
@@ -96,20 +99,56 @@ class SharedSearch:
             chi2[pulled] -= gain[group]
         return np.asarray(chi2)
 
-    @property
+    @cached_property
     def least(self) -> Array:
-        """What chi2 of each posture (N,) cannot come below: that of its trunk alone."""
-        return np.asarray(self.bases.found.chi2[self.trunk_of])
+        """What chi2 of each posture (N,) cannot come below: that of its trunk, with any of its limbs that pull much."""
+        least = self.bases.found.chi2[self.trunk_of].copy()
+        if self.tables is not None:
+            np.maximum(least, _at(self._pairs, self._slots, 0.0).max(axis=0), out=least)
+        return least
 
     @cached_property
     def hopeless(self) -> NDArray[np.bool_]:
         """Which postures (N,) have a trunk, or a limb on it, whose chi2 is hopeless even when both give way."""
         over = ~np.isfinite(self.least) | ~self.bases.open(self.settings)[self.trunk_of]
         if self.tables is not None:
-            slots = _at(self.fitted.place, np.where(self.pull, self.column, -1), -1)
-            least = _at(self.tables.least(self.bases, self.fitted), slots, 0.0)
+            least = _at(self.tables.least(self.bases, self.fitted), self._slots, 0.0)
             over |= (least > self.settings.hopeless).any(axis=0)
         return over
+
+    @cached_property
+    def _slots(self) -> Rows:
+        """The place of each posture's limbs (4, N) among those that pull, -1 for the others."""
+        return _at(self.fitted.place, np.where(self.pull, self.column, -1), -1)
+
+    @cached_property
+    def _pairs(self) -> Array:
+        """The chi2 of a trunk with each limb (4, P) that pulls at it, where that promises to be much; else zero.
+
+        Two together are refined to the end: where limits bend, what is promised may be far too much.
+        """
+        out = np.zeros(self.fitted.pulling.chi2.shape)
+        if self.tables is None:
+            return out
+        promised = self.tables.least(self.bases, self.fitted)
+        kind, slot = np.nonzero((promised > MUCH_CHI2) & (promised <= self.settings.hopeless))
+        if not len(kind):
+            return out
+        slots = np.full((4, len(kind)), -1)
+        slots[kind, np.arange(len(kind))] = slot
+        base = self.fitted.pulling.base[slot]
+        pairs = assemble(
+            self.problem,
+            self.bases,
+            base,
+            self.bases.leaf[base],
+            self.fitted,
+            slots,
+            self.settings,
+            self.tables,
+        )
+        out[kind, slot] = pairs.found.chi2
+        return out
 
     @property
     def promised_dof(self) -> Rows:
@@ -118,9 +157,8 @@ class SharedSearch:
         felt = (found.active + found.folds)[self.trunk_of]
         if self.tables is None:
             return felt
-        slots = _at(self.fitted.place, np.where(self.pull, self.column, -1), -1)
         limbs = self.tables.limbs
-        return np.asarray(felt + _at(limbs.active + limbs.folds, slots, 0).sum(axis=0))
+        return np.asarray(felt + _at(limbs.active + limbs.folds, self._slots, 0).sum(axis=0))
 
     def finish(self, rows: Rows) -> SearchResult:
         """Refine some of the postures (M,) to the end; chi2 is never more than it was."""
