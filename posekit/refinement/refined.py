@@ -18,7 +18,7 @@ from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.size import BodySize
 from posekit.refinement.start import measured_state
 from posekit.refinement.survival import chi2_survival
-from posekit.skeleton import JOINTS, SEGMENTS
+from posekit.skeleton import SEGMENTS
 
 REJECTION_PROBABILITY = 1e-3
 """Probability with which noise alone gives a posture that is rejected."""
