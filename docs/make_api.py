@@ -40,6 +40,7 @@ SECTIONS: Final = (
     ("Viewer", "posekit.viewer"),
     ("Articulated objects", "posekit.objects"),
     ("Recovery", "posekit.recovery"),
+    ("Live", "posekit.live"),
     ("Validation of files", "posekit.validation"),
     ("Conversion", "posekit.conversion"),
     ("Batches", "posekit.batch"),

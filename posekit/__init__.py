@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from posekit.formats.own import write_postures as write_postures
     from posekit.formats.own import write_result as write_result
     from posekit.formats.own import write_view as write_view
+    from posekit.live import TrackedPosture as TrackedPosture
+    from posekit.live import Tracker as Tracker
     from posekit.recovery import recover as recover
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
@@ -55,6 +57,7 @@ _HOMES = {
     "posekit.formats.keypoints": ("read_keypoints",),
     "posekit.formats.motion": ("read_motion",),
     "posekit.formats.opening": ("open",),
+    "posekit.live": ("TrackedPosture", "Tracker"),
     "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),

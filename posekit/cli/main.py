@@ -26,6 +26,7 @@ ClickError: Any = UsageError.__bases__[0]
 
 COMMAND_NAMES: Final = (
     "recover",
+    "follow",
     "validate",
     "convert",
     "inspect",

@@ -114,6 +114,11 @@ def validated(model: type[Model], document: object, path: str | Path) -> Model:
     """
     expected = str(model.model_fields["schema_"].annotation.__args__[0])  # type: ignore[union-attr]
     _check_schema(document, expected, path)
+    return conforming(model, document, path)
+
+
+def conforming(model: type[Model], document: object, path: str | Path) -> Model:
+    """Validate what names no schema: a part of a document, or a line of a stream. See `validated`."""
     try:
         return model.model_validate(document)
     except ValidationError as error:

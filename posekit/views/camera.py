@@ -62,7 +62,7 @@ def sighting(keypoints: KeyPoints, source: Source) -> SightedKeyPoints:
             "give --size WIDTHxHEIGHT"
         )
     if source.camera:
-        camera = _named(source.camera)
+        camera = named_camera(source.camera)
     elif source.fov is not None:
         camera = camera_from_fov(_size(keypoints, source, "--fov"), source.fov, "horizontal")
     elif source.focal35 is not None:
@@ -72,7 +72,7 @@ def sighting(keypoints: KeyPoints, source: Source) -> SightedKeyPoints:
         return SightedKeyPoints(keypoints, model, "no camera: scaled orthographic, the scale is not known")
     _check_size(camera, keypoints)
     _check_unit(camera, keypoints)
-    return SightedKeyPoints(_ideal(keypoints, camera), _model(camera), _says(camera))
+    return SightedKeyPoints(_ideal(keypoints, camera), model_of(camera), _says(camera))
 
 
 def in_pixels(keypoints: KeyPoints, size: tuple[int, int] | None) -> KeyPoints:
@@ -130,7 +130,7 @@ def _size(keypoints: KeyPoints, source: Source, option: str) -> tuple[int, int]:
     return int(sizes[0, 0]), int(sizes[0, 1])
 
 
-def _named(text: str) -> CalibratedCamera:
+def named_camera(text: str) -> CalibratedCamera:
     """Read the camera that an option names."""
     path, name = split_camera(text)
     cameras = read_cameras(path)
@@ -197,7 +197,8 @@ def _ideal(keypoints: KeyPoints, camera: CalibratedCamera) -> KeyPoints:
     )
 
 
-def _model(camera: CalibratedCamera) -> OpenCVModel:
+def model_of(camera: CalibratedCamera) -> OpenCVModel:
+    """Return what a view says of a camera, whose points are undistorted where its lens needs it."""
     pinhole = pinhole_of(camera)
     return OpenCVModel(K=pinhole.K, distortion=pinhole.distortion, R=camera.R, t=camera.t, size=camera.size)
 

@@ -62,7 +62,11 @@ def person(
     InputError, FigureError
         Where a file cannot be read, or what it says makes no body.
     """
-    lengths = _lengths(source, camera, given)
+    return figure_of(segment_lengths(source, camera, given), layout)
+
+
+def figure_of(lengths: SegmentLengths | None, layout: SkeletonMap) -> tuple[Figure, str, float | None]:
+    """Make the figure of lengths, of which maybe nobody knows any, as `person` does."""
     figure, says = load_figure(), BUILT_IN
     deviation: float | None = UNKNOWN_PERSON_DEVIATION
     if lengths is not None:
@@ -99,7 +103,8 @@ def middle_neck(lengths: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def _lengths(source: Source, camera: CameraModel, given: Path | None) -> SegmentLengths | None:
+def segment_lengths(source: Source, camera: CameraModel, given: Path | None = None) -> SegmentLengths | None:
+    """Return the lengths that a source gives, in whichever way; None where nobody knows any. See `person`."""
     if source.lengths is not None:
         read = read_lengths(source.lengths)
         if read.lengths or read.stature is None:
