@@ -197,6 +197,7 @@ def _frames(
                 cameras=cameras,
                 unlisted=one.unlisted,
                 unlisted_probability=one.unlisted_probability,
+                made_of=one.posture_set,
             )
         )
     return frames

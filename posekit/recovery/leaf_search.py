@@ -140,7 +140,7 @@ class _LeafSearch:
         self.leads[~self.done] = np.isfinite(self.score[~self.done])
         if self._uncertain:
             rows = np.flatnonzero(self.leads)
-            rows = rows[np.lexsort((-self.score[rows], ~self.done[rows], self.frame[rows]))]
+            rows = rows[np.lexsort((-self.p[rows], ~self.done[rows], self.frame[rows]))]
             leader = leaders_of(self.frame[rows], self.joints[rows], MERGE_DISTANCE_METRES, SAME_SIDES_METRES)
             self.leads[:] = False
             self.leads[rows[leader]] = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.formats.own import Family, Inferred, Root
+from posekit.formats.own.posture_set import PostureSet
 from posekit.geometry import Array
 from posekit.objects.mirror import mirrored
 from posekit.ranking import Ranking, deviation_of_tolerance
@@ -110,6 +111,8 @@ class FrameRecovery:
         How many postures that were not ruled out are not listed for being too unlikely, at most (`coverage`).
     unlisted_probability : float
         Which share of the frame's probability they have at most.
+    made_of : callable, optional
+        Returns the set where not all of its postures are listed: see `posture_set`.
     """
 
     time: float
@@ -125,6 +128,7 @@ class FrameRecovery:
     cameras: CameraRecords | None = None
     unlisted: int = 0
     unlisted_probability: float = 0.0
+    made_of: Callable[[], PostureSet] | None = None
 
     @cached_property
     def _rows(self) -> slice:
@@ -141,6 +145,14 @@ class FrameRecovery:
     def joints(self) -> Array:
         """Survivors (N, 14, 3), OpenCV camera frame, metres; NaN where a joint was not seen."""
         return self.batch.points[self._rows, :14] if self.batch else np.empty((0, 14, 3))
+
+    @cached_property
+    def posture_set(self) -> PostureSet:
+        """The complete set as trunks and limbs, whatever is listed of it.
+
+        Under noise trunks and limbs are where they are before whole bodies are refined.
+        """
+        return PostureSet.of(self.joints) if self.made_of is None else self.made_of()
 
     @property
     def head(self) -> Array:

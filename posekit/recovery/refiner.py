@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -331,6 +331,7 @@ class Refiner:
                 fit=fit,
                 unlisted=int(unlisted[k]),
                 unlisted_probability=float(missing[k]),
+                posture_set=partial(outcomes.posture_set, k),
             )
             for k, frame in enumerate(lifted.frames)
         }

@@ -8,11 +8,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.own.posture_set import PostureSet
 from posekit.geometry import Array
 from posekit.recovery.certified import Contradiction
 from posekit.recovery.factored import FactoredLeaves
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.refinement.refined import REJECTION_PROBABILITY
+from posekit.skeleton import JOINTS
 from posekit.tree import Leaves
 from posekit.tree.leaves import Pruned
 
@@ -70,6 +72,11 @@ class LeafOutcomes:
             survivors=RefinedSurvivors.joined([part.survivors for part in parts]),
             made_of=tuple(one for part in parts for one in part.made_of),
         )
+
+    def posture_set(self, frame: int) -> PostureSet:
+        """Return the set of one frame: the trunks and limbs of the leaves that are kept, or may be explained."""
+        own = [part for part in self.made_of if (part.frame == frame).any()]
+        return own[0].posture_set(frame) if own else PostureSet.of(np.empty((0, len(JOINTS), 3)))
 
     def prune(self, leaves: Leaves) -> Leaves:
         """Drop the leaves that checks contradict, those that noise cannot explain, and those that became another."""

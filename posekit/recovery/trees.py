@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -20,6 +20,7 @@ from posekit.validators import worst_margins
 
 if TYPE_CHECKING:
     from posekit.body import Configurations
+    from posekit.formats.own.posture_set import PostureSet
     from posekit.hidden import CompletedSurvivors
     from posekit.recovery.body import LiftedBody
     from posekit.recovery.fit_camera import CameraFit
@@ -166,6 +167,8 @@ class FrameTrees:
         How many postures are not listed for being too unlikely.
     unlisted_probability : float
         Which share of the frame's probability they have at most.
+    posture_set : callable, optional
+        Returns the trunks and limbs of which all that may be are made, where not every posture is listed.
     """
 
     batch: Batch | None
@@ -174,6 +177,7 @@ class FrameTrees:
     fit: CameraFit
     unlisted: int = 0
     unlisted_probability: float = 0.0
+    posture_set: Callable[[], PostureSet] | None = None
 
     @property
     def rows(self) -> slice:

@@ -17,7 +17,7 @@ from posekit.body.uncertainty import UNKNOWN_ADULT
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.own import View
-from posekit.recovery import recover, survival
+from posekit.recovery import leaf_search, recover
 from posekit.recovery.certified import certified_within
 from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.recovery import Recovery
@@ -139,7 +139,7 @@ def test_bodies_overlap_no_farther_than_is_allowed() -> None:
         return deepest.check(joints).verdicts.count("invalid")
 
     recovery = recover(view, length_deviation=0.0)
-    with mock.patch.object(survival, "contradictions", lambda *_: []):
+    with mock.patch.object(leaf_search, "contradictions", lambda *_: []):
         unchecked = recover(view, length_deviation=0.0)
     assert recovery.settings["refined"]["contact"] == -0.03
     assert overlapping(unchecked) > 0

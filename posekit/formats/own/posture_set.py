@@ -96,10 +96,11 @@ class PostureSet:
             raise _refused("bodies", str(self.bodies), "a count from 0")
 
     @staticmethod
-    def of(joints: Array) -> PostureSet:
+    def of(joints: Array, trunk_chi2: Array | None = None, limb_chi2: Array | None = None) -> PostureSet:
         """Find the set of whole bodies (N, 14, 3), joints compared to the last bit.
 
-        The set has all of them; it has others too where what they exclude takes three limbs or more to say.
+        The set has all of them; it has others too where what they exclude takes three limbs or more to say. The chi2 of
+        each body's trunk (N,) and of its limbs (4, N) may be known.
         """
         n = len(joints)
         factors = factor_postures(np.zeros(n, dtype=np.intp), np.asarray(joints, dtype=np.float64))
@@ -115,11 +116,11 @@ class PostureSet:
         ends = np.array([limb[1:] for limb in LIMB_JOINTS])
         found = PostureSet(
             trunks=joints[trunk_order, :N_SET_TRUNK_JOINTS],
-            trunk_chi2=np.full(len(trunk_order), np.nan),
+            trunk_chi2=np.full(len(trunk_order), np.nan) if trunk_chi2 is None else trunk_chi2[trunk_order],
             limb_trunk=trunk_of[member],
             limb_kind=kinds,
             limb_joints=joints[member[:, None], ends[kinds]],
-            limb_chi2=np.full(len(member), np.nan),
+            limb_chi2=np.full(len(member), np.nan) if limb_chi2 is None else limb_chi2[kinds, member],
             excluded=_never_together(trunk_of[member], kinds, limb_of),
             bodies=0,
         )

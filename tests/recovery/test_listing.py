@@ -1,0 +1,114 @@
+"""Which bodies are listed: the likeliest, and no fewer than hold the probability asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from posekit.body import load_figure
+from posekit.errors import InputError
+from posekit.recovery import Recovery, recover
+from posekit.recovery.listing import likeliest, masses
+from posekit.settings import RecoverSettings
+from posekit.synthesis import random_views
+from tests.recovery.test_refiner import noisy
+
+COVERAGE = 0.95
+
+
+def recovered(**changes: float) -> tuple[Recovery, Recovery]:
+    view = noisy(random_views(load_figure(), 12, np.random.default_rng(5)), 2.0)
+    return recover(view, coverage=1.0, **changes), recover(view, coverage=COVERAGE, **changes)
+
+
+@pytest.fixture(scope="module")
+def both() -> tuple[Recovery, Recovery]:
+    """The same views, every body listed, and those that hold a share of the probability."""
+    return recovered()
+
+
+def test_what_is_listed_is_the_likeliest_of_all() -> None:
+    """Where lengths are uncertain a valley of one branch may be told by another of its postures: see the next."""
+    fewer, both = 0, recovered(length_deviation=0.0)
+    for k, (whole, part) in enumerate(zip(both[0].frames, both[1].frames, strict=True)):
+        if not len(whole):
+            assert not len(part)
+            continue
+        apart = np.abs(whole.joints[:, None] - part.joints[None]).max(axis=(2, 3))
+        twin = apart.argmin(axis=0)
+        assert (apart[twin, np.arange(len(part))] < 1e-6).all()
+        p = both[0].probability[k]
+        out = np.ones(len(whole), dtype=np.bool_)
+        out[twin] = False
+        assert p[out].max(initial=0.0) <= p[twin].min() + 1e-9
+        assert p[twin].sum() >= COVERAGE
+        # What was never refined is foretold to second order.
+        assert p[out].sum() <= 1.1 * part.unlisted_probability + 1e-9
+        assert out.sum() <= part.unlisted
+        fewer += int(out.sum())
+    assert fewer > 0
+
+
+def test_the_likeliest_are_listed_where_lengths_are_uncertain(both: tuple[Recovery, Recovery]) -> None:
+    for k, (whole, part) in enumerate(zip(both[0].frames, both[1].frames, strict=True)):
+        if not len(whole):
+            continue
+        first = whole.joints[both[0].probability[k].argmax()]
+        near = np.linalg.norm(part.joints - first, axis=2).max(axis=1).min()
+        assert near < 0.1  # metres: of one branch
+
+
+def test_what_is_not_listed_is_bounded_and_counted(both: tuple[Recovery, Recovery]) -> None:
+    assert all(frame.unlisted == 0 == frame.unlisted_probability for frame in both[0].frames)
+    for frame in both[1].frames:
+        assert 0 <= frame.unlisted_probability <= 1 - COVERAGE + 1e-9
+        assert frame.rejected.get("noise/unlisted", 0) == frame.unlisted
+
+
+def test_the_set_holds_what_is_listed_and_what_is_not(both: tuple[Recovery, Recovery]) -> None:
+    for whole, part in zip(both[0].frames, both[1].frames, strict=True):
+        found = part.posture_set
+        assert found.bodies >= len(whole)
+        if not len(whole):
+            continue
+        composed = found.joints(found.compose())
+        # Limbs are on their trunks before whole bodies are refined: as far from where these end as depths are off.
+        near = np.linalg.norm(whole.joints[:, None] - composed[None], axis=3).max(axis=2).min(axis=1)
+        assert np.median(near) < 0.1
+
+
+def brute(score: NDArray[np.float64], coverage: float) -> int:
+    p = np.sort(np.exp(score - score.max()))[::-1]
+    return int(np.searchsorted(np.cumsum(p) / p.sum(), coverage - 1e-12) + 1)
+
+
+@pytest.mark.parametrize("coverage", [0.5, 0.9, 0.999])
+def test_the_fewest_that_hold_the_share_are_chosen(coverage: float) -> None:
+    rng = np.random.default_rng(2)
+    frame = np.repeat([7, 3, 4], [20, 1, 35])
+    score = 3.0 * rng.standard_normal(len(frame))
+    score[5] = -np.inf
+    mass, group = masses(score, frame)
+    chosen = likeliest(mass, group, (1 - coverage) * np.bincount(group, mass))
+    for one in (7, 3, 4):
+        own = (frame == one) & np.isfinite(score)
+        assert chosen[own].sum() == brute(score[own], coverage)
+        assert score[own & chosen].min() > score[own & ~chosen].max(initial=-np.inf)
+    assert not chosen[5]
+
+
+def test_exact_frames_list_all() -> None:
+    import posekit
+
+    view = posekit.builtin_view("seq1")
+    one, other = posekit.recover(view, coverage=0.5), posekit.recover(view, coverage=1.0)
+    for a, b in zip(one.frames, other.frames, strict=True):
+        np.testing.assert_array_equal(a.joints, b.joints)
+        assert a.posture_set.bodies >= len(a)
+
+
+@pytest.mark.parametrize("coverage", [0.0, 1.5, float("nan"), -0.1])
+def test_a_share_that_is_none_is_refused(coverage: float) -> None:
+    with pytest.raises(InputError, match="--coverage"):
+        RecoverSettings(coverage=coverage)
