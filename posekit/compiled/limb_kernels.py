@@ -29,6 +29,7 @@ from posekit.compiled.anatomical_kernels import (
     AT_UNSEEN,
     AT_WHOLE,
     BEYOND_ALL,
+    CLEAR_DEGREES,
     CLEAR_SHARE,
     HIGH_AT,
     LOW_AT,
@@ -94,22 +95,22 @@ def outside_by(angle: Any, ends: Array, k: int) -> Any:
 def first_writing(
     flexion: Any, abduction: Any, rotation: Any, hinge: Any, bend: Any, ends: Array, w: Array
 ) -> Any:
-    """Choose the writing that the closed form takes: 0 or 1 of the hinge's side, 2 more for the other branch.
+    """Choose the writing that the closed form takes: 0 or 1 by the hinge's side, 2 more for the other branch.
 
     `posekit.body.angles.limb_angles`: that which violates the figure's limits least, of those that tie the first; -1
     where that is not clear.
     """
+    rotated, turned = (
+        bend * outside_by(rotation, ends, OF_ROTATION),
+        bend * outside_by(rotation + HALF_TURN, ends, OF_ROTATION),
+    )
+    bent, back = outside_by(hinge, ends, OF_HINGE), outside_by(-hinge, ends, OF_HINGE)
+    ball = worst(outside_by(flexion, ends, 0), outside_by(abduction, ends, 1))
+    w[WORST_AT], w[WORST_AT + 1] = worst(worst(ball, rotated), bent), worst(worst(ball, turned), back)
+    ball = worst(outside_by(flexion + HALF_TURN, ends, 0), outside_by(HALF_TURN - abduction, ends, 1))
+    w[WORST_AT + 2], w[WORST_AT + 3] = worst(worst(ball, turned), bent), worst(worst(ball, rotated), back)
     least = math.inf
     for k in range(4):
-        other, back = k >= 2, k % 2 == 1
-        cost = worst(
-            outside_by(flexion + HALF_TURN if other else flexion, ends, 0),
-            outside_by(HALF_TURN - abduction if other else abduction, ends, 1),
-        )
-        cost = worst(
-            cost, bend * outside_by(rotation + HALF_TURN if other != back else rotation, ends, OF_ROTATION)
-        )
-        w[WORST_AT + k] = worst(cost, outside_by(-hinge if back else hinge, ends, OF_HINGE))
         if math.isnan(w[WORST_AT + k]):
             return -1
         least = min(least, w[WORST_AT + k])
@@ -120,8 +121,72 @@ def first_writing(
     return -1
 
 
-def beyond_limits(u: Array, v: Array, ends: Array, w: Array, above: Array, below: Array) -> Any:
-    """Say how far one limb is beyond its limits, radians; return whether that is clear, else the judge must say it.
+def raise_arm(u: Array, flexion: Any, abduction: Any, w: Array) -> Any:
+    """Write down an arm's elevation and its plane; return its turn without rotation, degrees, NaN where unclear."""
+    at = NUMBERS_AT
+    ahead, aside, down = -u[0] * w[at + AT_SIGNS], u[1] * w[at + AT_SIGNS + 1], -u[2]
+    raised = math.sqrt(ahead * ahead + aside * aside)
+    if not raised > SINGULAR_SINE:
+        return math.nan
+    plane = math.atan2(aside, ahead) * PER_RADIAN
+    w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.atan2(raised, down) * PER_RADIAN, plane
+    alpha, beta = flexion / PER_RADIAN, abduction / PER_RADIAN
+    twist = -2.0 * math.atan2(
+        math.sin(alpha / 2) * math.sin(beta / 2), math.cos(alpha / 2) * math.cos(beta / 2)
+    )
+    from_side = 90.0 - (plane + 360.0 if plane < w[at + AT_CUT] else plane)
+    return twist * PER_RADIAN - (1.0 - down) * from_side
+
+
+def read(flexion: Any, abduction: Any, rotation: Any, hinge: Any, writing: int, w: Array) -> Any:
+    """Write down the four angles of one writing; return how far they are outside their own limits at least, degrees.
+
+    Couplings and what is rounded off only narrow those limits; not so the rotation's, which is left out. NaN where a
+    turn is unclear.
+    """
+    at = NUMBERS_AT
+    other, back = writing >= 2, writing % 2 == 1
+    w[READ_AT] = near(flexion + HALF_TURN if other else flexion, w[at + AT_ENDS])
+    w[READ_AT + 1] = near(HALF_TURN - abduction if other else abduction, w[at + AT_ENDS + 5])
+    w[READ_AT] -= min(max(w[READ_AT] - w[at + AT_ENDS], w[at + AT_TURN_LEAST]), w[at + AT_TURN_MOST])
+    w[READ_AT + OF_ROTATION] = near(
+        rotation + HALF_TURN if other != back else rotation, w[at + AT_ENDS + 5 * OF_ROTATION]
+    )
+    w[READ_AT + OF_HINGE] = near(-hinge if back else hinge, w[at + AT_ENDS + 5 * OF_HINGE])
+    most = -math.inf
+    for i in range(4):
+        if math.isnan(w[READ_AT + i]):
+            return math.nan
+        if i != OF_ROTATION:
+            value = w[READ_AT + i]
+            most = max(most, w[at + AT_ENDS + 5 * i + 2] - value, value - w[at + AT_ENDS + 5 * i + 4])
+    return most - w[at + AT_TOLERANCE]
+
+
+def judge_writing(offset: Any, bend: Any, writing: int, w: Array, above: Array, below: Array) -> Any:
+    """Say how far the writing that was read is beyond its limits, radians; return its worst, degrees, or NaN."""
+    at = NUMBERS_AT
+    if not bounds(w, at, offset + HALF_TURN if writing >= 2 else offset, False):
+        return math.nan
+    tolerance, most = w[at + AT_TOLERANCE], -math.inf
+    loose = tolerance / bend
+    for place in range(int(w[at + AT_JUDGED])):
+        i = int(w[at + AT_JUDGED + 1 + place])
+        low, value, high = w[LOW_AT + i], w[READ_AT + i], w[HIGH_AT + i]
+        if math.isnan(low + high):
+            return math.nan
+        unseen = i == OF_ROTATION and loose > w[at + AT_UNSEEN]
+        over = -math.inf if unseen or high >= BEYOND_ALL else value - high
+        under = -math.inf if unseen or low <= -BEYOND_ALL else low - value
+        most = max(most, max(over, under) - (loose if i == OF_ROTATION else tolerance))
+        # A rotation of an almost straight limb has its tolerance over the sine of the bend: its weight is that.
+        weight = (bend if i == OF_ROTATION else 1.0) / PER_RADIAN
+        above[place], below[place] = over * weight, under * weight
+    return most
+
+
+def beyond_limits(u: Array, v: Array, ends: Array, w: Array, fixed: int, above: Array, below: Array) -> Any:
+    """Say how far one limb is beyond its limits, radians; return in which writing, -1 where the judge must say it.
 
     Parameters
     ----------
@@ -131,70 +196,46 @@ def beyond_limits(u: Array, v: Array, ends: Array, w: Array, above: Array, below
         The figure's limits of the four angles, degrees, which choose among ways to write them.
     w : array
         Room, and from `NUMBERS_AT` on the numbers of the check.
+    fixed : int
+        The writing that is judged; -1 for the one that the judge would report.
     above, below : array (4,)
         To be written: for each place of the check; minus infinity where nothing is judged.
     """
     at = NUMBERS_AT
     flexion, abduction, rotation, hinge, bend = angles_of(u, v, w)
     if math.isnan(bend) or not w[at + AT_WHOLE] > 0:
-        return False
-    first = first_writing(flexion, abduction, rotation, hinge, bend, ends, w)
-    tolerance, unseen = w[at + AT_TOLERANCE], w[at + AT_UNSEEN]
-    if first < 0 or not abs(tolerance - unseen * bend) > CLEAR_SHARE * tolerance:
-        return False
-    loose = tolerance / bend
-    seen, offset = loose <= unseen, 0.0
+        return -1
+    tolerance, unseen, offset = w[at + AT_TOLERANCE], w[at + AT_UNSEEN], 0.0
+    if not abs(tolerance - unseen * bend) > CLEAR_SHARE * tolerance:
+        return -1
     w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.nan, math.nan
     if w[at + AT_ARM] > 0:
-        ahead, aside, down = -u[0] * w[at + AT_SIGNS], u[1] * w[at + AT_SIGNS + 1], -u[2]
-        raised = math.sqrt(ahead * ahead + aside * aside)
-        if not raised > SINGULAR_SINE:
-            return False
-        plane = math.atan2(aside, ahead) * PER_RADIAN
-        w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.atan2(raised, down) * PER_RADIAN, plane
-        alpha, beta = flexion / PER_RADIAN, abduction / PER_RADIAN
-        twist = -2.0 * math.atan2(
-            math.sin(alpha / 2) * math.sin(beta / 2), math.cos(alpha / 2) * math.cos(beta / 2)
-        )
-        from_side = 90.0 - (plane + 360.0 if plane < w[at + AT_CUT] else plane)
-        offset = twist * PER_RADIAN - (1.0 - down) * from_side
-    least, judged = math.inf, int(w[at + AT_JUDGED])
+        offset = raise_arm(u, flexion, abduction, w)
+        if math.isnan(offset):
+            return -1
+    if fixed >= 0:
+        read(flexion, abduction, rotation, hinge, fixed, w)
+        return -1 if math.isnan(judge_writing(offset, bend, fixed, w, above, below)) else fixed
+    first = first_writing(flexion, abduction, rotation, hinge, bend, ends, w)
+    if first < 0:
+        return -1
+    least, best, trial = math.inf, -1, w[JUDGED_AT : JUDGED_AT + 8].reshape(2, 4)
     # Where elevation and turn say all, both branches of the ball joint are the same.
     for k in range(4 if w[at + AT_BRANCHES] == 2 else 2):
-        other, back = (first >= 2) != (k >= 2), (first % 2 == 1) != (k % 2 == 1)
-        w[READ_AT] = near(flexion + HALF_TURN if other else flexion, w[at + AT_ENDS])
-        w[READ_AT + 1] = near(HALF_TURN - abduction if other else abduction, w[at + AT_ENDS + 5])
-        w[READ_AT] -= min(max(w[READ_AT] - w[at + AT_ENDS], w[at + AT_TURN_LEAST]), w[at + AT_TURN_MOST])
-        w[READ_AT + OF_ROTATION] = near(
-            rotation + HALF_TURN if other != back else rotation, w[at + AT_ENDS + 5 * OF_ROTATION]
-        )
-        w[READ_AT + OF_HINGE] = near(-hinge if back else hinge, w[at + AT_ENDS + 5 * OF_HINGE])
-        known = w[READ_AT] + w[READ_AT + 1] + w[READ_AT + OF_ROTATION] + w[READ_AT + OF_HINGE]
-        if math.isnan(known) or not bounds(w, at, offset + HALF_TURN if other else offset, False):
-            return False
-        most = -math.inf
-        for place in range(judged):
-            i = int(w[at + AT_JUDGED + 1 + place])
-            if math.isnan(w[LOW_AT + i] + w[HIGH_AT + i]):
-                return False
-            over, under = w[READ_AT + i] - w[HIGH_AT + i], w[LOW_AT + i] - w[READ_AT + i]
-            if w[HIGH_AT + i] >= BEYOND_ALL or (i == OF_ROTATION and not seen):
-                over = -math.inf
-            if w[LOW_AT + i] <= -BEYOND_ALL or (i == OF_ROTATION and not seen):
-                under = -math.inf
-            w[JUDGED_AT + place], w[JUDGED_AT + 4 + place] = over, under
-            most = max(most, max(over, under) - (loose if i == OF_ROTATION else tolerance))
+        writing = first ^ k
+        outside = read(flexion, abduction, rotation, hinge, writing, w)
+        if math.isnan(outside):
+            return -1
+        if outside > least + CLEAR_DEGREES:
+            continue
+        most = judge_writing(offset, bend, writing, w, trial[0], trial[1])
+        if math.isnan(most):
+            return -1
         if most < least:
-            least = most
-            for place in range(judged):
-                # A rotation of an almost straight limb has its tolerance over the sine of the bend: its weight is that.
-                i = int(w[at + AT_JUDGED + 1 + place])
-                weight = (bend if i == OF_ROTATION else 1.0) / PER_RADIAN
-                above[place], below[place] = (
-                    w[JUDGED_AT + place] * weight,
-                    w[JUDGED_AT + 4 + place] * weight,
-                )
-    return least < math.inf
+            least, best = most, writing
+            for place in range(int(w[at + AT_JUDGED])):
+                above[place], below[place] = trial[0, place], trial[1, place]
+    return best
 
 
 def limbs_beyond(
@@ -204,13 +245,17 @@ def limbs_beyond(
     numbers: Array,
     above: Array,
     below: Array,
-    unclear: NDArray[np.bool_],
+    writing: NDArray[np.int64],
 ) -> None:
-    """Say how far limbs (N, 3), (N, 3) are beyond their limits: `above` and `below` (N, 4) and `unclear` (N,)."""
+    """Say how far limbs (N, 3), (N, 3) are beyond their limits: `above` and `below` (N, 4).
+
+    In the `writing` (N,) that is said, or where that is -1 in the judge's, which is written down; there it stays -1
+    where the judge must be asked.
+    """
     w = np.empty(NUMBERS_AT + len(numbers))
     w[NUMBERS_AT:] = numbers
     for n in range(len(upper)):
-        unclear[n] = not beyond_limits(upper[n], lower[n], ends, w, above[n], below[n])
+        writing[n] = beyond_limits(upper[n], lower[n], ends, w, writing[n], above[n], below[n])
 
 
 COMPILED_TYPES = {
@@ -222,7 +267,10 @@ COMPILED_TYPES = {
     "angles_of": "",
     "outside_by": "",
     "first_writing": "",
-    "beyond_limits": "(f8[::1], f8[::1], f8[:,::1], f8[::1], f8[::1], f8[::1])",
-    "limbs_beyond": "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], b1[::1])",
+    "raise_arm": "",
+    "read": "",
+    "judge_writing": "",
+    "beyond_limits": "",
+    "limbs_beyond": "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1])",
 }
 """The kernels, in the order in which they need each other, with the types of those that are called."""

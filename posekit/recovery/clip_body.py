@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
@@ -29,7 +30,10 @@ from posekit.refinement.one_body import BodyEstimate, PostureDirections, find_bo
 from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, segment_name
 
 MOST_FRAMES: Final = 40
-"""Frames that are used, spread evenly: more of one clip tell little more."""
+"""Frames that count: more of one clip tell little more."""
+
+FRAMES_USED: Final = 20
+"""Frames that are looked at, spread evenly: each stands for two where there are as many."""
 
 UNSTATED_OWN: Final = 0.08
 """Deviation of each length beside the size from which a clip starts where nobody says how well lengths are known.
@@ -154,7 +158,9 @@ def body_of_clip(grower: Grower, noise: Noise, prior: Prior | None = None) -> Cl
     rows, sized = _rows(fit)
     if len(rows) < FEWEST_CLIP_FRAMES:
         return None
-    rows = rows[np.linspace(0, len(rows) - 1, min(len(rows), MOST_FRAMES)).round().astype(np.intp)]
+    count = min(len(rows), FRAMES_USED)
+    stands_for = min(len(rows), MOST_FRAMES) / count
+    rows = rows[np.linspace(0, len(rows) - 1, count).round().astype(np.intp)]
     camera = fit.cameras(rows)
     if not isinstance(camera, PinholeCamera):
         return None
@@ -165,10 +171,11 @@ def body_of_clip(grower: Grower, noise: Noise, prior: Prior | None = None) -> Cl
         observed, root=RootPrior.along_ray(camera, root, depth=depth, lateral=LATERAL_METRES), walls=None
     )
     directions = _directions(prior or load_prior())
-    estimate = find_body(observed, noise.lengths, directions, sized=sized)
+    find = partial(find_body, observed, directions=directions, sized=sized, stands_for=stands_for)
+    estimate = find(known=noise.lengths)
     if not stated and _surprise(estimate, figure, noise.lengths) > 1:
-        estimate = find_body(observed, _widened(noise.lengths), directions, sized=sized)
-    if estimate.frames < FEWEST_CLIP_FRAMES:
+        estimate = find(known=_widened(noise.lengths))
+    if estimate.frames * stands_for < FEWEST_CLIP_FRAMES:
         return None
     found = estimate.uncertainty
     return ClipBody(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Final
 
 import numpy as np
@@ -72,22 +72,30 @@ class LimbWalls:
         )
         return LimbWalls(figure=figure, checks=mine, balls=balls, tolerance=tolerance, on_torso=on_torso)
 
-    def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
+    def beyond(
+        self, limb: int, upper: Array, lower: Array, beside: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
         """Say how far limbs are beyond their limits; see `posekit.refinement.walls.Walls`."""
-        found = self.looped(limb, upper, lower) if is_installed() else None
+        found = self.looped(limb, upper, lower, beside) if is_installed() else None
         return self.judged(limb, upper, lower) if found is None else found
 
-    def looped(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array] | None:
+    def looped(
+        self, limb: int, upper: Array, lower: Array, beside: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array] | None:
         """Say it by a compiled loop; None where none knows the checks."""
         numbers = self._numbers[limb]
         if numbers is None:
             return None
         above, below = np.full((2, len(upper), MAX_ANGLES), -np.inf)
-        unclear = np.zeros(len(upper), dtype=np.bool_)
-        directions = np.ascontiguousarray(upper), np.ascontiguousarray(lower)
-        compiled(limb_kernels).limbs_beyond(*directions, self._ends[limb], numbers, above, below, unclear)
-        if unclear.any():
-            rows = np.flatnonzero(unclear)
+        writing = np.full(len(upper), -1)
+        run = partial(compiled(limb_kernels).limbs_beyond, ends=self._ends[limb], numbers=numbers)
+        if beside is not None and len(upper):
+            own = np.full(len(beside[0]), -1)
+            run(*map(np.ascontiguousarray, beside), above=above, below=below, writing=own)
+            writing = np.tile(own, len(upper) // len(own))
+        run(*map(np.ascontiguousarray, (upper, lower)), above=above, below=below, writing=writing)
+        rows = np.flatnonzero(writing < 0)
+        if rows.size:
             above[rows], below[rows] = (each.T for each in self.judged(limb, upper[rows], lower[rows]))
         return above.T, below.T
 

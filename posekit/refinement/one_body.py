@@ -29,6 +29,7 @@ from posekit.refinement.inputs import EXACT_DISTANCE_DEVIATION
 from posekit.refinement.limb_evidence import DirectionDensity, LimbEvidence
 from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.trunk_evidence import TRUNK_NAMES, TrunkEvidence
+from posekit.refinement.trunks import Trunks
 from posekit.skeleton import LIMB_JOINTS, SEGMENT_NAMES, other_side, segment_name
 
 SIDE_ASYMMETRY: Final = 0.02
@@ -41,8 +42,11 @@ Sides of bones differ by 1 % or less in most people (Auerbach & Ruff 2006, J. Hu
 LENGTH_GRID: Final = np.sinh(3.0 * np.linspace(-1.0, 1.0, 17)) / np.sinh(3.0)
 """Lengths of a limb segment that are tried, as shares of the widest: denser where it is."""
 
-GRID_WIDTHS: Final = (0.25, 0.25, 0.2, 0.15, 0.15, 0.15)
+GRID_WIDTHS: Final = (0.25, 0.2, 0.15, 0.15)
 """The widest, logarithms; one a round."""
+
+SEARCHED_ROUNDS: Final = 2
+"""Rounds in which trunks are searched; then the body hardly moves, and those that were found are followed."""
 
 MAX_STEP: Final = 0.05
 """The most that a logarithm is changed in a round."""
@@ -118,7 +122,12 @@ class BodyEstimate:
 
 
 def find_body(
-    observed: ObservedFrames, known: LengthUncertainty, directions: PostureDirections, *, sized: bool
+    observed: ObservedFrames,
+    known: LengthUncertainty,
+    directions: PostureDirections,
+    *,
+    sized: bool,
+    stands_for: float = 1.0,
 ) -> BodyEstimate:
     """Find the body that explains frames of one person.
 
@@ -132,6 +141,8 @@ def find_body(
         What is known of postures.
     sized : bool
         Whether the root's depths are known from elsewhere than the lengths.
+    stands_for : float
+        For how many frames each counts, where some were left out.
     """
     figure = observed.figure
     start = np.log([figure.lengths[name] for name in SEGMENT_NAMES])
@@ -141,7 +152,7 @@ def find_body(
     prior = prior + _sides_alike()
     x, covariance = np.linalg.solve(prior, pull), np.linalg.inv(prior)
     sites = np.zeros((len(SEGMENT_NAMES), 2))
-    frames = 0
+    frames, trunks = 0, None
     for number, width in enumerate(GRID_WIDTHS):
         x = x if sized else _in_size(x, start, own)
         try:
@@ -150,15 +161,17 @@ def find_body(
             break
         x = np.log([figure.lengths[name] for name in SEGMENT_NAMES])
         deviation = np.sqrt(np.diag(covariance))
-        round_ = _Round.of(replace(observed, figure=figure), deviation, directions, number, np.exp(x), width)
+        seen = replace(observed, figure=figure)
+        round_ = _Round.of(seen, deviation, directions, number, np.exp(x), width, trunks)
         frames = round_.count
+        trunks = round_.evidence.found if number + 1 >= SEARCHED_ROUNDS else None
         if not frames:
             break
-        for segment, values in round_.limbs(x, width):
+        for segment, values in round_.limbs(x, width, stands_for):
             cavity = max(1 / covariance[segment, segment] - sites[segment, 0], LEAST_PRECISION)
             middle = (x[segment] / covariance[segment, segment] - sites[segment, 1]) / cavity
             sites[segment] = _site(values, x[segment] + width * LENGTH_GRID, cavity, middle)
-        slope, curvature = round_.trunk()
+        slope, curvature = (stands_for * each for each in round_.trunk())
         precision = prior + np.diag(sites[:, 0])
         right = pull + sites[:, 1]
         precision[np.ix_(_TRUNK, _TRUNK)] += curvature
@@ -232,6 +245,7 @@ class _Round:
         number: int,
         lengths: Array,
         width: float,
+        trunks: Trunks | None = None,
     ) -> _Round:
         """Look at the frames with the figure's lengths; `deviation` (17,) is how far they may be off."""
         varied = {
@@ -240,7 +254,7 @@ class _Round:
         }
         observed = replace(observed, length_deviation=varied, size_deviation=0.0)
         of_trunk = np.maximum([varied[name] for name in TRUNK_NAMES], EXACT_DISTANCE_DEVIATION)
-        evidence = TrunkEvidence.of(observed, of_trunk, np.random.default_rng(number))
+        evidence = TrunkEvidence.of(observed, of_trunk, np.random.default_rng(number), trunks)
         vectors = [np.einsum("cin,cn->in", evidence.torso, one) for one in _parts(evidence)]
         evidence = evidence.weighted(directions.trunk.log_of(np.concatenate(vectors)))
         upper, lower = [], []
@@ -265,7 +279,7 @@ class _Round:
         """The log-likelihood of each trunk with its limbs (N,)."""
         return np.asarray(self.evidence.log_weight + self.each.sum(axis=0))
 
-    def limbs(self, x: Array, width: float) -> list[tuple[int, Array]]:
+    def limbs(self, x: Array, width: float, stands_for: float) -> list[tuple[int, Array]]:
         """Return for each limb segment its place in the body, and log-likelihoods (G,) of lengths on the grid."""
         middle = len(LENGTH_GRID) // 2
         out = []
@@ -277,7 +291,7 @@ class _Round:
                 (second, lower + upper[:, :, middle, None]),
             ):
                 by_trunk = rest + _summed(found)
-                out.append((segment, LIMB_FRAME_SHARE * self._by_frame(by_trunk).sum(axis=0)))
+                out.append((segment, stands_for * LIMB_FRAME_SHARE * self._by_frame(by_trunk).sum(axis=0)))
         return out
 
     def trunk(self) -> tuple[Array, Array]:

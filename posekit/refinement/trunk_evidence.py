@@ -25,7 +25,7 @@ from posekit.refinement.observed_frames import ObservedFrames
 from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureStep, moved, trunk_offsets
 from posekit.refinement.trunk_terms import shape_distances, to_unknowns, trunk_terms
-from posekit.refinement.trunks import find_trunks
+from posekit.refinement.trunks import Trunks, find_trunks
 from posekit.skeleton import segment_name
 
 TRUNK_NAMES: Final = tuple(segment_name(pair) for pair in TRUNK_SEGMENTS)
@@ -37,7 +37,7 @@ RIVAL_CHI2: Final = 10.0
 MAX_STEPS: Final = 8
 """Steps to the minimum from where trunks were found."""
 
-N_DRAWS: Final = 2
+N_DRAWS: Final = 1
 """Pairs of draws, one the other's mirror image, from each minimum."""
 
 LEAST_INFORMATION: Final = 1e-2
@@ -56,6 +56,8 @@ class TrunkEvidence:
 
     Parameters
     ----------
+    found : Trunks
+        From which they were drawn.
     frame : int array (N,)
         The frame of each.
     joints : array (6, 3, N)
@@ -70,6 +72,7 @@ class TrunkEvidence:
         On the logarithms of the body's distances.
     """
 
+    found: Trunks
     frame: NDArray[np.intp]
     joints: Array
     torso: Array
@@ -79,9 +82,14 @@ class TrunkEvidence:
     information: Array
 
     @staticmethod
-    def of(observed: ObservedFrames, deviation: Array, rng: np.random.Generator) -> TrunkEvidence:
-        """Find trunks, and draw from each; `deviation` (9,) are those that `observed` gives to the distances."""
-        found = find_trunks(observed, level=0.0)
+    def of(
+        observed: ObservedFrames, deviation: Array, rng: np.random.Generator, found: Trunks | None = None
+    ) -> TrunkEvidence:
+        """Draw from trunks, found for nearly the same body or not yet.
+
+        The `deviation` (9,) are those that `observed` gives to the distances.
+        """
+        found = find_trunks(observed, level=0.0) if found is None else found
         least = np.full(len(observed.points()), np.inf)
         np.minimum.at(least, found.frame, found.chi2)
         keep = np.flatnonzero(found.chi2 < least[found.frame] + RIVAL_CHI2)
@@ -109,6 +117,7 @@ class TrunkEvidence:
         chi2 = evaluate(problem.take(each), state)[0]
         room = -np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
         return TrunkEvidence(
+            found=found,
             frame=found.frame[keep][each],
             joints=state.root + trunk_offsets(state),
             torso=state.torso,
@@ -125,6 +134,7 @@ class TrunkEvidence:
         np.maximum.at(best, self.frame, np.where(np.isfinite(total), total, -np.inf))
         keep = np.flatnonzero(total > best[self.frame] - HOPELESS_LOG)
         return TrunkEvidence(
+            found=self.found,
             frame=self.frame[keep],
             joints=self.joints[..., keep],
             torso=self.torso[..., keep],

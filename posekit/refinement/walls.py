@@ -36,7 +36,9 @@ class Walls(Protocol):
         """Whether legs, too, are judged in the torso's frame."""
         ...
 
-    def beyond(self, limb: int, upper: Array, lower: Array) -> tuple[Array, Array]:
+    def beyond(
+        self, limb: int, upper: Array, lower: Array, beside: tuple[Array, Array] | None = None
+    ) -> tuple[Array, Array]:
         """Say how far limbs are beyond their limits.
 
         Parameters
@@ -45,6 +47,8 @@ class Walls(Protocol):
             Of `posekit.refinement.figure_numbers.LIMB_JOINTS`.
         upper, lower : array (M, 3)
             Unit directions of the segments, in the frame of the part by which the limb is judged.
+        beside : tuple of arrays (K, 3), (K, 3), optional
+            Directions from which these were turned by next to nothing, M / K blocks of K: they may be written as those.
 
         Returns
         -------
@@ -200,7 +204,8 @@ def _asked(walls: Walls, found: Beyond, local: Array) -> Array:
     for limb in range(4):
         own = np.flatnonzero(found.limb == limb)
         if own.size:
-            above, below = walls.beyond(limb, *local[:, :, own].reshape(2, -1, 3))
-            upper = np.tile(found.side[:, own] > 0, ways)
-            out[:, :, own] = np.where(upper, above, -below).reshape(-1, ways, len(own))
+            upper, lower = local[:, :, own].reshape(2, -1, 3)
+            above, below = walls.beyond(limb, upper, lower, (found.local[0, own], found.local[1, own]))
+            past = np.tile(found.side[:, own] > 0, ways)
+            out[:, :, own] = np.where(past, above, -below).reshape(-1, ways, len(own))
     return out
