@@ -10,6 +10,7 @@ import argparse
 import json
 import time
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -92,17 +93,17 @@ def main() -> None:
     parser.add_argument("--replay", type=Path, help="what was recorded, instead of a camera")
     asked = parser.parse_args()
 
-    tracker = None
-    record = asked.record.open("w", encoding="utf-8") if asked.record else None
-    for picture in from_file(asked.replay) if asked.replay else from_camera(asked.camera):
-        seconds, size, points = picture
-        if tracker is None:
-            tracker = posekit.Tracker(size=size, stature=asked.stature, layout="mediapipe_33")
-        if record is not None:
-            record.write(recorded(picture))
-        start = time.perf_counter()
-        told = tracker.update(points, seconds)
-        print(say(told, 1 / (time.perf_counter() - start)), flush=True)
+    with asked.record.open("w", encoding="utf-8") if asked.record else nullcontext() as record:
+        tracker = None
+        for picture in from_file(asked.replay) if asked.replay else from_camera(asked.camera):
+            seconds, size, points = picture
+            if tracker is None:
+                tracker = posekit.Tracker(size=size, stature=asked.stature, layout="mediapipe_33")
+            if record is not None:
+                record.write(recorded(picture))
+            start = time.perf_counter()
+            told = tracker.update(points, seconds)
+            print(say(told, 1 / (time.perf_counter() - start)), flush=True)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from posekit.cameras.guesses import camera_from_fov
 from posekit.cameras.undistortion import undistorted
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
-from posekit.formats.own import OpenCVModel, View
+from posekit.formats.own import CameraModel, OpenCVModel, View
 from posekit.formats.skeleton_maps import LANDMARK_INDEX, SkeletonMap
 from posekit.geometry import Array
 from posekit.skeleton import HEAD, JOINT, JOINTS, POINTS
@@ -32,7 +32,8 @@ webcam (Logitech C920, data sheet). Laptops' have some 70 to 80, phones' main ca
 STANDING_METRES: Final = 4.0
 """How far away the figure stands that is recovered beforehand."""
 
-LiveCamera = CalibratedCamera | OpenCVModel
+LiveCamera = CalibratedCamera | CameraModel
+"""What a user has of a camera."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -189,5 +190,18 @@ def likely_camera(size: tuple[int, int]) -> CalibratedCamera:
 
 
 def model_of(camera: LiveCamera) -> OpenCVModel:
-    """Return the camera of points that are undistorted where its lens needs it."""
-    return camera if isinstance(camera, OpenCVModel) else calibrated_model(camera)
+    """Return the camera of points that are undistorted where its lens needs it.
+
+    Raises
+    ------
+    InputError
+        Where it is none of OpenCV's.
+    """
+    if isinstance(camera, CalibratedCamera):
+        return calibrated_model(camera)
+    if isinstance(camera, OpenCVModel):
+        return camera
+    raise InputError(
+        f"Tracker: a camera of the model {type(camera).__name__}; expected an OpenCVModel or a calibrated camera; give "
+        "one, or leave it out and give size"
+    )
