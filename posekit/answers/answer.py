@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.answers.cover import cover
+from posekit.answers.cover import cover, held_by, most_held
 from posekit.answers.depth_order import DepthOrder, depth_orders
 from posekit.answers.listed_bodies import ListedBodies
 from posekit.answers.regions import JointRegions, joint_regions
@@ -98,25 +98,14 @@ def _answers(frames: Sequence[ListedBodies]) -> list[Answer]:
     )
     depths = depth_orders(joints[..., 2], variance, frame, p, len(frames))
     stands = cover(joints, frame, p, within=DISTINCT_METRES, hold=REPRESENTED_PROBABILITY)
-    held = np.zeros(len(joints))
-    np.add.at(held, stands[stands >= 0], p[stands >= 0])
+    held = held_by(stands, p)
     starts = np.cumsum([0, *counts])
     found = []
     for one, depth, (start, end) in zip(frames, depths, pairwise(starts.tolist()), strict=True):
-        rows = _few(held[start:end])
+        rows = most_held(held[start:end], REPRESENTED_PROBABILITY)
         found.append(Answer(bodies=one, rows=rows, probability=held[start + rows], depth=depth))
     return found
 
-
-def _few(held: Array) -> NDArray[np.intp]:
-    """Return the rows that hold most, as many as hold enough together."""
-    rows = np.argsort(-held, kind="stable")
-    before = np.cumsum(held[rows]) - held[rows]
-    return rows[(before < REPRESENTED_PROBABILITY - SUM_ROUNDING) & (held[rows] > 0)]
-
-
-SUM_ROUNDING: Final = 1e-9
-"""Of sums of probabilities."""
 
 FRAMES_AT_A_TIME: Final = 256
 """Frames whose bodies are looked at together: more would not be faster."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -50,3 +52,21 @@ def cover(
         np.subtract.at(missing, own[near], weight[left[near]])
         left = left[~near & (missing[own] > enough[own])]
     return stands
+
+
+def held_by(stands: NDArray[np.intp], weight: Array) -> Array:
+    """Add up the probability (N,) that each row holds, by who stands for whom (`cover`)."""
+    held = np.zeros(len(stands))
+    np.add.at(held, stands[stands >= 0], weight[stands >= 0])
+    return held
+
+
+def most_held(held: Array, enough: float) -> NDArray[np.intp]:
+    """Return the rows that hold most, the first of them most, as few as hold enough together."""
+    rows = np.argsort(-held, kind="stable")
+    before = np.cumsum(held[rows]) - held[rows]
+    return rows[(before < enough - SUM_ROUNDING) & (held[rows] > 0)]
+
+
+SUM_ROUNDING: Final = 1e-9
+"""Of sums of probabilities."""

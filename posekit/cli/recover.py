@@ -239,7 +239,7 @@ def summarize(recovery: Recovery) -> None:
     total = len(recovery.frames)
     reasons = sorted(recovery.unrecovered.items(), key=lambda pair: -len(pair[1]))
     for reason, frames in reasons[:REASONS_SHOWN]:
-        named = ", ".join(str(k + 1) for k in frames[:FRAMES_NAMED_IN_WARNINGS]) + (
+        named = ", ".join(str(k) for k in frames[:FRAMES_NAMED_IN_WARNINGS]) + (
             ", …" if len(frames) > FRAMES_NAMED_IN_WARNINGS else ""
         )
         which = f"frame{'s' if len(frames) > 1 else ''} {named}"

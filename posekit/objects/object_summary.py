@@ -40,7 +40,7 @@ def _frame_line(k: int, frame: ObjectFrame) -> str:
     certified = [verdict for verdict in frame.certified if verdict is not None]
     sure = str(sum(certified)) if certified else "-"
     most = ", ".join(f"{reason} {count}" for reason, count in Counter(frame.rejected).most_common(MAX_SHOWN))
-    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {sure:>9} {frame.judged or '-':>9}  {frame.reason or most}"
+    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {sure:>9} {frame.judged or '-':>9}  {frame.reason or most}"
 
 
 def _scale_lines(result: ObjectResult) -> list[str]:

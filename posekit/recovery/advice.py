@@ -33,15 +33,15 @@ def advice_lines(recovery: Recovery) -> list[str]:
     for k in empty[:MAX_FRAMES_EXPLAINED]:
         frame = recovery.frames[k]
         if photographs is not None and frame.judged == "refined":
-            lines.append(f"frame {k + 1}: no posture; {photograph_line(photographs, frame.number)}")
+            lines.append(f"frame {k}: no posture; {photograph_line(photographs, frame.number)}")
             continue
         allowed = MEASURED_TOLERANCE if frame.judged in ("exact", "measured") else frame.tolerance
         found = least_violation(grower, frame.number, allowed)
         if found is not None and found.excesses:
-            lines.append(f"frame {k + 1}: no posture; the one nearest to the limits breaks {found}")
+            lines.append(f"frame {k}: no posture; the one nearest to the limits breaks {found}")
         elif found is not None and frame.refined is not None:
             lines.append(
-                f"frame {k + 1}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"
+                f"frame {k}: every posture is less likely than 1 in 1000 by chi-square: give a larger --deviation"
             )
     if len(empty) > MAX_FRAMES_EXPLAINED and lines:
         lines.append(f"and {len(empty) - MAX_FRAMES_EXPLAINED} more frames without a posture")

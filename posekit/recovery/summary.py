@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from posekit.answers.wording import answer_lines, percent
 from posekit.recovery.recovery import FrameRecovery, Recovery
 
 if TYPE_CHECKING:
@@ -21,10 +22,16 @@ TOLERANCE_WORDS: Final[Mapping[str, str]] = {"given": "as given", "noisy": "from
 
 
 def summary_lines(recovery: Recovery) -> list[str]:
-    """Describe each frame's survivors and losses; of a long sequence the first and last frames."""
+    """Say what was recovered of a person: in three lines, then frame by frame.
+
+    The lines are how many postures there are, the likeliest and how sure it is, and what else it can be. The table has
+    each frame's survivors and losses; of a long sequence the first and last frames. Frames are counted from 0.
+    """
     frames = list(enumerate(recovery.frames))
     lines = [
-        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'tolerances':>10}  rejected by (leaves, 8192 a tree)"
+        _count_line(recovery),
+        *answer_lines(recovery.answers),
+        f"{'frame':>5} {'time':>8} {'postures':>8} {'groups':>6} {'tolerances':>10}  rejected by (leaves, 8192 a tree)",
     ]
     cut = len(frames) - 2 * MAX_SHOWN
     for k, frame in frames:
@@ -33,12 +40,26 @@ def summary_lines(recovery: Recovery) -> list[str]:
                 lines.append(f"{'…':>5} {cut} frames between")
             continue
         lines.append(_frame_line(k, frame))
-    counts = [len(frame) for frame in recovery.frames]
-    lines.append(
-        f"{sum(counts)} postures in {len(counts)} frames: median {np.median(counts):g}, most {max(counts)}, "
-        f"none in {counts.count(0)}"
-    )
     return lines + _scale_lines(recovery)
+
+
+def _count_line(recovery: Recovery) -> str:
+    """Say how many postures there are, and in how many frames."""
+    counts = [len(frame) for frame in recovery.frames]
+    total = f"{sum(counts)} posture{'s' if sum(counts) != 1 else ''}"
+    if len(counts) == 1:
+        return f"{total} in 1 frame{_unlisted(recovery)}"
+    middle = f"median {np.median(counts):g}, most {max(counts)}"
+    return f"{total} in {len(counts)} frames: {middle}, none in {counts.count(0)}{_unlisted(recovery)}"
+
+
+def _unlisted(recovery: Recovery) -> str:
+    """Say how many more there are that are not listed, and what they hold at most."""
+    unlisted = sum(frame.unlisted for frame in recovery.frames)
+    if not unlisted:
+        return ""
+    most = max(frame.unlisted_probability for frame in recovery.frames)
+    return f"; up to {unlisted} more hold {percent(most)} of a frame at most (--coverage 1 lists them)"
 
 
 def _scale_lines(recovery: Recovery) -> list[str]:
@@ -62,12 +83,12 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
     groups = "-" if frame.groups is None else str(len(set(frame.groups.tolist())))
     judged = "-" if frame.judged is None else TOLERANCE_WORDS.get(frame.judged, frame.judged)
     if frame.reason:
-        return f"{k + 1:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
+        return f"{k:>5} {frame.time:>8.3f} {0:>8} {groups:>6} {judged:>10}  {frame.reason}"
     lost = Counter(frame.rejected).most_common()
     if not len(frame):  # what the last ones died of comes first
         lost.sort(key=lambda pair: not pair[0].startswith("noise/"))
     most = ", ".join(f"{reason} {count}" for reason, count in lost[:MAX_SHOWN])
-    return f"{k + 1:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
+    return f"{k:>5} {frame.time:>8.3f} {len(frame):>8} {groups:>6} {judged:>10}  {most}"
 
 
 def following_line(following: Following) -> str:

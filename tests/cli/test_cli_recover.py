@@ -36,8 +36,9 @@ def test_recover_writes_what_it_prints(run, walk: dict[str, Any], suffix: str, w
     assert (outcome.code, outcome.err) == (0, "")
     result = read_result(target)
     lines = outcome.out.splitlines()
-    assert lines[0].split()[:4] == ["frame", "time", "postures", "groups"]
-    for line, frame in zip(lines[1:3], result.frames, strict=True):
+    assert lines[3].split()[:4] == ["frame", "time", "postures", "groups"]
+    for k, (line, frame) in enumerate(zip(lines[4:6], result.frames, strict=True)):
+        assert int(line.split()[0]) == k
         assert int(line.split()[2]) == len(frame.joints)
         assert frame.groups is not None
         assert int(line.split()[3]) == len(set(frame.groups.tolist()))
@@ -118,7 +119,7 @@ def test_frames_that_cannot_be_recovered_say_why_and_the_others_are_the_same(run
     assert outcome.code == 0
     assert "frames[1]: the neck, from which the tree grows, is not seen" in outcome.out
     assert (
-        "1 of 4 frames not recovered: the neck, from which the tree grows, is not seen (frame 2)"
+        "1 of 4 frames not recovered: the neck, from which the tree grows, is not seen (frame 1)"
         in outcome.err
     )
     assert run("recover", "view.json", "-o", f"all.{suffix}").code == 0

@@ -235,7 +235,7 @@ def test_an_empty_photograph_says_what_would_have_to_be_wrong_in_it() -> None:
     image[0, JOINT["left_wrist"]] = image[0, JOINT["left_elbow"]] + [1.5 * S, 0.0]
     recovery = recover(view_of(image, deviation=1.0))
     assert len(recovery.frames[0]) == 0
-    lines = [line for line in advice_lines(recovery) if line.startswith("frame 1: no posture")]
+    lines = [line for line in advice_lines(recovery) if line.startswith("frame 0: no posture")]
     assert len(lines) == 1
     assert "left_elbow" in lines[0] or "left_wrist" in lines[0]
     assert "would have to be" in lines[0]

@@ -1,0 +1,71 @@
+"""One answer of a whole sequence, of all the paths that it can be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.answers.answer import DISTINCT_METRES, REPRESENTED_PROBABILITY, Answer, answers_of
+from posekit.answers.cover import cover, held_by, most_held
+from posekit.answers.listed_bodies import ListedBodies
+from posekit.following.following import Following
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PathAnswer:
+    """The answer of a sequence: its likeliest path, how sure it is, and what else it can be.
+
+    Parameters
+    ----------
+    rows : int array (K,)
+        The representatives: paths that differ by 5 cm in some joint of some frame, so few that with what is within 5 cm
+        of them they hold 95 % of the probability. Rows of the paths, the likeliest first.
+    probability : array (K,)
+        Of each representative and what it stands for; 0.95 or more together.
+    frames : tuple of Answer (T,)
+        Of each frame, over all paths.
+    """
+
+    rows: NDArray[np.intp]
+    probability: NDArray[np.float64]
+    frames: tuple[Answer, ...]
+
+    def __post_init__(self) -> None:
+        self.rows.flags.writeable = self.probability.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Count the representatives."""
+        return len(self.rows)
+
+
+def path_answer(following: Following) -> PathAnswer:
+    """Say of the paths of a sequence what `posekit.answers.answers_of` says of the bodies of a frame.
+
+    Joints that a path bridges are not known there: their regions and near and far are not either.
+    """
+    paths, frames = following.joints.shape[:2]
+    share = np.asarray(following.share, dtype=np.float64)
+    one = np.zeros(paths, dtype=np.intp)
+    points = following.joints.reshape(paths, -1, 3)
+    stands = cover(points, one, share, within=DISTINCT_METRES, hold=REPRESENTED_PROBABILITY)
+    held = held_by(stands, share)
+    rows = most_held(held, REPRESENTED_PROBABILITY)
+    variance = np.where(np.isfinite(following.deviation), following.deviation, np.nan) ** 2
+    return PathAnswer(
+        rows=rows,
+        probability=held[rows],
+        frames=tuple(
+            answers_of(
+                [
+                    ListedBodies(
+                        joints=following.joints[:, t],
+                        probability=share,
+                        uncertainty=variance[:, t, :, None, None] * np.eye(3),
+                    )
+                    for t in range(frames)
+                ]
+            )
+        ),
+    )
