@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.own import ScaledOrthographicModel, View, read_view, write_view
 from posekit.geometry import Array
-from posekit.recovery.observed import NECK_LOST, NO_NECK, ROOT_LOST
+from posekit.recovery.observed import ROOT_LOST, why_neckless
 from posekit.skeleton import HEAD, JOINTS, POINTS
 
 N_IMAGE_POINTS: Final = len(JOINTS)
@@ -82,11 +82,11 @@ class ImageRows:
         uncalibrated = isinstance(head.camera, ScaledOrthographicModel)
         return np.asarray(seen.any(axis=1) if uncalibrated else seen[:, 0])
 
-    @staticmethod
-    def lacking(head: View) -> tuple[str, str]:
-        """Say why a frame is not usable, and what its leaves are lost to, as `posekit.recover` says it."""
-        uncalibrated = isinstance(head.camera, ScaledOrthographicModel)
-        return ("no joint is seen", ROOT_LOST) if uncalibrated else (NO_NECK, NECK_LOST)
+    def lacking(self, head: View) -> list[tuple[str, str]]:
+        """Say of each frame why it is not usable, and what its leaves are lost to, as `posekit.recover` says it."""
+        if isinstance(head.camera, ScaledOrthographicModel):
+            return [("no joint is seen", ROOT_LOST)] * len(self)
+        return [why_neckless(image, head.derived) for image in self.points[:, :N_IMAGE_POINTS]]
 
     def view(self, head: View) -> View:
         """Make the view of the rows, its camera and person those of `head`.

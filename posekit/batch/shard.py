@@ -205,9 +205,12 @@ def _pieces(shard: Shard, head: View) -> Iterator[ShardFrames]:
         for piece in portions(rows, noisy=noisy):
             part = rows.part(piece)
             usable = np.flatnonzero(part.usable(head))
-            reason, lost_to = part.lacking(head)
-            rejected = (json.dumps({lost_to: N_LEAVES}),) * len(part)
-            found = replace(unrecovered(part, reason), rejected=rejected)
+            lacking = part.lacking(head)
+            found = replace(
+                unrecovered(part, ""),
+                reason=tuple(reason for reason, _ in lacking),
+                rejected=tuple(json.dumps({lost_to: N_LEAVES}) for _, lost_to in lacking),
+            )
             yield (
                 found.with_part(usable, _recovered(part.part(usable), head, shard)) if len(usable) else found
             )

@@ -19,7 +19,7 @@ from posekit.recovery.fit_camera import CameraFit, fit_camera
 from posekit.recovery.grower import Grower
 from posekit.recovery.judged import record_of
 from posekit.recovery.noise import Noise
-from posekit.recovery.observed import lost_to, neckless, trunkless, with_reasons
+from posekit.recovery.observed import lost_to, trunkless, with_reasons
 from posekit.recovery.person import FEWEST_CLIP_FRAMES, body_of, refuse_settings, uncertainty_of
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.rooting import tolerance_of
@@ -98,7 +98,7 @@ def recover(
 
     # Root: whose body it is, where the camera sees it, and where the tree grows from.
     body = body_of(view, figure or load_figure(), asked.proportions)
-    without_neck, bare = neckless(view), trunkless(view, body)
+    bare = trunkless(view, body)
     lengths = uncertainty_of(view, asked.length_deviation, own_figure=figure is not None)
     noise = _noise(view, body, asked, lengths)
     photographs = uncalibrated and noise is not None
@@ -150,7 +150,7 @@ def recover(
             trees |= _refiner(grower, noise).grow(undecided)
 
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
-    frames = _frames(view, trees, fit, asked.group, list(zip(without_neck, bare, strict=True)))
+    frames = _frames(view, trees, fit, asked.group, bare)
     _refuse_impossible(frames)
     record = _record(asked, tolerance, body.figure, frames, noise)
     record |= {} if refiner is None or refiner.clip is None else {"one_body": refiner.clip.document()}
@@ -175,9 +175,9 @@ def _frames(
     trees: Mapping[int, FrameTrees],
     fit: CameraFit,
     group: float | None,
-    lacking: Sequence[tuple[np.bool_, np.bool_]],
+    bare: NDArray[np.bool_],
 ) -> list[FrameRecovery]:
-    """Say what is left of each frame; `lacking` is whether it shows no neck, and too little of a trunk."""
+    """Say what is left of each frame; `bare` (F,) is whether it shows too little of a trunk."""
     frames = []
     cameras = CameraRecords(view=view, fit=fit)
     for k, time in enumerate(view.time.tolist()):
@@ -191,7 +191,7 @@ def _frames(
                 family=None if one.fit.families is None else one.fit.families[k],
                 placement=None if one.fit.placements is None else one.fit.placements[k],
                 reason=one.fit.reasons[k],
-                lost_to=lost_to(*map(bool, lacking[k])),
+                lost_to=lost_to(view, k, without_trunk=bool(bare[k])),
                 group_within=group,
                 number=k,
                 cameras=cameras,

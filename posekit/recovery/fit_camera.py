@@ -16,7 +16,7 @@ from posekit.compiled.compiling import n_threads
 from posekit.errors import HeadError, InputError
 from posekit.formats.own import Family, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
-from posekit.recovery.observed import NO_NECK, neckless
+from posekit.recovery.observed import neckless, why_neckless
 from posekit.recovery.rooting import place_roots
 from posekit.settings import Rooting, Tolerance
 from posekit.skeleton import HEAD, HEAD_POINTS
@@ -125,7 +125,9 @@ def fit_camera(
     camera, pose = _head_pose(view, figure, image, worth=bool(seen.any()))
     root = np.where(shown[:, None], view.root, np.nan)
     head = np.full((n, len(HEAD), 3), np.nan)
-    reasons = ["" if there else f"frames[{k}]: {NO_NECK}" for k, there in enumerate(shown.tolist())]
+    reasons = [""] * n
+    for k in np.flatnonzero(~shown).tolist():
+        reasons[k] = f"frames[{k}]: {why_neckless(view.image[k], view.derived)[0]}"
     if pose is not None:
         neck = pose.points_cam[:, 0]
         unknown = np.isnan(root).any(axis=1)

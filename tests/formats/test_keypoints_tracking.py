@@ -141,6 +141,23 @@ def test_somebody_hidden_for_a_while_is_known_again(gap: int, rng: np.random.Gen
     assert same(track(keypoints).person, who)
 
 
+@given(seed=st.integers(0, 2**32 - 1), frames=st.integers(1, 20))
+def test_one_detection_a_picture_is_one_person_however_far_apart_they_are(seed: int, frames: int) -> None:
+    rng = np.random.default_rng(seed)
+    alone, _ = walkers(np.zeros((1, 2)), np.zeros((1, 2)), frames, rng)
+    places = rng.uniform(0, 4000, (frames, 1, 2)) + rng.uniform(0.2, 5, (frames, 1, 1)) * alone.points
+    moved = replace(alone, points=places)
+    assert set(track(moved).person.tolist()) == {0}
+    assert len(choose(moved)) == frames
+
+
+def test_people_in_pictures_a_second_apart_keep_their_numbers(rng: np.random.Generator) -> None:
+    keypoints, who = walkers(np.array([(100.0, 300.0), (1900.0, 300.0)]), np.zeros((2, 2)), 12, rng)
+    keypoints = replace(keypoints, points=keypoints.points + rng.normal(0, 25, (len(who), 1, 2)))
+    assert not same(track(keypoints).person, who)
+    assert same(track(replace(keypoints, time=np.arange(12.0))).person, who)
+
+
 def test_somebody_gone_for_longer_than_the_patience_is_new(rng: np.random.Generator) -> None:
     keypoints, _ = walkers(np.array([(100.0, 300.0)]), np.zeros((1, 2)), 50, rng)
     keypoints = select(keypoints, (keypoints.frame < 10) | (keypoints.frame > 20))

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.formats.keypoints.keypoints import KeyPoints
 from posekit.formats.keypoints.track_assignment import assign
-from posekit.formats.keypoints.track_similarity import COMPARED_LANDMARKS, area, similarity
+from posekit.formats.keypoints.track_similarity import (
+    COMPARED_LANDMARKS,
+    MOTION_SIGMA,
+    area,
+    similarity,
+)
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 
@@ -26,6 +31,10 @@ FRESH_MOTION_FACTOR: Final = 3.0
 """How much more motion is allowed somebody who was seen once, whose speed is not known."""
 TRUSTED_SPEED_PICTURES: Final = 8
 """Pictures over which a speed is trusted: who is gone for longer may have turned."""
+VIDEO_SHARE: Final = 0.75
+"""Share of a video's pictures between which people move less than `MOTION_SIGMA`: now and then somebody else comes."""
+PICTURES_A_SECOND: Final = 30.0
+"""Of usual video: pictures that are farther apart in time count as so many as it would have had between them."""
 
 
 def track(
@@ -36,6 +45,9 @@ def track(
     Each detection is compared with where the people of the pictures before are expected (the last place, moved on at
     the last speed) by `posekit.formats.keypoints.track_similarity.similarity`, and the assignment with the largest
     sum is taken. Who is not seen is waited for. The work is O(F P²) for P people in each of F pictures.
+
+    Pictures that are farther apart in time than a video's leave people room for as much more. One detection a picture
+    is one person where people move farther between pictures than in a video, whatever the times.
 
     Parameters
     ----------
@@ -73,10 +85,12 @@ def track(
         expected = f"at most {MAX_PEOPLE:,} to track"
         remedy = "leave out the unsure ones"
         raise refusal(keypoints.source, f"picture {picture}", f"{busiest:,} people", expected, remedy)
+    person = keypoints.person.copy()
     points = keypoints.landmarks[unknown][:, COMPARED_LANDMARKS]
     areas = area(points)
-    person = keypoints.person.copy()
-    tracks = _Tracks(int(keypoints.person.max(initial=-1)) + 1)
+    if busiest == 1 and len(unknown) == len(person) and _far_apart(points, areas):
+        return replace(keypoints, person=np.cumsum(np.diff(frames, prepend=frames[0]) > patience + 1))
+    tracks = _Tracks(int(keypoints.person.max(initial=-1)) + 1, _moments(keypoints))
     edges = np.flatnonzero(np.diff(frames, prepend=-1, append=frames[-1] + 1))
     for start, end in pairwise(edges):
         rows = slice(int(start), int(end))
@@ -84,11 +98,31 @@ def track(
     return replace(keypoints, person=person)
 
 
+def _far_apart(points: Array, areas: Array) -> bool:
+    """Tell whether somebody, seen at points (F, P, 2), moves farther from picture to picture than in a video."""
+    if len(points) == 1:
+        return True
+    moved = np.linalg.norm(np.diff(points, axis=0), axis=2)
+    moved[np.isnan(moved).all(axis=1)] = 0.0
+    far = np.nanmedian(moved, axis=1) / np.sqrt(np.fmax(np.fmax(areas[1:], areas[:-1]), 1.0))
+    return float(np.nanquantile(far, VIDEO_SHARE)) > MOTION_SIGMA
+
+
+def _moments(keypoints: KeyPoints) -> Array:
+    """Return when each picture was taken (F,), in pictures of usual video; neighbours are one apart at least."""
+    count = np.arange(len(keypoints.pictures), dtype=np.float64)
+    apart = np.diff(keypoints.time)
+    if not np.isfinite(apart).all():
+        return count
+    return np.concatenate([count[:1], np.cumsum(np.maximum(PICTURES_A_SECOND * apart, 1.0))])
+
+
 @dataclass
 class _Tracks:
-    """The people who may be seen again: where they were last, how fast, and when."""
+    """The people who may be seen again: where they were last, how fast, and when; `moments` (F,) are the pictures'."""
 
     next: int
+    moments: Array
     who: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     last: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
     points: Array = field(default_factory=lambda: np.empty((0, len(COMPARED_LANDMARKS), 2)))
@@ -126,7 +160,7 @@ class _Tracks:
 
     def _pairs(self, frame: int, seen: Array, areas: Array, least: float) -> NDArray[np.intp]:
         """Return pairs (track, detection) with the largest sum of similarities, none below `least`."""
-        gap = (frame - self.last).astype(np.float64)
+        gap = self.moments[frame] - self.moments[self.last]
         ahead = np.minimum(gap, TRUSTED_SPEED_PICTURES)
         expected = self.points + (ahead[:, None] * self.speed)[:, None]
         both = np.stack(np.broadcast_arrays(self.area[:, None], areas[None]))
@@ -143,7 +177,7 @@ class _Tracks:
 
     def _move(self, rows: NDArray[np.intp], frame: int, seen: Array, areas: Array) -> None:
         """Take over where people are now; a point that is hidden stays where it was, moved along with the others."""
-        gap = (frame - self.last[rows]).astype(np.float64)
+        gap = self.moments[frame] - self.moments[self.last[rows]]
         moved = seen - self.points[rows]
         known = ~np.isnan(moved[..., 0])
         step = np.zeros((len(rows), 2))
