@@ -198,7 +198,7 @@ def test_pictures_of_nobody_are_frames_from_end_to_end(tmp_path: Path, command: 
     asked = ("--fov", f"{fov:.12g}", "--size", f"{size[0]:.0f}x{size[1]:.0f}", "--fps", "10")
     done = command("recover", place, "-o", tmp_path / "r.npz", *asked, "--follow", "1", "--no-refine")
     assert done.code == 0, done.err
-    assert "1 of 5 frames not recovered: the person is not seen: none of the joints is (frame 1)" in done.err
+    assert "1 of 5 frames not recovered: the person is not seen: none of the joints is (frame 0)" in done.err
     assert "right_shoulder and left_shoulder are not seen" in done.err
     result = files.read_result(tmp_path / "r.npz")
     np.testing.assert_allclose([frame.time for frame in result.frames], np.arange(5) / 10)
