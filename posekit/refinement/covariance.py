@@ -17,13 +17,18 @@ turn: with it stated and measured errors agree over random legal postures, at ha
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
+from posekit.compiled import covariance_kernels
+from posekit.compiled.compiling import compiled, is_installed
+from posekit.errors import InputError
 from posekit.geometry import Array, dot
 from posekit.geometry.batch_last import backward, cholesky, forward, matrix_vector
 from posekit.refinement.descent import BLOCK_POSTURES
-from posekit.refinement.equations import Equations, assemble, linearise
-from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES
+from posekit.refinement.equations import EliminatedBlock, assemble, linearise
+from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS
 from posekit.refinement.limb_terms import LimbTerms
 from posekit.refinement.problem import RefinementProblem
 from posekit.refinement.state import PostureState, place
@@ -49,15 +54,16 @@ def covariances(problem: RefinementProblem, state: PostureState, gain: Array | N
     for at in range(0, n, BLOCK_POSTURES):
         rows = np.arange(at, min(at + BLOCK_POSTURES, n))
         part, here = problem.take(rows), state.take(rows)
-        out[rows] = _covariances(part, here, linearise(part, here), None if gain is None else gain[rows].T)
+        system = joint_system(part, here, None if gain is None else gain[rows].T)
+        out[rows] = system.looped() if is_installed() else system.summed()
     return out
 
 
-def _covariances(
-    problem: RefinementProblem, state: PostureState, here: Equations, gain: Array | None
-) -> Array:
+def joint_system(problem: RefinementProblem, state: PostureState, gain: Array | None = None) -> JointSystem:
+    """Set up what covariances of whole postures follow from; the gain is (3, N)."""
+    here = linearise(problem, state)
     if here.limbs is None:
-        return np.full((state.root.shape[1], 14, 3, 3), np.nan)
+        raise InputError("covariances are of whole postures; expected a problem that has its limbs")
     n, width = state.root.shape[1], problem.trunk_width
     limbs = here.limbs._replace(matrix=_with_priors(problem, state, here.limbs))
     arrow = assemble(here._replace(limbs=limbs), 0.0, UNKNOWN_ANGLE_RADIANS**-2 * 1e-6)
@@ -67,34 +73,87 @@ def _covariances(
         UNKNOWN_PLACE_METRES**-2,
         np.where(index < 9, UNKNOWN_ANGLE_RADIANS**-2, UNKNOWN_PLACE_METRES**-2),
     )[:, None]
-    trunk = cholesky(arrow.matrix)
-    out = np.empty((14, 3, 3, n))
-    # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
-    right = np.ascontiguousarray(here.trunk.jacobian.transpose(2, 0, 1, 3)).reshape(width, 18, n)
-    root = forward(trunk, right).reshape(width, 6, 3, n)
-    if gain is not None:
-        joints, shrink = place(state), np.einsum("win,in->wn", root[:, 0], gain)
-        root = root - joints[None, :6] * shrink[:, None, None]
-    np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
-    if arrow.limbs is None or arrow.starts is None:
+    assert arrow.limbs is not None and arrow.starts is not None  # there are limbs
+    return JointSystem(
+        matrix=arrow.matrix,
+        jacobian=here.trunk.jacobian,
+        starts=arrow.starts,
+        turns=tuple(turn.start for turn in here.trunk.turns),
+        limbs=arrow.limbs,
+        levers=_levers(state, limbs),
+        joints=place(state),
+        gain=np.zeros((3, n)) if gain is None else gain,
+    )
+
+
+class JointSystem(NamedTuple):
+    """How N bodies' unknowns are known, and move their joints.
+
+    Attributes
+    ----------
+    matrix : array (C, C, N)
+        The trunk's, limbs and head eliminated; with what is known of all.
+    jacobian : array (6, 3, C, N)
+        How the trunk's unknowns move its joints.
+    starts : array (4, 6, C, N)
+        How they move limbs' starts and turn the parts by which limbs are judged.
+    turns : tuple of 4 int
+        The first of the three unknowns that turn that part.
+    limbs : EliminatedBlock
+        The limbs.
+    levers : array (2, 4, 3, U, N)
+        How limbs' unknowns move their middles and ends, from their starts.
+    joints, gain : array (14, 3, N), (3, N)
+        Of bodies that are scaled, see `covariances`; a gain of zeros of others.
+    """
+
+    matrix: Array
+    jacobian: Array
+    starts: Array
+    turns: tuple[int, ...]
+    limbs: EliminatedBlock
+    levers: Array
+    joints: Array
+    gain: Array
+
+    def looped(self) -> Array:
+        """Find the covariances (N, 14, 3, 3) by a compiled loop."""
+        order = [*range(6), *np.ravel(np.column_stack([LIMB_MIDDLES, LIMB_ENDS]))]
+        scaled = np.concatenate([self.joints[order], self.gain[None]])
+        found = np.empty((scaled.shape[2], 14, 3, 3))
+        turns = np.column_stack([LIMB_STARTS, self.turns])
+        arrays = self.matrix, self.jacobian, turns, self.limbs.factor, self.limbs.right, self.levers, scaled
+        compiled(covariance_kernels).joint_covariances(*map(np.ascontiguousarray, arrays), found)
+        out = np.empty_like(found)
+        out[:, order] = found
+        return out
+
+    def summed(self) -> Array:
+        """Find them by sums over all postures at once."""
+        width, n = self.jacobian.shape[2:]
+        trunk = cholesky(self.matrix.copy())
+        out = np.empty((14, 3, 3, n))
+        # With C = (L L')^-1 and S = L^-1 T', T C T' is S'S.
+        right = np.ascontiguousarray(self.jacobian.transpose(2, 0, 1, 3)).reshape(width, 18, n)
+        root = forward(trunk, right).reshape(width, 6, 3, n)
+        shrink = np.einsum("win,in->wn", root[:, 0], self.gain)
+        root = root - self.joints[None, :6] * shrink[:, None, None]
+        np.einsum("wpin,wpjn->pijn", root, root, out=out[:6])
+        whitened = backward(trunk, np.repeat(np.eye(width)[:, :, None], n, axis=2))
+        shift = np.einsum("licn,cwn->iwln", self.starts, whitened)
+        coupling = self.limbs.right[:, :6]
+        reach = len(coupling)
+        followed = -backward(self.limbs.factor, np.einsum("uiln,iwln->uwln", coupling, shift))
+        own = np.empty((reach, reach, 4, n))
+        own[:] = np.eye(reach)[:, :, None, None]
+        own = backward(self.limbs.factor, own)
+        for U, ends in zip(self.levers, (list(LIMB_MIDDLES), list(LIMB_ENDS)), strict=True):
+            moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
+            moving -= self.joints[ends][:, :, None] * shrink
+            alone = np.einsum("liun,uwln->liwn", U, own)
+            both = np.concatenate([moving, alone], axis=2)
+            out[ends] = np.einsum("liwn,ljwn->lijn", both, both)
         return out.transpose(3, 0, 1, 2)
-    whitened = backward(trunk, np.repeat(np.eye(width)[:, :, None], n, axis=2))
-    shift = np.einsum("licn,cwn->iwln", arrow.starts, whitened)
-    coupling = arrow.limbs.right[:, :6]
-    reach = len(coupling)
-    followed = -backward(arrow.limbs.factor, np.einsum("uiln,iwln->uwln", coupling, shift))
-    own = np.empty((reach, reach, 4, n))
-    own[:] = np.eye(reach)[:, :, None, None]
-    own = backward(arrow.limbs.factor, own)
-    for segment, ends in ((0, LIMB_MIDDLES), (1, LIMB_ENDS)):
-        U = _limb_jacobian(state, limbs, segment, reach)
-        moving = np.einsum("liun,uwln->liwn", U, followed) + shift[:3].transpose(2, 0, 1, 3)
-        if gain is not None:
-            moving -= joints[list(ends)][:, :, None] * shrink
-        alone = np.einsum("liun,uwln->liwn", U, own)
-        both = np.concatenate([moving, alone], axis=2)
-        out[list(ends)] = np.einsum("liwn,ljwn->lijn", both, both)
-    return out.transpose(3, 0, 1, 2)
 
 
 def _with_priors(problem: RefinementProblem, state: PostureState, terms: LimbTerms) -> Array:
@@ -130,13 +189,13 @@ MIN_LENGTH = 1e-12
 """Stands for zero where a vector's length is divided by: the direction is then arbitrary, and its share zero."""
 
 
-def _limb_jacobian(state: PostureState, terms: LimbTerms, segment: int, reach: int) -> Array:
-    """Return how limbs' unknowns move their middles (segment 0) or ends (1), from their starts: (4, 3, U, N)."""
-    out = np.zeros((4, 3, reach, state.root.shape[1]))
-    for part in range(segment + 1):
+def _levers(state: PostureState, terms: LimbTerms) -> Array:
+    """Return how limbs' unknowns move their middles and ends, from their starts: (2, 4, 3, U, N)."""
+    out = np.zeros((2, 4, 3, len(terms.matrix), state.root.shape[1]))
+    for segment, part in ((0, 0), (1, 0), (1, 1)):
         length = state.limbs[:, part, None]
         for tangent in range(2):
-            out[:, :, 2 * part + tangent] = length * terms.tangents[:, part, tangent]
-        if reach > 4:
-            out[:, :, 4 + part] = length * state.directions[:, part]
+            out[segment, :, :, 2 * part + tangent] = length * terms.tangents[:, part, tangent]
+        if len(terms.matrix) > 4:
+            out[segment, :, :, 4 + part] = length * state.directions[:, part]
     return out

@@ -37,7 +37,7 @@ RIVAL_CHI2: Final = 10.0
 MAX_STEPS: Final = 8
 """Steps to the minimum from where trunks were found."""
 
-N_DRAWS: Final = 1
+N_DRAWS: Final = 2
 """Pairs of draws, one the other's mirror image, from each minimum."""
 
 LEAST_INFORMATION: Final = 1e-2

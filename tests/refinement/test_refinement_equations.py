@@ -12,6 +12,7 @@ import pytest
 from posekit.body import Figure, load_figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
 from posekit.refinement import ObservedFrames, RootPrior, project, refine
+from posekit.refinement.covariance import joint_system
 from posekit.refinement.equations import evaluate, linearise, solve
 from posekit.refinement.freedom import degrees_of_freedom
 from posekit.refinement.problem import RefinementProblem
@@ -213,6 +214,23 @@ def test_covariances_are_those_of_pinocchios_jacobian() -> None:
         apart.append(np.abs(refined.covariance[n] - C) / scale)
     # Beside a right angle to the ray the second order tells all the same.
     assert np.median(apart) < 1e-3 and np.mean(np.array(apart) < 0.02) > 0.98
+
+
+@pytest.mark.parametrize("varied", [0.0, 0.02])
+@pytest.mark.parametrize("limits", [2.0, np.inf])
+def test_the_compiled_loop_finds_the_same_covariances(
+    varied: float, limits: float, rng: np.random.Generator
+) -> None:
+    view = scene()
+    sight = sight_of(view, 1.0, limit_deviation=limits, length_deviation=varied)
+    problem = sight.problem(np.arange(N), view.joints_cam[:, 0])
+    state = somewhere(problem, view, rng, 0.1)
+    for gain in (None, rng.standard_normal((3, N))):
+        system = joint_system(problem, state, gain)
+        expected = system.summed()
+        scale = np.trace(expected, axis1=2, axis2=3)[..., None, None]
+        np.testing.assert_allclose(system.looped() / scale, expected / scale, rtol=0, atol=1e-9)
+        assert (scale > 0).all()
 
 
 @pytest.mark.parametrize("perspective", [True, False])
