@@ -16,14 +16,10 @@ from posekit.recovery.listing import Listing, likeliest, masses
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.recovery.survival import LeafOutcomes
 from posekit.refinement import ObservedFrames, Refined, merge
+from posekit.refinement.alike import alike
 from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.limb_fitting import SearchSettings
-from posekit.refinement.merging import (
-    INDISTINCT_SQUARE,
-    MERGE_DISTANCE_METRES,
-    SAME_SIDES_METRES,
-    leaders_of,
-)
+from posekit.refinement.merging import INDISTINCT_SQUARE
 from posekit.refinement.refine import BegunRefinement, begin_refinement
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check
@@ -94,6 +90,7 @@ class _LeafSearch:
         if not listing.all:
             self.joints = begun.joints
             self._rate(np.flatnonzero(possible), begun.promised[possible])
+            self.alike = alike(begun, frame) if self._uncertain else np.arange(count)
 
     def outcomes(self) -> LeafOutcomes:
         """Refine, reject, merge and list."""
@@ -137,13 +134,15 @@ class _LeafSearch:
 
     def _lead(self) -> None:
         """Find which of the leaves that are not refined stand for themselves: others would become one with these."""
-        self.leads[~self.done] = np.isfinite(self.score[~self.done])
+        waiting = ~self.done & np.isfinite(self.score)
         if self._uncertain:
-            rows = np.flatnonzero(self.leads)
-            rows = rows[np.lexsort((-self.p[rows], ~self.done[rows], self.frame[rows]))]
-            leader = leaders_of(self.frame[rows], self.joints[rows], MERGE_DISTANCE_METRES, SAME_SIDES_METRES)
-            self.leads[:] = False
-            self.leads[rows[leader]] = True
+            told = np.zeros(len(self.frame), dtype=np.bool_)
+            told[self.alike[self.row]] = True
+            rows = np.flatnonzero(waiting & ~told[self.alike])
+            rows = rows[np.lexsort((-self.p[rows], self.alike[rows]))]
+            waiting[:] = False
+            waiting[rows[np.diff(self.alike[rows], prepend=-1) > 0]] = True
+        self.leads = np.where(self.done, self.leads, waiting)
 
     def _chosen(self, *, every: bool) -> NDArray[np.intp]:
         """Return the leaves to be refined next; all that are left of frames which lack some, if `every`."""

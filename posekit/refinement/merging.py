@@ -181,10 +181,16 @@ def _code(joints: Array) -> NDArray[np.intp]:
 def groups_of(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:
     """Find for each posture (N, P, 3) the one of its frame that stands for it; the best come first in each frame.
 
-    A posture stands for itself unless one before it that does so is near; it goes to the first such.
+    See `leaders_of_pairs`.
     """
-    n = len(frame)
-    first, second = _near(frame, joints, within)
+    return leaders_of_pairs(len(frame), *_near(frame, joints, within))
+
+
+def leaders_of_pairs(n: int, first: NDArray[np.intp], second: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Find for each of n, the best come first, the one that stands for it; pairs are near, the earlier first.
+
+    One stands for itself unless one before it that does so is near; it goes to the first such.
+    """
     open_ = np.zeros(n, dtype=np.bool_)
     open_[second] = True
     stands = ~open_

@@ -215,11 +215,24 @@ class BegunRefinement:
         frames = self.frame[self.factors.trunk]
         return size_of(root, prior, frames, self.observed.size_deviation).factor
 
+    @cached_property
+    def columns(self) -> Refined:
+        """The limbs side by side on their trunks, as whole bodies (M): what they share is theirs, with covariances."""
+        search = self.search
+        base, chains = search.columns.base, search.fitted.chains
+        found = search.bases.found.take(base)
+        state = found.state._replace(directions=chains.directions, limbs=chains.lengths)
+        one = self.factors.trunk[base]
+        return self._refined(one, SearchResult(found._replace(state=state), search.first[one]))
+
     def finish(self, rows: NDArray[np.intp] | None = None) -> Refined:
         """Refine survivors, or some of them, to the end."""
         rows = np.arange(len(self.frame)) if rows is None else rows
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):  # of joints at the very lens
             found = self.search.finish(rows)
+        return self._refined(rows, found)
+
+    def _refined(self, rows: NDArray[np.intp], found: SearchResult) -> Refined:
         size = None
         frames, observed = self.frame[rows], self.observed
         if observed.size_deviation and observed.root is not None:

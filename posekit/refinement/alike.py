@@ -1,0 +1,85 @@
+"""Which whole bodies will be told as one, foretold from their trunks and limbs: what lies within another's ellipsoids.
+
+Thousands of bodies are put together from tens of limbs: a limb that is indistinct from another of its trunk makes
+every body that has it indistinct from the body that has the other.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.refinement.merging import INDISTINCT_SQUARE, ROUNDING_SQUARE_METRES, leaders_of_pairs
+from posekit.refinement.refine import BegunRefinement
+from posekit.skeleton import LIMB_JOINTS
+from posekit.tree.factors import Rows
+
+TRUNK_JOINTS: Final = slice(0, 6)
+"""The joints of torso and hips, in tree order."""
+
+
+def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
+    """Give bodies (N,) of frames (N,) numbers, the same to those that will be told as one.
+
+    A trunk is as another where its six joints are in the ellipsoids of the likelier one, a limb on the same or such a
+    trunk where both its joints are: as `merge` has it of whole bodies.
+    """
+    factors, columns = begun.factors, begun.columns
+    count = len(factors.trunk)
+    inverse = np.asarray(np.linalg.inv(columns.covariance + ROUNDING_SQUARE_METRES * np.eye(3)))
+    base, of = begun.search.columns
+    first = np.searchsorted(base, np.arange(count))
+    chi2 = begun.search.bases.found.chi2
+    own_joints, ellipsoids = columns.joints[first, TRUNK_JOINTS], inverse[first, TRUNK_JOINTS]
+    leader = _leaders(frame[factors.trunk], chi2, own_joints, ellipsoids)
+    matched = np.ones(len(factors.trunk_of), dtype=np.bool_)
+    keys = [leader[factors.trunk_of]]
+    own = [factors.trunk_of]
+    for kind, (_, *ends) in enumerate(LIMB_JOINTS):
+        place, ellipsoid = columns.joints[of[kind]][:, ends], inverse[of[kind]][:, ends]
+        on, fit = base[of[kind]], begun.limb_chi2[kind]
+        alone = _leaders(on, fit, place, ellipsoid)
+        # Limbs of a trunk that is as another: the likeliest of that one's that they are as.
+        a, b = _pairs(on, np.where(leader[on] == on, -1, leader[on]))
+        near = _within(place[b] - place[a], ellipsoid[a])
+        order = np.lexsort((fit[a[near]], b[near]))
+        other, which = np.unique(b[near][order], return_index=True)
+        across = np.full(len(on), -1)
+        across[other] = alone[a[near][order][which]]
+        stays = leader[on] == on
+        across[stays] = alone[stays]
+        limb = factors.limb_of[kind]
+        matched &= across[limb] >= 0
+        keys.append(across[limb])
+        own.append(alone[limb])
+    table = np.where(matched, np.stack(keys), np.stack(own))
+    return np.unique(table, axis=1, return_inverse=True)[1].reshape(-1)
+
+
+def _leaders(group: Rows, chi2: Array, place: Array, ellipsoid: Array) -> Rows:
+    """Find for each part (n, J, 3) the first of its group, the likeliest first, in whose ellipsoids it is."""
+    order = np.argsort(chi2, kind="stable")
+    a, b = _pairs(group[order], group[order])
+    a, b = a[a < b], b[a < b]
+    near = _within(place[order[b]] - place[order[a]], ellipsoid[order[a]])
+    leader = np.empty_like(order)
+    leader[order] = order[leaders_of_pairs(len(order), a[near], b[near])]
+    return leader
+
+
+def _pairs(of: Rows, wanted: Rows) -> tuple[Rows, Rows]:
+    """Pair all rows a and b where what a is of is what b wants."""
+    order = np.argsort(of, kind="stable")
+    begin = np.searchsorted(of[order], wanted)
+    count = np.searchsorted(of[order], wanted, side="right") - begin
+    b = np.repeat(np.arange(len(wanted)), count)
+    return order[np.arange(len(b)) + np.repeat(begin - np.cumsum(count) + count, count)], b
+
+
+def _within(apart: Array, ellipsoid: Array) -> NDArray[np.bool_]:
+    """Tell where all joints (n, J, 3) are within ellipsoids (n, J, 3, 3)."""
+    square = np.einsum("nji,njik,njk->nj", apart, ellipsoid, apart)
+    return np.asarray((square < INDISTINCT_SQUARE).all(axis=1))
