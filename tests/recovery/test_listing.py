@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -18,7 +20,7 @@ from tests.recovery.test_refiner import noisy
 COVERAGE = 0.95
 
 
-def recovered(**changes: float) -> tuple[Recovery, Recovery]:
+def recovered(**changes: Any) -> tuple[Recovery, Recovery]:
     view = noisy(random_views(load_figure(), 12, np.random.default_rng(5)), 2.0)
     return recover(view, coverage=1.0, **changes), recover(view, coverage=COVERAGE, **changes)
 
@@ -91,7 +93,7 @@ def test_the_fewest_that_hold_the_share_are_chosen(coverage: float) -> None:
     score = 3.0 * rng.standard_normal(len(frame))
     score[5] = -np.inf
     mass, group = masses(score, frame)
-    chosen = likeliest(mass, group, (1 - coverage) * np.bincount(group, mass))
+    chosen = likeliest(mass, group, np.asarray((1 - coverage) * np.bincount(group, mass)))
     for one in (7, 3, 4):
         own = (frame == one) & np.isfinite(score)
         assert chosen[own].sum() == brute(score[own], coverage)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from unittest import mock
+
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.recovery import leaf_search, recover
@@ -14,21 +17,17 @@ from posekit.synthesis import random_views
 from tests.recovery.test_refiner import noisy
 
 
-def begun_refinement() -> tuple[BegunRefinement, np.ndarray]:  # type: ignore[type-arg]
+def begun_refinement() -> tuple[BegunRefinement, NDArray[np.intp]]:
     """Return what a recovery of a few views begins with."""
-    caught = []
+    caught: list[tuple[BegunRefinement, NDArray[np.intp]]] = []
 
-    def catch(begun: BegunRefinement, frame: np.ndarray) -> np.ndarray:  # type: ignore[type-arg]
+    def catch(begun: BegunRefinement, frame: NDArray[np.intp]) -> NDArray[np.intp]:
         caught.append((begun, frame))
         return alike(begun, frame)
 
     view = noisy(random_views(load_figure(), 6, np.random.default_rng(3)), 4.0)
-    original = leaf_search.alike
-    leaf_search.alike = catch
-    try:
+    with mock.patch.object(leaf_search, "alike", catch):
         recover(view)
-    finally:
-        leaf_search.alike = original
     return caught[0]
 
 
