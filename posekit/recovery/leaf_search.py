@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.recovery.certified import Contradiction, contradictions
 from posekit.recovery.factored import FactoredLeaves
-from posekit.recovery.listing import Listing, likeliest, masses
+from posekit.recovery.listing import BodyListing, likeliest, masses
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.recovery.survival import LeafOutcomes
 from posekit.refinement import ObservedFrames, Refined, merge
@@ -44,7 +44,7 @@ def refine_leaves(
     hypothesis: NDArray[np.intp],
     frame: NDArray[np.intp],
     checks: Sequence[Check],
-    listing: Listing,
+    listing: BodyListing,
     hopeless: float | None = None,
 ) -> LeafOutcomes:
     """Refine leaves (N, 14, 3) as their hypotheses (N,) were seen; reject, list and merge frame by frame (N,).
@@ -76,7 +76,7 @@ class _LeafSearch:
         frame: NDArray[np.intp],
         known: NDArray[np.bool_],
         checks: Sequence[Check],
-        listing: Listing,
+        listing: BodyListing,
     ) -> None:
         count = len(frame)
         self.begun, self.frame, self.known = begun, frame, known

@@ -15,7 +15,7 @@ Score = Callable[[Array, Array, NDArray[np.intp]], Array]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Listing:
+class BodyListing:
     """How much of the probability of each frame is listed.
 
     Parameters

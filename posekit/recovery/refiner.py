@@ -27,7 +27,7 @@ from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
 from posekit.recovery.leaf_search import blocks, refine_leaves
 from posekit.recovery.limb_walls import LimbWalls
-from posekit.recovery.listing import Listing
+from posekit.recovery.listing import BodyListing
 from posekit.recovery.noise import Noise, contact_under_noise
 from posekit.recovery.ranked import rank_postures
 from posekit.recovery.refined_completion import RefinedCompletion
@@ -262,7 +262,7 @@ class Refiner:
             self.hopeless,
         )
 
-    def listing(self, lifted: Lifted) -> Listing:
+    def listing(self, lifted: Lifted) -> BodyListing:
         """Say how much is listed, and how likely postures are."""
         lengths, spread = self.grower.body.figure.lengths, self.spread(lifted)
 
@@ -270,7 +270,7 @@ class Refiner:
             ranking = rank_postures(joints, lengths, frame, None, chi2, np.full(len(lifted.frames), spread))
             return np.asarray(np.sum(list(ranking.terms.values()), axis=0))
 
-        return Listing(coverage=self.grower.settings.coverage, score=score)
+        return BodyListing(coverage=self.grower.settings.coverage, score=score)
 
     @property
     def hopeless(self) -> float | None:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Final
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,9 +15,6 @@ from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.skeleton import JOINTS
 from posekit.tree import Leaves
 from posekit.tree.leaves import Pruned
-
-UNLISTED: Final = "unlisted"
-"""Where leaves are counted that may be explained, and are too unlikely to be listed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +87,7 @@ class LeafOutcomes:
         place = np.where(self.unlisted, 2, np.where(self.explained, 1, 0))
         why = Contradiction(
             check="noise",
-            where=("unlikely", "merged", UNLISTED),
+            where=("unlikely", "merged", "unlisted"),
             unit=("", "", ""),
             row=number[gone],
             place=place[number][gone].astype(np.int8),
