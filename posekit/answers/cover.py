@@ -42,16 +42,26 @@ def cover(
     np.add.at(missing, group, weight)
     enough = (1.0 - hold) * missing
     left = np.lexsort((-weight, group))
+    parts = _widest_first(points)
     while len(left):
         own = group[left]
         first = np.flatnonzero(np.diff(own, prepend=-1))
         centre = np.repeat(left[first], np.diff(first, append=len(left)))
-        apart = ((points[left] - points[centre]) ** 2).sum(axis=-1)
-        near = np.fmax.reduce(apart, axis=1, initial=0.0) <= within**2
+        near = np.ones(len(left), dtype=np.bool_)
+        for part in parts:
+            apart = ((part[left[near]] - part[centre[near]]) ** 2).sum(axis=-1)
+            near[near] = ~(apart > within**2).any(axis=1)  # NaN is not
         stands[left[near]] = centre[near]
         np.subtract.at(missing, own[near], weight[left[near]])
         left = left[~near & (missing[own] > enough[own])]
     return stands
+
+
+def _widest_first(points: Array) -> list[Array]:
+    """Split points (N, P, 3) into those two that are farthest about, which tell most apart, and the others."""
+    about = np.nan_to_num(np.fmax.reduce(points, axis=0) - np.fmin.reduce(points, axis=0)).max(axis=-1)
+    order = np.argsort(-about)
+    return [np.ascontiguousarray(points[:, some]) for some in (order[:2], order[2:]) if len(some)]
 
 
 def held_by(stands: NDArray[np.intp], weight: Array) -> Array:

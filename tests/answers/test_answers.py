@@ -161,3 +161,19 @@ def test_what_does_not_fit_together_is_refused(rng):
         answer(joints, probability[:4], covariance)
     with pytest.raises(InputError, match="uncertainty has shape"):
         answer(joints, probability, covariance[0])
+
+
+def test_representatives_are_those_of_the_plain_way(rng):
+    joints, probability, covariance = bodies(rng, 150, 12)
+    joints[rng.random(joints.shape[:2]) < 0.05] = np.nan
+    left, held = list(range(150)), {}
+    while left and sum(held.values()) < REPRESENTED_PROBABILITY:
+        centre = max(left, key=lambda row: probability[row])
+        apart = np.linalg.norm(joints[left] - joints[centre], axis=-1)
+        near = [row for row, far in zip(left, apart, strict=True) if not (far > DISTINCT_METRES).any()]
+        held[centre] = probability[near].sum()
+        left = [row for row in left if row not in near]
+    found = answer(joints, probability, covariance)
+    expected = sorted(held, key=lambda row: -held[row])[: len(found)]
+    assert found.rows.tolist() == expected
+    np.testing.assert_allclose(found.probability, [held[row] for row in expected])
