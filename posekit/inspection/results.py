@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from posekit.answers.wording import answer_lines
 from posekit.formats.own import Result
 from posekit.formats.own.paths import FollowedPaths
 from posekit.inspection.telling import (
@@ -19,6 +20,7 @@ from posekit.inspection.telling import (
     settings_line,
     tally,
 )
+from posekit.recovery.answered import result_answers
 
 
 def result_lines(result: Result) -> list[str]:
@@ -42,6 +44,8 @@ def result_lines(result: Result) -> list[str]:
             f"joints not seen, and inferred in {plural(len(inferred), 'frame')}: {', '.join(sorted(names))}"
         )
     lines += [_refined(result), _ranked(result)]
+    if all(frame.probability is not None for frame in frames):
+        lines += answer_lines(result_answers(result))
     lines.append("no paths through the frames" if result.paths is None else _paths(result.paths))
     return [*lines, settings_line(settings)]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from posekit.answers import path_answer
 from posekit.answers.wording import answer_lines, percent
 from posekit.recovery.recovery import FrameRecovery, Recovery
 
@@ -104,6 +105,15 @@ def following_line(following: Following) -> str:
     )
     count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
     return (
-        f"{count}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
+        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
         f"{len(following.switches())} changes between near and far"
     )
+
+
+def _distinct(following: Following) -> str:
+    """Say how many of the paths are distinct, and how probable each of those is."""
+    if len(following) == 1:
+        return ""
+    found = path_answer(following)
+    each = ", ".join(percent(p) for p in found.probability[:MAX_SHOWN].tolist())
+    return f", of which {len(found)} that differ by 5 cm hold 95 % ({each}{', …' if len(found) > MAX_SHOWN else ''})"
