@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.merging import INDISTINCT_SQUARE, ROUNDING_SQUARE_METRES, leaders_of_pairs
+from posekit.refinement.ellipsoids import ROUNDING_SQUARE_METRES
+from posekit.refinement.merging import INDISTINCT_SQUARE, leaders_of_pairs
 from posekit.refinement.refine import BegunRefinement
 from posekit.skeleton import LIMB_JOINTS
 from posekit.tree.factors import Rows

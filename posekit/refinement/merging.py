@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.refinement.ellipsoids import held_by
 from posekit.refinement.refined import Refined
 from posekit.skeleton import TREE_SEGMENTS
 
@@ -20,9 +20,6 @@ MERGE_DISTANCE_METRES = 0.005
 SAME_SIDES_METRES = 0.10
 """Metres: the same of survivors all of whose segments point to the same sides, near or far: they are one branch of the
 tree, and where lengths are uncertain its likeliest posture lies in a valley, in which searches stop here and there."""
-
-ROUNDING_SQUARE_METRES = 1e-8
-"""Square metres that are added to every variance: a neck that is known exactly has none."""
 
 PROJECTION_AXIS = np.array([0.48, 0.6, 0.64])
 """A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
@@ -118,17 +115,15 @@ def merge(
     rows, joints = rows[order], joints[order]
     leader = leaders_of(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
-    some = refined.select(rows[leaders])
     if indistinct and len(rows):
-        onto = _indistinct(some, indistinct)
+        onto = held_by(refined, rows[leaders], indistinct)
         leader = leaders[onto][np.searchsorted(leaders, leader)]
-        stands = np.flatnonzero(onto == np.arange(len(leaders)))
-        leaders, some = leaders[stands], some.select(stands)
+        leaders = leaders[onto == np.arange(len(leaders))]
     number = np.full(len(rows), -1)
     number[leaders] = np.arange(len(leaders))
     group = np.full(len(refined), -1)
     group[rows] = number[leader]
-    return Merged(refined=some, rows=rows[leaders], group=group)
+    return Merged(refined=refined.select(rows[leaders]), rows=rows[leaders], group=group)
 
 
 def leaders_of(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
@@ -152,23 +147,6 @@ def leaders_of(frame: NDArray[np.intp], joints: Array, within: float, of_branch:
     leader = np.empty(len(frame), dtype=np.intp)
     leader[stands] = stands[second]
     return leader[first]
-
-
-def _indistinct(some: Refined, square: float) -> NDArray[np.intp]:
-    """Find for each survivor, the best of a frame first, the first whose ellipsoids hold all its joints, or itself."""
-    information = np.linalg.inv(some.covariance + ROUNDING_SQUARE_METRES * np.eye(3))
-    taken_by = np.arange(len(some))
-    begins = np.flatnonzero(np.diff(some.frame, prepend=-1))
-    for begin, end in pairwise([*begins.tolist(), len(some)]):
-        open_ = np.arange(begin, end)
-        while len(open_) > 1:
-            first, rest = open_[0], open_[1:]
-            apart = some.joints[rest] - some.joints[first]
-            off = np.einsum("npi,pij,npj->np", apart, information[first], apart).max(axis=1)
-            near = off < square
-            taken_by[rest[near]] = first
-            open_ = rest[~near]
-    return taken_by
 
 
 def _code(joints: Array) -> NDArray[np.intp]:
