@@ -85,7 +85,8 @@ def capsules(w: Array, at: int) -> Any:
     if unknown(w, 0, second + starts_b + ends_b):
         return NO_VIOLATION
     center_a, half_a, center_b, half_b, reach = w[at], w[at + 1], w[at + 2], w[at + 3], w[at + 4]
-    far, near, deep = half_a + half_b + reach + CLEAR_GAP, reach + CLEAR_GAP, reach - CLEAR_GAP
+    # Of bodies that may overlap by more than their radii are, coal is asked about the lines in their middles.
+    far, near, deep = half_a + half_b + reach + CLEAR_GAP, max(reach, 0.0) + CLEAR_GAP, reach - CLEAR_GAP
     sx, sy, sz = mean(w, 0, starts_a)
     ex, ey, ez = mean(w, starts_a, ends_a)
     ux, uy, uz = unit(ex - sx, ey - sy, ez - sz)
@@ -115,7 +116,7 @@ def capsules(w: Array, at: int) -> Any:
     for end in (-1.0, 1.0):
         least = min(least, apart(gx, gy, gz, ax, ay, az, clamp((ag + end * ab) / aa), bx, by, bz, end))
         least = min(least, apart(gx, gy, gz, ax, ay, az, end, bx, by, bz, clamp((end * ab - bg) / bb)))
-    if near > 0 and least > near * near:
+    if least > near * near:
         return NO_VIOLATION
     if not (deep > 0 and least < deep * deep):
         return NOT_CLEAR

@@ -77,6 +77,11 @@ def is_installed() -> bool:
     return find_spec("numba") is not None and _numba() is not None
 
 
+def expect(frames: int) -> None:
+    """Say that as many frames are to come, or that what comes takes as long: loops are then compiled from now on."""
+    _State.grown += frames
+
+
 @contextmanager
 def path(chosen: Path_) -> Iterator[None]:
     """Choose the ``plain`` or the ``fast`` path for a while: for tests and benchmarks, results are the same.

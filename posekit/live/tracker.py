@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from posekit.body import load_figure
+from posekit.compiled.compiling import PAYS_FROM, expect
 from posekit.errors import InputError, PosekitError
 from posekit.following import Follower
 from posekit.following.follower import LiveEstimate
@@ -98,6 +99,7 @@ class Tracker:
         )
         self._follower = Follower(lag=lag)
         self._frame, self._last = 0, -math.inf
+        expect(PAYS_FROM + 1)
         # What the first picture would have to load and make is loaded and made by one that nobody sees.
         standing = recover(self.sight.standing(load_figure()), self.settings)
         Follower(lag=0).push(survivor_frames(standing.frames, _log(standing.probability))[0])

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.angles import Limits
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.compiled.compiling import expect
 from posekit.geometry import Array
 from posekit.ranking import deviation_of_noise
 from posekit.recovery.body import ranges_of, suite_of
@@ -49,6 +50,9 @@ NOISE_UNIT_DEGREES: Final = 1.0
 
 LOOSENED: Final = 2.0
 """By how many times lengths may be farther off than is usual, in frames that have no posture otherwise."""
+
+REFINED_FRAME_WORTH: Final = 50
+"""Exact frames that take as long as a refined one."""
 
 HYPOTHESES_AT_ONCE: Final = 250
 """Hypotheses whose trees are grown together: each may have thousands of leaves."""
@@ -116,6 +120,7 @@ class Refiner:
     def grow(self, frames: NDArray[np.intp]) -> dict[int, FrameTrees]:
         """Grow the trees of some frames of the view, and refine their leaves: hypotheses are trunks, maybe none."""
         fit = self.fit
+        expect(REFINED_FRAME_WORTH * len(frames))
         chosen = np.flatnonzero(np.isin(fit.frame, frames) & np.isfinite(fit.root).all(axis=1))
         trees = {
             int(k): FrameTrees(batch=None, index=0, hypotheses=1, fit=fit)

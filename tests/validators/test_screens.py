@@ -100,6 +100,15 @@ def test_a_screen_is_hardly_ever_unsure_of_ordinary_postures(index: int) -> None
         assert (judged >= 0).any() and (judged == NO_VIOLATION).any()
 
 
+def test_bodies_that_may_overlap_by_more_than_their_radii_are_clear() -> None:
+    points = np.concatenate([postures(5), special(6)])
+    for check in collision(FIGURE, contact_margin=-1.0):
+        screened, judged = places(check, points)
+        clear = screened != NOT_CLEAR
+        np.testing.assert_array_equal(screened[clear], judged[clear])
+        assert clear[:N].all() and (judged == NO_VIOLATION).all()
+
+
 def test_the_polar_factor_is_the_best_rotation() -> None:
     rng = np.random.default_rng(0)
     body = rng.normal(size=(5, 3))
