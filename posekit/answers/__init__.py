@@ -11,6 +11,7 @@ from posekit.answers.answer import answers_of as answers_of
 from posekit.answers.depth_order import ANSWER_SEGMENTS as ANSWER_SEGMENTS
 from posekit.answers.depth_order import DepthOrder as DepthOrder
 from posekit.answers.listed_bodies import ListedBodies as ListedBodies
+from posekit.answers.listed_bodies import ListedFrame as ListedFrame
 from posekit.answers.regions import JointRegions as JointRegions
 from posekit.on_demand import on_demand
 

@@ -2,16 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 
 from posekit.errors import InputError
+from posekit.formats.own import Inferred
 from posekit.geometry import Array
+from posekit.skeleton import JOINT
 
 FLOOR_METRES: Final = 1e-3
 """Metres, added to every covariance: what is given, as a neck is, is not known better."""
+
+
+class UncertainSurvivors(Protocol):
+    """Survivors that were refined."""
+
+    @property
+    def covariance(self) -> Array:
+        """Of every joint (N, 14, 3, 3), square metres; NaN where it is not known."""
+        ...
+
+
+class ListedFrame(Protocol):
+    """What a frame lists: of a recovery, or of a result."""
+
+    @property
+    def joints(self) -> Array:
+        """Camera frame (N, 14, 3), metres."""
+        ...
+
+    @property
+    def refined(self) -> UncertainSurvivors | None:
+        """How sure each survivor is, where the frame was refined."""
+        ...
+
+    @property
+    def inferred(self) -> Sequence[Mapping[str, Inferred]] | None:
+        """Joints that were not seen, by survivor."""
+        ...
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,6 +84,19 @@ class ListedBodies:
     def __len__(self) -> int:
         """Count the bodies."""
         return len(self.joints)
+
+    @staticmethod
+    def of(frame: ListedFrame, probability: Array, deviation: float) -> ListedBodies:
+        """Take what a frame lists; of what was not refined joints are off by `deviation` metres, if they were seen."""
+        if frame.refined is not None:
+            uncertainty: Array | float = frame.refined.covariance
+        elif frame.inferred is None:
+            uncertainty = deviation
+        else:
+            uncertainty = np.tile(np.eye(3) * deviation**2, (len(frame.joints), 14, 1, 1))
+            for row, joints in enumerate(frame.inferred):
+                uncertainty[row, [JOINT[name] for name in joints]] = np.nan
+        return ListedBodies(joints=frame.joints, probability=probability, uncertainty=uncertainty)
 
     @property
     def covariance(self) -> Array:

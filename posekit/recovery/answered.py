@@ -2,47 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Protocol
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.answers import Answer, ListedBodies, answers_of
+from posekit.answers import Answer, ListedBodies, ListedFrame, answers_of
 from posekit.errors import InputError
-from posekit.formats.own import Inferred, Result
+from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.ranking import deviation_of_tolerance
 from posekit.recovery.judged import rigid_of
-from posekit.skeleton import JOINT
-
-
-class UncertainSurvivors(Protocol):
-    """Survivors that were refined."""
-
-    @property
-    def covariance(self) -> Array:
-        """Of every joint (N, 14, 3, 3), square metres; NaN where it is not known."""
-        ...
-
-
-class ListedFrame(Protocol):
-    """What a frame lists: of a recovery, or of a result."""
-
-    @property
-    def joints(self) -> Array:
-        """Camera frame (N, 14, 3), metres."""
-        ...
-
-    @property
-    def refined(self) -> UncertainSurvivors | None:
-        """How sure each survivor is, where the frame was refined."""
-        ...
-
-    @property
-    def inferred(self) -> Sequence[Mapping[str, Inferred]] | None:
-        """Joints that were not seen, by survivor."""
-        ...
 
 
 def answered(
@@ -61,10 +31,7 @@ def answered(
     """
     off = np.broadcast_to(np.asarray(deviation, dtype=np.float64), (len(frames),))
     return answers_of(
-        [
-            ListedBodies(joints=frame.joints, probability=p, uncertainty=_uncertainty(frame, d))
-            for frame, p, d in zip(frames, probability, off.tolist(), strict=True)
-        ]
+        [ListedBodies.of(frame, p, d) for frame, p, d in zip(frames, probability, off.tolist(), strict=True)]
     )
 
 
@@ -84,15 +51,3 @@ def result_answers(result: Result) -> list[Answer]:
     return answered(
         result.frames, told, deviation_of_tolerance(rigid_of(result.settings, len(result.frames)))
     )
-
-
-def _uncertainty(frame: ListedFrame, deviation: float) -> Array | float:
-    """Return the covariances of a frame's survivors, NaN of joints that were not seen; one deviation if all were."""
-    if frame.refined is not None:
-        return frame.refined.covariance
-    if frame.inferred is None:
-        return deviation
-    covariance = np.tile(np.eye(3) * deviation**2, (len(frame.joints), 14, 1, 1))
-    for row, joints in enumerate(frame.inferred):
-        covariance[row, [JOINT[name] for name in joints]] = np.nan
-    return covariance

@@ -172,6 +172,13 @@ def test_the_tables_say_what_the_result_says(opened):
     assert errors == []
 
 
+def test_the_answer_is_told_beside_the_table(opened):
+    tab, _, errors = opened(walking_result())
+    told = tab.locator("#answer p").all_inner_texts()
+    assert [line.partition(":")[0] for line in told] == ["likeliest", "what else it can be"]
+    assert errors == []
+
+
 def test_results_without_probabilities_have_no_such_column(opened):
     result = dataclasses.replace(
         walking_result(),

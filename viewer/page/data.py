@@ -10,6 +10,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.answers import ListedBodies, answers_of
+from posekit.answers.wording import answer_lines
 from posekit.body import Figure
 from posekit.errors import ViewerError
 from posekit.formats.held_postures import HeldPostures
@@ -17,6 +19,7 @@ from posekit.formats.own.camera_model import ScaledOrthographicModel
 from posekit.formats.own.postures import Postures
 from posekit.formats.own.result import Result, ResultFrame
 from posekit.formats.own.view import View
+from posekit.ranking import deviation_of_tolerance
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENTS
 from posekit.viewer.page.family_page import family_data, inferred_data, tree_of, walk
 from posekit.viewer.scene.colours import GROUP_RGB, SIDE_RGB, number, side
@@ -135,9 +138,18 @@ def _frame(frame: ResultFrame) -> Json:
         "branches": list(frame.branches),
         "groups": None if frame.groups is None else frame.groups.tolist(),
         "probability": None if frame.probability is None else _numbers(frame.probability),
+        "answer": _answer(frame),
         "margins": {name: _numbers(values) for name, values in frame.margins.items()},
         "rejected": [[*reason.partition("/")[::2], leaves] for reason, leaves in reasons],
     }
+
+
+def _answer(frame: ResultFrame) -> list[str]:
+    """Tell the frame's answer: the likeliest posture, how sure it is, and what else it can be."""
+    if frame.probability is None:
+        return []
+    bodies = ListedBodies.of(frame, frame.probability, float(deviation_of_tolerance(0.0)))
+    return answer_lines(answers_of([bodies]))
 
 
 def _uncalibrated(frame: ResultFrame, shown: Shown, world: World) -> Json:

@@ -117,6 +117,7 @@ const page = (() => {
     head.replaceChildren();
     body.replaceChildren();
     const count = here.points.length;
+    byId("answer").replaceChildren(...(here.answer ?? []).map((line) => element("p", line)));
     const groups = here.groups ? `, in ${plural(new Set(here.groups).size, "group", "groups")}` : "";
     byId("survivors-title").textContent =
       count === 0
