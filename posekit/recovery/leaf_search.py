@@ -19,7 +19,6 @@ from posekit.refinement import ObservedFrames, Refined, merge
 from posekit.refinement.alike import alike
 from posekit.refinement.descent import CHI2_PRECISION, MAX_STEPS
 from posekit.refinement.limb_fitting import SearchSettings
-from posekit.refinement.merging import INDISTINCT_SQUARE
 from posekit.refinement.refine import BegunRefinement, begin_refinement
 from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.tree import Check
@@ -87,10 +86,10 @@ class _LeafSearch:
         self.contradicted: list[Contradiction] = []
         possible = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
         self.score = np.where(possible, 0.0, -np.inf)
+        self.alike = alike(begun, frame) if self._uncertain else np.arange(count)
         if not listing.all:
             self.joints = begun.joints
             self._rate(np.flatnonzero(possible), begun.promised[possible])
-            self.alike = alike(begun, frame) if self._uncertain else np.arange(count)
 
     def outcomes(self) -> LeafOutcomes:
         """Refine, reject, merge and list."""
@@ -127,21 +126,19 @@ class _LeafSearch:
 
     def _merge(self) -> None:
         """Make one of what became one, of all leaves that passed so far."""
-        indistinct = INDISTINCT_SQUARE if self._uncertain else 0.0
-        self.merged = merge(self.refined, indistinct=indistinct)
+        self.merged = merge(self.refined, told=self.alike[self.row])
         self.leads[self.done] = False
         self.leads[self.row[self.merged.rows]] = True
 
     def _lead(self) -> None:
         """Find which of the leaves that are not refined stand for themselves: others would become one with these."""
         waiting = ~self.done & np.isfinite(self.score)
-        if self._uncertain:
-            told = np.zeros(len(self.frame), dtype=np.bool_)
-            told[self.alike[self.row]] = True
-            rows = np.flatnonzero(waiting & ~told[self.alike])
-            rows = rows[np.lexsort((-self.p[rows], self.alike[rows]))]
-            waiting[:] = False
-            waiting[rows[np.diff(self.alike[rows], prepend=-1) > 0]] = True
+        told = np.zeros(len(self.frame), dtype=np.bool_)
+        told[self.alike[self.row]] = True
+        rows = np.flatnonzero(waiting & ~told[self.alike])
+        rows = rows[np.lexsort((-self.p[rows], self.alike[rows]))]
+        waiting[:] = False
+        waiting[rows[np.diff(self.alike[rows], prepend=-1) > 0]] = True
         self.leads = np.where(self.done, self.leads, waiting)
 
     def _chosen(self, *, every: bool) -> NDArray[np.intp]:

@@ -1,7 +1,8 @@
-"""Which whole bodies will be told as one, foretold from their trunks and limbs: what lies within another's ellipsoids.
+"""Which whole bodies are told as one: those whose trunk and limbs all lie within the ellipsoids of likelier ones.
 
-Thousands of bodies are put together from tens of limbs: a limb that is indistinct from another of its trunk makes
-every body that has it indistinct from the body that has the other.
+Where lengths are uncertain, a branch of the tree has a valley of postures in which searches stop here and there: one of
+them tells it, with its ellipsoids. Thousands of bodies are put together from tens of limbs: a limb that is indistinct
+from another of its trunk makes every body that has it indistinct from the body that has the other.
 """
 
 from __future__ import annotations
@@ -12,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.refinement.ellipsoids import ROUNDING_SQUARE_METRES
-from posekit.refinement.merging import INDISTINCT_SQUARE, leaders_of_pairs
+from posekit.refinement.merging import leaders_of_pairs
 from posekit.refinement.refine import BegunRefinement
 from posekit.skeleton import LIMB_JOINTS
 from posekit.tree.factors import Rows
@@ -21,12 +21,19 @@ from posekit.tree.factors import Rows
 TRUNK_JOINTS: Final = slice(0, 6)
 """The joints of torso and hips, in tree order."""
 
+INDISTINCT_SQUARE: Final = 2.366
+"""Chi-square of three degrees of freedom that half of all draws are below: a joint within it is in the ellipsoid that
+holds the truth as often as not."""
+
+ROUNDING_SQUARE_METRES: Final = 1e-8
+"""Square metres that are added to every variance: a neck that is known exactly has none."""
+
 
 def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
-    """Give bodies (N,) of frames (N,) numbers, the same to those that will be told as one.
+    """Give bodies (N,) of frames (N,) numbers, the same to those that are told as one.
 
     A trunk is as another where its six joints are in the ellipsoids of the likelier one, a limb on the same or such a
-    trunk where both its joints are: as `merge` has it of whole bodies.
+    trunk where both its joints are.
     """
     factors, columns = begun.factors, begun.columns
     count = len(factors.trunk)

@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.refinement.ellipsoids import held_by
 from posekit.refinement.refined import Refined
-from posekit.skeleton import TREE_SEGMENTS
 
 MERGE_DISTANCE_METRES = 0.005
 """Metres: survivors none of whose joints are farther apart became one, unless told otherwise."""
-
-SAME_SIDES_METRES = 0.10
-"""Metres: the same of survivors all of whose segments point to the same sides, near or far: they are one branch of the
-tree, and where lengths are uncertain its likeliest posture lies in a valley, in which searches stop here and there."""
 
 PROJECTION_AXIS = np.array([0.48, 0.6, 0.64])
 """A unit vector, not along an axis, on which joints are projected to find which postures may be near."""
@@ -66,17 +60,12 @@ class Merged:
         return [[branches[int(row)] for row in rows] for rows in self.members()]
 
 
-INDISTINCT_SQUARE = 2.366
-"""Chi-square of three degrees of freedom that half of all draws are below: a joint within it is in the ellipsoid that
-holds the truth as often as not."""
-
-
 def merge(
     refined: Refined,
     *,
     within: float = MERGE_DISTANCE_METRES,
     keep: NDArray[np.bool_] | None = None,
-    indistinct: float = 0.0,
+    told: NDArray[np.intp] | None = None,
 ) -> Merged:
     """Merge survivors of a frame that became one: all joints within a distance of those of a likelier one.
 
@@ -91,10 +80,9 @@ def merge(
         Metres that no joint may be apart.
     keep : bool array (N,), optional
         Which survivors are looked at: those that the noise explains (`Refined.explained`).
-    indistinct : float
-        Squared Mahalanobis distance, by the covariance of the likelier one, within which all joints are one too: a
-        valley of postures that uncertain lengths leave is told by one of them with its ellipsoids. With it, survivors
-        of one branch (`SAME_SIDES_METRES`) are one, too.
+    told : int array (N,), optional
+        Numbers, the same of survivors of a frame that are told as one (`posekit.refinement.alike`): the likeliest of
+        them takes in the others first.
 
     Raises
     ------
@@ -113,47 +101,19 @@ def merge(
     ties = (*shadow[:, 6:].T, shadow.mean(axis=1), refined.chi2[rows])
     order = np.lexsort((*ties, -refined.p[rows], refined.frame[rows]))
     rows, joints = rows[order], joints[order]
-    leader = leaders_of(refined.frame[rows], joints, within, SAME_SIDES_METRES if indistinct else 0.0)
+    leader = np.arange(len(rows))
+    if told is not None:
+        _, first, which = np.unique(told[rows], return_index=True, return_inverse=True)
+        leader = first[which.reshape(-1)]
     leaders = np.flatnonzero(leader == np.arange(len(rows)))
-    if indistinct and len(rows):
-        onto = held_by(refined, rows[leaders], indistinct)
-        leader = leaders[onto][np.searchsorted(leaders, leader)]
-        leaders = leaders[onto == np.arange(len(leaders))]
+    near = groups_of(refined.frame[rows[leaders]], joints[leaders], within)
+    leader = leaders[near][np.searchsorted(leaders, leader)]
+    stands = np.flatnonzero(leader == np.arange(len(rows)))
     number = np.full(len(rows), -1)
-    number[leaders] = np.arange(len(leaders))
+    number[stands] = np.arange(len(stands))
     group = np.full(len(refined), -1)
     group[rows] = number[leader]
-    return Merged(refined=refined.select(rows[leaders]), rows=rows[leaders], group=group)
-
-
-def leaders_of(frame: NDArray[np.intp], joints: Array, within: float, of_branch: float) -> NDArray[np.intp]:
-    """Find which of the postures (N, 14, 3), the best of a frame first, stands for each: near, or of one branch.
-
-    Parameters
-    ----------
-    frame : int array (N,)
-        Ascending.
-    joints : array (N, 14, 3)
-        Camera frame, metres.
-    within, of_branch : float
-        Metres that no joint may be apart, and the same of postures all of whose segments point to the same sides.
-    """
-    if not of_branch:
-        return groups_of(frame, joints, within)
-    _, branch = np.unique(np.column_stack([frame, _code(joints)]), axis=0, return_inverse=True)
-    first = groups_of(branch.reshape(-1), joints, of_branch)
-    stands = np.flatnonzero(first == np.arange(len(frame)))
-    second = groups_of(frame[stands], joints[stands], within)
-    leader = np.empty(len(frame), dtype=np.intp)
-    leader[stands] = stands[second]
-    return leader[first]
-
-
-def _code(joints: Array) -> NDArray[np.intp]:
-    """Say to which side each segment of postures (N, 14, 3) points, near or far, as the bits of a number (N,)."""
-    start, end = np.array(TREE_SEGMENTS).T
-    along = np.einsum("nsi,nsi->ns", joints[:, end] - joints[:, start], joints[:, end])
-    return np.asarray((along > 0) @ (1 << np.arange(len(start))))
+    return Merged(refined=refined.select(rows[stands]), rows=rows[stands], group=group)
 
 
 def groups_of(frame: NDArray[np.intp], joints: Array, within: float) -> NDArray[np.intp]:

@@ -89,8 +89,10 @@ class Refined:
         sizes = [part.size for part in parts if part.size is not None]
         size = BodySize(*map(np.concatenate, zip(*sizes, strict=True))) if sizes else None
         out = replace(parts[0], problem=problem, size=size, **arrays)
-        if any("_found" in vars(part) for part in parts):
-            vars(out)["_found"] = np.concatenate([part._found for part in parts])
+        if any(
+            "covariance" in vars(part) for part in parts
+        ):  # found by now of some, and as much work as anything
+            vars(out)["covariance"] = np.concatenate([part.covariance for part in parts])
         return out
 
     def select(self, rows: NDArray[np.intp] | NDArray[np.bool_]) -> Refined:
@@ -102,10 +104,7 @@ class Refined:
             if isinstance(getattr(self, item.name), np.ndarray)
         }
         size = None if self.size is None else self.size.take(chosen)
-        out = replace(self, problem=self.problem.take(chosen), size=size, **arrays)
-        if "_found" in vars(self):  # covariances are as much work as anything before
-            vars(out)["_found"] = self._found[chosen]
-        return out
+        return replace(self, problem=self.problem.take(chosen), size=size, **arrays)
 
     @cached_property
     def p(self) -> Array:
@@ -133,21 +132,6 @@ class Refined:
     @cached_property
     def covariance(self) -> Array:
         """The covariance of every joint (N, 14, 3, 3), square metres, to first order: see `covariances`."""
-        return self.covariance_of(np.arange(len(self)))
-
-    def covariance_of(self, rows: NDArray[np.intp]) -> Array:
-        """Return the covariances of some survivors; each is found once, also for those that are selected from these."""
-        missing = rows[np.isnan(self._found[rows, 0, 0, 0])]
-        if len(missing):
-            self._found[missing] = self.select(missing)._covariance()
-        return self._found[rows]
-
-    @cached_property
-    def _found(self) -> Array:
-        """Room for covariances, NaN until they are found."""
-        return np.full((len(self), 14, 3, 3), np.nan)
-
-    def _covariance(self) -> Array:
         factor = np.ones(len(self)) if self.size is None else self.size.factor
         joints = self.joints / factor[:, None, None]
         state = measured_state(self.problem.anatomy, joints, self.head / factor[:, None, None])

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.recovery import leaf_search, recover
-from posekit.refinement.alike import alike
-from posekit.refinement.ellipsoids import ROUNDING_SQUARE_METRES
-from posekit.refinement.merging import INDISTINCT_SQUARE
+from posekit.refinement.alike import INDISTINCT_SQUARE, ROUNDING_SQUARE_METRES, alike
 from posekit.refinement.refine import BegunRefinement
 from posekit.skeleton import LIMB_JOINTS
 from posekit.synthesis import random_views

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -12,13 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from posekit.body import load_figure
-from posekit.compiled import ellipsoid_kernels
-from posekit.compiled.compiling import compiled
 from posekit.errors import InputError
 from posekit.refinement import Merged, ObservedFrames, Refined, RootPrior, merge, refine
-from posekit.refinement.covariance import covariances
-from posekit.refinement.ellipsoids import take_in
-from posekit.refinement.merging import INDISTINCT_SQUARE, groups_of
+from posekit.refinement.merging import groups_of
 from posekit.synthesis import random_views
 
 
@@ -115,26 +109,13 @@ def test_codes_must_be_one_each() -> None:
         merge(survivors()).codes(["a", "b", "c"])
 
 
-def test_covariances_that_merging_asked_for_are_not_found_again() -> None:
-    some = survivors().select(np.arange(20))
-    with mock.patch("posekit.refinement.refined.covariances", wraps=covariances) as asked:
-        merged = merge(some, indistinct=INDISTINCT_SQUARE).refined
-        carried = merged.covariance
-        assert asked.call_count == 1
-    np.testing.assert_allclose(carried, replace(merged).covariance, rtol=1e-9, atol=1e-15)
-
-
-def test_the_compiled_loop_takes_in_the_same(rng: np.random.Generator) -> None:
-    joints = rng.normal(size=(60, 14, 3)) * rng.choice([0.5, 1.0], size=(60, 1, 1))
-    half = rng.normal(size=(60, 14, 3, 3))
-    information = half @ half.transpose(0, 1, 3, 2)
-    known = np.arange(60) < 40
-    found = []
-    for take in (compiled(ellipsoid_kernels).take_in, take_in):
-        waiting, taken_by = np.arange(60), np.arange(60)
-        left = take(joints, information, known, waiting, taken_by, 30.0)
-        found.append((waiting[:left], taken_by))
-    for loop, reference in zip(*found, strict=True):
-        np.testing.assert_array_equal(loop, reference)
-    assert 0 < (taken_by != np.arange(60)).sum() < 60
-    assert left
+def test_what_is_told_as_one_becomes_the_likeliest_of_it() -> None:
+    refined = survivors()
+    told = np.arange(100) // 4
+    merged = merge(refined, within=0.0, told=told)
+    for one in np.unique(told):
+        rows = np.flatnonzero(told == one)
+        stands = np.flatnonzero(np.isin(merged.rows, rows))
+        assert len(stands) == 1
+        assert refined.p[merged.rows[stands[0]]] == refined.p[rows].max()
+        assert (merged.group[rows] == stands[0]).all()
