@@ -151,4 +151,4 @@ def json_pieces(head: dict[str, Any], name: str, items: Iterable[Any]) -> Iterat
 
 
 def _spell(value: Any) -> str:
-    return json.dumps(value, allow_nan=False)
+    return json.dumps(value, allow_nan=False, separators=(",", ":"))

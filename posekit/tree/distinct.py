@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,12 +25,18 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """
     filled = np.where(np.isnan(table), NAN_SUBSTITUTE, table)
     # Not a product of matrices: that adds up some rows in another order than others, so that equal rows would differ.
-    mixture = (filled * np.random.default_rng(0).standard_normal(table.shape[1])).sum(axis=1)
+    mixture = (filled * _weights(table.shape[1])).sum(axis=1)
     _, one, which = np.unique(mixture, return_index=True, return_inverse=True)
     which = which.reshape(-1)
     if (filled[one[which]] == filled).all():
         return one, which
     return np.arange(len(table)), np.arange(len(table))
+
+
+@cache
+def _weights(count: int) -> Array:
+    """Return the mixture of so many entries."""
+    return np.random.default_rng(0).standard_normal(count)
 
 
 NAN_SUBSTITUTE = 1e9

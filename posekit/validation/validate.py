@@ -34,6 +34,9 @@ POSTURES_AT_ONCE: Final = 4096
 CONFIGURATIONS_FACTOR: Final = 4
 """Times as many configurations, which need no search: the fewer calls, the less time is lost between threads."""
 
+SHORTEST_LIMB_METRES: Final = 0.2
+"""Metres: by it what positions are off becomes what angles are off."""
+
 MAX_LISTED: Final = 10_000
 """Postures that a report lists one by one: all of a file that has no more, else the first that are not valid."""
 
@@ -175,6 +178,10 @@ def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
             rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
             angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
             margins.append(_number(said, "contact", asked, within=within))
+    if "decimals" in settings:  # what was rounded may be off by that
+        step = math.sqrt(3) * 10.0 ** -_number(settings, "decimals", 0.0)
+        rigid, margins = [max(rigid) + step], [min(margins) - step]
+        angles = [max(angles) + math.degrees(2 * step / SHORTEST_LIMB_METRES)]
     walkers, ranges = settings.get("walkers", "paper"), settings.get("ranges")
     if not (isinstance(walkers, str) and walkers in THRESHOLDS_BY_WALKERS):
         raise refusal(

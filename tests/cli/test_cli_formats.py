@@ -442,7 +442,7 @@ def test_inspect_says_what_is_in_every_kind_of_file(there: Path, command: Run, t
         there / "mmpose.json": ["key points (mmpose)"],
         there / "landmarks.json": ["key points (mediapipe)", "--size WIDTHxHEIGHT makes them pixels"],
         there / "view.json": ["a view (posekit.view/1)", "3 frames, camera opencv", "truth in 3"],
-        there / "result.npz": ["a result (posekit.result/1)", "3 frames"],
+        there / "result.npz": ["a result (posekit.result/2)", "3 frames"],
         there / "walk.trc": ["motion (trc)", "3 frames at 10 a second", "+y up", "missing joints: none"],
         there / "clips.npz": ["6 frames in 2 clips at 10 a second (0.40 s)"],
         there / "two.toml": ["cameras", "left: calibrated", "right: calibrated"],

@@ -97,7 +97,7 @@ def test_a_followed_and_refined_result(command: Run, tmp_path: Path, suffix: str
     view.write_text(json.dumps(document), encoding="utf-8")
     assert command("recover", view, "-o", out, "--follow", "2", "--length-deviation", "0.015").code == 0
     text = told(command, out)
-    assert "a result (posekit.result/1)" in text
+    assert "a result (posekit.result/2)" in text
     assert "3 frames, " in text
     assert "least 0, " in text
     assert "none in 1\n" in text

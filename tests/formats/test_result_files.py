@@ -126,7 +126,7 @@ def test_the_json_is_what_the_design_says(tmp_path, rng):
     write_result(tmp_path / "r.json", result)
     document = json.loads((tmp_path / "r.json").read_text())
     assert list(document) == ["schema", "unit", "joint_names", "configuration_names", "settings", "frames"]
-    assert document["schema"] == "posekit.result/1"
+    assert document["schema"] == "posekit.result/2"
     frame = document["frames"][0]
     assert list(frame) == ["time", "camera", "levels", "postures", "rejected"]
     assert frame["camera"]["f"] == 5.0
@@ -153,7 +153,7 @@ def test_the_npz_is_plain_numpy(tmp_path, rng):
         assert arrays["margins/joint_range"].shape == (3, 5)
         assert arrays["rejected/counts"].shape == (3, len(arrays["rejected/names"]))
         assert json.loads(str(arrays["settings"])) == result.settings
-        assert str(arrays["schema"]) == "posekit.result/1"
+        assert str(arrays["schema"]) == "posekit.result/2"
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
@@ -229,7 +229,7 @@ def test_nan_in_a_camera_is_none(rng):
 
 
 BAD_JSON = [
-    (("schema",), "posekit.view/1", "give a file of schema posekit.result/1 instead"),
+    (("schema",), "posekit.view/1", "give a file of schema posekit.result/2 instead"),
     (("joint_names",), list(JOINTS[::-1]), "expected the 14 joints in tree order"),
     (("frames",), [], "frames: got []; expected at least 1"),
     (("frames", 0, "levels", "motion"), [1], "frames[0].levels: got 14, 14 and 1 entries"),
@@ -280,7 +280,7 @@ def rewritten(path, changes):
 
 BAD_NPZ: list[tuple[dict[str, Any], str]] = [
     ({"schema": np.array("posekit.view/1")}, 'schema: got "posekit.view/1"'),
-    ({"schema": np.array(["posekit.result/1"])}, r"schema: got shape \(1,\); expected shape \(\)"),
+    ({"schema": np.array(["posekit.result/2"])}, r"schema: got shape \(1,\); expected shape \(\)"),
     ({"unit": np.array("inch")}, 'unit: got "inch"; expected m or cm or mm'),
     ({"unit": None}, "unit: got nothing; expected the array unit"),
     ({"joints": np.zeros((2, 5, 13, 3))}, r"joints: got shape \(2, 5, 13, 3\)"),

@@ -56,6 +56,10 @@ def test_the_schema_has_the_columns_with_their_meanings() -> None:
     for found in SURVIVOR_COLUMNS.values():
         assert posture["properties"][found.key]["description"] == found.meaning
     assert set(posture["required"]) == {
+        found.key for found in SURVIVOR_COLUMNS.values() if not (found.optional or found.detail)
+    }
+    earlier = schema("posekit.result/1")["$defs"]["ResultPosture"]
+    assert set(earlier["required"]) == {
         found.key for found in SURVIVOR_COLUMNS.values() if not found.optional
     }
     refined = schema("result")["$defs"]["ResultRefined"]["properties"]

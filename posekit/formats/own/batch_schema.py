@@ -58,6 +58,7 @@ class BatchSettingsFields(FileModel):
     root: str
     refine: bool | None
     length_deviation: float | None
+    coverage: Annotated[float, Field(gt=0, le=1)] = 0.99
     rank: bool
     q: bool
     margins: bool

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cache
@@ -10,6 +11,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.own.digits import Precision, significant
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
@@ -18,7 +20,7 @@ COLUMN_KEY: Final = "column"
 """The metadata of a dataclass's field that hold its `Column`."""
 UPPER_TRIANGLE: Final = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
 """Entries of a symmetric matrix that files hold: xx, xy, xz, yy, yz, zz."""
-COVARIANCE_DIGITS: Final = 6
+COVARIANCE_DIGITS: Final = 4
 """Significant digits of a symmetric matrix in a file: a deviation is never known better."""
 
 
@@ -46,6 +48,10 @@ class Column:
         What may be unknown in JSON (null; in arrays NaN): nothing, single numbers, or rows of the last axis.
     lower, upper : float, optional
         Bounds of its numbers.
+    decimals : int, optional
+        Where noise is known, with how many decimals more than positions it is written.
+    digits : int
+        The same in significant digits; 0 for all.
     longest : int, optional
         Characters of a text.
     whole : bool
@@ -54,6 +60,10 @@ class Column:
         Whether memory holds symmetric matrices (3, 3), of which files hold the upper triangle.
     by_check : bool
         Whether it is a mapping with an array for each check.
+    once : bool
+        Whether a frame has one value of it.
+    detail : bool
+        Whether a file may have it of some survivors of a refined frame alone: of the others it is not known.
     optional : bool
         Whether a frame may lack it, which then has None; `column` fills it in.
     everywhere : bool
@@ -78,10 +88,14 @@ class Column:
     null: Literal["", "number", "row"] = ""
     lower: float | None = None
     upper: float | None = None
+    decimals: int | None = None
+    digits: int = 0
     longest: int | None = None
     whole: bool = False
     symmetric: bool = False
     by_check: bool = False
+    once: bool = False
+    detail: bool = False
     optional: bool = False
     everywhere: bool = False
     flat_prefix: str = ""
@@ -117,12 +131,18 @@ class Column:
             return {check: self._array(f"{name}.{check}", values, count) for check, values in given.items()}
         return self._array(name, given, count)
 
-    def in_file(self, values: Array, unit: Unit) -> Array:
-        """Turn numbers of memory, in metres, into those of a file."""
+    def in_file(self, values: Array, unit: Unit, precision: Precision | None = None) -> Array:
+        """Turn numbers of memory, in metres, into those of a file, where noise is known with the digits they have."""
         if self.symmetric:
             values = values[..., UPPER_TRIANGLE[0], UPPER_TRIANGLE[1]]
         values = _scaled(values, PER_METRE[unit], self.length_power)
-        return _rounded(values, COVARIANCE_DIGITS) if self.symmetric else values
+        if precision is None:
+            return significant(values, COVARIANCE_DIGITS) if self.symmetric else values
+        if self.decimals is not None:
+            of_unit = round(self.length_power * math.log10(PER_METRE[unit]))
+            return precision.places(values, precision.decimals + self.decimals - of_unit)
+        digits = COVARIANCE_DIGITS if self.symmetric else self.digits
+        return precision.significant(values, digits) if digits else values
 
     def in_memory(self, values: Array, unit: Unit) -> Array:
         """Turn numbers of a file into those of memory, in metres."""
@@ -188,14 +208,6 @@ def _scaled(values: Array, per_metre: float, power: int) -> Array:
     if not power:
         return values
     return np.asarray(values * per_metre**power if power > 0 else values / per_metre**-power)
-
-
-def _rounded(values: Array, digits: int) -> Array:
-    """Round to significant digits."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        places = digits - 1 - np.floor(np.log10(np.abs(values)))
-        scale = np.where(np.isfinite(places), 10.0**places, 1.0)
-    return np.asarray(np.round(values * scale) / scale)
 
 
 def _refused(name: str, got: str, expected: str) -> Exception:

@@ -44,6 +44,9 @@ class EvaluationSettingsFields(FileModel):
     length_deviation: NotNegative | None = Field(
         default=None, description="How far lengths were said to be off; null: as is usual for the view."
     )
+    coverage: Annotated[float, Field(gt=0, le=1)] = Field(
+        default=1.0, description="Which share of the probability the postures hold that were compared."
+    )
     checks: list[str]
     ranges: str
     rules: list[int]

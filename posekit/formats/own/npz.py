@@ -19,6 +19,8 @@ from posekit.safe_io.refusal import cut, nearest, refusal
 _CHUNK: Final = 1 << 22
 COMPRESSION_LEVEL: Final = 3
 """Of zlib: half the time of the usual 6, for files that are a fifth larger."""
+COMPACT_LEVEL: Final = 6
+"""Of what took longer to make than to write."""
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)
 """The date of every member, so that the same content gives the same bytes."""
 
@@ -61,13 +63,15 @@ class Ragged:
             yield block
 
 
-def write_npz(file: BinaryIO, arrays: Mapping[str, NDArray[Any] | Ragged]) -> None:
-    """Write arrays as a compressed NPZ; the same arrays always give the same bytes."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=COMPRESSION_LEVEL) as archive:
+def write_npz(
+    file: BinaryIO, arrays: Mapping[str, NDArray[Any] | Ragged], *, level: int = COMPRESSION_LEVEL
+) -> None:
+    """Write arrays as a compressed NPZ, at a level of zlib; the same arrays always give the same bytes."""
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED, compresslevel=level) as archive:
         for name, array in arrays.items():
             member = zipfile.ZipInfo(f"{name}.npy", _EPOCH)
             member.compress_type = zipfile.ZIP_DEFLATED
-            member._compresslevel = COMPRESSION_LEVEL  # type: ignore[attr-defined]  # no argument of open() says it
+            member._compresslevel = level  # type: ignore[attr-defined]  # no argument of open() says it
             # The size is not known beforehand, and padding may take it past 4 GB.
             with archive.open(member, "w", force_zip64=True) as out:
                 _write(out, array)

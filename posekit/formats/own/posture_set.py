@@ -6,13 +6,14 @@ them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.own.column import column, columns_in
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
 from posekit.skeleton import JOINTS, LIMB_JOINTS
@@ -20,7 +21,6 @@ from posekit.tree.factors import Rows, factor_postures
 
 N_SET_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 """The joints of torso and hips: the first six of the tree."""
-INDEX_ARRAYS: Final = ("limb_trunk", "limb_kind", "excluded")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -50,14 +50,43 @@ class PostureSet:
         an upper bound then.
     """
 
-    trunks: Array
-    trunk_chi2: Array
-    limb_trunk: Rows
-    limb_kind: Rows
-    limb_joints: Array
-    limb_chi2: Array
-    excluded: Rows
-    bodies: int
+    schema_title: ClassVar = (
+        "ResultSet",
+        "The complete set of a frame: trunks, and the limbs that each can have.",
+    )
+
+    trunks: Array = column(
+        "Neck, shoulders, pelvis and hips of each trunk, OpenCV camera frame, in `unit`; null where not known.",
+        shape=(N_SET_TRUNK_JOINTS, 3),
+        length_power=1,
+        decimals=0,
+        null="row",
+    )
+    trunk_chi2: Array = column(
+        "Of each trunk, where the noise is known: sum of squares of what is off over its standard deviations.",
+        decimals=-1,
+        null="number",
+    )
+    limb_trunk: Rows = column("The trunk of each limb, from 0.", kind="int")
+    limb_kind: Rows = column(
+        "What each limb is: 0 right arm, 1 left arm, 2 right leg, 3 left leg.", kind="int"
+    )
+    limb_joints: Array = column(
+        "Elbow and wrist, or knee and ankle, of each limb, in `unit`; null where not known.",
+        shape=(2, 3),
+        length_power=1,
+        decimals=0,
+        null="row",
+    )
+    limb_chi2: Array = column(
+        "What each limb adds to its trunk's chi2, where the noise is known.", decimals=-1, null="number"
+    )
+    excluded: Rows = column("Pairs of limbs of one trunk that no body has both of.", shape=(2,), kind="int")
+    bodies: int = column(
+        "How many whole bodies that makes: a trunk with one limb of each kind, of which no two exclude each other.",
+        kind="int",
+        once=True,
+    )
 
     def __post_init__(self) -> None:
         T, L, E = len(self.trunks), len(self.limb_trunk), len(self.excluded)
@@ -70,10 +99,11 @@ class PostureSet:
             "limb_chi2": (L,),
             "excluded": (E, 2),
         }
-        for item in fields(self)[:-1]:
-            name = item.name
+        for name, each in columns_in(PostureSet).items():
+            if each.once:
+                continue
             values: NDArray[Any] = np.array(
-                getattr(self, name), dtype=np.intp if name in INDEX_ARRAYS else np.float64
+                getattr(self, name), dtype=np.intp if each.kind == "int" else np.float64
             )
             if values.shape != shapes[name]:
                 raise _refused(name, f"shape {values.shape}", f"shape {shapes[name]}")

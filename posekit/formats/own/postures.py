@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.own.npz import suffix, write_npz
 from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
-from posekit.formats.own.result import RESULT_SCHEMA, Result
+from posekit.formats.own.result import RESULT_SCHEMAS, Result
 from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
 from posekit.formats.own.units import Unit, from_metres, to_metres
@@ -77,7 +77,7 @@ def read_postures(path: str | Path) -> Postures:
     if suffix(path, ".json", ".npz") == ".npz":
         return _read_npz(path)
     document = read_json(path)
-    if isinstance(document, dict) and document.get("schema") == RESULT_SCHEMA:
+    if isinstance(document, dict) and document.get("schema") in RESULT_SCHEMAS:
         return _survivors(result_of(document, path))
     file = validated(PosturesFile, document, path)
     names = file.joint_names
@@ -151,7 +151,7 @@ def _read_npz(path: str | Path) -> Postures:
     with open_npz(path, limit=MAX_PADDED) as archive:
         if "schema" in archive.names:
             schema = str(archive.array("schema", "U", ()))
-            if schema == RESULT_SCHEMA:
+            if schema in RESULT_SCHEMAS:
                 return _survivors(result_in(archive))
             if schema != POSTURES_SCHEMA:
                 raise refusal(

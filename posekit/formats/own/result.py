@@ -8,8 +8,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.formats.own.digits import Precision
 from posekit.formats.own.family import Family
+from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.formats.own.paths import FollowedPaths
+from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.units import Unit
@@ -22,8 +25,11 @@ LEVEL_FIELDS: Final = ("joint", "physical", "motion")
 EVERYWHERE_COLUMNS: Final = tuple(name for name, column in SURVIVOR_COLUMNS.items() if column.everywhere)
 """Columns that all frames of a result have, or none."""
 
-RESULT_SCHEMA: Final = "posekit.result/1"
+RESULT_SCHEMA: Final = "posekit.result/2"
 """What a result's file says it is."""
+EARLIER_RESULT_SCHEMA: Final = "posekit.result/1"
+"""What one of an earlier version says, which is read as well: it has no sets and no answers, and lists everything."""
+RESULT_SCHEMAS: Final = (RESULT_SCHEMA, EARLIER_RESULT_SCHEMA)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,6 +54,14 @@ class ResultFrame(SurvivorColumns):
         The scales that an uncalibrated frame can have.
     root : Root, optional
         How the neck's depth was found, where the frame is calibrated and it was not given.
+    posture_set : PostureSet, optional
+        All that the frame can be.
+    unlisted : int
+        How many whole bodies of the set are not among the survivors here, at most.
+    unlisted_probability : float
+        What these hold at most, of the probability of all.
+    answer : FrameAnswer, optional
+        What is to be said of the frame first.
     """
 
     time: float
@@ -57,6 +71,10 @@ class ResultFrame(SurvivorColumns):
     pruned: Sequence[Mapping[str, Any]] | None = None
     family: Family | None = None
     root: Root | None = None
+    posture_set: PostureSet | None = None
+    unlisted: int = 0
+    unlisted_probability: float = 0.0
+    answer: FrameAnswer | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -75,6 +93,16 @@ class ResultFrame(SurvivorColumns):
         object.__setattr__(self, "rejected", {str(name): int(n) for name, n in self.rejected.items()})
         if not np.isfinite(self.time):
             raise _refused("time", str(self.time), "a finite number of seconds")
+        if self.unlisted < 0 or not 0 <= self.unlisted_probability <= 1:
+            got = f"{self.unlisted} with {self.unlisted_probability:g}"
+            raise _refused("unlisted", got, "a count from 0, with a probability")
+        if self.answer is not None:
+            self.answer.check_against(len(self.joints))
+
+    @property
+    def precision(self) -> Precision | None:
+        """The digits that its numbers have; None where they have all, as its noise is not known."""
+        return None if self.refined is None else Precision.of(self.refined.covariance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,4 +1,4 @@
-"""Read and write ``posekit.result/1``; the suffix decides between JSON and NPZ."""
+"""Read ``posekit.result/2`` and ``/1``, write ``/2``; the suffix decides between JSON and NPZ."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def read_result(path: str | Path) -> Result:
     Raises
     ------
     InputError
-        Where the file breaks the schema ``posekit.result/1``.
+        Where the file breaks its schema, ``posekit.result/2`` or ``posekit.result/1``.
 
     Notes
     -----

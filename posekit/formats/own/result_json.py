@@ -1,4 +1,4 @@
-"""``posekit.result/1`` as JSON: NaN becomes null, lengths are in the file's unit."""
+"""``posekit.result/2`` as JSON, and ``/1`` to read: NaN becomes null, lengths are in the file's unit."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.own.digits import shortened
 from posekit.formats.own.family import Family
+from posekit.formats.own.frame_answer import ANSWER_PRECISION, FrameAnswer
+from posekit.formats.own.frame_tables import table_fields, table_of
 from posekit.formats.own.paths import FollowedPaths
-from posekit.formats.own.result import RESULT_SCHEMA, Result, ResultFrame
+from posekit.formats.own.posture_set import PostureSet
+from posekit.formats.own.result import EARLIER_RESULT_SCHEMA, RESULT_SCHEMA, Result, ResultFrame
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
 from posekit.formats.own.survivor_json import survivor_columns, survivor_rows
@@ -21,7 +25,7 @@ from posekit.safe_io.refusal import refusal
 from posekit.safe_io.writing import json_pieces, write_text
 
 if TYPE_CHECKING:
-    from posekit.formats.own.result_schema import ResultFrameFields, ResultPaths
+    from posekit.formats.own.result_schema import EarlierFrameFields, ResultPaths
 
 _KINDS: Final = {"survivor": int, "interpolated": bool}
 
@@ -34,15 +38,19 @@ def read_result_json(path: str | Path) -> Result:
 def result_of(document: object, path: str | Path) -> Result:
     """Make a result of a parsed document that came from `path`."""
     # What checks a file takes as long to load as a result to write: who only writes one does without.
-    from posekit.formats.own.result_schema import ResultFile
+    from posekit.formats.own.result_schema import EarlierResultFile, ResultFile
     from posekit.tables.file_model import validated
 
-    file = validated(ResultFile, document, path)
+    earlier = isinstance(document, dict) and document.get("schema") == EARLIER_RESULT_SCHEMA
+    file = validated(EarlierResultFile if earlier else ResultFile, document, path)
     nq = len(file.configuration_names)
     for index, frame in enumerate(file.frames):
         _check_frame(path, f"frames[{index}]", frame, nq)
     postures = [posture for frame in file.frames for posture in frame.postures]
-    extents = {"q": nq, "margins": list(dict.fromkeys(name for one in postures for name in one.margins))}
+    extents = {
+        "q": nq,
+        "margins": list(dict.fromkeys(name for one in postures for name in one.margins or ())),
+    }
     carried = set()
     for name, column in SURVIVOR_COLUMNS.items():
         told = (
@@ -92,7 +100,7 @@ def write_result_json(path: str | Path, result: Result) -> None:
 def _frames(result: Result) -> Iterator[dict[str, Any]]:
     unit = result.unit
     for frame in result.frames:
-        camera = frame.camera
+        camera, precision = frame.camera, frame.precision
         fields: dict[str, Any] = {
             "time": float(frame.time),
             "camera": {
@@ -102,13 +110,20 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
                 "residual": camera["residual"] if camera["f"] is None else _length(camera["residual"], unit),
             },
             "levels": {name: list(values) for name, values in frame.levels.items()},
-            "postures": survivor_rows(frame, unit),
+            "postures": survivor_rows(frame, unit, precision=precision),
             "rejected": dict(frame.rejected),
         }
+        if frame.posture_set is not None:
+            fields["set"] = table_fields(frame.posture_set, unit, precision=precision)
+            fields["unlisted"] = int(frame.unlisted)
+            fields["unlisted_probability"] = float(frame.unlisted_probability)
+        if frame.answer is not None:
+            fields["answer"] = table_fields(frame.answer, unit, precision=precision or ANSWER_PRECISION)
         if frame.family is not None:
             fields["family"] = frame.family.fields(unit)
         if frame.root is not None:
-            fields["root"] = frame.root.fields(unit)
+            root = frame.root.fields(unit)
+            fields["root"] = shortened(root) if precision else root
         if frame.pruned is not None:
             fields["pruned"] = [dict(entry) for entry in frame.pruned]
         yield fields
@@ -118,14 +133,14 @@ def _length(value: Any, unit: Unit) -> Any:
     return None if value is None else from_metres(value, unit).tolist()
 
 
-def _check_frame(path: str | Path, where: str, frame: ResultFrameFields, nq: int) -> None:
+def _check_frame(path: str | Path, where: str, frame: EarlierFrameFields, nq: int) -> None:
     """Check what ties fields together, which the schema cannot say."""
     levels = frame.levels
     if not len(levels.joint) == len(levels.physical) == len(levels.motion):
         counts = f"{len(levels.joint)}, {len(levels.physical)} and {len(levels.motion)} entries"
         raise refusal(path, f"{where}.levels", counts, "one of each a level", "add what is missing")
     for index, posture in enumerate(frame.postures):
-        if len(posture.q) != nq:
+        if posture.q is not None and len(posture.q) != nq:
             raise refusal(
                 path,
                 f"{where}.postures[{index}].q",
@@ -136,7 +151,7 @@ def _check_frame(path: str | Path, where: str, frame: ResultFrameFields, nq: int
 
 
 def _frame(
-    frame: ResultFrameFields, unit: Unit, extents: Mapping[str, Any], in_file: set[str]
+    frame: EarlierFrameFields, unit: Unit, extents: Mapping[str, Any], in_file: set[str]
 ) -> ResultFrame:
     camera = frame.camera
     # Of these two frames decide one by one; of all other columns the whole file has them, or none of it.
@@ -161,7 +176,22 @@ def _frame(
         pruned=frame.pruned,
         family=None if frame.family is None else Family.of(frame.family.model_dump(), unit),
         root=None if frame.root is None else Root.of(frame.root.model_dump(), unit),
+        **_of_set(frame, unit),
         **survivor_columns(
             SurvivorColumns, frame.postures, unit, extents=extents, carried=frozenset(carried)
         ),
     )
+
+
+def _of_set(frame: EarlierFrameFields, unit: Unit) -> dict[str, Any]:
+    """Read what the first version did not have."""
+    from posekit.formats.own.result_schema import ResultFrameFields
+
+    if not isinstance(frame, ResultFrameFields):
+        return {}
+    return {
+        "posture_set": None if frame.set is None else table_of(PostureSet, frame.set, unit),
+        "unlisted": frame.unlisted,
+        "unlisted_probability": frame.unlisted_probability,
+        "answer": None if frame.answer is None else table_of(FrameAnswer, frame.answer, unit),
+    }

@@ -1,4 +1,4 @@
-"""``posekit.result/1`` as NPZ: the content of the JSON as arrays, padded to the largest number of survivors.
+"""``posekit.result/2`` as NPZ, and ``/1`` to read: what JSON holds as arrays, padded to the most survivors of a frame.
 
 Arrays (F frames, at most N survivors, L levels): ``schema``, ``unit``, ``settings`` (JSON text) and, where
 there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names``; ``time`` (F,); ``count``
@@ -9,6 +9,9 @@ there is detail, ``pruned`` (JSON text); ``joint_names``, ``configuration_names`
 what is not known are NaN, -1 or an empty text. Uncalibrated: ``scales`` (F, N) and ``families`` (JSON text); with
 joints that were not seen: ``inferred`` (JSON text). ``probability`` (F, N). Refined: ``refined/chi2``,
 ``refined/dof``, ``refined/p``, ``refined/merged`` (F, N), ``refined/covariance`` (F, N, 14, 6) in square units.
+Sets (`posekit.formats.own.posture_set`) and answers (`posekit.formats.own.frame_answer`): an array a column, padded as
+well, ``set/trunks`` (F, T, 6, 3), ``answer/representatives`` (F, K), …, and how long each is in ``set/counts`` and
+``answer/counts``, a column each; ``unlisted``, ``unlisted_probability`` (F,).
 Followed: ``paths/survivor``, ``paths/scale`` (K, F), ``paths/joints``, ``paths/smoothed`` (K, F, 14, 3),
 ``paths/interpolated``, ``paths/deviation`` (K, F, 14), ``paths/cost``, ``paths/share`` (K,), ``paths/told`` (text).
 """
@@ -17,6 +20,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,11 +28,22 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from posekit.formats.own.digits import shortened
 from posekit.formats.own.family import Family
+from posekit.formats.own.frame_answer import ANSWER_PRECISION, FrameAnswer
+from posekit.formats.own.frame_tables import table_arrays, tables_in
 from posekit.formats.own.inferred import Inferred
-from posekit.formats.own.npz import Ragged, write_npz
+from posekit.formats.own.npz import COMPACT_LEVEL, COMPRESSION_LEVEL, Ragged, write_npz
 from posekit.formats.own.paths import FollowedPaths, path_shapes
-from posekit.formats.own.result import CAMERA_FIELDS, LEVEL_FIELDS, RESULT_SCHEMA, Result, ResultFrame
+from posekit.formats.own.posture_set import PostureSet
+from posekit.formats.own.result import (
+    CAMERA_FIELDS,
+    LEVEL_FIELDS,
+    RESULT_SCHEMA,
+    RESULT_SCHEMAS,
+    Result,
+    ResultFrame,
+)
 from posekit.formats.own.result_schema import ResultDetails, ResultPathsTold
 from posekit.formats.own.root import Root
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS, SurvivorColumns
@@ -45,12 +60,17 @@ Array = NDArray[Any]
 MAX_PADDED: Final = 16_000_000_000
 """Bytes that a result may declare with its padding, which is passed over and never held."""
 _MARGIN = "margins/"
+_SET = "set/"
+_ANSWER = "answer/"
 _PATHS = "paths/"
 
 
 def write_result_npz(path: str | Path, result: Result) -> None:
     """Write a result as NPZ; see `posekit.formats.own.write_result`."""
     frames, unit = result.frames, result.unit
+    precision = [
+        None if frame.precision is None else replace(frame.precision, binary=True) for frame in frames
+    ]
     arrays: dict[str, Array | Ragged] = {
         "schema": np.array(RESULT_SCHEMA),
         "unit": np.array(unit),
@@ -62,7 +82,19 @@ def write_result_npz(path: str | Path, result: Result) -> None:
         **_camera_arrays(frames, unit),
         **_level_arrays(frames),
         **_rejected_arrays(frames),
-        **survivor_arrays(SurvivorColumns, frames, unit, carried=_carried(frames)),
+        **survivor_arrays(SurvivorColumns, frames, unit, carried=_carried(frames), precision=precision),
+        **table_arrays(
+            PostureSet, [one.posture_set for one in frames], unit, within=_SET, precision=precision
+        ),
+        **table_arrays(
+            FrameAnswer,
+            [one.answer for one in frames],
+            unit,
+            within=_ANSWER,
+            precision=[one or replace(ANSWER_PRECISION, binary=True) for one in precision],
+        ),
+        "unlisted": np.array([frame.unlisted for frame in frames], dtype=np.int64),
+        "unlisted_probability": np.array([frame.unlisted_probability for frame in frames]),
     }
     if any(frame.pruned is not None for frame in frames):
         pruned = [
@@ -74,12 +106,13 @@ def write_result_npz(path: str | Path, result: Result) -> None:
         arrays["families"] = np.array(json.dumps(families, allow_nan=False))
     if any(frame.root is not None for frame in frames):
         roots = [None if frame.root is None else frame.root.fields(unit) for frame in frames]
+        roots = [shortened(root) if few else root for root, few in zip(roots, precision, strict=True)]
         arrays["roots"] = np.array(json.dumps(roots, allow_nan=False))
     if result.paths is not None:
         arrays |= {_PATHS + name: values for name, values in result.paths.in_unit(unit).items()}
         arrays[_PATHS + "told"] = np.array(json.dumps(result.paths.told(unit), allow_nan=False))
     with replacing(path) as file:
-        write_npz(file, arrays)
+        write_npz(file, arrays, level=COMPACT_LEVEL if any(precision) else COMPRESSION_LEVEL)
 
 
 def read_result_npz(path: str | Path) -> Result:
@@ -92,8 +125,8 @@ def result_in(archive: Archive) -> Result:
     """Make a result of an open archive."""
     path = archive.path
     # Padding is passed over in pieces: what it declares may be large, what else is there may not.
-    archive.check_held(MAX_ARRAYS, but=PADDED_PREFIXES)
-    _expect(archive, "schema", (RESULT_SCHEMA,))
+    archive.check_held(MAX_ARRAYS, but=(*PADDED_PREFIXES, _SET, _ANSWER))
+    _expect(archive, "schema", RESULT_SCHEMAS)
     unit: Unit = _expect(archive, "unit", UNIT_NAMES)  # type: ignore[assignment]
     names = tuple(archive.array("joint_names", "U", (None,)).tolist())
     if names != JOINTS:
@@ -127,6 +160,7 @@ def result_in(archive: Archive) -> Result:
         survivors["scales"] = [
             None if family is None else scale for family, scale in zip(families, scales, strict=True)
         ]
+    sets = _of_sets(archive, len(time), unit)
     settings = _json(archive, "settings")
     if not isinstance(settings, dict):
         raise refusal(path, "settings", shown(settings), "an object", "write the file again")
@@ -149,12 +183,28 @@ def result_in(archive: Archive) -> Result:
                 pruned=pruned[index],
                 family=None if families is None else families[index],
                 root=None if roots is None else roots[index],
+                **sets[index],
                 **own,
             )
             for index, own in enumerate(rows)
         ],
         paths=_followed(archive, len(time), unit),
     )
+
+
+def _of_sets(archive: Archive, frames: int, unit: Unit) -> list[dict[str, Any]]:
+    """Read what the first version did not have."""
+    rows: list[dict[str, Any]] = [{} for _ in range(frames)]
+    sets = tables_in(archive, PostureSet, frames, unit, within=_SET) or [None] * frames
+    answers = tables_in(archive, FrameAnswer, frames, unit, within=_ANSWER) or [None] * frames
+    for row, one, answer in zip(rows, sets, answers, strict=True):
+        row |= {"posture_set": one, "answer": answer}
+    if "unlisted" in archive.names:
+        unlisted = archive.array("unlisted", "iu", (frames,))
+        held = _floats(archive, "unlisted_probability", (frames,))
+        for row, count, share in zip(rows, unlisted.tolist(), held.tolist(), strict=True):
+            row |= {"unlisted": count, "unlisted_probability": share}
+    return rows
 
 
 def _followed(archive: Archive, frames: int, unit: Unit) -> FollowedPaths | None:

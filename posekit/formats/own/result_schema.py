@@ -1,4 +1,4 @@
-"""The schema ``posekit.result/1``, as a JSON file holds it: lengths in its own unit, null for unknown."""
+"""The schemas ``posekit.result/2`` and ``/1``, as a JSON file holds them: lengths in its own unit, null for unknown."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, FailFast, Field
 
+from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.formats.own.inferred import Inferred
+from posekit.formats.own.posture_set import PostureSet
 from posekit.formats.own.survivor_columns import SurvivorColumns
-from posekit.formats.own.survivor_models import Count, model_of
+from posekit.formats.own.survivor_models import Count, model_of, table_model_of
 from posekit.formats.own.units import Unit
 from posekit.safe_io.refusal import shown
 from posekit.skeleton import JOINTS
@@ -62,6 +64,12 @@ ResultInferred: Any = model_of(Inferred)
 """What is known of the position of a joint that was not seen."""
 ResultPosture: Any = model_of(SurvivorColumns)
 """One survivor, as the table of columns has it."""
+EarlierPosture: Any = model_of(SurvivorColumns, whole=True)
+"""The same in the first version, in which every survivor has every column."""
+ResultSet: Any = table_model_of(PostureSet)
+"""The complete set of a frame."""
+ResultAnswer: Any = table_model_of(FrameAnswer)
+"""What a result says of a frame first."""
 
 
 class ResultMinimum(FileModel):
@@ -139,13 +147,13 @@ class ResultRoot(FileModel):
     note: str = Field(description="Why another method was not used, where that needs saying.")
 
 
-class ResultFrameFields(FileModel):
-    """One frame."""
+class EarlierFrameFields(FileModel):
+    """One frame of the first version."""
 
     time: float = Field(description="Seconds.")
     camera: ResultCamera
     levels: ResultLevels
-    postures: Annotated[list[ResultPosture], FailFast()]
+    postures: Annotated[list[EarlierPosture], FailFast()]
     rejected: Annotated[dict[str, Count], FEW_ENTRIES] = Field(
         description="Pruned branches, by what killed them."
     )
@@ -156,6 +164,22 @@ class ResultFrameFields(FileModel):
     pruned: Annotated[list[Any], AfterValidator(_objects)] | None = Field(
         default=None, description="Detail on pruned branches, an object each."
     )
+
+
+class ResultFrameFields(EarlierFrameFields):
+    """One frame."""
+
+    postures: Annotated[list[ResultPosture], FailFast()] = Field(
+        description="The whole bodies that are listed, of which the probabilities are."
+    )
+    set: ResultSet | None = Field(default=None, description="All that the frame can be.")
+    unlisted: Count = Field(
+        default=0, description="How many whole bodies of the set are not listed, at most."
+    )
+    unlisted_probability: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="What these hold at most, of the probability of all."
+    )
+    answer: ResultAnswer | None = Field(default=None, description="What is to be said of the frame first.")
 
 
 PathPoints = Annotated[
@@ -207,7 +231,7 @@ class ResultDetails(FileModel):
     inferred: list[list[dict[str, ResultInferred]] | None] | None = None
 
 
-class ResultFile(FileModel):
+class EarlierResultFile(FileModel):
     """Every survivor of every frame of a view."""
 
     hints: ClassVar[Mapping[str, str]] = {"frames": "write the result again with posekit recover"}
@@ -217,5 +241,12 @@ class ResultFile(FileModel):
     joint_names: Annotated[Names, AfterValidator(_tree_order)]
     configuration_names: Names
     settings: dict[str, Any]
-    frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]
+    frames: Annotated[list[EarlierFrameFields], Field(min_length=1), FailFast()]
     paths: ResultPaths | None = Field(default=None, description="One person through all frames.")
+
+
+class ResultFile(EarlierResultFile):
+    """The set of every frame of a view, and of its whole bodies those that hold most of the probability."""
+
+    schema_: Literal["posekit.result/2"] = Field(alias="schema")  # type: ignore[assignment]
+    frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]  # type: ignore[assignment]

@@ -16,12 +16,13 @@ from posekit.formats.own import (
     view_schema,
 )
 from posekit.formats.own import nearer as nearer_schema
-from posekit.formats.own.result import RESULT_SCHEMA
+from posekit.formats.own.result import EARLIER_RESULT_SCHEMA, RESULT_SCHEMA
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.tables.file_model import FileModel
 
 _MODELS: Final[dict[str, type[FileModel]]] = {
     view_schema.VIEW_SCHEMA: view_schema.ViewFile,
+    EARLIER_RESULT_SCHEMA: result_schema.EarlierResultFile,
     RESULT_SCHEMA: result_schema.ResultFile,
     postures_schema.POSTURES_SCHEMA: postures_schema.PosturesFile,
     report_schema.REPORT_SCHEMA: report_schema.ReportFile,
@@ -42,7 +43,7 @@ def schema(name: str) -> dict[str, Any]:
     Parameters
     ----------
     name : str
-        One of `SCHEMA_NAMES`, or its middle: ``"posekit.view/1"``, ``"view"``.
+        One of `SCHEMA_NAMES`, or its middle, which is the newest of that kind: ``"posekit.view/1"``, ``"view"``.
 
     Returns
     -------

@@ -29,24 +29,33 @@ class Likelihoods:
 
     schema_title: ClassVar = ("ResultRefined", "How likely and how sure a survivor is that was refined.")
 
-    chi2: Array = column("Sum of squares of what is off over its standard deviations.", batch_place=4)
+    chi2: Array = column(
+        "Sum of squares of what is off over its standard deviations.", digits=5, batch_place=4
+    )
     dof: Array = column("Its degrees of freedom.", whole=True)
-    p: Array = column("The probability that noise alone gives a chi2 as large.")
+    p: Array = column(
+        "The probability that noise alone gives a chi2 as large.", digits=5, detail=True, null="number"
+    )
     merged: Array = column("How many other branches became the same posture.", whole=True)
     covariance: Array = column(
         "Of every joint: xx, xy, xz, yy, yz, zz, in the square of `unit`.",
         shape=(len(JOINTS), 6),
         length_power=2,
         symmetric=True,
+        detail=True,
         null="row",
     )
     size: Array | None = column(
         "By what factor the body is larger than the lengths say, as its neck's depth tells; 1 where nothing does.",
+        digits=6,
+        detail=True,
         null="number",
         default=None,
     )
     size_deviation: Array | None = column(
         "Standard deviation of the logarithm of that, beside what the covariance has of it.",
+        digits=5,
+        detail=True,
         null="number",
         default=None,
     )
@@ -84,11 +93,17 @@ class SurvivorColumns:
     schema_title: ClassVar = ("ResultPosture", "One survivor.")
 
     joints: Array = column(
-        "In tree order, OpenCV camera frame, in `unit`.", shape=JOINTS_SHAPE, length_power=1, null="number"
+        "In tree order, OpenCV camera frame, in `unit`.",
+        shape=JOINTS_SHAPE,
+        length_power=1,
+        decimals=0,
+        null="number",
     )
     q: Array = column(
         "Configuration in Pinocchio's order: metres and radians whatever the unit.",
         shape=(None,),
+        decimals=1,
+        detail=True,
         null="number",
         flat_prefix="q",
         batch_place=7,
@@ -101,6 +116,8 @@ class SurvivorColumns:
     margins: Mapping[str, Array] = column(
         "By validator: the distance to the nearest bound, in the validator's own unit.",
         by_check=True,
+        digits=5,
+        detail=True,
         null="number",
         flat_prefix="margin",
         batch_place=5,
@@ -110,6 +127,8 @@ class SurvivorColumns:
     fk_distance: Array = column(
         "From the joints to the forward kinematics of q, in `unit`.",
         length_power=1,
+        digits=5,
+        detail=True,
         null="number",
         batch_place=6,
         asked_by="q",
@@ -117,6 +136,8 @@ class SurvivorColumns:
     length_residual: Array = column(
         "Length lost where a ray is tangent, in `unit`.",
         length_power=1,
+        digits=5,
+        detail=True,
         null="number",
         batch_place=3,
         in_motion=True,
@@ -124,6 +145,7 @@ class SurvivorColumns:
     scales: Array | None = column(
         "Uncalibrated: pixels a `unit` that it was recovered at.",
         key="scale",
+        digits=7,
         length_power=-1,
         null="number",
         batch_place=2,
@@ -133,10 +155,12 @@ class SurvivorColumns:
         "Joints that were not seen; those of `joints` are in the middle of their sets.",
         kind="objects",
         of=Inferred,
+        detail=True,
         default=None,
     )
     probability: Array | None = column(
         "That it is the one nearest to the truth; over a frame they sum to one.",
+        digits=5,
         lower=0,
         upper=1,
         everywhere=True,

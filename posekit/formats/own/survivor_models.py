@@ -16,33 +16,54 @@ MAX_EXTENT: Final = 1000
 """Numbers of an array whose extent no schema says, as that of q."""
 
 
+MAX_ROWS: Final = 1_000_000
+"""Rows of a table of a frame."""
+
+
 @cache
-def model_of(table: Any) -> type[FileModel]:
+def model_of(table: Any, *, whole: bool = False) -> type[FileModel]:
     """Make the model of the objects that hold one row of a table each.
 
     Parameters
     ----------
     table : type
         A dataclass of columns, with its name and description in schemas as `schema_title`.
+    whole : bool
+        Whether no detail may be left out.
     """
     fields: dict[str, Any] = {}
     for column in columns_in(table).values():
-        kind = _annotation(column)
+        kind = annotation_of(column, whole=whole)
         fields[column.key] = (
             (kind | None, Field(default=None, description=column.meaning))
             if column.optional
+            else (kind, Field(default=None, description=column.meaning))
+            if column.detail and not whole
             else (kind, Field(description=column.meaning))
         )
     name, doc = table.schema_title
     return create_model(name, __base__=FileModel, __doc__=doc, **fields)
 
 
-def _annotation(column: Column) -> Any:
+@cache
+def table_model_of(table: Any) -> type[FileModel]:
+    """Make the model of an object that holds a table whole: a list for each column (`frame_tables`)."""
+    fields: dict[str, Any] = {}
+    for column in columns_in(table).values():
+        kind: Any = annotation_of(column)
+        if not column.once:
+            kind = Annotated[list[kind], Field(max_length=MAX_ROWS), FailFast()]
+        fields[column.key] = (kind, Field(description=column.meaning))
+    name, doc = table.schema_title
+    return create_model(name, __base__=FileModel, __doc__=doc, **fields)
+
+
+def annotation_of(column: Column, *, whole: bool = False) -> Any:
     """Return the type of one survivor's value in JSON."""
     if column.kind == "str":
         return str if column.longest is None else Annotated[str, Field(max_length=column.longest)]
     if column.kind == "table":
-        return model_of(column.of)
+        return model_of(column.of, whole=whole)
     if column.kind == "objects":
         model: Any = model_of(column.of)
         return Annotated[dict[str, model], named(JOINTS, "joint")]

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.column import Column, columns_in
+from posekit.formats.own.digits import Precision
 from posekit.formats.own.npz import Ragged
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
+from posekit.formats.own.survivor_json import column_lists
 from posekit.formats.own.units import Unit
 from posekit.geometry import Array
 from posekit.safe_io.npz_file import Archive, not_finite
@@ -23,9 +25,17 @@ PADDED_PREFIXES: Final = tuple(
 )
 """What the names of padded arrays begin with."""
 
+Precisions = Sequence[Precision | None]
+
 
 def survivor_arrays(
-    table: type, frames: Sequence[Any], unit: Unit, *, carried: frozenset[str], within: str = ""
+    table: type,
+    frames: Sequence[Any],
+    unit: Unit,
+    *,
+    carried: frozenset[str],
+    within: str = "",
+    precision: Precisions = (),
 ) -> dict[str, NDArray[Any] | Ragged]:
     """Write the columns of some frames' survivors as arrays, in the unit of the file.
 
@@ -41,7 +51,10 @@ def survivor_arrays(
         Optional columns that are written: where a frame lacks one, as not known.
     within : str
         What the arrays' names begin with.
+    precision : sequence of Precision or None
+        The digits of the numbers of frames whose noise is known; where that is of all, they take half the bytes.
     """
+    precision = precision or [None] * len(frames)
     arrays: dict[str, NDArray[Any] | Ragged] = {}
     for name, column in columns_in(table).items():
         if column.optional and name not in carried:
@@ -52,22 +65,37 @@ def survivor_arrays(
                 column.of.unknown(len(frame.joints)) if each is None else each
                 for each, frame in zip(values, frames, strict=True)
             ]
-            arrays |= survivor_arrays(column.of, known, unit, carried=frozenset(), within=f"{name}/")
+            arrays |= survivor_arrays(
+                column.of, known, unit, carried=frozenset(), within=f"{name}/", precision=precision
+            )
         elif column.kind == "objects":
-            texts = [None if each is None else _objects(each, unit) for each in values]
+            texts = [
+                None if each is None else column_lists(column, each, unit, precision=short)
+                for each, short in zip(values, precision, strict=True)
+            ]
             arrays[name] = np.array(json.dumps(texts, allow_nan=False))
         elif column.by_check:
             for check in values[0]:
-                arrays[f"{name}/{check}"] = Ragged(rows=[each[check] for each in values], fill=np.nan)
+                rows = [each[check] for each in values]
+                arrays[f"{name}/{check}"] = padded_column(column, rows, unit, precision)
         else:
-            arrays[within + name] = Ragged(
-                rows=[
-                    np.full(len(frame.joints), column.fill) if each is None else _array(column, each, unit)
-                    for each, frame in zip(values, frames, strict=True)
-                ],
-                fill=column.fill,
-            )
+            rows = [
+                np.full(len(frame.joints), column.fill) if each is None else each
+                for each, frame in zip(values, frames, strict=True)
+            ]
+            arrays[within + name] = padded_column(column, rows, unit, precision)
     return arrays
+
+
+def padded_column(column: Column, rows: Sequence[Any], unit: Unit, precision: Precisions) -> Ragged:
+    """Write one column of some frames' survivors as one array; see `survivor_arrays`."""
+    if column.kind == "str":
+        return Ragged(rows=[np.array(row, dtype=np.str_) for row in rows], fill=column.fill)
+    if column.kind == "int":
+        return Ragged(rows=rows, fill=column.fill)
+    short = all(one is not None or not len(row) for one, row in zip(precision, rows, strict=True))
+    written = [column.in_file(row, unit, one) for row, one in zip(rows, precision, strict=True)]
+    return Ragged(rows=[row.astype(np.float32) for row in written] if short else written, fill=column.fill)
 
 
 def survivors_in(
@@ -108,11 +136,13 @@ def survivors_in(
         elif column.kind == "objects" or (column.optional and within + name not in archive.names):
             found[name] = None
         elif column.by_check:
-            each = {check: _rows(archive, f"{name}/{check}", column, count, ()) for check in extents[name]}
+            each = {
+                check: column_rows(archive, f"{name}/{check}", column, count, ()) for check in extents[name]
+            }
             found[name] = [{check: rows[k] for check, rows in each.items()} for k in range(len(count))]
         else:
             shape = tuple(extents[name] if extent is None else extent for extent in column.shape)
-            rows = _rows(archive, within + name, column, count, shape)
+            rows = column_rows(archive, within + name, column, count, shape)
             found[name] = (
                 [each.tolist() for each in rows]
                 if column.kind == "str"
@@ -132,20 +162,13 @@ def _tables(archive: Archive, column: Column, count: NDArray[np.int64], unit: Un
     return [None if np.isnan(row[names[0]]).any() else column.of(**row) for row in rows]
 
 
-def _rows(
+def column_rows(
     archive: Archive, name: str, column: Column, count: NDArray[np.int64], shape: tuple[int | None, ...]
 ) -> list[Array]:
+    """Read one column of all frames' survivors as the file has it."""
     kinds = {"str": "U", "int": "iu"}.get(column.kind, "f")
     rows = archive.ragged(name, kinds, count, shape)
     for row in rows if kinds == "f" else ():
         if np.isinf(row).any():
             raise not_finite(archive.path, name, row)
     return rows
-
-
-def _array(column: Column, values: Any, unit: Unit) -> NDArray[Any]:
-    return np.array(values, dtype=np.str_) if column.kind == "str" else column.in_file(values, unit)
-
-
-def _objects(rows: Sequence[Mapping[str, Any]], unit: Unit) -> list[dict[str, Any]]:
-    return [{name: one.fields(unit) for name, one in row.items()} for row in rows]
