@@ -36,11 +36,17 @@ const page = (() => {
     return `${(100 * share).toFixed(1)} %`;
   }
 
-  // Chooses a frame; the survivor with the same near-far choices stays chosen where it is there too.
+  function likeliest() {
+    const { probability } = frame();
+    return probability?.length ? probability.indexOf(Math.max(...probability)) : 0;
+  }
+
+  // Chooses a frame; the survivor with the same near-far choices stays chosen where it is there too, else the likeliest.
   function chooseFrame(index) {
     const code = frame().branches?.[state.survivor];
     state.frame = Math.min(Math.max(index, 0), DATA.frames.length - 1);
-    state.survivor = Math.max(0, frame().branches?.indexOf(code) ?? 0);
+    const same = frame().branches?.indexOf(code) ?? -1;
+    state.survivor = same < 0 ? likeliest() : same;
     state.scale = null;
     byId("frame").value = state.frame;
     showTime();
@@ -340,6 +346,7 @@ const page = (() => {
   byId("play").onclick = play;
   for (const tab of document.querySelectorAll("#tabs button")) tab.onclick = () => chooseTab(tab.dataset.tab);
   document.addEventListener("keydown", keys);
+  state.survivor = likeliest();
   showSettings();
   // Without WebGL meshcat's viewer throws when it is made, and scene.js is never reached.
   window.addEventListener("error", () => {
