@@ -86,7 +86,9 @@ class _LeafSearch:
         self.contradicted: list[Contradiction] = []
         possible = (self.p >= REJECTION_PROBABILITY) & ~begun.search.hopeless
         self.score = np.where(possible, 0.0, -np.inf)
-        self.alike = alike(begun, frame) if self._uncertain else np.arange(count)
+        # Where lengths vary a branch may have a valley of postures, in which searches stop here and there.
+        vary = begun.search.problem.shape_weight is not None
+        self.alike = alike(begun, frame) if vary else np.arange(count)
         if not listing.all:
             self.joints = begun.joints
             self._rate(np.flatnonzero(possible), begun.promised[possible])
@@ -114,11 +116,6 @@ class _LeafSearch:
             survivors=RefinedSurvivors.of(merged, self.known[self.row]),
             made_of=(FactoredLeaves.of(self.begun, self.frame, legal),),
         )
-
-    @property
-    def _uncertain(self) -> bool:
-        """Whether lengths are, so that one branch may have a valley of postures."""
-        return bool(self.begun.observed.size_deviation) and self.begun.observed.root is not None
 
     def _rate(self, rows: NDArray[np.intp], chi2: Array) -> None:
         """Score some leaves as they are now."""
