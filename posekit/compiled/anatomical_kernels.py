@@ -15,6 +15,7 @@ from typing import Any
 
 from posekit.compiled.angle_kernels import direction, worst
 from posekit.compiled.frame_kernels import ROOM_AT
+from posekit.compiled.noise_kernels import ALLOWED_AT, BLUR_AT, beside, loosened
 from posekit.compiled.rigid_kernels import rigid_frame, unknown
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
@@ -203,11 +204,13 @@ def writing(w: Array, at: int, loose: Any, to: int) -> None:
         low, value, high = w[LOW_AT + k], w[READ_AT + k], w[HIGH_AT + k]
         if math.isnan(low + value + high):
             continue
-        beyond = max(low - value, value - high) - (loose if k == OF_ROTATION else w[at + AT_TOLERANCE])
-        edge = edge or abs(beyond) <= CLEAR_DEGREES
+        outside = max(low - value, value - high)
+        tolerance = loose if k == OF_ROTATION else w[at + AT_TOLERANCE]
+        most = max(most, outside - tolerance)
+        beyond = outside - loosened(w, place, tolerance, 1.0)
+        edge = edge or abs(beyond) <= CLEAR_DEGREES + w[BLUR_AT] * PER_RADIAN
         if beyond > 0 and first == NO_VIOLATION:
             first = place
-        most = max(most, beyond)
     w[WORST_AT + to], w[FIRST_AT + to] = most, NOT_CLEAR if edge else first
 
 
@@ -224,6 +227,7 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
     level = math.sqrt(ux * ux + uz * uz)
     if not (level > SINGULAR_SINE and w[at + AT_BRANCHES] > 0):
         return NOT_CLEAR
+    beside(w, level, uy)
     alpha, beta = math.atan2(-ux, -uz) * w[at + AT_SIGNS], math.atan2(uy, level) * w[at + AT_SIGNS + 1]
     flexion, abduction = alpha * PER_RADIAN, beta * PER_RADIAN
     rotation, hinge, loose, free = math.nan, math.nan, math.inf, False
@@ -262,6 +266,8 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
             offset = twist * PER_RADIAN - (1.0 - down) * from_side
     else:
         w[READ_AT + OF_ELEVATION], w[READ_AT + OF_PLANE] = math.nan, math.nan
+    # The judge chooses among writings by the tolerance without noise: one that this allows, noise of a degree does too.
+    allowed = w[ALLOWED_AT] if w[ALLOWED_AT] > 0 else 1.0
     count = 0
     for branch in range(int(w[at + AT_BRANCHES])):
         if branch == 1:
@@ -282,13 +288,13 @@ def anatomical(w: Array, at: int) -> Any:  # noqa: PLR0912, PLR0915 - a call cos
             if math.isnan(known) or not bounds(w, at, offset, free):
                 return NOT_CLEAR
             writing(w, at, loose, count)
-            if w[WORST_AT + count] < -CLEAR_DEGREES:
+            if w[WORST_AT + count] < -CLEAR_DEGREES and allowed >= 1.0:
                 return NO_VIOLATION
             count += 1
     least = math.inf
     for i in range(count):
         least = min(least, w[WORST_AT + i])
-    if not least > CLEAR_DEGREES:
+    if not (least > CLEAR_DEGREES or allowed < 1.0):
         return NOT_CLEAR
     first = NO_VIOLATION
     for i in range(count):

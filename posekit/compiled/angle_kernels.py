@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from posekit.compiled.frame_kernels import ROOM_AT
+from posekit.compiled.noise_kernels import ALLOWED_AT, BLUR_AT, beside, loosened
 from posekit.compiled.rigid_kernels import between, hips, rigid_frame, spine_hips, torso, unit, unknown
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
@@ -23,6 +24,9 @@ from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 
 CLEAR_RADIANS = 1e-9
 """Radians, or what is compared with them, within which nothing is clear: a million times the rounding."""
+
+DEGREE = math.pi / 180.0
+"""A degree, radians."""
 
 SINGULAR_SINE = 1e-5
 """Sine below which an angle is nearly free, and rounding is not small any more."""
@@ -71,8 +75,8 @@ def verdict(w: Array, count: int, width: int, tolerance: Any, loose: Any) -> Any
         if chosen < 0 and w[COST_AT + b] < least + TIED_ANGLES_RADIANS:
             chosen = b
     for k in range(width):
-        beyond = w[OVER_AT + 4 * chosen + k] - (loose if k == 2 else tolerance)
-        if abs(beyond) <= CLEAR_RADIANS:
+        beyond = w[OVER_AT + 4 * chosen + k] - loosened(w, k, loose if k == 2 else tolerance, DEGREE)
+        if abs(beyond) <= CLEAR_RADIANS + w[BLUR_AT]:
             return NOT_CLEAR
         if beyond > 0:
             return k
@@ -231,6 +235,7 @@ def limb(w: Array, at: int) -> Any:
     if not level > SINGULAR_SINE * SINGULAR_SINE:
         return NOT_CLEAR
     level = math.sqrt(level)
+    beside(w, level, uy)
     tolerance, unseen = w[at + 12], w[at + 13]
     alpha, beta = math.atan2(-ux, -uz), math.atan2(uy, level)
     first = outside(alpha * w[at], w[at + 4], w[at + 8])
@@ -263,7 +268,10 @@ def limb(w: Array, at: int) -> Any:
             return NOT_CLEAR
         least = min(max(first, second), max(first_turned, second_turned))
         least = max(least, min(bent, back), 0.0) + STRAIGHT_COSTS * loose + 2 * TIED_ANGLES_RADIANS
-        clear = tolerance > unseen * loose * (1 + CLEAR_RADIANS) and least < tolerance - CLEAR_RADIANS
+        allowed = tolerance * w[ALLOWED_AT] if w[ALLOWED_AT] > 0 else tolerance
+        clear = (
+            tolerance > unseen * loose * (1 + CLEAR_RADIANS) and least < allowed - CLEAR_RADIANS - w[BLUR_AT]
+        )
         return NO_VIOLATION if clear else NOT_CLEAR
     loose = tolerance / bend
     if abs(loose - unseen) <= CLEAR_RADIANS * loose:

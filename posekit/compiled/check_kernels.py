@@ -13,10 +13,17 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from posekit.compiled import anatomical_kernels, angle_kernels, projected_kernels, rigid_kernels
+from posekit.compiled import (
+    anatomical_kernels,
+    angle_kernels,
+    noise_kernels,
+    projected_kernels,
+    rigid_kernels,
+)
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
 from posekit.compiled.frame_kernels import PRESUMED_AT
+from posekit.compiled.noise_kernels import AT_COUNT, AT_PAIRS, PAIR_NUMBERS, allow, forget
 from posekit.compiled.projected_kernels import head_plane, hip_plane, projected_ball, projected_hinge
 from posekit.compiled.rigid_kernels import (
     distance,
@@ -37,6 +44,7 @@ from posekit.compiled.screen_kinds import (
     OF_HIP_PLANE,
     OF_LIMB,
     OF_NECK,
+    OF_NOISY,
     OF_PELVIS,
     OF_PLACEMENT,
     OF_PROJECTED_BALL,
@@ -135,7 +143,25 @@ def onto(x: Any, y: Any, z: Any, q: Array, at: int) -> None:
     q[at], q[at + 1], q[at + 2], q[at + 3] = -sign * y / size, sign * x / size, 0.0, w / size
 
 
-def screen(kind: int, w: Array, at: int) -> Any:
+def noisy(w: Array, at: int) -> Any:
+    """Screen an angle as another screen does, with what noise allows (`posekit.compiled.noise_kernels`)."""
+    if not allow(w, at):
+        return NOT_CLEAR
+    kind, own = int(w[at]), at + AT_PAIRS + PAIR_NUMBERS * int(w[at + AT_COUNT])
+    found = NOT_CLEAR
+    if kind == OF_ANATOMICAL_LIMB:
+        found = int(anatomical(w, own))
+    elif kind == OF_LIMB:
+        found = int(limb(w, own))
+    elif kind == OF_PELVIS:
+        found = int(pelvis(w, own))
+    elif kind == OF_NECK:
+        found = int(neck(w, own))
+    forget(w)
+    return found
+
+
+def screen(kind: int, w: Array, at: int) -> Any:  # noqa: PLR0912 - a branch a kind
     """Screen one posture by one check, of a kind; see `posekit.compiled.frame_kernels.screen`."""
     if kind == OF_CAPSULES:
         return capsules(w, at)
@@ -147,6 +173,8 @@ def screen(kind: int, w: Array, at: int) -> Any:
         return anatomical(w, at)
     if kind == OF_SIDE:
         return side(w, at)
+    if kind == OF_NOISY:
+        return noisy(w, at)
     if kind == OF_PLACEMENT:
         return placement(w, at)
     if kind == OF_PROJECTED_BALL:
@@ -164,7 +192,7 @@ def screen(kind: int, w: Array, at: int) -> Any:
     return NOT_CLEAR
 
 
-KERNEL_PARTS = (rigid_kernels, angle_kernels, anatomical_kernels, projected_kernels)
+KERNEL_PARTS = (rigid_kernels, noise_kernels, angle_kernels, anatomical_kernels, projected_kernels)
 """Other modules whose kernels are compiled with these."""
 
 COMPILED_TYPES = {
@@ -180,6 +208,7 @@ COMPILED_TYPES = {
     "apart": "",
     "onto": "",
     "capsules": "",
+    "noisy": "(f8[::1], i8)",
     "screen": "",
 }
 """The kernels, in the order in which they need each other, with the types of those that are called.

@@ -16,6 +16,7 @@ OF_PROJECTED_HINGE: Final = 8
 OF_HIP_PLANE: Final = 9
 OF_HEAD_PLANE: Final = 10
 OF_SIDE: Final = 11
+OF_NOISY: Final = 12
 """Kinds of screens."""
 
 CAPSULE_NUMBERS: Final = 14

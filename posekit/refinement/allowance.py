@@ -16,13 +16,15 @@ from functools import cached_property
 
 import numpy as np
 
+from posekit.compiled import screen_kinds as kernels
+from posekit.compiled.noise_kernels import LEAST_DEGREES, MIN_COSINE
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS, PARENTS, TORSO
-from posekit.tree import Check, Findings, Loosening, Place
+from posekit.tree import Check, Findings, Loosening, Place, Rule
 
-MIN_COSINE = 0.02
-"""Cosine of the abduction down to which the other angles' allowance is reckoned."""
+LOOSENED_KINDS = (kernels.OF_ANATOMICAL_LIMB, kernels.OF_LIMB, kernels.OF_NECK, kernels.OF_PELVIS)
+"""Screens that know what noise allows."""
 
 N_TRUNK_JOINTS = len(TORSO) + 2
 """Joints of torso and hips: the first six."""
@@ -87,18 +89,33 @@ class NoisyRange(Check):
         """The points that it reads."""
         return self.inner.points
 
+    @cached_property
+    def rule(self) -> Rule | None:
+        """The screen as numbers: what noise may do (`posekit.compiled.noise_kernels`), then those of the same check."""
+        inner = self.inner.rule
+        if inner is None or inner.kind not in LOOSENED_KINDS:
+            return None
+        pairs = [(*pair, 0) for pair in self._trunk] + [(*pair, 1) for pair in self._limb]
+        said = [inner.kind, self.bound, self.stretch, self.perspective, self._beside_abduction, len(pairs)]
+        return Rule(kind=kernels.OF_NOISY, numbers=np.concatenate([said, np.ravel(pairs), inner.numbers]))
+
+    @property
+    def _beside_abduction(self) -> bool:
+        """Whether the second place is an abduction."""
+        return len(self.places) > 1 and self.places[1].angle == "abduction"
+
     def judge(self, points: Array) -> Findings:
         """Judge postures; see `posekit.tree.Check`."""
         findings = self.inner.judge(points)
         tolerance = np.broadcast_to(findings.tolerance, findings.value.shape).copy()
-        if len(self.places) > 1 and self.places[1].angle == "abduction":
+        if self._beside_abduction:
             # Beside the abduction axis the first angle turns faster than the direction, and the rotation with it.
             abduction = np.radians(findings.value[:, 1])
             level = np.maximum(np.abs(np.cos(abduction)), MIN_COSINE)
             tolerance[:, 0] /= level
             if len(self.places) > 2:
                 tolerance[:, 2] += np.abs(np.sin(abduction)) / level
-        allowed = np.maximum(np.degrees(self.allowance(points)), 1e-3)[:, None]
+        allowed = np.maximum(np.degrees(self.allowance(points)), LEAST_DEGREES)[:, None]
         return replace(findings, tolerance=tolerance * allowed)
 
     def allowance(self, points: Array) -> Array:
