@@ -85,11 +85,12 @@ def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.int
     for part in (quick, slow):
         # To judge what is slow only to judge it again is slower still, unless compiled screens clear most of it.
         every = part is slow and not is_fast(0)
-        rows = np.arange(len(asked)) if every else np.flatnonzero(_doubtful(part, points))
+        doubtful = np.ones((len(points), len(part)), dtype=np.bool_) if every else _doubtful(part, points)
+        rows = np.flatnonzero(doubtful.any(axis=1))
         if not (part and len(rows)):
             continue
         open_ = np.ones(len(asked), dtype=np.bool_)
-        for judgement in judge(part, points[rows]):
+        for judgement in judge(_with_same_places(part, doubtful), points[rows]):
             bad = np.flatnonzero(judgement.violated.any(axis=1) & open_[rows])
             open_[rows[bad]] = False
             if bad.size:
@@ -99,16 +100,27 @@ def contradictions(checks: Sequence[Check], points: Array, asked: NDArray[np.int
 
 
 def _doubtful(checks: Sequence[Check], points: Array) -> NDArray[np.bool_]:
-    """Return which postures (N,) are not clearly valid by all checks, their screens asked where loops are compiled."""
-    doubtful = np.zeros(len(points), dtype=np.bool_)
+    """Return which postures are not clearly valid by which of C checks (N, C); compiled loops ask their screens."""
+    doubtful = np.zeros((len(points), len(checks)), dtype=np.bool_)
     fast = is_fast(0)
-    for check in checks:
+    for column, check in enumerate(checks):
         own = points[:, list(check.points)]
         if fast and check.rule is not None:
-            doubtful |= screened(check.rule, own)[0] != NO_VIOLATION
+            doubtful[:, column] = screened(check.rule, own)[0] != NO_VIOLATION
         else:
-            doubtful |= check.judge(own).violated.any(axis=1)
+            doubtful[:, column] = check.judge(own).violated.any(axis=1)
     return doubtful
+
+
+def _with_same_places(checks: Sequence[Check], doubtful: NDArray[np.bool_]) -> list[Check]:
+    """Return those of C checks that are doubtful anywhere (N, C), and those that judge a place of theirs too.
+
+    Of two that judge one place the later holds where it can.
+    """
+    places = {
+        where for check, found in zip(checks, doubtful.T, strict=True) if found.any() for where in check.where
+    }
+    return [check for check in checks if not places.isdisjoint(check.where)]
 
 
 def _contradiction(judgement: Judgement, bad: NDArray[np.intp], row: NDArray[np.intp]) -> Contradiction:
