@@ -180,6 +180,7 @@ class LimbEvidence:
 
 def _bell(seen: Array, expected: Array, blur: Array, turning: Array) -> Array:
     """Return the normal density of what is seen; an angle stands for those around it: their difference is noise."""
-    variance = blur * blur + (turning * _STEP) ** 2 / 12
-    off = seen - expected
-    return np.asarray(np.exp(-0.5 * off * off / variance) / np.sqrt(2 * np.pi * variance))
+    # Six digits are enough of a likelihood, and take a third of the time.
+    variance = np.asarray(blur * blur + (turning * _STEP) ** 2 / 12, dtype=np.float32)
+    off = np.asarray(seen - expected, dtype=np.float32)
+    return np.asarray(np.exp(-0.5 * off * off / variance) / np.sqrt(2 * np.pi * variance), dtype=np.float64)

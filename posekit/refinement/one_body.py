@@ -346,4 +346,6 @@ UNSEEN_PIXELS: Final = 15.0
 def _summed(logarithms: Array) -> Array:
     """Add likelihoods of which logarithms (N, K, ...) are given over the second axis."""
     most = logarithms.max(axis=1, keepdims=True)
-    return np.asarray(most[:, 0] + np.log(np.exp(logarithms - most).sum(axis=1)))
+    # Six digits are enough of a likelihood, and take a third of the time.
+    shares = np.exp((logarithms - most).astype(np.float32))
+    return np.asarray(most[:, 0] + np.log(shares.sum(axis=1, dtype=np.float64)))
