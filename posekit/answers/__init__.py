@@ -13,6 +13,7 @@ from posekit.answers.depth_order import DepthOrder as DepthOrder
 from posekit.answers.listed_bodies import ListedBodies as ListedBodies
 from posekit.answers.listed_bodies import ListedFrame as ListedFrame
 from posekit.answers.regions import JointRegions as JointRegions
+from posekit.answers.written import written_answer as written_answer
 from posekit.on_demand import on_demand
 
 if TYPE_CHECKING:

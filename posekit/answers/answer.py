@@ -39,12 +39,15 @@ class Answer:
         Of each representative and what it stands for; 0.95 or more together.
     depth : DepthOrder
         Which end of each segment is nearer, and how sure that is.
+    written : JointRegions, optional
+        The regions, where they were read; else they are found when they are asked for.
     """
 
     bodies: ListedBodies
     rows: NDArray[np.intp]
     probability: Array
     depth: DepthOrder
+    written: JointRegions | None = None
 
     def __post_init__(self) -> None:
         for values in (self.rows, self.probability):
@@ -72,7 +75,7 @@ class Answer:
     @cached_property
     def regions(self) -> JointRegions:
         """Where each joint is with 95 %, whichever of the postures it is."""
-        return joint_regions(self.bodies)
+        return joint_regions(self.bodies) if self.written is None else self.written
 
 
 def answers_of(frames: Sequence[ListedBodies]) -> list[Answer]:

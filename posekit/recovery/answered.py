@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.answers import Answer, ListedBodies, ListedFrame, answers_of
-from posekit.errors import InputError
+from posekit.answers import Answer, ListedBodies, ListedFrame, answers_of, written_answer
 from posekit.formats.own import Result
 from posekit.geometry import Array
 from posekit.ranking import deviation_of_tolerance
@@ -36,18 +35,12 @@ def answered(
 
 
 def result_answers(result: Result) -> list[Answer]:
-    """Make the answer of each frame of a result, as `Recovery.answers` does of a recovery.
+    """Return the answer of each frame of a result, as `Recovery.answers` has it of a recovery.
 
     Raises
     ------
     InputError
         Where the result does not say how probable its survivors are.
     """
-    told = [frame.probability for frame in result.frames if frame.probability is not None]
-    if len(told) < len(result.frames):
-        raise InputError(
-            "result: survivors without probabilities; expected them of all frames; recover the view again"
-        )
-    return answered(
-        result.frames, told, deviation_of_tolerance(rigid_of(result.settings, len(result.frames)))
-    )
+    off = deviation_of_tolerance(rigid_of(result.settings, len(result.frames)))
+    return [written_answer(frame, d) for frame, d in zip(result.frames, off.tolist(), strict=True)]

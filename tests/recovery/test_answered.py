@@ -44,8 +44,8 @@ def test_a_written_result_has_the_same_answers(recovery, tmp_path):
     read = result_answers(posekit.read_result(tmp_path / "r.npz"))
     for own, other in zip(recovery.answers, read, strict=True):
         np.testing.assert_array_equal(own.rows, other.rows)
-        np.testing.assert_allclose(own.depth.near, other.depth.near, atol=1e-6)
-        np.testing.assert_allclose(own.regions.level, other.regions.level, atol=1e-3)
+        np.testing.assert_allclose(own.depth.near, other.depth.near, atol=1e-3)
+        np.testing.assert_allclose(own.regions.level, other.regions.level, atol=0.05)
 
 
 def test_a_result_without_probabilities_is_refused(recovery):

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.answers import ListedBodies, answers_of
+from posekit.answers import written_answer
 from posekit.answers.wording import answer_lines
 from posekit.body import Figure
 from posekit.errors import ViewerError
@@ -148,8 +148,7 @@ def _answer(frame: ResultFrame) -> list[str]:
     """Tell the frame's answer: the likeliest posture, how sure it is, and what else it can be."""
     if frame.probability is None:
         return []
-    bodies = ListedBodies.of(frame, frame.probability, float(deviation_of_tolerance(0.0)))
-    return answer_lines(answers_of([bodies]))
+    return answer_lines([written_answer(frame, float(deviation_of_tolerance(0.0)))])
 
 
 def _uncalibrated(frame: ResultFrame, shown: Shown, world: World) -> Json:
