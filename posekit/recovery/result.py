@@ -61,11 +61,10 @@ def result_of(
         )
     ]
     settings = {**recovery.settings, **({"unrecovered": unrecovered} if unrecovered else {})}
-    written = [frame.precision.decimals for frame in frames if frame.precision is not None]
     return Result(
         unit=unit,
         configuration_names=recovery.figure.configuration_names,
-        settings=settings | ({"decimals": min(written)} if written else {}),
+        settings=settings,
         frames=frames,
         paths=None if following is None else _paths(following),
     )

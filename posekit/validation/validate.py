@@ -163,11 +163,11 @@ def recovered_with(result: Result) -> RecoveredWith:
     # Results of earlier versions, which are mute of it, did not ask for the side.
     if settings.get("shoulders", "undecided" if isinstance(lengths, dict) else "") == "undecided":
         figure = replace(figure, side_known=False)
-    return RecoveredWith(figure, _judged(settings))
+    return RecoveredWith(figure, _judged(settings, result.decimals))
 
 
-def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
-    """Return what frames were judged with."""
+def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettings:
+    """Return what frames were judged with, and by how much what a file says of them is off."""
     judged = settings.get("judged")
     kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
     asked = _number(settings, "contact_margin", 0.0)
@@ -178,8 +178,8 @@ def _judged(settings: Mapping[str, Any]) -> ValidateSettings:
             rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
             angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
             margins.append(_number(said, "contact", asked, within=within))
-    if "decimals" in settings:  # what was rounded may be off by that
-        step = math.sqrt(3) * 10.0 ** -_number(settings, "decimals", 0.0)
+    if decimals is not None:  # what was rounded may be off by that
+        step = math.sqrt(3) * 10.0**-decimals
         rigid, margins = [max(rigid) + step], [min(margins) - step]
         angles = [max(angles) + math.degrees(2 * step / SHORTEST_LIMB_METRES)]
     walkers, ranges = settings.get("walkers", "paper"), settings.get("ranges")

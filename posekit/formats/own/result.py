@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -99,7 +100,7 @@ class ResultFrame(SurvivorColumns):
         if self.answer is not None:
             self.answer.check_against(len(self.joints))
 
-    @property
+    @cached_property
     def precision(self) -> Precision | None:
         """The digits that its numbers have; None where they have all, as its noise is not known."""
         return None if self.refined is None else Precision.of(self.refined.covariance)
@@ -123,6 +124,8 @@ class Result:
         All with the same margins; all with groups or none, and with probabilities or none.
     paths : FollowedPaths, optional
         The person through all frames, where they were followed.
+    decimals : int, optional
+        Of a result that was read: how many decimals of metres positions have in frames whose noise is known.
     """
 
     unit: Unit
@@ -131,6 +134,7 @@ class Result:
     settings: Mapping[str, Any]
     frames: Sequence[ResultFrame]
     paths: FollowedPaths | None = None
+    decimals: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("joint_names", "configuration_names", "frames"):
@@ -159,6 +163,11 @@ class Result:
             for name in EVERYWHERE_COLUMNS:
                 if (getattr(frame, name) is None) != (getattr(first, name) is None):
                     raise _refused(f"{where}.{name}", f"{name} in some frames", "all frames or none with it")
+
+    @property
+    def written_decimals(self) -> int | None:
+        """How many decimals of metres positions of frames whose noise is known are written with."""
+        return min((one.precision.decimals for one in self.frames if one.precision), default=None)
 
 
 def _array(name: str, values: Array, shape: tuple[int, ...]) -> Array:

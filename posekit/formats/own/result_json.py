@@ -67,6 +67,7 @@ def result_of(document: object, path: str | Path) -> Result:
         settings=file.settings,
         frames=[_frame(frame, file.unit, extents, carried) for frame in file.frames],
         paths=None if file.paths is None else _paths(path, file.paths, file.unit),
+        decimals=file.decimals if isinstance(file, ResultFile) else None,
     )
 
 
@@ -85,13 +86,15 @@ def _paths(path: str | Path, given: ResultPaths, unit: Unit) -> FollowedPaths:
 
 def write_result_json(path: str | Path, result: Result) -> None:
     """Write a result as JSON; see `posekit.formats.own.write_result`."""
-    head = {
+    head: dict[str, Any] = {
         "schema": RESULT_SCHEMA,
         "unit": result.unit,
         "joint_names": list(result.joint_names),
         "configuration_names": list(result.configuration_names),
         "settings": dict(result.settings),
     }
+    if result.written_decimals is not None:
+        head["decimals"] = result.written_decimals
     if result.paths is not None:
         head["paths"] = result.paths.fields(result.unit)
     write_text(path, json_pieces(head, "frames", _frames(result)))

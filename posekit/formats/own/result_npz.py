@@ -93,6 +93,7 @@ def write_result_npz(path: str | Path, result: Result) -> None:
             within=_ANSWER,
             precision=[one or replace(ANSWER_PRECISION, binary=True) for one in precision],
         ),
+        **({} if result.written_decimals is None else {"decimals": np.array(result.written_decimals)}),
         "unlisted": np.array([frame.unlisted for frame in frames], dtype=np.int64),
         "unlisted_probability": np.array([frame.unlisted_probability for frame in frames]),
     }
@@ -189,6 +190,7 @@ def result_in(archive: Archive) -> Result:
             for index, own in enumerate(rows)
         ],
         paths=_followed(archive, len(time), unit),
+        decimals=int(archive.array("decimals", "iu", ())) if "decimals" in archive.names else None,
     )
 
 

@@ -250,3 +250,6 @@ class ResultFile(EarlierResultFile):
 
     schema_: Literal["posekit.result/2"] = Field(alias="schema")  # type: ignore[assignment]
     frames: Annotated[list[ResultFrameFields], Field(min_length=1), FailFast()]  # type: ignore[assignment]
+    decimals: Annotated[int, Field(ge=0, le=15)] | None = Field(
+        default=None, description="Of metres, of positions in frames whose noise is known."
+    )
