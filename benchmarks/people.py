@@ -30,9 +30,9 @@ from posekit.synthesis import Capture, clip_lengths, read_capture
 PELVIS_ABOVE_HIPS = 0.10
 """Metres: as the built-in figure and CMU's skeletons have it."""
 
-CHEST, NECK = (0.0, 0.236151, 0.0), (0.0, 0.223894, 0.0)
-SHOULDER, HIP = (-0.02405, 0.24350, 0.18311), (0.0, 0.0, 0.084887)
-UPPER_ARM, FOREARM, THIGH, SHANK = 0.274788, 0.258947, 0.421546, 0.409870
+CHEST_OFFSET, NECK_OFFSET = (0.0, 0.236151, 0.0), (0.0, 0.223894, 0.0)
+SHOULDER_OFFSET, HIP_OFFSET = (-0.02405, 0.24350, 0.18311), (0.0, 0.0, 0.084887)
+UPPER_ARM_LENGTH, FOREARM_LENGTH, THIGH_LENGTH, SHANK_LENGTH = 0.274788, 0.258947, 0.421546, 0.409870
 """Metres: offsets in the parent's frame (x forward, y up, z right; the left ones mirrored), and lengths."""
 
 N_NUMBERS = 44
@@ -104,14 +104,21 @@ def deep_mimic_joints(frames: Array) -> Array:
     """Return the 14 joints (T, 14, 3) of frames (T, 44) of a humanoid, metres, y up."""
     joints = np.full((len(frames), len(JOINTS), 3), np.nan)
     root, turned = frames[:, 1:4], _matrices(frames[:, 4:8])
-    chest_at, chest = root + turned @ np.array(CHEST), turned @ _matrices(frames[:, 8:12])
-    joints[:, JOINT["neck"]] = chest_at + chest @ np.array(NECK)
+    chest_at, chest = root + turned @ np.array(CHEST_OFFSET), turned @ _matrices(frames[:, 8:12])
+    joints[:, JOINT["neck"]] = chest_at + chest @ np.array(NECK_OFFSET)
     joints[:, JOINT["pelvis"]] = root + turned @ np.array([0.0, PELVIS_ABOVE_HIPS, 0.0])
     for side, leg, arm, sign in (("right", 16, 25, 1.0), ("left", 30, 39, -1.0)):
         mirror = np.array([1.0, 1.0, sign])
         for names, start, at, frame, offset, lengths in (
-            (("hip", "knee", "ankle"), leg, root, turned, HIP, (THIGH, SHANK)),
-            (("shoulder", "elbow", "wrist"), arm, chest_at, chest, SHOULDER, (UPPER_ARM, FOREARM)),
+            (("hip", "knee", "ankle"), leg, root, turned, HIP_OFFSET, (THIGH_LENGTH, SHANK_LENGTH)),
+            (
+                ("shoulder", "elbow", "wrist"),
+                arm,
+                chest_at,
+                chest,
+                SHOULDER_OFFSET,
+                (UPPER_ARM_LENGTH, FOREARM_LENGTH),
+            ),
         ):
             first = at + frame @ (np.array(offset) * mirror)
             upper = frame @ _matrices(frames[:, start : start + 4])

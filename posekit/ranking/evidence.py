@@ -77,7 +77,8 @@ class RankingEvidence:
         joints : array (N, 14, 3)
             Survivors, camera frame, metres; NaN where a joint is not known.
         lengths : mapping, optional
-            The person's, by segment name, metres. Without them and `chi2` the image says nothing.
+            The person's, by segment name, metres. Without them and `chi2` the image says
+            nothing, nor does foreshortening.
         frame : int array (N,), optional
             The frame of each survivor, from 0, in any order; without it all are of one frame.
         length_residual : array (N,), optional
@@ -135,9 +136,10 @@ class RankingEvidence:
     @property
     def possible(self) -> list[str]:
         """The names of the terms for which there is evidence."""
-        upright = self.up is not None
+        upright, seen = self.up is not None, self.lengths is not None or self.chi2 is not None
         there = {
-            "image": self.lengths is not None or self.chi2 is not None,
+            "image": seen,
+            "foreshortening": seen,
             "gravity": upright,
             "balance": upright,
             "contact": upright,

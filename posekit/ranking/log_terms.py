@@ -10,6 +10,7 @@ import numpy as np
 from posekit.geometry import Array
 from posekit.ranking.directions import directions
 from posekit.ranking.evidence import RankingEvidence
+from posekit.ranking.foreshortening import log_room
 from posekit.ranking.ground import standing
 from posekit.ranking.image_term import misfit
 from posekit.ranking.posture_prior import Prior
@@ -61,5 +62,7 @@ def _log_terms_of(
             yield "balance", prior.balance.judge(beside, CENTRE_OF_MASS_HEIGHT_METRES * sine)
         if "contact" in wanted:
             yield "contact", prior.contact.judge(apart, STANCE_WIDTH_METRES * sine)
+    if "foreshortening" in wanted:
+        yield "foreshortening", log_room(joints)
     if "depth" in wanted and evidence.depth is not None:
         yield "depth", evidence.depth.judge(joints[JOINT["neck"], 2], frame)

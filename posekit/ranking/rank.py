@@ -12,7 +12,7 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.ranking.evidence import RankingEvidence, numbers
 from posekit.ranking.log_terms import log_terms
-from posekit.ranking.posture_prior import TERM_NAMES, Prior
+from posekit.ranking.posture_prior import OF_POSTURES, TERM_NAMES, Prior
 from posekit.ranking.prior_file import load_prior
 from posekit.ranking.ranking import Ranking, softmax
 from posekit.safe_io import nearest
@@ -82,12 +82,16 @@ def rank(
     left_out = _left_out(without, added)
     prior = prior or load_prior()
     terms = log_terms(evidence, [name for name in TERM_NAMES if name not in left_out], prior)
-    # After a refinement chi2 says how well the image fits; it has a weight of its own.
+    # After a refinement chi2 says how well the image fits, and terms have weights of their own.
     refined = evidence.chi2 is not None
     if refined and "image" in terms:
         terms["image"] = _least_where_unknown(terms["image"], evidence.frame)
+    weights = prior.weights_of(refined)
+    coolness = 1.0 / (1.0 + (evidence.deviation / prior.image_temperature) ** 2)
     for name in terms:
-        terms[name] *= prior.weights["chi2" if refined and name == "image" else name]
+        terms[name] *= weights[name]
+        if refined and name not in OF_POSTURES:
+            terms[name] *= coolness[evidence.frame]
     for name, term in added.items():
         if name not in left_out:
             terms[name] = _added(name, term, evidence)

@@ -74,11 +74,10 @@ class Up:
         )
 
     @staticmethod
-    def of_camera(R_cam_world: ArrayLike, up_world: ArrayLike) -> Up:
+    def of_camera(R_cam_world: ArrayLike, up_world: ArrayLike, *, says: str = "known") -> Up:
         """Turn the world's up into a camera's frame: R_cam_world is (3, 3) or (F, 3, 3)."""
-        return Up(
-            direction=np.asarray(R_cam_world, dtype=np.float64) @ np.asarray(up_world, dtype=np.float64)
-        )
+        direction = np.asarray(R_cam_world, dtype=np.float64) @ np.asarray(up_world, dtype=np.float64)
+        return Up(direction=direction, says=says)
 
     @property
     def sine(self) -> float:

@@ -170,7 +170,7 @@ def body_of_clip(grower: Grower, noise: Noise, prior: Prior | None = None) -> Cl
     observed = replace(
         observed, root=RootPrior.along_ray(camera, root, depth=depth, lateral=LATERAL_METRES), walls=None
     )
-    directions = _directions(prior or load_prior())
+    directions = _directions(prior or load_prior("cmu"))
     find = partial(find_body, observed, directions=directions, sized=sized, stands_for=stands_for)
     estimate = find(known=noise.lengths)
     if not stated and _surprise(estimate, figure, noise.lengths) > 1:
@@ -246,12 +246,13 @@ def _density(prior: Prior, names: list[str], sine: float = 0.0) -> DirectionDens
     """Return the density of some directions of one block; the variance of `up` is as much more as it may be off."""
     block = next(block for block in prior.blocks if set(names) <= set(block.names))
     rows = [3 * block.names.index(name) + axis for name in names for axis in range(3)]
-    scale = block.student.scale[np.ix_(rows, rows)].copy()
+    student = block.student.moments
+    scale = student.scale[np.ix_(rows, rows)].copy()
     if "up" in names:
         at = 3 * names.index("up") + np.arange(3)
         scale[at, at] += sine**2
     return DirectionDensity(
-        mean=block.student.mean[rows],
+        mean=student.means[0, rows],
         whitening=np.linalg.inv(np.linalg.cholesky(scale)),
-        dof=block.student.dof,
+        dof=student.dof,
     )

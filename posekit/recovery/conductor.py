@@ -13,6 +13,7 @@ from posekit.body import Figure, LengthUncertainty, load_figure
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.formats.own.units import PER_METRE
+from posekit.ranking import Up
 from posekit.recovery.body import FigureBody, LiftedBody, loaded
 from posekit.recovery.camera_record import CameraRecords
 from posekit.recovery.fit_camera import CameraFit, fit_camera
@@ -21,6 +22,7 @@ from posekit.recovery.judged import record_of
 from posekit.recovery.noise import Noise
 from posekit.recovery.observed import lost_to, trunkless, with_reasons
 from posekit.recovery.person import FEWEST_CLIP_FRAMES, body_of, refuse_settings, uncertainty_of
+from posekit.recovery.ranked import up_of
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.rooting import tolerance_of
 from posekit.recovery.trees import FrameTrees, trees_of
@@ -152,9 +154,12 @@ def recover(
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = _frames(view, trees, fit, asked.group, bare)
     _refuse_impossible(frames)
-    record = _record(asked, tolerance, body.figure, frames, noise)
-    record |= {} if refiner is None or refiner.clip is None else {"one_body": refiner.clip.document()}
-    return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower)
+    up, clip = up_of(view.camera), None if refiner is None else refiner.clip
+    record = {
+        **_record(asked, tolerance, body.figure, frames, noise, up),
+        **({} if clip is None else {"one_body": clip.document()}),
+    }
+    return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
 
 
 def _refined(
@@ -209,6 +214,7 @@ def _record(
     figure: Figure,
     frames: Sequence[FrameRecovery],
     noise: Noise | None,
+    up: Up,
 ) -> dict[str, Any]:
     """Gather what decided the result; the noise of photographs only where one was refined with it."""
     photographs = any(frame.family is not None for frame in frames)
@@ -219,6 +225,7 @@ def _record(
         figure,
         [(frame.judged, frame.tolerance) for frame in frames],
         None if noise is None or unused else noise.document(),
+        up,
     )
 
 

@@ -42,6 +42,7 @@ def record_of(
     figure: Figure,
     frames: Sequence[tuple[Judged | None, Tolerance | None]],
     noise: Mapping[str, Any] | None,
+    up: Up,
 ) -> dict[str, Any]:
     """Gather the ``settings`` of a result: everything that decided it, besides the view.
 
@@ -57,6 +58,8 @@ def record_of(
         How each frame was judged, and with what; None where nothing was grown.
     noise : mapping or None
         What noise frames were refined with.
+    up : Up
+        Which way is up in the camera's frame.
     """
     ranges = ranges_of(asked)
     return {
@@ -85,7 +88,7 @@ def record_of(
             ),
         ),
         "noise": noise,
-        "ranking": {"up": Up.level().says, "prior": load_prior().name},
+        "ranking": {"up": up.says, "prior": load_prior().name},
         "versions": {name: _version(name) for name in RECORDED_PACKAGES},
         "asked": asked.to_json(),
     }

@@ -147,8 +147,8 @@ class _LeafSearch:
         mass, group = masses(np.where(self.leads, self.score, -np.inf), self.group)
         total = np.bincount(group, mass)
         left = np.bincount(group, np.where(waiting, mass, 0.0), len(total))
-        # A quarter of what may be left out is for those that are only foretold: of the rest the likeliest are listed.
-        spare = np.asarray(0.25 * (1.0 - self.listing.coverage) * total)
+        # A tenth of what may be left out is for those that are only foretold: of the rest the likeliest are listed.
+        spare = np.asarray(0.1 * (1.0 - self.listing.coverage) * total)
         wanted = waiting & (left > spare)[group]
         return np.flatnonzero(wanted if every else likeliest(np.where(wanted, mass, 0.0), group, spare))
 

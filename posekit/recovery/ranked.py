@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.formats.own import Result
+from posekit.formats.own import CameraModel, OpenCVModel, Result
 from posekit.geometry import Array
 from posekit.ranking import Ranking, RankingEvidence, Up, deviation_of_tolerance, rank
 from posekit.recovery.judged import rigid_of
@@ -33,8 +33,21 @@ class Survivors(Protocol):
         ...
 
 
-def ranked(frames: Sequence[Survivors], lengths: Mapping[str, float], deviation: ArrayLike) -> Ranking:
-    """Give every survivor of some frames a probability (`posekit.ranking.rank`), of a camera held level.
+def up_of(camera: CameraModel) -> Up:
+    """Return which way is up in a camera's frame: as its calibration says, else as if it were held level."""
+    if isinstance(camera, OpenCVModel) and camera.R is not None and camera.up:
+        axis = np.eye(3)["xyz".index(camera.up[1])] * (-1.0 if camera.up[0] == "-" else 1.0)
+        return Up.of_camera(camera.R, axis, says=f"known: the calibration's {camera.up}")
+    return Up.level()
+
+
+def ranked(
+    frames: Sequence[Survivors],
+    lengths: Mapping[str, float],
+    deviation: ArrayLike,
+    up: Up | None = None,
+) -> Ranking:
+    """Give every survivor of some frames a probability (`posekit.ranking.rank`).
 
     Parameters
     ----------
@@ -44,7 +57,10 @@ def ranked(frames: Sequence[Survivors], lengths: Mapping[str, float], deviation:
         The person's, by segment name, metres.
     deviation : float or array (F,)
         How far off the survivors of each frame are, metres.
+    up : Up, optional
+        Which way is up in the camera's frame (`up_of`); that of a camera held level if not given.
     """
+    up = up or Up.level()
     counts = [len(frame.joints) for frame in frames]
     frame = np.repeat(np.arange(len(frames)), counts)
     off = np.broadcast_to(np.asarray(deviation, dtype=np.float64), (len(frames),))
@@ -61,7 +77,7 @@ def ranked(frames: Sequence[Survivors], lengths: Mapping[str, float], deviation:
         (
             rows,
             rank_postures(
-                joints[rows], lengths, frame[rows], residual[rows], chi2[rows] if known else None, off
+                joints[rows], lengths, frame[rows], residual[rows], chi2[rows] if known else None, off, up
             ),
         )
         for known in (False, True)
@@ -83,8 +99,9 @@ def rank_postures(
     length_residual: Array | None,
     chi2: Array | None,
     deviation: Array,
+    up: Up,
 ) -> Ranking:
-    """Rank postures (N, 14, 3) of frames (N,), with what `RankingEvidence.of` takes, of a camera held level."""
+    """Rank postures (N, 14, 3) of frames (N,), with what `RankingEvidence.of` takes."""
     return rank(
         RankingEvidence.of(
             joints,
@@ -93,7 +110,7 @@ def rank_postures(
             length_residual=length_residual,
             chi2=chi2,
             deviation=deviation,
-            up=Up.level(),
+            up=up,
         )
     )
 

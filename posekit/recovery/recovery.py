@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Final
 
@@ -17,7 +17,7 @@ from posekit.formats.own import Family, Inferred, Root
 from posekit.formats.own.posture_set import PostureSet
 from posekit.geometry import Array
 from posekit.objects.mirror import mirrored
-from posekit.ranking import Ranking, deviation_of_tolerance
+from posekit.ranking import Ranking, Up, deviation_of_tolerance
 from posekit.recovery.camera_record import CameraRecords
 from posekit.recovery.grouping import group_postures
 from posekit.recovery.ranked import ranked
@@ -355,6 +355,8 @@ class Recovery:
         Everything that decided the result.
     grower : Grower, optional
         What grew the trees: it can tell what would have admitted a posture (`posekit.recovery.least_violation`).
+    up : Up
+        Which way is up in the camera's frame.
     """
 
     figure: Figure
@@ -362,6 +364,7 @@ class Recovery:
     frames: list[FrameRecovery]
     settings: Mapping[str, Any]
     grower: Grower | None = None
+    up: Up = field(default_factory=Up.level)
 
     @property
     def unrecovered(self) -> dict[str, list[int]]:
@@ -374,8 +377,9 @@ class Recovery:
 
     @cached_property
     def ranking(self) -> Ranking:
-        """The probability of every survivor of every frame (`posekit.ranking.rank`), of a camera held level."""
-        return ranked(self.frames, self.figure.lengths, [frame.spread for frame in self.frames])
+        """The probability of every survivor of every frame (`posekit.ranking.rank`)."""
+        spread = [frame.spread for frame in self.frames]
+        return ranked(self.frames, self.figure.lengths, spread, self.up)
 
     @cached_property
     def probability(self) -> list[Array]:

@@ -30,7 +30,7 @@ from posekit.recovery.leaf_search import blocks, refine_leaves
 from posekit.recovery.limb_walls import LimbWalls
 from posekit.recovery.listing import BodyListing
 from posekit.recovery.noise import Noise, contact_under_noise
-from posekit.recovery.ranked import rank_postures
+from posekit.recovery.ranked import rank_postures, up_of
 from posekit.recovery.refined_completion import RefinedCompletion
 from posekit.recovery.survival import LeafOutcomes, drop
 from posekit.recovery.trees import Batch, FrameTrees
@@ -270,9 +270,11 @@ class Refiner:
     def listing(self, lifted: Lifted) -> BodyListing:
         """Say how much is listed, and how likely postures are."""
         lengths, spread = self.grower.body.figure.lengths, self.spread(lifted)
+        up = up_of(self.grower.view.camera)
 
         def score(joints: Array, chi2: Array, frame: NDArray[np.intp]) -> Array:
-            ranking = rank_postures(joints, lengths, frame, None, chi2, np.full(len(lifted.frames), spread))
+            off = np.full(len(lifted.frames), spread)
+            ranking = rank_postures(joints, lengths, frame, None, chi2, off, up)
             return np.asarray(np.sum(list(ranking.terms.values()), axis=0))
 
         return BodyListing(coverage=self.grower.settings.coverage, score=score)

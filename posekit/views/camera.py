@@ -200,7 +200,14 @@ def _ideal(keypoints: KeyPoints, camera: CalibratedCamera) -> KeyPoints:
 def model_of(camera: CalibratedCamera) -> OpenCVModel:
     """Return what a view says of a camera, whose points are undistorted where its lens needs it."""
     pinhole = pinhole_of(camera)
-    return OpenCVModel(K=pinhole.K, distortion=pinhole.distortion, R=camera.R, t=camera.t, size=camera.size)
+    return OpenCVModel(
+        K=pinhole.K,
+        distortion=pinhole.distortion,
+        R=camera.R,
+        t=camera.t,
+        size=camera.size,
+        up=camera.up if camera.R is not None else "",
+    )
 
 
 def _says(camera: CalibratedCamera) -> str:

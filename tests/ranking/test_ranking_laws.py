@@ -94,17 +94,26 @@ def test_frames_are_ranked_by_themselves() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_rigid_motion_of_everything_changes_nothing(seed: int) -> None:
+def test_a_rigid_motion_of_everything_changes_nothing_but_how_it_is_seen(seed: int) -> None:
     joints, frame, residual = survivors()
+    unseen = ["foreshortening"]
     rng = np.random.default_rng(seed)
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     turn *= np.sign(np.linalg.det(turn))
     moved = joints @ turn.T + rng.normal(size=3)
-    here = ranked(joints, frame, residual)
-    there = ranked(moved, frame, residual, up=Up(direction=ups() @ turn.T))
+    here = ranked(joints, frame, residual, without=unseen)
+    there = ranked(moved, frame, residual, up=Up(direction=ups() @ turn.T), without=unseen)
     np.testing.assert_allclose(there.probability, here.probability, rtol=1e-6, atol=1e-12)
     for name, values in here.terms.items():
         np.testing.assert_allclose(there.terms[name], values, rtol=0, atol=1e-8)
+
+
+def test_a_camera_that_rolls_changes_nothing() -> None:
+    joints, frame, residual = survivors()
+    roll = np.array([[0.6, -0.8, 0], [0.8, 0.6, 0], [0, 0, 1]])
+    here = ranked(joints, frame, residual)
+    there = ranked(joints @ roll.T, frame, residual, up=Up(direction=ups() @ roll.T))
+    np.testing.assert_allclose(there.probability, here.probability, rtol=1e-6, atol=1e-12)
 
 
 def test_turning_the_body_but_not_up_changes_gravity_alone() -> None:
@@ -144,7 +153,7 @@ def test_a_term_left_out_leaves_the_others_as_they_are(name: str) -> None:
 def test_without_up_the_posture_is_judged_as_with_it() -> None:
     joints, frame, residual = survivors()
     with_up, without = ranked(joints, frame, residual), ranked(joints, frame, residual, up=None)
-    assert set(without.terms) == {"image", "posture"}
+    assert set(without.terms) == {"image", "posture", "foreshortening"}
     np.testing.assert_allclose(without.terms["posture"], with_up.terms["posture"], rtol=0, atol=1e-9)
     assert without.up == ""
     assert with_up.up == "known"

@@ -22,11 +22,13 @@ from posekit.ranking import (
     load_prior,
     rank,
 )
-from posekit.ranking.directions import DIRECTION_NAMES, directions
+from posekit.ranking.directions import DIRECTION_NAMES, LIMB_SEGMENTS, directions
+from posekit.ranking.evidence import DEFAULT_DEVIATION_METRES
+from posekit.ranking.foreshortening import log_room
 from posekit.ranking.ground import standing
 from posekit.ranking.image_term import MIN_DEVIATION_METRES
 from posekit.ranking.posture_prior import WEIGHT_NAMES
-from posekit.ranking.student import Student, digamma
+from posekit.ranking.student import StudentMixture, digamma
 from posekit.skeleton import JOINT, JOINTS
 from posekit.synthesis import random_postures
 
@@ -34,6 +36,7 @@ FIGURE = load_figure()
 LENGTHS = FIGURE.lengths
 STANDING = FIGURE.neutral_points[:14].copy()
 UP = np.array([0.0, 0.0, 1.0])
+POSTURE_ITSELF = ["posture", "foreshortening"]
 
 
 def columns(postures: Array) -> Array:
@@ -52,10 +55,10 @@ def test_digamma_is_scipys(x: float) -> None:
 def test_students_excess_is_scipys_density_over_its_mean() -> None:
     rng = np.random.default_rng(0)
     a = rng.normal(size=(5, 5))
-    student = Student(mean=rng.normal(size=5), scale=a @ a.T + np.eye(5), dof=4.0)
+    student = StudentMixture(means=rng.normal(size=5), scale=a @ a.T + np.eye(5), dof=4.0)
     x = rng.normal(size=(5, 8)) * 3
     for count in (2, 5):
-        law = stats.multivariate_t(student.mean[:count], student.scale[:count, :count], df=4.0)
+        law = stats.multivariate_t(student.means[0, :count], student.scale[:count, :count], df=4.0)
         wanted = law.logpdf(x[:count].T) + law.entropy()
         np.testing.assert_allclose(student.excess(x, (count,))[0], wanted, rtol=1e-9, atol=1e-9)
 
@@ -63,7 +66,7 @@ def test_students_excess_is_scipys_density_over_its_mean() -> None:
 def test_unknown_coordinates_are_left_out() -> None:
     rng = np.random.default_rng(1)
     a = rng.normal(size=(6, 6))
-    student = Student(mean=rng.normal(size=6), scale=a @ a.T + np.eye(6), dof=3.0)
+    student = StudentMixture(means=rng.normal(size=6), scale=a @ a.T + np.eye(6), dof=3.0)
     x = rng.normal(size=(6, 9))
     x[1, ::2] = np.nan
     x[5, ::3] = np.nan
@@ -71,15 +74,81 @@ def test_unknown_coordinates_are_left_out() -> None:
     for k in range(9):
         for row, count in enumerate((4, 6)):
             known = np.flatnonzero(np.isfinite(x[:count, k]))
-            law = stats.multivariate_t(student.mean[known], student.scale[np.ix_(known, known)], df=3.0)
+            law = stats.multivariate_t(student.means[0, known], student.scale[np.ix_(known, known)], df=3.0)
             assert found[row, k] == pytest.approx(law.logpdf(x[known, k]) + law.entropy(), abs=1e-9)
     assert (student.excess(np.full((6, 2), np.nan), (4, 6)) == 0).all()
 
 
 def test_the_mean_excess_of_draws_is_zero() -> None:
-    student = Student(mean=np.zeros(3), scale=np.diag([1.0, 4.0, 0.1]), dof=5.0)
-    draws = stats.multivariate_t(student.mean, student.scale, df=5.0, seed=2).rvs(40_000)
+    student = StudentMixture(means=np.zeros(3), scale=np.diag([1.0, 4.0, 0.1]), dof=5.0)
+    draws = stats.multivariate_t(student.means[0], student.scale, df=5.0, seed=2).rvs(40_000)
     assert student.excess(draws.T, (3,)).mean() == pytest.approx(0.0, abs=0.03)
+
+
+def mixture(seed: int, size: int = 4, count: int = 5, dof: float = 4.0) -> StudentMixture:
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(size, size))
+    return StudentMixture(
+        means=rng.normal(size=(count, size)) * 4,
+        share=rng.uniform(0.2, 1, count),
+        scale=a @ a.T + np.eye(size),
+        dof=dof,
+    )
+
+
+@pytest.mark.parametrize("dof", [4.0, 5.0, 4.3, 300.0])
+def test_a_mixture_is_as_dense_as_its_parts_together(dof: float) -> None:
+    """Differences of the log-density are those of the sum of scipy's densities, near and far."""
+    one = mixture(3, dof=dof)
+    x = np.random.default_rng(4).normal(size=(4, 700)) * np.geomspace(0.1, 50, 700)
+    for count in (2, 4):
+        laws = [stats.multivariate_t(m[:count], one.scale[:count, :count], df=dof) for m in one.means]
+        parts = np.array([law.logpdf(x[:count].T) for law in laws]) + np.log(one.shares)[:, None]
+        wanted = special.logsumexp(parts, axis=0)
+        found = one.excess(x, (count,))[0]
+        np.testing.assert_allclose(found - found[0], wanted - wanted[0], rtol=1e-8, atol=1e-8)
+
+
+def test_equal_parts_are_one() -> None:
+    one = mixture(5, count=1)
+    thrice = replace(one, means=np.repeat(one.means, 3, axis=0), share=np.array([1.0, 2.0, 3.0]))
+    x = np.random.default_rng(6).normal(size=(4, 20)) * 3
+    x[2, ::3] = np.nan
+    np.testing.assert_allclose(thrice.excess(x, (2, 4)), one.excess(x, (2, 4)), rtol=1e-9, atol=1e-9)
+    assert (one.moments.scale == one.scale).all()
+
+
+def test_the_moments_of_a_mixture_are_those_of_its_draws() -> None:
+    one = mixture(7, dof=6.0)
+    rng = np.random.default_rng(8)
+    which = rng.choice(5, 60_000, p=one.shares)
+    normal = rng.multivariate_normal(np.zeros(4), one.scale, size=60_000)
+    draws = one.means[which] + normal
+    np.testing.assert_allclose(one.moments.means[0], draws.mean(axis=0), rtol=0, atol=0.1)
+    np.testing.assert_allclose(one.moments.scale, np.cov(draws.T), rtol=0.05, atol=0.4)
+
+
+def test_foreshortening_is_zero_on_average_and_more_beside_the_picture() -> None:
+    """Far away rays are parallel; limbs whose segments point evenly everywhere say nothing on average."""
+    rng = np.random.default_rng(9)
+    joints = np.zeros((14, 3, 40_000))
+    for start, end in LIMB_SEGMENTS:
+        vector = rng.normal(size=(3, 40_000))
+        joints[end] = joints[start] + vector / np.linalg.norm(vector, axis=0)
+    joints[:, 2] += 1e6
+    room = log_room(joints)
+    assert room.mean() == pytest.approx(0.0, abs=0.03)
+    flat, deep = np.zeros((14, 3, 1)), np.zeros((14, 3, 1))
+    for k, (_, end) in enumerate(LIMB_SEGMENTS):
+        flat[end, 0], deep[end, 2] = k + 1, k + 1
+    flat[:, 2] += 1e6
+    deep[:, 2] += 1e6
+    assert log_room(flat)[0] >= room.max()
+    assert log_room(deep)[0] <= room.min() + 1e-6
+    # A photograph's rays are parallel wherever the body is put.
+    np.testing.assert_allclose(log_room(flat - 1e6), log_room(flat), rtol=0, atol=1e-4)
+    flat[LIMB_SEGMENTS[1][1]] = np.nan
+    assert np.isfinite(log_room(flat)).all()
 
 
 def test_directions_are_those_of_the_figures_frames() -> None:
@@ -257,14 +326,15 @@ def test_a_torso_is_no_more_rigid_than_torsos_are() -> None:
 def test_chi2_is_the_images_term_where_there_is_one() -> None:
     joints = random_joints(4)
     chi2 = np.array([1.0, 5.0, np.nan, np.inf])
-    ranking = rank(RankingEvidence.of(joints, LENGTHS, chi2=chi2), without=["posture"])
-    weight = load_prior().weights["chi2"]
+    ranking = rank(RankingEvidence.of(joints, LENGTHS, chi2=chi2), without=POSTURE_ITSELF)
+    weight = load_prior().weights_of(refined=True)["image"]
+    weight /= 1 + (DEFAULT_DEVIATION_METRES / load_prior().image_temperature) ** 2
     assert ranking.terms["image"][:2].tolist() == pytest.approx([-0.5 * weight, -2.5 * weight])
     assert ranking.terms["image"][2] == -np.inf  # as bad as the worst of its frame
     assert ranking.probability[2:].tolist() == [0, 0]
-    finite = rank(RankingEvidence.of(joints[:3], chi2=chi2[:3]), without=["posture"])
+    finite = rank(RankingEvidence.of(joints[:3], chi2=chi2[:3]), without=POSTURE_ITSELF)
     assert finite.terms["image"][2] == finite.terms["image"][1]
-    nothing = rank(RankingEvidence.of(joints[:2], chi2=np.full(2, np.nan)), without=["posture"])
+    nothing = rank(RankingEvidence.of(joints[:2], chi2=np.full(2, np.nan)), without=POSTURE_ITSELF)
     assert nothing.probability.tolist() == [0.5, 0.5]
     hopeless = rank(RankingEvidence.of(joints[:2], chi2=np.full(2, np.inf)), without=["posture"])
     assert hopeless.probability.tolist() == [0.5, 0.5]

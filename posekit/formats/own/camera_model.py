@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
+from posekit.cameras.calibrated import UP_AXES
 from posekit.errors import CameraError
+from posekit.safe_io import shown
 
 Array = NDArray[np.float64]
 
@@ -50,6 +52,8 @@ class OpenCVModel:
         Translation of the same, metres.
     size : (int, int), optional
         Width and height of the picture, pixels.
+    up : str
+        The world's axis that points against gravity, ``+x`` … ``-z``, where R is given; empty where nobody says.
     """
 
     K: Array
@@ -57,6 +61,7 @@ class OpenCVModel:
     R: Array | None = None
     t: Array | None = None
     size: tuple[int, int] | None = None
+    up: str = ""
 
     def __post_init__(self) -> None:
         camera = PinholeCamera(K=self.K, distortion=self.distortion)
@@ -76,6 +81,8 @@ class OpenCVModel:
             raise CameraError(f"t must be three finite numbers; got {self.t.tolist()}")
         if self.size is not None and not (len(self.size) == 2 and min(self.size) > 0):
             raise CameraError(f"size must be a positive width and height in pixels; got {self.size}")
+        if self.up not in UP_AXES:
+            raise CameraError(f"up must be one of {', '.join(UP_AXES[1:])}; got {shown(self.up)}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -175,6 +175,7 @@ def _in_metres(camera: LeeChenCamera | OpenCVCamera | ScaledOrthographicFields, 
             R=None if camera.R is None else np.array(camera.R, dtype=np.float64),
             t=None if camera.t is None else to_metres(camera.t, unit),
             size=None if camera.size is None else (camera.size[0], camera.size[1]),
+            up=camera.up or "",
         )
     scale = camera.scale
     return ScaledOrthographicModel(
@@ -199,6 +200,8 @@ def _camera_fields(camera: CameraModel, unit: Unit) -> dict[str, Any]:
         fields["t"] = from_metres(camera.t, unit).tolist()
     if camera.size is not None:
         fields["size"] = [int(extent) for extent in camera.size]
+    if camera.up:
+        fields["up"] = camera.up
     return fields
 
 

@@ -62,6 +62,9 @@ class OpenCVCamera(FileModel):
     size: Annotated[list[Pixels], Field(min_length=2, max_length=2)] | None = Field(
         default=None, description="Width and height of the picture, pixels."
     )
+    up: Literal["+x", "-x", "+y", "-y", "+z", "-z"] | None = Field(
+        default=None, description="The world's axis that points against gravity, where R is given."
+    )
 
 
 class ScaledOrthographicFields(FileModel):
@@ -128,6 +131,7 @@ class ViewFile(FileModel):
         "t": "t is three numbers in the view's unit",
         "distortion": "give the five numbers k1, k2, p1, p2, k3, or leave it out",
         "size": "size is [width, height] in whole pixels",
+        "up": "give +x, -x, +y, -y, +z or -z, or leave it out",
         "frames": "a view has at least one frame, each of them an object with time and image",
         "time": "give it in seconds",
     }
