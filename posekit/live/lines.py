@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from typing import IO, Any, Final
 
 import numpy as np
 
+from posekit.answers.depth_order import ANSWER_SEGMENTS
 from posekit.errors import InputError
 from posekit.formats.own import OpenCVModel
 from posekit.formats.own.live_schema import LiveFrame, LiveHeader, live_frame, live_header
@@ -108,7 +110,8 @@ def document_of(told: TrackedPosture) -> dict[str, Any]:
         "probability": _short(told.probability),
         "joints": _by_joint(told.joints),
         "deviation": _by_joint(told.deviation),
-        "nearer": {name: _short(one) for name, one in told.nearer.items()},
+        "near": {} if told.answer is None else _by_segment(told.answer.depth.near),
+        "far": {} if told.answer is None else _by_segment(told.answer.depth.far),
         "reason": told.reason,
         "path": None
         if path is None
@@ -131,6 +134,15 @@ def _by_joint(values: Array) -> dict[str, Any]:
     known = np.asarray(np.isfinite(values.reshape(len(JOINTS), -1)).all(axis=1)).tolist()
     rounded = np.round(values, WRITTEN_DECIMALS).tolist()
     return {name: one for name, one, there in zip(JOINTS, rounded, known, strict=True) if there}
+
+
+def _by_segment(values: Array) -> dict[str, float]:
+    """Name the segments of an answer (11,) of which something is known."""
+    return {
+        f"{JOINTS[start]}-{JOINTS[end]}": _short(one)
+        for (start, end), one in zip(ANSWER_SEGMENTS, values.tolist(), strict=True)
+        if not math.isnan(one)
+    }
 
 
 def _short(value: float) -> float:

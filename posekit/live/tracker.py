@@ -18,11 +18,11 @@ from posekit.following.survivor_frame import SurvivorFrame, check_order
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.live.sight import LiveCamera, LiveSight, likely_camera
-from posekit.live.tracked_posture import TrackedPosture, likeliest, nearer_ends
+from posekit.live.tracked_posture import TrackedPosture, deviation_from
 from posekit.recovery.body import loaded
 from posekit.recovery.conductor import recover
 from posekit.recovery.observed import NO_NECK
-from posekit.recovery.recovery import FrameRecovery
+from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.sequences import survivor_frames
 from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINTS
@@ -137,23 +137,19 @@ class Tracker:
             raise InputError(f"time: got {time}; expected a number of seconds; give every picture its time")
         check_order(self._last, time, self._frame)
         view = self.sight.view(points, time, root)
-        frame, reason, probability = None, NO_NECK, np.empty(0)
+        recovery, reason = None, NO_NECK
         if view is not None:
             try:
-                recovery = recover(view, self.settings)
-                frame, probability = recovery.frames[0], recovery.probability[0]
-                reason = "" if len(frame) else _lost(frame)
+                recovery, reason = recover(view, self.settings), ""
             except PosekitError as error:  # of this picture: the standing figure's had none
                 reason = str(error)
-        known = _nobody(time) if frame is None else survivor_frames([frame], _log([probability]))[0]
+        known, found = _found(recovery, time)
         told = TrackedPosture(
             frame=self._frame,
             time=time,
             survivors=len(known),
-            reason=reason.removeprefix("frames[0]: "),
             path=self._follower.push(known),
-            recovery=frame,
-            **_likeliest(frame, probability, known),
+            **{"reason": reason.removeprefix("frames[0]: ")} | found,
         )
         self._frame, self._last = self._frame + 1, time
         return told
@@ -163,29 +159,28 @@ class Tracker:
         return self._follower.finish()
 
 
-def _likeliest(frame: FrameRecovery | None, probability: Array, survivors: SurvivorFrame) -> dict[str, Any]:
-    """Return what a `TrackedPosture` says of the likeliest survivor; nothing where none is left."""
-    if frame is None or not len(frame):
-        return {}
-    best, deviation = likeliest(probability, survivors)
-    joints = frame.joints
-    return {
-        "joints": joints[best].copy(),
-        "probability": float(probability[best]),
-        "deviation": deviation,
-        "nearer": nearer_ends(probability, joints),
+def _found(recovery: Recovery | None, time: float) -> tuple[SurvivorFrame, dict[str, Any]]:
+    """Return the survivors of a picture, and what a `TrackedPosture` says of them."""
+    if recovery is None:
+        return SurvivorFrame(time=time, joints=np.empty((0, len(JOINTS), 3))), {}
+    frame, probability = recovery.frames[0], recovery.probability[0]
+    known = survivor_frames([frame], _log([probability]))[0]
+    if not len(frame):
+        return known, {"reason": _lost(frame), "recovery": frame}
+    answer = recovery.answers[0]
+    return known, {
+        "joints": answer.posture.copy(),
+        "probability": answer.sure,
+        "deviation": deviation_from(answer.posture, probability, known),
+        "answer": answer,
+        "recovery": frame,
     }
-
-
-def _nobody(time: float) -> SurvivorFrame:
-    """Return a picture in which nothing is known."""
-    return SurvivorFrame(time=time, joints=np.empty((0, len(JOINTS), 3)))
 
 
 def _lost(frame: FrameRecovery) -> str:
     """Say why nothing is left of a picture."""
     if frame.reason:
-        return frame.reason
+        return frame.reason.removeprefix("frames[0]: ")
     most = max(frame.rejected, key=frame.rejected.__getitem__)
     return f"no posture passes: most were lost to {most}"
 

@@ -9,8 +9,8 @@ from posekit.errors import InputError
 from posekit.following.survivor_frame import SurvivorFrame
 from posekit.formats.own import ScaledOrthographicModel
 from posekit.formats.skeleton_maps import load_skeleton_map
-from posekit.live.tracked_posture import likeliest, nearer_ends
-from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS, segment_name
+from posekit.live.tracked_posture import deviation_from
+from posekit.skeleton import JOINT, JOINTS
 from tests.live.conftest import PIXELS, SETTINGS, picture
 
 
@@ -21,10 +21,11 @@ def shown(tracker, seen, k, time):
 def test_a_picture_is_what_recover_finds_of_it_alone(tracker, seen, alone) -> None:
     for k, recovery in enumerate(alone):
         told = shown(tracker, seen, k, seen.time[k])
-        best = int(np.argmax(recovery.probability[0]))
+        answer = recovery.answers[0]
         assert told.survivors == len(recovery.frames[0]) > 0
-        assert told.probability == recovery.probability[0][best]
-        np.testing.assert_array_equal(told.joints, recovery.frames[0].joints[best])
+        assert told.probability == answer.sure
+        np.testing.assert_array_equal(told.joints, answer.posture)
+        np.testing.assert_array_equal(told.answer.depth.near, answer.depth.near)
         assert told.frame == k and told.time == seen.time[k] and told.reason == ""
 
 
@@ -133,23 +134,8 @@ def test_a_joint_is_off_by_its_own_deviation_and_by_where_the_others_are(rng) ->
     joints = rng.normal(size=(3, 14, 3))
     deviation = rng.uniform(0.01, 0.1, (3, 14))
     alone = SurvivorFrame(time=0.0, joints=joints[:1], deviation=deviation[:1])
-    np.testing.assert_allclose(likeliest(np.ones(1), alone)[1], deviation[0])
+    np.testing.assert_allclose(deviation_from(joints[0], np.ones(1), alone), deviation[0])
     p = np.array([0.2, 0.5, 0.3])
-    best, off = likeliest(p, SurvivorFrame(time=0.0, joints=joints, deviation=deviation))
+    off = deviation_from(joints[1], p, SurvivorFrame(time=0.0, joints=joints, deviation=deviation))
     drawn = [p[i] * (np.sum((joints[i] - joints[1]) ** 2, axis=1) + deviation[i] ** 2) for i in range(3)]
-    assert best == 1
     np.testing.assert_allclose(off, np.sqrt(sum(drawn)))
-
-
-def test_nearer_ends_are_the_survivors_that_have_them_nearer(rng) -> None:
-    joints = rng.normal(size=(5, 14, 3))
-    joints[:, JOINT["left_wrist"]] = np.nan
-    p = rng.dirichlet(np.ones(5))
-    found = nearer_ends(p, joints)
-    assert "left_elbow-left_wrist" not in found and len(found) == len(TREE_SEGMENTS) - 1
-    for start, end in TREE_SEGMENTS:
-        if JOINTS[end] != "left_wrist":
-            expected = sum(p[i] for i in range(5) if joints[i, end, 2] < joints[i, start, 2])
-            assert found[segment_name((start, end))] == pytest.approx(expected)
-    mirrored = nearer_ends(p, joints * [1, 1, -1])
-    assert all(mirrored[name] == pytest.approx(1 - one) for name, one in found.items())
