@@ -1,8 +1,9 @@
-"""Which ends of paths are followed while searching."""
+"""Which survivors, and which ends of paths, are looked at while searching."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +12,24 @@ from posekit.errors import InputError
 from posekit.geometry import Array
 
 
+TIED_COST: Final = 1e-9
+"""Cost by which survivors that are as likely may differ by rounding."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Beam:
-    """Which ends of paths are followed.
+    """What is looked at while searching.
 
     Parameters
     ----------
-    width : int
-        How many at most. As long as no path has a velocity, all survivors of a frame are followed.
-    slack : float
-        None whose cost is more than this above the cheapest.
+    coverage : float
+        Of a frame's survivors the likeliest that hold this share of the probability are looked at.
     survivors : int
-        How many survivors of a frame are looked at, those that cost least.
+        How many of them at most.
+    width : int
+        Paths are kept apart as long as there are no more; of more, those are merged that end in the same survivor.
+    slack : float
+        No end of a path is followed whose cost is more than this above the cheapest.
 
     Raises
     ------
@@ -30,61 +37,33 @@ class Beam:
         Where one of them is impossible.
     """
 
-    width: int = 1024
+    coverage: float = 0.95
+    survivors: int = 128
+    width: int = 64
     slack: float = 60.0
-    survivors: int = 4096
 
     def __post_init__(self) -> None:
-        for name in ("width", "survivors"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InputError(f"beam: {name} is {value!r}; expected a whole number, one or more")
+        for name in ("survivors", "width"):
+            count = getattr(self, name)
+            if isinstance(count, bool) or not isinstance(count, int) or count < 1:
+                raise InputError(f"beam: {name} is {count!r}; expected a whole number, one or more")
+        if not 0 < self.coverage <= 1:
+            raise InputError(f"beam: coverage is {self.coverage!r}; expected a share above 0, at most 1")
         if not self.slack >= 0:
             raise InputError(f"beam: slack is {self.slack!r}; expected zero or more")
 
-    def cheapest(self, own: Array) -> tuple[NDArray[np.intp], float]:
-        """Choose among survivors by what they cost themselves (N,): which, and the cheapest cost that was not."""
-        possible = np.flatnonzero(np.isfinite(own))
-        if len(possible) <= self.survivors:
-            return possible, np.inf
-        order = possible[np.argsort(own[possible], kind="stable")]
-        return np.sort(order[: self.survivors]), float(own[order[self.survivors]])
-
-    def keep(
-        self, cost: Array, fresh: NDArray[np.bool_], *, least: int = 0
-    ) -> tuple[NDArray[np.intp], float]:
-        """Choose among ends of paths, the fresh ones by themselves.
-
-        Parameters
-        ----------
-        cost : array (S,)
-            Of each path so far, infinite for one that is not to be followed.
-        fresh : bool array (S,)
-            Those that are compared with each other only: a dearer path that goes elsewhere is not to be crowded out.
-        least : int
-            How many may be kept of each kind, even where the beam is narrower.
-
-        Returns
-        -------
-        kept : int array
-            Ascending.
-        dropped : float
-            The cheapest cost that was not kept; infinite if all were.
-        """
-        kept, dropped = [], np.inf
-        # Fresh paths are compared among themselves: they are dearer than the best path, and would be crowded out.
-        for kind in (False, True):
-            rows = np.flatnonzero(fresh == kind)
-            if not len(rows):
-                continue
-            near = cost[rows] <= cost[rows].min() + self.slack
-            dropped = min(dropped, float(cost[rows][~near].min(initial=np.inf)))
-            rows = rows[near & np.isfinite(cost[rows])]
-            width = max(self.width, least)
-            if len(rows) > width:
-                # The element at `width` is in its sorted place: the cheapest of those that are dropped.
-                order = np.argpartition(cost[rows], width)
-                dropped = min(dropped, float(cost[rows[order[width]]]))
-                rows = rows[order[:width]]
-            kept.append(rows)
-        return np.sort(np.concatenate(kept)) if kept else np.empty(0, dtype=np.intp), dropped
+    def likeliest(self, own: Array) -> tuple[NDArray[np.intp], float]:
+        """Choose among survivors by what they cost (N,): which, ascending, and the cheapest cost that was not."""
+        order = np.argsort(own, kind="stable")
+        order = order[np.isfinite(own[order])]
+        if not len(order):
+            return order, np.inf
+        held = np.cumsum(np.exp(own[order[0]] - own[order]))
+        enough = len(order)
+        if self.coverage < 1:
+            last = min(int(np.searchsorted(held, self.coverage * held[-1])), len(order) - 1)
+            # Of equally likely ones none is left out.
+            enough = int(np.searchsorted(own[order], own[order[last]] + TIED_COST, side="right"))
+        count = min(enough, self.survivors)
+        left = float(own[order[count]]) if count < len(order) else np.inf
+        return np.sort(order[:count]), left

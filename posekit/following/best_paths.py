@@ -1,24 +1,28 @@
-"""The cheapest path through a sequence, and the next that are different."""
+"""The likeliest motion through a sequence, and what else it can have been."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.following.beam import Beam
+from posekit.following.expected_path import ExpectedPath, expected_path
 from posekit.following.motion_model import MotionModel
-from posekit.following.states import States
 from posekit.following.survivor_frame import SurvivorFrame, check_frames
-from posekit.following.survivor_paths import Paths, joints_of
-from posekit.following.viterbi import PathStep, advance, trace
+from posekit.following.survivor_paths import Paths
+from posekit.following.trellis import Trellis
 from posekit.geometry import Array
 
 PATH_SEPARATION_METRES = 0.25
 """Metres by which a joint must differ for a path to be another one, unless told otherwise."""
+
+LEAST_SHARE: Final = 1e-6
+"""The least probability that another path has in the frame in which it differs most."""
 
 
 def best_paths(
@@ -30,14 +34,14 @@ def best_paths(
     apart: float = PATH_SEPARATION_METRES,
     progress: Callable[[int, int], None] | None = None,
 ) -> Paths:
-    """Find the cheapest paths through the survivors of a sequence.
+    """Find the likeliest motion through the survivors of a sequence.
 
-    A path takes a survivor in each frame, or passes it over. Its cost is the survivors' own, times `model.ranking`,
-    that of its steps and turns (see `MotionModel`), and `model.skip` for every frame passed over.
+    All paths are weighed at once: a path takes a survivor in each frame, or passes it over, and is as likely as its
+    cost says (`MotionModel`). That gives the probability of each survivor given all frames, and the first path is what
+    is expected under these (`expected_path`): in each frame the survivor that is nearest to it, and the posture itself.
 
-    The first path is the cheapest that the search finds; where `Paths.exact`, of all. Each further one is the cheapest
-    of those that in some frame go through a survivor with a joint more than `apart` from where every path found before
-    has it.
+    Each further path is what is expected if in one frame the body is elsewhere: in that frame, with that survivor, of
+    all that have a joint more than `apart` from where every path before has it, that is the likeliest.
 
     Parameters
     ----------
@@ -46,14 +50,13 @@ def best_paths(
     k : int
         How many paths; fewer are returned where there are not so many.
     model : MotionModel, optional
-        How bodies move: what steps and turns cost.
+        How bodies move: what steps cost.
     beam : Beam, optional
-        Which paths are followed while searching.
+        What is looked at while searching.
     apart : float
         Metres.
     progress : callable, optional
-        Told after every frame of every search how many there were so far, and how many there will be at most: each path
-        takes a search.
+        Told after every frame how many there were so far, and how many there are.
 
     Returns
     -------
@@ -78,81 +81,77 @@ def best_paths(
     if not (math.isfinite(apart) and apart >= 0):
         raise InputError(f"apart is {apart!r} m; expected zero or a positive length")
     model, beam = model or MotionModel(), beam or Beam()
-    chosen: list[NDArray[np.intp]] = []
-    costs: list[float] = []
-    along: list[tuple[Array, NDArray[np.bool_]]] = []
-    exact = False
-    for number in range(k):
-        # After the first, only paths through a survivor that is new to all paths found before are looked for.
-        new = None if number == 0 else [_new(frame, at, along, apart) for at, frame in enumerate(frames)]
-        found = _cheapest(frames, model, beam, new, _after(progress, number * len(frames), k * len(frames)))
-        if found is None:
+    trellis = Trellis(model, beam)
+    for number, frame in enumerate(frames):
+        trellis.push(frame)
+        if progress is not None:
+            progress(number + 1, len(frames))
+    cost, cheapest = trellis.path()
+    survivors = [stage.survivor for stage in trellis.stages]
+    marginals = trellis.marginals()
+    found = [expected_path(frames, survivors, marginals, model)]
+    odds = [1.0]
+    while len(found) < k:
+        other = _elsewhere(frames, survivors, marginals, found, apart)
+        if other is None:
             break
-        cost, path, dropped = found
-        if number == 0:
-            # Nothing that was dropped could have become cheaper, as no cost is negative.
-            exact = dropped >= cost and _markov(frames)
-        costs.append(cost)
-        chosen.append(path)
-        along.append(joints_of(frames, path))
-    order = np.argsort(costs, kind="stable")
+        at, among, ratio = other
+        found.append(expected_path(frames, survivors, trellis.marginals(at, among), model))
+        odds.append(ratio)
+    order = np.argsort([-each for each in odds], kind="stable").tolist()
+    share = np.array(odds)[order]
     return Paths(
         time=np.array([frame.time for frame in frames]),
-        cost=np.array(costs)[order],
-        survivor=np.array(chosen)[order],
-        joints=np.stack([along[one][0] for one in order]),
-        interpolated=np.stack([along[one][1] for one in order]),
-        codes=tuple(_codes(frames, chosen[one]) for one in order),
-        exact=exact,
+        cost=cost - np.log(share),
+        share=share / share.sum(),
+        cheapest=cheapest,
+        survivor=np.stack([found[one].survivor for one in order]),
+        joints=np.stack([found[one].joints for one in order]),
+        deviation=np.stack([found[one].deviation for one in order]),
+        confidence=np.stack([found[one].confidence for one in order]),
+        interpolated=np.stack([found[one].interpolated for one in order]),
+        codes=tuple(_codes(frames, found[one].survivor) for one in order),
+        # Nothing that was dropped could have become cheaper, as no cost is negative.
+        exact=trellis.dropped >= cost and all((frame.cost >= 0).all() for frame in frames),
     )
 
 
-def _after(progress: Callable[[int, int], None] | None, before: int, total: int) -> Callable[[int], None]:
-    """Tell progress how many frames of a search are done."""
-    return lambda done: None if progress is None else progress(before + done, total)
-
-
-def _cheapest(
+def _elsewhere(
     frames: Sequence[SurvivorFrame],
-    model: MotionModel,
-    beam: Beam,
-    new: list[NDArray[np.bool_]] | None,
-    tell: Callable[[int], None],
-) -> tuple[float, NDArray[np.intp], float] | None:
-    """Find the cheapest path, of fresh ones where it is said what is new: cost, survivors, cheapest end dropped."""
-    states, steps = States.start(), list[PathStep]()
-    for k, frame in enumerate(frames):
-        states, step = advance(states, frame, model, beam, fresh=None if new is None else new[k])
-        steps.append(step)
-        tell(k + 1)
-    ends = np.arange(len(states)) if new is None else np.flatnonzero(states.fresh)
-    if not len(ends):
+    survivors: Sequence[NDArray[np.int32]],
+    marginals: Sequence[Array],
+    found: Sequence[ExpectedPath],
+    apart: float,
+) -> tuple[int, NDArray[np.bool_], float] | None:
+    """Find where the body is likeliest elsewhere than on the paths found: frame, ends there, odds against the first."""
+    best: tuple[float, int] = (LEAST_SHARE, -1)
+    away: list[NDArray[np.bool_]] = []
+    for at, (frame, chosen, share) in enumerate(zip(frames, survivors, marginals, strict=True)):
+        away.append(chosen >= 0)
+        joints = _at(frame, chosen)
+        for path in found:
+            away[at] &= _apart(joints, path.survivors[at]) > apart
+        best = max(best, (float(share[away[at]].max(initial=0.0)), at), key=lambda each: each[0])
+    at = best[1]
+    if at < 0:
         return None
-    end = int(ends[np.argmin(states.cost[ends])])
-    return float(states.cost[end]), trace(steps, end), min(step.dropped for step in steps)
+    share, joints = marginals[at], _at(frames[at], survivors[at])
+    one = int(np.argmax(np.where(away[at], share, -1.0)))
+    among = away[at] & (_apart(joints, joints[one]) <= apart)
+    near = (survivors[at] < 0) | (_apart(joints, found[0].survivors[at]) <= apart)
+    return at, among, float(min(share[among].sum() / max(share[near].sum(), LEAST_SHARE), 1.0))
 
 
-def _new(
-    frame: SurvivorFrame, at: int, along: list[tuple[Array, NDArray[np.bool_]]], apart: float
-) -> NDArray[np.bool_]:
-    """Tell which survivors (N,) have a joint that is not where any of some paths has it."""
-    new = np.ones(len(frame), dtype=np.bool_)
-    for joints, _ in along:
-        away = np.linalg.norm(frame.joints - joints[at], axis=-1)
-        new &= np.fmax.reduce(away, axis=1, initial=0.0) > apart
-    return new
+def _at(frame: SurvivorFrame, chosen: NDArray[np.int32]) -> Array:
+    """Return the joints (S, 14, 3) of ends at some survivors; NaN where the frame is passed over."""
+    joints = np.full((len(chosen), 14, 3), np.nan)
+    joints[chosen >= 0] = frame.joints[chosen[chosen >= 0]]
+    return joints
 
 
-def _markov(frames: Sequence[SurvivorFrame]) -> bool:
-    """Tell whether no velocity reaches back past the last two survivors, and no cost is negative."""
-    seen = [frame for frame in frames if len(frame)]
-    if not seen:
-        return True
-    known = ~np.isnan(seen[0].joints[0, :, 0])
-    return all(
-        bool((np.isnan(frame.joints[..., 0]) == ~known).all()) and float(frame.cost.min()) >= 0
-        for frame in seen
-    )
+def _apart(joints: Array, other: Array) -> Array:
+    """Return by how much the farthest joint of postures (N, 14, 3) is elsewhere in another."""
+    return np.asarray(np.fmax.reduce(np.linalg.norm(joints - other, axis=-1), axis=1, initial=0.0))
 
 
 def _codes(frames: Sequence[SurvivorFrame], path: NDArray[np.intp]) -> tuple[str, ...]:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.following.beam import Beam
 from posekit.following.bridging import COASTING_SECONDS, bridge
+from posekit.following.expected_path import ExpectedPosture
 from posekit.following.motion_model import MotionModel
-from posekit.following.states import States
 from posekit.following.survivor_frame import SurvivorFrame, check_order
-from posekit.following.viterbi import PathStep, advance
+from posekit.following.trellis import Trellis
 from posekit.geometry import Array
 
-LIVE_BEAM = Beam(width=128, survivors=1024)
-"""Which paths are followed live, unless told otherwise."""
+LIVE_BEAM = Beam(coverage=0.9, survivors=48, width=32)
+"""What is looked at live, unless told otherwise."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,9 +37,8 @@ class LiveEstimate:
         Camera frame, metres; NaN where nothing is known.
     interpolated : bool array (14,)
         Which joints are no survivor's: what bridges the gap, or the last known posture moved on.
-    lead : float
-        How much cheaper the path is than the cheapest that takes another survivor here, of those that are followed;
-        infinite where all take this one.
+    confidence : float
+        The probability, as far as it was known then, that all joints are within 5 cm of these.
     """
 
     frame: int
@@ -47,7 +46,7 @@ class LiveEstimate:
     survivor: int
     joints: Array
     interpolated: NDArray[np.bool_]
-    lead: float
+    confidence: float
 
     @property
     def bridged(self) -> bool:
@@ -59,8 +58,9 @@ class Follower:
     """Follows a sequence frame by frame.
 
     `push` takes a frame and returns the estimate of the frame `lag` frames before it; `finish` returns those that are
-    left. With a lag of the whole sequence these are `best_paths`'s; with a shorter one each is the best that was known
-    by then, so that the path may change its mind in between, and memory and time of a frame are bounded.
+    left. With a lag of the whole sequence these are the survivors of `best_paths`'s first path; with a shorter one each is
+    the best that was known by then, so that the path may change its mind in between, and memory and time of a frame are
+    bounded. Nothing is smoothed.
 
     Parameters
     ----------
@@ -94,9 +94,8 @@ class Follower:
         self.lag = lag
         self.model = model or MotionModel()
         self.beam = beam or LIVE_BEAM
-        self._states = States.start()
+        self._trellis = Trellis(self.model, self.beam)
         self._frames: deque[SurvivorFrame] = deque()
-        self._steps: deque[PathStep] = deque()
         self._known: list[tuple[float, Array]] = []
         self._last = -np.inf
         self._first = 0
@@ -111,9 +110,8 @@ class Follower:
         """
         check_order(self._last, frame.time, self._first + len(self._frames))
         self._last = frame.time
-        self._states, step = advance(self._states, frame, self.model, self.beam)
+        self._trellis.push(frame)
         self._frames.append(frame)
-        self._steps.append(step)
         return self._tell()[0] if len(self._frames) > self.lag else None
 
     def finish(self) -> list[LiveEstimate]:
@@ -122,44 +120,48 @@ class Follower:
 
     def _tell(self, *, every: bool = False) -> list[LiveEstimate]:
         """Estimate the oldest frame that was not told yet, or all."""
-        survivors, leads = self._trace()
-        count = len(survivors) if every else 1
-        window = self._places(survivors[:count])
+        found = self._expected(every=every)
+        count = len(found) if every else 1
+        window = np.stack([each.joints for each in found])
         missing = np.isnan(window[..., 0])
         whole = window
-        if missing.any():  # what comes after helps
-            window = self._places(survivors)
-            missing = np.isnan(window[..., 0])
+        if missing[:count].any():
+            if not every:  # what comes after helps
+                found = self._expected(every=True)
+                window = np.stack([each.joints for each in found])
+                missing = np.isnan(window[..., 0])
             time = [*(time for time, _ in self._known), *(frame.time for frame in self._frames)]
             known = np.concatenate([*(joints[None] for _, joints in self._known), window])
             whole = bridge(np.array(time), known)[len(self._known) :]
         estimates = []
         for k in range(count):
             frame = self._frames.popleft()
-            self._steps.popleft()
+            self._trellis.forget()
             joints, unseen = whole[k].copy(), missing[k].copy()
             joints.flags.writeable = unseen.flags.writeable = False
             estimates.append(
                 LiveEstimate(
                     frame=self._first,
                     time=frame.time,
-                    survivor=int(survivors[k]),
+                    survivor=found[k].survivor,
                     joints=joints,
                     interpolated=unseen,
-                    lead=float(leads[k]),
+                    confidence=found[k].confidence,
                 )
             )
             self._first += 1
             self._remember(frame.time, window[k])
         return estimates
 
-    def _places(self, survivors: NDArray[np.intp]) -> Array:
-        """Return the joints (T, 14, 3) of survivors of the oldest frames; NaN where there is none."""
-        places = np.full((len(survivors), 14, 3), np.nan)
-        for k, (frame, chosen) in enumerate(zip(self._frames, survivors.tolist(), strict=False)):
-            if chosen >= 0:
-                places[k] = frame.joints[chosen]
-        return places
+    def _expected(self, *, every: bool) -> list[ExpectedPosture]:
+        """Find what is expected of the oldest frame, or of all that were not told yet."""
+        stages = self._trellis.stages
+        told = zip(self._frames, stages, self._trellis.marginals(), strict=True)
+        return [
+            ExpectedPosture.of(frame, stage.survivor, share)
+            for k, (frame, stage, share) in enumerate(told)
+            if every or k == 0
+        ]
 
     def _remember(self, time: float, joints: Array) -> None:
         """Keep what bridges to come start from: the last places of all joints, and the neck's of a while before."""
@@ -174,19 +176,3 @@ class Follower:
                 needed.append((at, place))
             lacking &= ~found
         self._known = needed[::-1]
-
-    def _trace(self) -> tuple[NDArray[np.intp], Array]:
-        """Follow all ends of paths back: the best one's survivors, and by how much each is ahead of others."""
-        cost = self._states.cost
-        best = int(np.argmin(cost))
-        survivors = np.empty(len(self._steps), dtype=np.intp)
-        leads = np.empty(len(self._steps))
-        at = np.arange(len(cost))
-        for k in range(len(self._steps) - 1, -1, -1):
-            step = self._steps[k]
-            taken = step.survivor[at]
-            survivors[k] = taken[best]
-            # How much dearer the cheapest path is that went through another survivor of this frame.
-            leads[k] = cost[taken != taken[best]].min(initial=np.inf) - cost[best]
-            at = step.parent[at]
-        return survivors, leads

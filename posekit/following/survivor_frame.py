@@ -36,8 +36,10 @@ class SurvivorFrame:
     cost : array (N,), optional
         Minus the logarithm of each survivor's probability; zero if not given, infinite for an impossible one.
     deviation : array (N, 14), optional
-        Standard deviation of each joint, metres, most of it along the ray; zero if not given. It may be NaN where the
-        joint is.
+        Standard deviation of each joint, metres, the root of its covariance's trace; what the covariance says if not
+        given, zero without one. It may be NaN where the joint is.
+    covariance : array (N, 14, 3, 3), optional
+        Of each joint, square metres; that deviation in all directions alike if not given.
     branches : sequence of str (N,), optional
         The branch code of each, near 0 and far 1.
 
@@ -56,6 +58,7 @@ class SurvivorFrame:
     joints: Array
     cost: Array = field(default_factory=_none)
     deviation: Array = field(default_factory=_none)
+    covariance: Array = field(default_factory=_none)
     branches: Sequence[str] = ()
 
     def __post_init__(self) -> None:
@@ -81,7 +84,14 @@ class SurvivorFrame:
             raise InputError(
                 f"{where}: a cost is {'NaN' if np.isnan(cost).any() else '-inf'}; expected -log probability"
             )
+        told = np.asarray(self.covariance, dtype=np.float64)
+        covariance = _filled("covariance", told, (n, len(JOINTS), 3, 3), where)
         deviation = _filled("deviation", self.deviation, (n, len(JOINTS)), where)
+        if np.asarray(self.deviation).shape == (0,):
+            deviation = np.sqrt(np.trace(covariance, axis1=2, axis2=3))
+        elif told.shape == (0,):
+            covariance = (deviation**2 / 3)[..., None, None] * np.eye(3)
+        covariance[partly] = 0.0
         deviation[partly] = 0.0
         if not ((deviation >= 0) & (deviation <= MAX_DEVIATION_METRES)).all():
             raise InputError(
@@ -92,7 +102,12 @@ class SurvivorFrame:
             raise InputError(
                 f"{where}: {len(branches)} branch codes for {n} survivors; expected one each, or none"
             )
-        for name, value in (("joints", joints), ("cost", cost), ("deviation", deviation)):
+        for name, value in (
+            ("joints", joints),
+            ("cost", cost),
+            ("deviation", deviation),
+            ("covariance", covariance),
+        ):
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         object.__setattr__(self, "branches", branches)

@@ -16,31 +16,47 @@ from posekit.geometry import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Paths:
-    """K paths through T frames, the cheapest first.
+    """K paths through T frames, the likeliest first.
 
     Parameters
     ----------
     time : array (T,)
         Seconds.
     cost : array (K,)
-        Minus the log-likelihood of each, but for a constant: between two, odds are the exponential of the difference.
+        Minus the log-likelihood of each, but for a constant: of the first, that of the cheapest path; of another, as
+        much more as the odds say.
+    share : array (K,)
+        Of the probability of these paths, each one's: 1 together. Odds of two are those of what is near to either in the
+        frame in which they differ most.
+    cheapest : int array (T,)
+        The survivors of the cheapest path: of all paths the likeliest single one.
     survivor : int array (K, T)
-        Which of each frame's survivors; -1 where the frame was passed over.
+        Of each frame the survivor that is nearest to what is expected; -1 where the frame is passed over.
     joints : array (K, T, 14, 3)
-        Camera frame, metres: the survivors', and between them what bridges them; NaN where nothing is known.
+        What is expected, camera frame, metres: smoothed where there is noise, the survivors' where points are exact, and
+        between them what bridges them; NaN where nothing is known.
+    deviation : array (K, T, 14)
+        How far off each joint is, metres; infinite where that is not known.
+    confidence : array (K, T)
+        The probability, given all frames, that all joints are within 5 cm of the survivor chosen; below a half the
+        path is a guess there.
     interpolated : bool array (K, T, 14)
         Which joints are no survivor's.
     codes : tuple of tuple of str (K, T)
         The branch codes of the survivors; empty where there is none.
     exact : bool
-        Whether it is certain that the first path is the cheapest of all: no end of a path was dropped that could have
+        Whether it is certain that the cheapest path is the cheapest of all: no end of a path was dropped that could have
         become cheaper.
     """
 
     time: Array
     cost: Array
+    share: Array
+    cheapest: NDArray[np.intp]
     survivor: NDArray[np.intp]
     joints: Array
+    deviation: Array
+    confidence: Array
     interpolated: NDArray[np.bool_]
     codes: tuple[tuple[str, ...], ...]
     exact: bool

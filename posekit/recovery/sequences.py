@@ -126,7 +126,6 @@ def follow_frames(
     given = survivor_frames(frames, log_probability)
     searched = given
     if any(frame.family is not None for frame in frames):
-        model = model or MotionModel(resting=math.inf)
         searched = [_about_neck(frame) for frame in given]
     paths = best_paths(searched, k=k, model=model, beam=beam, apart=apart, progress=progress)
     return _following(frames, given, paths, k, apart)
@@ -171,7 +170,7 @@ def survivor_frames(
                 time=frame.time,
                 joints=_seen(frame),
                 cost=np.maximum(cost, 0.0),
-                deviation=_deviation(frame),
+                **_off(frame),
                 branches=frame.branches,
             )
         )
@@ -191,13 +190,20 @@ def _seen(frame: FrameRecovery) -> Array:
     return joints
 
 
-def _deviation(frame: FrameRecovery) -> Array:
-    """Return how far off the joints of survivors are (N, 14), metres."""
+def _off(frame: FrameRecovery) -> dict[str, Array]:
+    """Return how far off the joints of survivors are: covariances (N, 14, 3, 3) or deviations (N, 14)."""
     if frame.refined is not None:
-        spread = np.sqrt(np.trace(frame.refined.covariance, axis1=2, axis2=3))
-        return np.where(np.isfinite(spread), np.minimum(spread, MAX_DEVIATION_METRES), 0.0)
+        covariance = frame.refined.covariance
+        size = np.trace(covariance, axis1=2, axis2=3)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            most = np.minimum(MAX_DEVIATION_METRES**2 / size, 1.0)
+        return {
+            "covariance": np.where(
+                np.isfinite(size * most)[..., None, None], covariance * most[..., None, None], 0.0
+            )
+        }
     off = 0.0 if frame.judged in (None, "exact") else frame.spread
-    return np.full((len(frame), len(JOINTS)), np.hypot(off, _neck_deviation(frame)))
+    return {"deviation": np.full((len(frame), len(JOINTS)), np.hypot(off, _neck_deviation(frame)))}
 
 
 def _neck_deviation(frame: FrameRecovery) -> float:
@@ -218,29 +224,28 @@ def _following(
     frames: Sequence[FrameRecovery], given: Sequence[SurvivorFrame], paths: Paths, k: int, apart: float
 ) -> Following:
     """Put the first K paths together, in the places where the survivors are."""
-    joints, interpolated = (
-        np.stack(each) for each in zip(*(joints_of(given, one) for one in paths.survivor), strict=True)
-    )
-    deviation = np.full(interpolated.shape, np.inf)
-    scale = None if all(frame.family is None for frame in frames) else np.full(joints.shape[:2], np.nan)
+    uncalibrated = any(frame.family is not None for frame in frames)
+    joints, deviation = paths.joints.copy(), np.where(paths.interpolated, np.inf, paths.deviation)
+    if uncalibrated:
+        joints = np.stack([joints_of(given, one)[0] for one in paths.survivor])
+    scale = np.full(joints.shape[:2], np.nan) if uncalibrated else None
     for path, at in zip(*np.nonzero(paths.survivor >= 0), strict=True):
         frame, chosen = frames[at], int(paths.survivor[path, at])
-        deviation[path, at] = np.where(interpolated[path, at], np.inf, given[at].deviation[chosen])
         # What no frame shows is where this survivor's completion has it.
         lost = np.isnan(joints[path, at, :, 0])
         joints[path, at, lost] = frame.joints[chosen, lost]
         if scale is not None and frame.scales is not None:
             scale[path, at] = frame.scales[chosen]
-    odds = np.exp(paths.cost[0] - paths.cost)
     return Following(
         time=paths.time,
         survivor=paths.survivor,
         joints=joints,
-        interpolated=interpolated,
+        interpolated=paths.interpolated,
         deviation=deviation,
         cost=paths.cost,
+        confidence=paths.confidence,
         lead=float(paths.cost[1] - paths.cost[0]) if len(paths) > 1 else math.nan if k == 1 else math.inf,
-        share=odds / odds.sum(),
+        share=paths.share,
         branches=paths.codes,
         scale=scale,
         exact=paths.exact,

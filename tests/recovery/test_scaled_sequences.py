@@ -68,7 +68,8 @@ def test_the_scale_of_lengths_that_are_off_is_told(view):
     error, without = (
         np.linalg.norm(one.joints[0] - view.truth, axis=-1).mean() for one in (found.following, wrong)
     )
-    assert error < 0.8 * without
+    assert error < without
+    assert error < 0.014
     assert [done for done, _ in told] == list(range(1, len(told) + 1))
     assert len(found.choice.scales) <= len(told) <= told[-1][1]
 
@@ -123,8 +124,12 @@ def chosen(scales, cost):
     paths = Paths(
         time=np.zeros(1),
         cost=np.zeros(1),
+        share=np.ones(1),
+        cheapest=np.zeros(1, dtype=np.intp),
         survivor=np.zeros((1, 1), dtype=np.intp),
         joints=np.zeros((1, 1, 14, 3)),
+        deviation=np.zeros((1, 1, 14)),
+        confidence=np.ones((1, 1)),
         interpolated=np.zeros((1, 1, 14), dtype=np.bool_),
         codes=(("",),),
         exact=True,
