@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.geometry import Array
 
-
 TIED_COST: Final = 1e-9
 """Cost by which survivors that are as likely may differ by rounding."""
 

@@ -142,7 +142,7 @@ def expected_path(
 
 def _mean(joints: Array, covariance: Array, weight: Array) -> tuple[Array, Array]:
     """Return the mean (14, 3) of postures (N, 14, 3) as far as they are known, and its covariance (14, 3, 3)."""
-    known = np.isfinite(joints).all(axis=2)
+    known = np.asarray(np.isfinite(joints).all(axis=2))
     share = weight[:, None] * known
     total = share.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -58,9 +58,9 @@ class Follower:
     """Follows a sequence frame by frame.
 
     `push` takes a frame and returns the estimate of the frame `lag` frames before it; `finish` returns those that are
-    left. With a lag of the whole sequence these are the survivors of `best_paths`'s first path; with a shorter one each is
-    the best that was known by then, so that the path may change its mind in between, and memory and time of a frame are
-    bounded. Nothing is smoothed.
+    left. With a lag of the whole sequence these are the survivors of `best_paths`'s first path; with a shorter one each
+    is the best that was known by then, so that the path may change its mind in between, and memory and time of a frame
+    are bounded. Nothing is smoothed.
 
     Parameters
     ----------

@@ -97,7 +97,7 @@ class Following:
             raise InputError(
                 "an uncalibrated view tells no distances to be smoothed; expected a calibrated camera; take the joints"
             )
-        return self.joints[path]
+        return np.asarray(self.joints[path])
 
     def switches(self, path: int = 0) -> tuple[Switch, ...]:
         """List where segments of a path change between near and far, and how fast they had to turn for it."""

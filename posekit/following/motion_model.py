@@ -46,7 +46,7 @@ class MotionModel:
     nu : float
         Degrees of freedom of the distribution: the fewer, the cheaper is what is rare.
     weight : float
-        What steps to survivors with noise count: joints of a body are off together, and frames are off as their neighbours
+        What steps to survivors with noise count: joints of a body are off together, and frames as their neighbours
         are. Where points are exact, steps count whole.
     ranking : float
         What the survivors' own costs count.

@@ -1,7 +1,7 @@
 r"""A path smoothed over time: what noise does to depth is large, and different in each frame.
 
-Each joint is taken to move with a random acceleration, white noise of the spectral density :math:`q`, and to be known in
-each frame within its covariance: along its ray much worse than across it (Rauch, Tung & Striebel 1965, "Maximum
+Each joint is taken to move with a random acceleration, white noise of the spectral density :math:`q`, and to be known
+in each frame within its covariance: along its ray much worse than across it (Rauch, Tung & Striebel 1965, "Maximum
 likelihood estimates of linear dynamic systems", AIAA J. 3:1445). Then the segments get their lengths back, from the
 neck outward.
 """
@@ -87,7 +87,7 @@ def smooth(
     if not (np.isfinite(sudden) & (sudden > 0)).all():
         raise InputError("acceleration must be positive and finite")
     count = 1 if root_alone else len(JOINTS)
-    known = np.isfinite(path).all(axis=2) & np.isfinite(given).all(axis=(2, 3))
+    known = np.asarray(np.isfinite(path).all(axis=2) & np.isfinite(given).all(axis=(2, 3)))
     smoothed, spread = rts(
         times,
         path[:, :count],
@@ -141,7 +141,7 @@ def rts(
     frames, count = value.shape[:2]
     first = np.argmax(measured, axis=0)
     now = np.zeros((count, 6))
-    now[:, :3] = np.where(measured.any(axis=0)[:, None], value[first, np.arange(count)], 0.0)
+    now[:, :3] = np.where(np.asarray(measured.any(axis=0))[:, None], value[first, np.arange(count)], 0.0)
     P = np.broadcast_to(START_DEVIATION**2 * np.eye(6), (count, 6, 6))
     ahead, after = [], []
     for k in range(frames):
@@ -169,7 +169,7 @@ def rts(
             P = own_P + back @ (P - ahead[k + 1][1]) @ back.swapaxes(1, 2)
         mean[k] = now[:, :3]
         spread[k] = np.sqrt(np.maximum(np.trace(P[:, :3, :3], axis1=1, axis2=2), 0.0))
-    never = ~measured.any(axis=0)
+    never = np.asarray(~measured.any(axis=0))
     return np.where(never[:, None], np.nan, mean), np.where(never, np.nan, spread)
 
 

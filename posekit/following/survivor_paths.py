@@ -26,15 +26,15 @@ class Paths:
         Minus the log-likelihood of each, but for a constant: of the first, that of the cheapest path; of another, as
         much more as the odds say.
     share : array (K,)
-        Of the probability of these paths, each one's: 1 together. Odds of two are those of what is near to either in the
-        frame in which they differ most.
+        Of the probability of these paths, each one's: 1 together. Odds of two are those of what is near to either in
+        the frame in which they differ most.
     cheapest : int array (T,)
         The survivors of the cheapest path: of all paths the likeliest single one.
     survivor : int array (K, T)
         Of each frame the survivor that is nearest to what is expected; -1 where the frame is passed over.
     joints : array (K, T, 14, 3)
-        What is expected, camera frame, metres: smoothed where there is noise, the survivors' where points are exact, and
-        between them what bridges them; NaN where nothing is known.
+        What is expected, camera frame, metres: smoothed where there is noise, the survivors' where points are exact,
+        and between them what bridges them; NaN where nothing is known.
     deviation : array (K, T, 14)
         How far off each joint is, metres; infinite where that is not known.
     confidence : array (K, T)
@@ -45,8 +45,8 @@ class Paths:
     codes : tuple of tuple of str (K, T)
         The branch codes of the survivors; empty where there is none.
     exact : bool
-        Whether it is certain that the cheapest path is the cheapest of all: no end of a path was dropped that could have
-        become cheaper.
+        Whether it is certain that the cheapest path is the cheapest of all: no end of a path was dropped that could
+        have become cheaper.
     """
 
     time: Array

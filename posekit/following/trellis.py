@@ -153,7 +153,7 @@ class Trellis:
 
     def _survivors(self, frame: SurvivorFrame) -> tuple[MovingJoints, NDArray[np.intp], Array, float]:
         """Return the survivors that are looked at: as ends, which they are, what they cost, and the cheapest other."""
-        known = np.isfinite(frame.joints).all(axis=2)
+        known = np.asarray(np.isfinite(frame.joints).all(axis=2))
         own = self.model.ranking * frame.cost + absence(known)
         chosen, left = self.beam.likeliest(np.where(known.any(axis=1), own, np.inf))
         seen = known[chosen]
@@ -191,7 +191,7 @@ class Trellis:
         stages, found = self.stages, list[Array]()
         forward = [stage.forward for stage in stages]
         if among is not None:
-            forward = forward[:at] + [np.where(among, forward[at], -np.inf)]
+            forward = [*forward[:at], np.where(among, forward[at], -np.inf)]
             for stage in stages[at + 1 :]:
                 after = _log_sum(forward[-1][:, None] - stage.cost, axis=0)
                 forward.append(after - after.max())
