@@ -428,6 +428,36 @@ def cost(views: int) -> None:
     print("\n".join(table_lines(head, rows)))
 
 
+def beside_exact(views: int) -> None:
+    print("\nA noisy frame beside an exact one: CPU time of `recover`, necks given, ratios in one run\n")
+    rows = []
+    for ranges in VIEWS_PER_POSTURE_INSIDE:
+        scene = legal(ranges, views)
+
+        def spent(seen: SyntheticScene, ranges: str = ranges, **known: float) -> float:
+            view = view_of(seen)
+            unseen = np.full_like(view.head_image, np.nan)
+            view = replace(view, root=seen.joints_cam[:, 0], head_image=unseen, **known)  # type: ignore[arg-type]
+            return timed(lambda: recover(view, ranges=ranges)) / len(seen)
+
+        base = spent(scene)
+        for pixels in NOISE_PIXELS:
+            noisy = scene.with_noise(pixels, np.random.default_rng(7))
+            each, alone = (
+                spent(part, deviation=pixels, length_deviation=0.02) / base
+                for part in (noisy, noisy.select(np.arange(1)))
+            )
+            rows.append([ranges, f"{pixels:g}", f"{base * 1e6:.0f}", f"{each:.0f}", f"{alone:.0f}"])
+    head = [
+        "ranges",
+        "noise, px",
+        "exact frame, us",
+        "noisy frame, times that",
+        "one frame a call, times that",
+    ]
+    print("\n".join(table_lines(head, rows)))
+
+
 def real(capture: Path, frames: int) -> None:
     print("\nReal motion: lengths are each clip's medians, with deviations\n")
     scenes = mocap_scenes(read_capture(capture), frames, np.random.default_rng(0))
@@ -467,6 +497,7 @@ def main() -> None:
     certificates(given.views)
     calibration(given.truths)
     cost(given.views)
+    beside_exact(given.views)
     if given.capture is not None:
         real(given.capture, given.frames)
 
