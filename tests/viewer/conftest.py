@@ -108,6 +108,8 @@ def _frame_with(frame: ResultFrame, joints: Array, scales: Array, **changes: obj
         frame,
         **{
             "joints": joints,
+            "answer": None,
+            "posture_set": None,
             "q": np.full((count, frame.q.shape[1]), np.nan),
             "branches": ["0" * 13] * count,
             "groups": np.zeros(count, dtype=int),
