@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MAX_SHOWN = 4
 """How many reasons, and how many frames at each end of a long sequence, are printed."""
 
+SURE_CONFIDENCE: Final = 0.5
+"""Confidence below which a path is a guess."""
+
 TOLERANCE_WORDS: Final[Mapping[str, str]] = {"given": "as given", "noisy": "from noise"}
 """What the table says of frames that were judged so, where the word alone would be a riddle."""
 
@@ -96,17 +99,18 @@ def following_line(following: Following) -> str:
     """Describe the paths through a recovery in a line."""
     lead = following.lead
     bridged = int(following.bridged[0].sum())
+    guessed = int((following.confidence[0] < SURE_CONFIDENCE).sum())
     sure = (
         f"{lead:.3g} cheaper than the next that is different"
         if np.isfinite(lead)
-        else "without another that differs by a limb"
+        else "without another that differs by 5 cm"
         if np.isinf(lead)
         else "how sure is not asked (--follow 2)"
     )
     count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
     return (
-        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
-        f"{len(following.switches())} changes between near and far"
+        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, {guessed} "
+        f"a guess, {len(following.switches())} changes between near and far"
     )
 
 
@@ -116,4 +120,6 @@ def _distinct(following: Following) -> str:
         return ""
     found = path_answer(following)
     each = ", ".join(percent(p) for p in found.probability[:MAX_SHOWN].tolist())
+    if len(found) == 1:
+        return f", of which one holds {each}"
     return f", of which {len(found)} that differ by 5 cm hold 95 % ({each}{', …' if len(found) > MAX_SHOWN else ''})"
