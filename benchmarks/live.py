@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import time
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -36,6 +37,7 @@ def main(arguments: list[str] | None = None) -> None:
         "--lengths", type=float, help="how far lengths may be off; as given ones are, if not said"
     )
     asked = parser.parse_args(arguments)
+    warnings.simplefilter("ignore")  # a neck that was given lies beside the ray of its noisy point
     settings = posekit.RecoverSettings(ranges=asked.ranges, length_deviation=asked.lengths)
     exact = seen(max(asked.batch, asked.pictures + LOADING_CALLS), 0.0)
     noisy = seen(asked.pictures + LOADING_CALLS, asked.pixels)

@@ -25,7 +25,7 @@ from posekit.geometry.rotations import TIED_ANGLES_RADIANS
 CLEAR_RADIANS = 1e-9
 """Radians, or what is compared with them, within which nothing is clear: a million times the rounding."""
 
-DEGREE = math.pi / 180.0
+DEGREE_RADIANS = math.pi / 180.0
 """A degree, radians."""
 
 SINGULAR_SINE = 1e-5
@@ -75,7 +75,7 @@ def verdict(w: Array, count: int, width: int, tolerance: Any, loose: Any) -> Any
         if chosen < 0 and w[COST_AT + b] < least + TIED_ANGLES_RADIANS:
             chosen = b
     for k in range(width):
-        beyond = w[OVER_AT + 4 * chosen + k] - loosened(w, k, loose if k == 2 else tolerance, DEGREE)
+        beyond = w[OVER_AT + 4 * chosen + k] - loosened(w, k, loose if k == 2 else tolerance, DEGREE_RADIANS)
         if abs(beyond) <= CLEAR_RADIANS + w[BLUR_AT]:
             return NOT_CLEAR
         if beyond > 0:
