@@ -109,8 +109,8 @@ def following_line(following: Following) -> str:
     )
     count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
     return (
-        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, {guessed} "
-        f"a guess, {len(following.switches())} changes between near and far"
+        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
+        f"{guessed} a guess, {len(following.switches())} changes between near and far"
     )
 
 
