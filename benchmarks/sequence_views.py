@@ -213,7 +213,7 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
     own = trunks.carries(leaves.frame, postures)
     refined = refine(sight, postures[own], frame=trunks.frame[leaves.frame[own]], hopeless=HOPELESS_CHI2)
     kept = merge(refined, keep=refined.explained()).refined
-    spread = kept.deviation
+    spread = kept.covariance
 
     def evidence(prior: Prior) -> np.ndarray:
         return rank(
@@ -221,7 +221,7 @@ def noisy(scene: SyntheticScene, pixels: float, *, real: bool) -> Recovered:
         ).probability
 
     frames = [
-        SurvivorFrame(time=float(at), joints=kept.joints[kept.frame == k], deviation=spread[kept.frame == k])
+        SurvivorFrame(time=float(at), joints=kept.joints[kept.frame == k], covariance=spread[kept.frame == k])
         for k, at in enumerate(scene.time)
     ]
     return Recovered(frames=frames, evidence=evidence)

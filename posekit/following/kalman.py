@@ -113,9 +113,9 @@ class MovingJoints:
         learnt = MovingJoints(
             place=self.place + (place_gain @ off)[..., 0],
             velocity=self.velocity + (velocity_gain @ off)[..., 0],
-            of_place=self.of_place - place_gain @ self.of_place,
+            of_place=_symmetric(self.of_place - place_gain @ self.of_place),
             of_both=self.of_both - place_gain @ self.of_both,
-            of_velocity=self.of_velocity - velocity_gain @ self.of_both,
+            of_velocity=_symmetric(self.of_velocity - velocity_gain @ self.of_both),
             known=self.known | known,
             since=np.where(known, 0.0, self.since),
         )
@@ -132,3 +132,8 @@ class MovingJoints:
                 for item in fields(new)
             }
         )
+
+
+def _symmetric(matrices: Array) -> Array:
+    """Take off what rounding made of one side: what is not symmetric grows from frame to frame."""
+    return np.asarray((matrices + matrices.swapaxes(-1, -2)) / 2)

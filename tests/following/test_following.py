@@ -11,6 +11,7 @@ from posekit.errors import InputError
 from posekit.following import (
     Beam,
     Follower,
+    MotionModel,
     SurvivorFrame,
     best_paths,
     bridge,
@@ -19,6 +20,7 @@ from posekit.following import (
     smooth,
 )
 from posekit.following.smoothing import START_DEVIATION, rts
+from posekit.following.trellis import Trellis
 from posekit.formats.own import OpenCVModel, View
 from posekit.recovery import recover
 from posekit.skeleton import JOINTS, TREE_SEGMENTS
@@ -87,6 +89,19 @@ def test_a_follower_forgets_what_it_told():
         follower.push(frame)
     assert len(follower._frames) == len(follower._trellis.stages) == 3
     assert len(follower._known) <= 8
+
+
+def test_covariances_stay_covariances_however_long_a_sequence_is():
+    rng = np.random.default_rng(2)
+    posture = sequence(0, (1,))[0].joints[0]
+    root = rng.normal(0, [[0.01], [0.01], [0.2]], (3, 14, 3, 3))
+    trellis = Trellis(MotionModel(), Beam())
+    for k in range(600):
+        joints = posture + rng.normal(0, 0.05, (3, 14, 3))
+        trellis.push(SurvivorFrame(time=k / 30, joints=joints, covariance=root @ root.swapaxes(-1, -2)))
+    ends = trellis.ends
+    both, turned = ends.of_both, ends.of_both.swapaxes(-1, -2)
+    assert np.linalg.eigvalsh(np.block([[ends.of_place, both], [turned, ends.of_velocity]])).min() > 0
 
 
 def test_a_follower_goes_on_where_nothing_survives():
