@@ -27,6 +27,7 @@ def result_lines(result: Result) -> list[str]:
     """Describe survivors, what they were judged as and refined with, ranking, paths and settings."""
     frames, settings = result.frames, result.settings
     lines = [counts_line([len(frame.joints) for frame in frames]), *reason_lines(_unrecovered(settings))]
+    lines += _sets(result)
     judged = settings.get("judged")
     kinds = [one for one in judged if isinstance(one, str)] if isinstance(judged, list) else []
     if kinds:
@@ -58,6 +59,21 @@ def _unrecovered(settings: Mapping[str, Any]) -> dict[str, int]:
         for reason, frames in (said.items() if isinstance(said, dict) else ())
         if isinstance(frames, list)
     }
+
+
+def _sets(result: Result) -> list[str]:
+    """Say what the sets are made of, and what is not listed of them."""
+    sets = [frame.posture_set for frame in result.frames if frame.posture_set is not None]
+    if not sets:
+        return []
+    trunks, limbs = (
+        int(np.median([len(getattr(one, name)) for one in sets])) for name in ("trunks", "limb_kind")
+    )
+    made = f"sets of {trunks} trunks with {limbs} limbs (median)"
+    unlisted = sum(frame.unlisted for frame in result.frames)
+    share = max(frame.unlisted_probability for frame in result.frames)
+    told = f"{unlisted} at most are not listed, with at most {share:.2g} of a frame's probability"
+    return [f"{made}; {told if unlisted else 'all whole postures are listed'}"]
 
 
 def _refined(result: Result) -> str:

@@ -13,8 +13,11 @@ from posekit.errors import InputError
 from posekit.formats.own import PostureSet, Result, View, read_postures, read_result, write_result
 from posekit.formats.own.column import columns_in
 from posekit.formats.own.frame_answer import FrameAnswer
+from posekit.inspection.results import result_lines
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import MAX_DETAILED, result_of
+from posekit.validation.validate import recovered_with
+from posekit.validators import Validator
 
 EARLIER = Path(__file__).parent / "earlier"
 
@@ -142,6 +145,24 @@ def test_details_that_a_posture_lacks_are_left_out_of_the_json(tmp_path, noisy):
         for posture in some:
             assert set(posture) == {"joints", "branches", "probability", "refined"}
             assert set(posture["refined"]) == {"chi2", "dof", "merged"}
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_what_was_certified_is_valid_when_it_is_read(tmp_path, noisy, suffix):
+    back = read_back(tmp_path, result_of(noisy), suffix)
+    assert back.decimals == min(frame.precision.decimals for frame in back.frames)
+    said = recovered_with(back)
+    validator = Validator(said.figure, settings=said.settings)
+    for frame in back.frames:
+        assert len(frame)
+        assert "invalid" not in validator.check(frame.joints).verdicts
+
+
+def test_inspect_says_what_sets_are_made_of_and_what_is_not_listed(noisy, exact):
+    told = "\n".join(result_lines(result_of(noisy)))
+    unlisted = sum(frame.unlisted for frame in noisy.frames)
+    assert unlisted and f"{unlisted} at most are not listed" in told
+    assert "all whole postures are listed" in "\n".join(result_lines(result_of(exact)))
 
 
 def test_a_set_in_an_npz_that_is_damaged_is_refused(tmp_path, exact):
