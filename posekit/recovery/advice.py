@@ -21,7 +21,7 @@ def advice_lines(recovery: Recovery) -> list[str]:
     grower = recovery.grower
     if grower is None:
         return []
-    lines = _of_one_body(recovery)
+    lines = [*_of_one_body(recovery), *_of_outliers(recovery)]
     empty = [k for k, frame in enumerate(recovery.frames) if not len(frame) and not frame.reason]
     if empty:
         from posekit.recovery.least_violation import least_violation
@@ -56,6 +56,17 @@ def advice_lines(recovery: Recovery) -> list[str]:
 
         lines += length_diagnosis_lines(recovery, grower, lost)
     return lines
+
+
+def _of_outliers(recovery: Recovery) -> list[str]:
+    """Name the points that were not believed."""
+    said = recovery.settings.get("outliers", {})
+    lines = [
+        f"frame {k}: {' and '.join(names)} taken for not seen: where detected, it jumps or leaves no posture"
+        for k, names in said.items()
+    ]
+    more = [f"and outliers in {len(lines) - MAX_FRAMES_EXPLAINED} more frames"]
+    return lines[:MAX_FRAMES_EXPLAINED] + (more if len(lines) > MAX_FRAMES_EXPLAINED else [])
 
 
 def _of_one_body(recovery: Recovery) -> list[str]:

@@ -154,19 +154,25 @@ def recover(
     # Answer: what is left of each frame, and what it was judged with; ranks and certificates are made when asked for.
     frames = _frames(view, trees, fit, asked.group, bare)
     _refuse_impossible(frames)
-    up, clip = up_of(view.camera), None if refiner is None else refiner.clip
-    record = {
-        **_record(asked, tolerance, body.figure, frames, noise, up),
-        **({} if clip is None else {"one_body": clip.document()}),
-    }
+    up = up_of(view.camera)
+    record = {**_record(asked, tolerance, body.figure, frames, noise, up), **_told(refiner, trees)}
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
 
 
 def _refined(
     refiner: Refiner, frames: NDArray[np.intp], trees: Mapping[int, FrameTrees]
 ) -> dict[int, FrameTrees]:
-    """Refine some frames; those of which nothing is left once more, where nobody says how well lengths are known."""
-    found, view, asked = refiner.grow(frames), refiner.grower.view, refiner.grower.settings
+    """Refine some frames; those of which nothing is left once more, where nobody says how well lengths are known.
+
+    Of a detector's points, outliers are taken for not seen.
+    """
+    view, asked = refiner.grower.view, refiner.grower.settings
+    if view.derived:
+        from posekit.recovery.outliers import grow_trusted
+
+        found = grow_trusted(refiner, frames)
+    else:
+        found = refiner.grow(frames)
     said = asked.length_deviation is not None or view.length_deviation is not None
     lost = np.array([k for k in frames.tolist() if not found[k].survivors], dtype=np.intp)
     if len(lost) and not said:
@@ -229,15 +235,30 @@ def _record(
     )
 
 
+def _told(refiner: Refiner | None, trees: Mapping[int, FrameTrees]) -> dict[str, Any]:
+    """Return what results say of refinement: the one body of a clip, and the points that were not believed."""
+    found = {str(k): list(one.outliers) for k, one in sorted(trees.items()) if one.outliers}
+    said: dict[str, Any] = {"outliers": found} if found else {}
+    return said if refiner is None or refiner.clip is None else said | {"one_body": refiner.clip.document()}
+
+
 def _share(some: NDArray[np.intp], frames: NDArray[np.intp]) -> float:
     """Return which share of different frames some are."""
     return len(some) / max(len(_distinct(frames)), 1)
 
 
 def _found_again(refiner: Refiner, fit: CameraFit) -> dict[int, FrameTrees]:
-    """Grow frames whose necks could not be placed by the lengths that were given, but can by those that were found."""
+    """Grow frames whose necks could not be placed, but can by the lengths that were found, or without an outlier."""
     found = [k for k, why in enumerate(fit.reasons) if why and not refiner.fit.reasons[k]]
-    return refiner.grow(np.array(found, dtype=np.intp)) if found and refiner.clip is not None else {}
+    trees = refiner.grow(np.array(found, dtype=np.intp)) if found and refiner.clip is not None else {}
+    view = refiner.grower.view
+    nowhere = [k for k, why in enumerate(refiner.fit.reasons) if why and np.isfinite(view.image[k, 0, 0])]
+    if view.derived and nowhere:
+        from posekit.recovery.outliers import grow_trusted
+
+        again = grow_trusted(refiner, np.array(nowhere, dtype=np.intp))
+        trees |= {k: one for k, one in again.items() if one.survivors}
+    return trees
 
 
 def _distinct(frames: NDArray[np.intp]) -> NDArray[np.intp]:

@@ -18,11 +18,24 @@ from posekit.settings import ALLOWED_DEVIATIONS
 from posekit.settings.rooting import DETECTED_DEVIATION
 from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
-JOINT_OFFSET: Final = 0.02
-"""Metres: standard deviation of a detector's joint centres from the figure's (docs, "Detections")."""
+JOINT_OFFSET: Final = 0.012
+"""Metres: standard deviation of a detector's key points from the figure's joints, at full confidence."""
+
+OFFSET_POWER: Final = 0.7
+"""How key points' deviations fall with confidence: as its inverse to this power (docs, "Detections")."""
+
+UNTOLD_CONFIDENCE: Final = 0.5
+"""What the confidence of a detector's point counts as where the file has none: MediaPipe's, which are 2 cm off."""
+
+LEAST_OFFSET_CONFIDENCE: Final = 0.05
+"""A confidence below this counts as this, for how far key points are from joints."""
+
+KEY_POINT_DEVIATION: Final = 3.0
+"""Pixels: standard deviation of a detector's points beside that, of a person some 700 pixels tall. Where necks can be
+is searched with more (`DETECTED_DEVIATION`): frames whose trunk is off most would have none."""
 
 LEAST_CONFIDENCE: Final = 0.25
-"""A confidence below this counts as this."""
+"""A confidence below this counts as this, for the deviation in pixels."""
 
 UNSTATED_DEVIATION_PIXELS: Final = 1.0
 """Standard deviation (px) of image points of which nobody says any, of a body whose lengths are not exact."""
@@ -55,7 +68,7 @@ class Noise:
     deviation : float
         Standard deviation of each coordinate of an image point that was seen with full confidence, pixels.
     offset : float
-        How far a detector's joints are from the figure's, standard deviation, metres.
+        How far a detector's points are from the figure's joints at full confidence, standard deviation, metres.
     lengths : LengthUncertainty
         How well the person's lengths are known; exactly if not given.
     overlap : float
@@ -76,7 +89,7 @@ class Noise:
         The deviation that is given comes before the view's own, and that before what detectors' points have.
         """
         detected = bool(view.derived)
-        known = deviation or view.deviation or (DETECTED_DEVIATION if detected else None)
+        known = deviation or view.deviation or (KEY_POINT_DEVIATION if detected else None)
         if known is None and lengths.exact and not asked:
             return None
         noise = Noise(
@@ -143,12 +156,15 @@ class Noise:
         focal : array (F,)
             Focal length, pixels.
         """
-        confidence = np.clip(np.nan_to_num(view.confidence[frames], nan=1.0), LEAST_CONFIDENCE, 1.0)
+        told = view.confidence[frames]
+        confidence = np.clip(np.nan_to_num(told, nan=1.0), LEAST_CONFIDENCE, 1.0)
+        sure = np.clip(np.nan_to_num(told, nan=UNTOLD_CONFIDENCE), LEAST_OFFSET_CONFIDENCE, 1.0)
+        offset = self.offset * sure**-OFFSET_POWER
         # A head is not larger where limbs are longer; and one that nobody measured has its nose and neck elsewhere.
         of_head = HEAD_METRES * math.hypot(self.lengths.common, max(self.lengths.own.values()))
         if view.head_points is None and not self.lengths.exact:
             of_head = math.hypot(of_head, HEAD_OFFSET_METRES)
-        beside = np.repeat([self.offset, math.hypot(self.offset, of_head)], [len(JOINTS), len(HEAD)])
+        beside = np.hypot(offset, np.repeat([0.0, of_head], [len(JOINTS), len(HEAD)]))
         off = beside * (focal / depth)[:, None]
         return np.asarray(np.hypot(self.deviation / np.sqrt(confidence), off))
 

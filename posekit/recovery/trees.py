@@ -169,6 +169,8 @@ class FrameTrees:
         Which share of the frame's probability they have at most.
     posture_set : callable, optional
         Returns the trunks and limbs of which all that may be are made, where not every posture is listed.
+    outliers : tuple of str
+        Joints that are taken for not seen, as their points are no joint's (`posekit.recovery.outliers`).
     """
 
     batch: Batch | None
@@ -178,6 +180,7 @@ class FrameTrees:
     unlisted: int = 0
     unlisted_probability: float = 0.0
     posture_set: Callable[[], PostureSet] | None = None
+    outliers: tuple[str, ...] = ()
 
     @property
     def rows(self) -> slice:

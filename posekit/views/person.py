@@ -30,6 +30,7 @@ from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.views.camera import in_pixels
+from posekit.views.layout_offsets import between_key_points
 from posekit.views.source import Source
 
 BUILT_IN: Final = (
@@ -42,7 +43,8 @@ LEAST_DEVIATION: Final = 0.01
 """The least that estimated lengths are taken to be off: joints of a detector are not quite those of a skeleton."""
 
 DEFAULT_PROPORTIONS: Final = "de-leva"
-"""Of those that are built in the one whose ends are the joints' centres, where key points are too."""
+"""Of those that are built in the one whose ends are the joints' centres: key points are put beside those
+(`posekit.views.layout_offsets`)."""
 
 
 def person(
@@ -62,7 +64,7 @@ def person(
     InputError, FigureError
         Where a file cannot be read, or what it says makes no body.
     """
-    return figure_of(segment_lengths(source, camera, given), layout)
+    return figure_of(segment_lengths(source, camera, given, layout), layout)
 
 
 def figure_of(lengths: SegmentLengths | None, layout: SkeletonMap) -> tuple[Figure, str, float | None]:
@@ -103,8 +105,13 @@ def middle_neck(lengths: Mapping[str, float]) -> dict[str, float]:
     }
 
 
-def segment_lengths(source: Source, camera: CameraModel, given: Path | None = None) -> SegmentLengths | None:
-    """Return the lengths that a source gives, in whichever way; None where nobody knows any. See `person`."""
+def segment_lengths(
+    source: Source, camera: CameraModel, given: Path | None = None, layout: SkeletonMap | None = None
+) -> SegmentLengths | None:
+    """Return the lengths that a source gives, in whichever way; None where nobody knows any. See `person`.
+
+    Those of joint centres by a table are put between the key points of the `layout`.
+    """
     if source.lengths is not None:
         read = read_lengths(source.lengths)
         if read.lengths or read.stature is None:
@@ -115,7 +122,10 @@ def segment_lengths(source: Source, camera: CameraModel, given: Path | None = No
     if source.stature is None:
         return None
     name = DEFAULT_PROPORTIONS if source.proportions in ("figure", "taylor") else source.proportions
-    return lengths_from_proportions(name, source.stature)
+    found = lengths_from_proportions(name, source.stature)
+    if layout is None or name != DEFAULT_PROPORTIONS:
+        return found
+    return between_key_points(found, source.stature, layout)
 
 
 def _from_recording(path: Path, source: Source, camera: CameraModel, given: Path | None) -> SegmentLengths:
