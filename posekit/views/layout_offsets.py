@@ -49,19 +49,14 @@ Learned from one recording (MediaPipe's points, triangulated by four cameras, 0.
 0.82). In the other (OpenPose's BODY_25B), which it was not learned from, they are 0.655 of the trunk apart.
 """
 
-COCO_HIP_OFFSET: Final = LayoutOffset(outward=0.0, up=0.012, deviation=0.009)
-"""Of hips that are labelled as COCO's, from the heads of the femurs: detectors that learned from such labels are 30 to
-50 mm off at the hip (Needham et al. 2021, "The accuracy of several pose estimation methods for 3D joint centre
-localisation", Sci. Rep. 11:20673). Half of it is taken to lie above, and as much to be open."""
-
-MEDIAPIPE_HIP_OFFSET: Final = LayoutOffset(outward=0.0, up=0.0, deviation=0.009)
-"""The same of MediaPipe's, whose thighs are as long as between joints where they were triangulated."""
+HIP_OFFSET: Final = LayoutOffset(outward=0.0, up=0.0, deviation=0.014)
+"""Of hips, from the heads of the femurs: detectors are 30 to 50 mm off there (Needham et al. 2021, "The accuracy of
+several pose estimation methods for 3D joint centre localisation", Sci. Rep. 11:20673). Which way differs: the thighs of
+one of the two recordings are 4 cm longer than between joints, those of the other are not; all of it is left open.
+"""
 
 JOINT_LAYOUTS: Final = ("h36m_17",)
 """Layouts of joints that motion capture has put: Human3.6M's."""
-
-MEDIAPIPE_LAYOUTS: Final = ("mediapipe_33",)
-"""Layouts of MediaPipe; the others of detectors are labelled as COCO's."""
 
 
 def offsets_of(layout: SkeletonMap) -> Mapping[str, LayoutOffset]:
@@ -71,8 +66,7 @@ def offsets_of(layout: SkeletonMap) -> Mapping[str, LayoutOffset]:
     """
     if "neck" in layout.landmarks or not layout.points or layout.name in JOINT_LAYOUTS:
         return {}
-    hips = MEDIAPIPE_HIP_OFFSET if layout.name in MEDIAPIPE_LAYOUTS else COCO_HIP_OFFSET
-    return {"shoulder": SHOULDER_OFFSET, "hip": hips}
+    return {"shoulder": SHOULDER_OFFSET, "hip": HIP_OFFSET}
 
 
 def between_key_points(lengths: SegmentLengths, stature: float, layout: SkeletonMap) -> SegmentLengths:
