@@ -12,7 +12,7 @@ import numpy as np
 
 from posekit.body import Figure, LengthUncertainty
 from posekit.geometry import Array
-from posekit.ranking.prior_file import load_prior
+from posekit.ranking.prior_file import BUILT_IN
 from posekit.ranking.upright import Up
 from posekit.recovery.body import ranges_of
 from posekit.recovery.noise import Noise, contact_under_noise
@@ -88,7 +88,7 @@ def record_of(
             ),
         ),
         "noise": noise,
-        "ranking": {"up": up.says, "prior": load_prior().name},
+        "ranking": {"up": up.says, "prior": BUILT_IN[0]},
         "versions": {name: _version(name) for name in RECORDED_PACKAGES},
         "asked": asked.to_json(),
     }
