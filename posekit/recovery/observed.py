@@ -24,7 +24,7 @@ TRUNK_LOST, ROOT_LOST = "trunk/not_seen", "root/not_known"
 """What all leaves of a frame are lost to in which nothing grows."""
 
 
-SHOULDERS: Final = ("right_shoulder", "left_shoulder")
+SHOULDER_JOINTS: Final = ("right_shoulder", "left_shoulder")
 """Joints between which a detector's neck is."""
 
 
@@ -51,7 +51,7 @@ def why_neckless(image: Array, derived: Collection[str]) -> tuple[str, str]:
     seen = np.isfinite(image[:, 0])
     if not seen.any():
         return NO_PERSON, PERSON_LOST
-    lacking = [name for name in SHOULDERS if not seen[JOINT[name]]]
+    lacking = [name for name in SHOULDER_JOINTS if not seen[JOINT[name]]]
     if "neck" not in derived or not lacking:
         return NO_NECK, NECK_LOST
     names = f"{lacking[0]} is" if len(lacking) == 1 else f"{' and '.join(lacking)} are"

@@ -35,7 +35,7 @@ FEW_FRAMES: Final = 3
 FEW_SHARE: Final = 0.15
 """... what share of them, up to which they are asked without single points."""
 
-NEIGHBOURS: Final = 2
+NEIGHBOUR_PICTURES: Final = 2
 """Pictures before and after with which a picture is compared."""
 
 VIDEO_SECONDS: Final = 0.1
@@ -125,12 +125,12 @@ def jumps(view: View, deviation: Array) -> NDArray[np.bool_]:
     deviation : array (F, 14)
         Standard deviations of the points, pixels.
     """
-    count, width = len(view), 2 * NEIGHBOURS + 1
+    count, width = len(view), 2 * NEIGHBOUR_PICTURES + 1
     out = np.zeros((count, len(JOINTS)), dtype=np.bool_)
     if count < width or float(np.median(np.diff(view.time))) > VIDEO_SECONDS:
         return out
     doubted = [JOINT[name] for name in DOUBTED_JOINTS]
-    first = np.clip(np.arange(count) - NEIGHBOURS, 0, count - width)
+    first = np.clip(np.arange(count) - NEIGHBOUR_PICTURES, 0, count - width)
     window = view.image[first[:, None] + np.arange(width)][:, :, doubted]
     known = np.isfinite(window).all(axis=(1, 3))
     middle = np.median(window, axis=1, keepdims=True)
