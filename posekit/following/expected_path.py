@@ -104,7 +104,7 @@ class ExpectedPosture:
             joints=joints[one],
             mean=joints[one] if exact else mean,
             covariance=np.zeros_like(covariance) if exact else covariance,
-            confidence=float(weight[away <= SAME_POSTURE_METRES].sum()),
+            confidence=min(float(weight[away <= SAME_POSTURE_METRES].sum()), 1.0),
         )
 
 
