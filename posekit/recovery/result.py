@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 LIKELIHOOD_COLUMNS: Final = columns_in(Likelihoods)
 
-MAX_DETAILED: Final = 8
+MAX_DETAILED: Final = 5
 """Representatives of a refined frame of which a result has all columns, where it does not list everything."""
 
 
