@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 NOISE_UNIT_DEGREES: Final = 1.0
 """Degrees: what `under_noise` multiplies with what the noise does to each segment."""
 
-LOOSENED: Final = 2.0
+LOOSENED_LENGTHS: Final = 2.0
 """By how many times lengths may be farther off than is usual, in frames that have no posture otherwise."""
 
 REFINED_FRAME_WORTH: Final = 50
@@ -143,7 +143,7 @@ class Refiner:
 
     def less_sure(self) -> Refiner:
         """Return the same for a body of which less is known: of frames that nothing explains otherwise."""
-        return replace(self, noise=replace(self.noise, lengths=self.noise.lengths.widened(LOOSENED)))
+        return replace(self, noise=replace(self.noise, lengths=self.noise.lengths.widened(LOOSENED_LENGTHS)))
 
     @cached_property
     def settings(self) -> RecoverSettings:

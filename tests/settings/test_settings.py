@@ -35,6 +35,7 @@ CHANGED = {
     "rooting": Rooting(method="search", deviation=2.0, trust_head=False),
     "refine": True,
     "length_deviation": 0.02,
+    "coverage": 0.9,
 }
 
 
