@@ -148,7 +148,7 @@ def test_following_shows_how_far_it_is_on_a_terminal_alone(
     shown = run(*command)
     assert shown.code == 0
     assert "following" in shown.err
-    assert "/4" in shown.err  # two searches through two frames
+    assert "/2" in shown.err  # frames
     assert "following" not in shown.out
 
 

@@ -16,7 +16,7 @@ from posekit.formats.own import View
 from posekit.recovery import recover, refiner
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.refined import Covariances
-from posekit.recovery.result import result_of
+from posekit.recovery.result import MAX_DETAILED, result_of
 from posekit.refinement import covariance, refined
 from posekit.skeleton import JOINT
 from posekit.synthesis import random_views
@@ -84,7 +84,9 @@ def test_covariances_are_found_once(run: Recorded) -> None:
         assert written.refined is not None
         own = frame.refined.covariance
         assert own.shape == (len(frame), 14, 3, 3)
-        np.testing.assert_array_equal(own, written.refined.covariance)
+        told = ~np.isnan(written.refined.covariance).all(axis=(1, 2, 3))
+        np.testing.assert_array_equal(own[told], written.refined.covariance[told])
+        assert min(len(frame), 1) <= told.sum() <= MAX_DETAILED
         unknown = np.asarray(np.isnan(frame.joints).any(axis=2))
         for row, regions in enumerate(frame.inferred or []):
             unknown[row, [JOINT[name] for name in regions]] = True

@@ -240,6 +240,7 @@ def test_unknown_joints_and_empty_frames_are_left_out(opened):
     empty = {"joints": np.empty((0, 14, 3)), "q": frames[1].q[:0], "branches": [], "groups": np.empty(0, int)}
     empty |= {"margins": {name: np.empty(0) for name in frames[1].margins}}
     empty |= {"fk_distance": np.empty(0), "length_residual": np.empty(0), "probability": np.empty(0)}
+    empty |= {"answer": None, "posture_set": None}
     frames[0] = dataclasses.replace(frames[0], joints=joints)
     frames[1] = dataclasses.replace(frames[1], **empty)
     tab, _, errors = opened(dataclasses.replace(walking_result(), frames=frames))

@@ -381,7 +381,7 @@ def test_frames_without_survivors_have_no_family(opened, flat):
     empty = {
         name: getattr(frame, name)[:0]
         for name in ("joints", "q", "fk_distance", "length_residual", "scales", "probability")
-    }
+    } | {"answer": None, "posture_set": None}
     margins = {name: values[:0] for name, values in frame.margins.items()}
     frames[1] = dataclasses.replace(frame, branches=[], groups=np.empty(0, int), margins=margins, **empty)
     tab = opened(dataclasses.replace(flat, frames=frames))
