@@ -54,7 +54,7 @@ LOOSENED_LENGTHS: Final = 2.0
 REFINED_FRAME_WORTH: Final = 50
 """Exact frames that take as long as a refined one."""
 
-HYPOTHESES_AT_ONCE: Final = 250
+HYPOTHESES_AT_ONCE: Final = 1000
 """Hypotheses whose trees are grown together: each may have thousands of leaves."""
 
 
