@@ -133,7 +133,8 @@ def test_what_is_not_known_stays_so(rng):
 
 def test_frames_do_not_depend_on_each_other(rng):
     frames = [bodies(rng, count) for count in (12, 1, 30)]
-    frames.insert(1, tuple(values[:0] for values in frames[0]))
+    J, p, S = frames[0]
+    frames.insert(1, (J[:0], p[:0], S[:0]))
     together = answers_of([ListedBodies(joints=J, probability=p, uncertainty=S) for J, p, S in frames])
     for given, found in zip(frames, together, strict=True):
         alone = answer(*given)
@@ -166,7 +167,8 @@ def test_what_does_not_fit_together_is_refused(rng):
 def test_representatives_are_those_of_the_plain_way(rng):
     joints, probability, covariance = bodies(rng, 150, 12)
     joints[rng.random(joints.shape[:2]) < 0.05] = np.nan
-    left, held = list(range(150)), {}
+    left: list[int] = list(range(150))
+    held: dict[int, float] = {}
     while left and sum(held.values()) < REPRESENTED_PROBABILITY:
         centre = max(left, key=lambda row: probability[row])
         apart = np.linalg.norm(joints[left] - joints[centre], axis=-1)

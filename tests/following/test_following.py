@@ -231,7 +231,7 @@ def test_the_smoother_is_the_least_squares_solution(seed):
         right.append(W @ wanted)
 
     add(np.eye(6), 0, np.append(value[0], np.zeros(3)), START_DEVIATION**2 * np.eye(6))
-    for k in np.flatnonzero(measured):
+    for k in np.flatnonzero(measured).tolist():
         add(np.eye(3, 6), k, value[k], covariance[k])
     for k in range(count - 1):
         dt = time[k + 1] - time[k]

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -66,7 +67,8 @@ def along(taken, times, joint, model):
     if not taken:
         return 0.0
     at = {frame.time: (frame, one) for frame, one in taken}
-    total, x, P, before, seen = 0.0, None, None, None, None
+    total, x, before, seen = 0.0, None, None, None
+    P: Any = None
     density = 0.05 * model.acceleration[joint] ** 2
     for now in times:
         if x is not None:
@@ -265,7 +267,7 @@ def test_a_single_frame_has_all_its_survivors():
 @given(st.integers(0, 10**6))
 def test_a_narrower_beam_never_finds_a_cheaper_path(seed):
     frames = sequence(seed, (5,) * 3, move=0.1)
-    wide = {"width": 10**4, "slack": 1e9}
+    wide: Any = {"width": 10**4, "slack": 1e9}
     costs = [best_paths(frames, beam=Beam(coverage=share, **wide)).cost[0] for share in (0.3, 0.7, 0.95, 1.0)]
     assert all(a >= b - 1e-9 for a, b in itertools.pairwise(costs))
 

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -75,7 +76,7 @@ def test_the_set_of_an_exact_frame_is_read_to_the_bit(tmp_path, exact, suffix, u
     back = read_back(tmp_path, result_of(exact, unit=unit), suffix)
     for frame, read in zip(exact.frames, back.frames, strict=True):
         assert read.unlisted == 0 and read.unlisted_probability == 0
-        made = read.posture_set
+        made: Any = read.posture_set
         np.testing.assert_allclose(made.trunks, frame.posture_set.trunks, rtol=0 if unit == "m" else 3e-16)
         assert made.bodies == frame.posture_set.bodies == len(made.compose())
         np.testing.assert_array_equal(made.excluded, frame.posture_set.excluded)
@@ -89,6 +90,7 @@ def test_json_and_npz_of_noisy_frames_agree_to_the_digits_that_they_have(tmp_pat
     a, b = (read_back(tmp_path, result, suffix) for suffix in ("json", "npz"))
     for frame, one, other in zip(noisy.frames, a.frames, b.frames, strict=True):
         deviation = np.sqrt(np.nanmedian(np.diagonal(frame.refined.covariance, axis1=-2, axis2=-1)))
+        read: Any
         for read in (one, other):
             assert np.abs(read.joints - frame.joints).max() < deviation / 10
             assert read.unlisted == frame.unlisted
@@ -105,7 +107,7 @@ def test_json_and_npz_of_noisy_frames_agree_to_the_digits_that_they_have(tmp_pat
 def test_answers_are_read_back(tmp_path, noisy, suffix):
     back = read_back(tmp_path, result_of(noisy), suffix)
     for answer, read in zip(noisy.answers, back.frames, strict=True):
-        said = read.answer
+        said: Any = read.answer
         np.testing.assert_array_equal(said.representatives, answer.rows)
         np.testing.assert_allclose(said.probability, answer.probability, rtol=1e-3)
         np.testing.assert_allclose(said.near, answer.depth.near, rtol=1e-3, atol=1e-12)
@@ -121,6 +123,7 @@ def same_region(answer: Answer, said: FrameAnswer) -> bool:
 
 
 def test_a_result_that_lists_a_part_details_few(noisy):
+    frame: Any
     for frame, answer in zip(result_of(noisy).frames, noisy.answers, strict=True):
         told = np.isfinite(frame.q).all(axis=1)
         assert told.sum() == min(MAX_DETAILED, len(answer))
@@ -131,6 +134,7 @@ def test_a_result_that_lists_a_part_details_few(noisy):
 
 def test_a_result_that_lists_everything_details_everything(noisy):
     settings = noisy.settings | {"asked": noisy.settings["asked"] | {"coverage": 1.0}}
+    frame: Any
     for frame in result_of(replace(noisy, settings=settings)).frames:
         assert np.isfinite(frame.q).all() and np.isfinite(frame.refined.covariance).all()
 
@@ -150,7 +154,7 @@ def test_details_that_a_posture_lacks_are_left_out_of_the_json(tmp_path, noisy):
 @pytest.mark.parametrize("suffix", ["json", "npz"])
 def test_what_was_certified_is_valid_when_it_is_read(tmp_path, noisy, suffix):
     back = read_back(tmp_path, result_of(noisy), suffix)
-    assert back.decimals == min(frame.precision.decimals for frame in back.frames)
+    assert back.decimals == min(frame.precision.decimals for frame in back.frames if frame.precision)
     said = recovered_with(back)
     validator = Validator(said.figure, settings=said.settings)
     for frame in back.frames:

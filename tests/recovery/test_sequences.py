@@ -218,7 +218,9 @@ def test_refined_survivors_bring_their_deviation(view):
     assert all(frame.refined is not None for frame in recovery.frames)
     found = follow(recovery)
     given = survivor_frames(recovery.frames)
-    np.testing.assert_array_equal(given[3].covariance, recovery.frames[3].refined.covariance)
+    refined = recovery.frames[3].refined
+    assert refined is not None
+    np.testing.assert_array_equal(given[3].covariance, refined.covariance)
     # What is expected of all survivors, smoothed, has the lengths of those chosen, and is surer than they are.
     chosen = np.stack([frame.joints[one] for frame, one in zip(given, found.survivor[0], strict=True)])
     assert 1e-3 < np.linalg.norm(found.joints[0] - chosen, axis=-1).max() < 0.3
