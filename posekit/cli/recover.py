@@ -161,6 +161,8 @@ def recover(
                 scaled = None
                 with progress("recovering", len(one.view)) as done, about(view):
                     recovery = recover_view(one.view, settings, progress=done)
+                if paths:
+                    recovery = _sides_undone(recovery, view)
             refuse_unrecovered(recovery, view)
             recovered.append((one, recovery, scaled))
     for one, recovery, scaled in recovered:
@@ -198,7 +200,10 @@ def _tell(
         typer.echo(_scale_line(scaled))
     if following is not None:
         from posekit.recovery.summary import following_line
+        from posekit.recovery.swapped_labels import swapped_line
 
+        if line := swapped_line(recovery):
+            typer.echo(line)
         typer.echo(following_line(following))
     if truth is not None:
         from posekit.evaluate.comparison import compare
@@ -215,6 +220,14 @@ def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, pa
 
     with progress_so_far("following") as done, about(view):
         return follow(recovery, k=paths, progress=done)
+
+
+def _sides_undone(recovery: Recovery, view: Path) -> Recovery:
+    """Exchange left and right back where the person's path says that they were exchanged."""
+    from posekit.recovery.swapped_labels import undo_swaps
+
+    with about(view):
+        return undo_swaps(recovery)
 
 
 def _scale_line(scaled: ScaledFollowing) -> str:

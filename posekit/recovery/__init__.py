@@ -37,6 +37,8 @@ if TYPE_CHECKING:
     from posekit.recovery.sequences import survivor_frames as survivor_frames
     from posekit.recovery.summary import following_line as following_line
     from posekit.recovery.summary import summary_lines as summary_lines
+    from posekit.recovery.swapped_labels import swapped_line as swapped_line
+    from posekit.recovery.swapped_labels import undo_swaps as undo_swaps
 else:
     __getattr__ = on_demand(
         __name__,
@@ -59,6 +61,10 @@ else:
             "summary": (
                 "following_line",
                 "summary_lines",
+            ),
+            "swapped_labels": (
+                "swapped_line",
+                "undo_swaps",
             ),
         },
     )
