@@ -137,7 +137,9 @@ def test_what_cannot_be_followed_is_one_line(command, monkeypatch, arguments, te
 
 
 def test_ctrl_c_and_a_reader_that_is_gone_end_it_quietly(seen, header) -> None:
-    start = "from posekit.cli import main; main()"
+    # Whoever runs the tests in the background has SIGINT ignored, which a process passes on.
+    heed = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    start = f"{heed}; from posekit.cli import main; main()"
     options = ("--ranges", "urdf", "--length-deviation", "0")
     command = [sys.executable, "-c", start, "follow", "--stdin", *options]
     text = header + line_at(seen, 0)
