@@ -104,6 +104,16 @@ def test_json_and_npz_of_noisy_frames_agree_to_the_digits_that_they_have(tmp_pat
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_configurations_of_few_digits_are_placed(tmp_path, noisy, suffix):
+    """Pinocchio would place a quaternion that is none of unit length without a word: the figure refuses it."""
+    for frame in read_back(tmp_path, result_of(noisy), suffix).frames:
+        told = np.isfinite(frame.q).all(axis=1)
+        placed = noisy.figure.forward_kinematics(frame.q[told])[:, :14]
+        # The figure's own lengths stand for what refinement varied.
+        assert np.linalg.norm(placed - frame.joints[told], axis=2).max() < 0.1
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
 def test_answers_are_read_back(tmp_path, noisy, suffix):
     back = read_back(tmp_path, result_of(noisy), suffix)
     for answer, read in zip(noisy.answers, back.frames, strict=True):

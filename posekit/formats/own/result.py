@@ -33,6 +33,13 @@ EARLIER_RESULT_SCHEMA: Final = "posekit.result/1"
 RESULT_SCHEMAS: Final = (RESULT_SCHEMA, EARLIER_RESULT_SCHEMA)
 
 
+BASE_QUATERNION: Final = slice(3, 7)
+"""Where a configuration has the rotation of its base, after its place."""
+
+ROUNDED_QUATERNION: Final = 1e-3
+"""How far from one the length of a quaternion may be whose numbers were rounded."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ResultFrame(SurvivorColumns):
     """The survivors of one frame: their columns (`SurvivorColumns`), and what is said of the frame.
@@ -99,6 +106,8 @@ class ResultFrame(SurvivorColumns):
             raise _refused("unlisted", got, "a count from 0, with a probability")
         if self.answer is not None:
             self.answer.check_against(len(self.joints))
+        if self.refined is not None:
+            object.__setattr__(self, "q", _with_unit_quaternions(self.q))
 
     @cached_property
     def precision(self) -> Precision | None:
@@ -178,6 +187,18 @@ def _array(name: str, values: Array, shape: tuple[int, ...]) -> Array:
         raise _refused(name, "an infinite number", "finite numbers, or NaN where undecided")
     array.flags.writeable = False
     return array
+
+
+def _with_unit_quaternions(q: Array) -> Array:
+    """Give the base's quaternion of configurations (N, nq) its length back where few digits were written."""
+    length = np.linalg.norm(q[:, BASE_QUATERNION], axis=1, keepdims=True)
+    rounded = (np.abs(length - 1) > 1e-9) & (np.abs(length - 1) < ROUNDED_QUATERNION)
+    if not rounded.any():
+        return q
+    mended = q.copy()
+    mended[:, BASE_QUATERNION] = np.where(rounded, q[:, BASE_QUATERNION] / length, q[:, BASE_QUATERNION])
+    mended.flags.writeable = False
+    return mended
 
 
 def _camera(given: Mapping[str, Any]) -> dict[str, Any]:
