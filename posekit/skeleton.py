@@ -77,6 +77,9 @@ LIMB_JOINTS: Final = tuple(
 )
 """Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
 
+N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
+"""Joints of torso and hips: the first of the tree, on which limbs hang."""
+
 
 def segment_name(segment: tuple[int, int]) -> str:
     """Name a segment as files do: `a-b`, with a before b in tree order."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.errors import FigureError, InputError
 from posekit.evaluate.frame_sampling import FrameSampling, action_names
-from posekit.evaluate.method import Method, of_frames, scaled
+from posekit.evaluate.method import Method, scaled
 from posekit.evaluate.sweep import Sweep, facing, middles
 from posekit.evaluate.work import Work
 from posekit.formats.own import LeeChenModel, OpenCVModel, View
@@ -152,7 +152,7 @@ def of_view(view: View, method: Method, name: str = "view") -> Material:
         for part in _parts(noisy, known, size):
             works.append(
                 Work(
-                    view=of_frames(noisy, part),
+                    view=noisy.take(part),
                     clip=0,
                     noise=sigma,
                     frame=part,

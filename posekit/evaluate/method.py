@@ -113,7 +113,7 @@ class Method:
 
     def _parts(self, view: View, figure: Figure, rows: NDArray[np.intp]) -> Iterator[list[FrameRecovery]]:
         try:
-            part = view if len(rows) == len(view) else of_frames(view, rows)
+            part = view if len(rows) == len(view) else view.take(rows)
             yield recover(part, self.settings, figure=figure).frames
         except PosekitError as error:
             if len(rows) == 1:
@@ -121,12 +121,6 @@ class Method:
                 return
             for half in np.array_split(rows, 2):
                 yield from self._parts(view, figure, half)
-
-
-def of_frames(view: View, rows: NDArray[np.intp]) -> View:
-    """Take some frames of a view."""
-    names = ("time", "image", "head_image", "confidence", "root", "truth")
-    return replace(view, **{name: getattr(view, name)[rows] for name in names})
 
 
 @lru_cache(maxsize=32)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -16,14 +16,13 @@ from posekit.following import Follower
 from posekit.following.follower import LiveEstimate
 from posekit.following.survivor_frame import SurvivorFrame, check_order
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
-from posekit.geometry import Array
 from posekit.live.sight import LiveCamera, LiveSight, likely_camera
 from posekit.live.tracked_posture import TrackedPosture, deviation_from
 from posekit.recovery.body import loaded
 from posekit.recovery.conductor import recover
 from posekit.recovery.observed import NO_NECK
 from posekit.recovery.recovery import FrameRecovery, Recovery
-from posekit.recovery.sequences import survivor_frames
+from posekit.recovery.sequences import ranked_frames
 from posekit.settings import RecoverSettings
 from posekit.skeleton import JOINTS
 
@@ -102,7 +101,7 @@ class Tracker:
         expect(PAYS_FROM + 1)
         # What the first picture would have to load and make is loaded and made by one that nobody sees.
         standing = recover(self.sight.standing(load_figure()), self.settings)
-        Follower(lag=0).push(survivor_frames(standing.frames, _log(standing.probability))[0])
+        Follower(lag=0).push(ranked_frames(standing)[0])
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -164,7 +163,7 @@ def _found(recovery: Recovery | None, time: float) -> tuple[SurvivorFrame, dict[
     if recovery is None:
         return SurvivorFrame(time=time, joints=np.empty((0, len(JOINTS), 3))), {}
     frame, probability = recovery.frames[0], recovery.probability[0]
-    known = survivor_frames([frame], _log([probability]))[0]
+    known = ranked_frames(recovery)[0]
     if not len(frame):
         return known, {"reason": _lost(frame), "recovery": frame}
     answer = recovery.answers[0]
@@ -183,8 +182,3 @@ def _lost(frame: FrameRecovery) -> str:
         return frame.reason.removeprefix("frames[0]: ")
     most = max(frame.rejected, key=frame.rejected.__getitem__)
     return f"no posture passes: most were lost to {most}"
-
-
-def _log(probability: Sequence[Array]) -> list[Array]:
-    with np.errstate(divide="ignore"):
-        return [np.log(each) for each in probability]

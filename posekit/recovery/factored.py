@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.posture_set import N_SET_TRUNK_JOINTS, PostureSet
+from posekit.formats.own.posture_set import PostureSet
 from posekit.geometry import Array
 from posekit.refinement.refine import BegunRefinement
-from posekit.skeleton import JOINTS, LIMB_JOINTS
+from posekit.tree.factors import whole_bodies
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,9 +57,6 @@ class FactoredLeaves:
         """Return the set of one frame."""
         own = slice(*np.searchsorted(self.frame, [frame, frame + 1]))
         trunk_of, limb_of = self.trunk_of[own], self.limb_of[:, own]
-        joints = np.empty((len(trunk_of), len(JOINTS), 3))
-        joints[:, :N_SET_TRUNK_JOINTS] = self.trunks[trunk_of]
-        for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
-            joints[:, [middle, end]] = self.limbs[kind][limb_of[kind]]
+        joints = whole_bodies(self.trunks, self.limbs, trunk_of, limb_of)
         chi2 = np.stack([values[which] for values, which in zip(self.limb_chi2, limb_of, strict=True)])
         return PostureSet.of(joints, self.trunk_chi2[trunk_of], chi2)

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.ranking.ranking import softmax
 from posekit.recovery.certified import Contradiction, contradictions
 from posekit.recovery.factored import FactoredLeaves
-from posekit.recovery.listing import BodyListing, likeliest, masses
+from posekit.recovery.listing import BodyListing, likeliest
 from posekit.recovery.refined import RefinedSurvivors
 from posekit.recovery.survival import LeafOutcomes
 from posekit.refinement import ObservedFrames, Refined, merge
@@ -143,14 +144,17 @@ class _LeafSearch:
         if self.listing.all:
             return np.flatnonzero(np.isfinite(self.score) & ~self.done)
         self._lead()
-        waiting = ~self.done & self.leads
-        mass, group = masses(np.where(self.leads, self.score, -np.inf), self.group)
-        total = np.bincount(group, mass)
-        left = np.bincount(group, np.where(waiting, mass, 0.0), len(total))
+        share, left = self._shares(self.leads)
         # A tenth of what may be left out is for those that are only foretold: of the rest the likeliest are listed.
-        spare = np.asarray(0.1 * (1.0 - self.listing.coverage) * total)
-        wanted = waiting & (left > spare)[group]
-        return np.flatnonzero(wanted if every else likeliest(np.where(wanted, mass, 0.0), group, spare))
+        spare = np.full(len(left), 0.1 * (1.0 - self.listing.coverage))
+        wanted = ~self.done & self.leads & (left > spare)[self.group]
+        return np.flatnonzero(wanted if every else likeliest(np.where(wanted, share, 0.0), self.group, spare))
+
+    def _shares(self, among: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return what share of its frame's probability each of some leaves has (N,), and those not refined (F,)."""
+        some = among & np.isfinite(self.score)
+        share = np.where(some, softmax(np.where(some, self.score, -np.inf), self.group), 0.0)
+        return share, np.asarray(np.bincount(self.group, np.where(self.done, 0.0, share)), dtype=np.float64)
 
     def _refine(self, chosen: NDArray[np.intp]) -> None:
         """Refine some leaves as whole bodies, and judge them."""
@@ -190,13 +194,9 @@ class _LeafSearch:
         listed[rows] = True
         if self.listing.all:
             return listed, np.zeros(len(listed))
-        waiting = ~self.done & self.leads
-        mass, group = masses(np.where(listed | waiting, self.score, -np.inf), self.group)
-        total = np.bincount(group, mass)
-        left = np.bincount(group, np.where(waiting, mass, 0.0), len(total))
-        spare = np.maximum((1.0 - self.listing.coverage) * total - left, 0.0)
-        share = mass / np.maximum(total, np.finfo(float).tiny)[group]
-        return likeliest(np.where(listed, mass, 0.0), group, spare), share
+        share, left = self._shares(listed | (~self.done & self.leads))
+        spare = np.maximum(1.0 - self.listing.coverage - left, 0.0)
+        return likeliest(np.where(listed, share, 0.0), self.group, spare), share
 
 
 def blocks(frame: NDArray[np.intp], most: int) -> Iterator[slice]:

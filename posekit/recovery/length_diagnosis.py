@@ -16,10 +16,10 @@ from posekit.geometry import Array
 from posekit.recovery.fit_camera import CameraFit
 from posekit.recovery.grower import Grower
 from posekit.recovery.hypotheses import ObservedHypotheses
-from posekit.recovery.noise import N_TRUNK_JOINTS, Noise
+from posekit.recovery.noise import Noise
 from posekit.recovery.recovery import Recovery
 from posekit.refinement import LengthDoubt, diagnose
-from posekit.skeleton import SEGMENT_NAMES, SEGMENTS, segment_name
+from posekit.skeleton import N_TRUNK_JOINTS, SEGMENT_NAMES, SEGMENTS, segment_name
 
 MAX_FRAMES_DIAGNOSED: Final = 12
 """Frames, spread over all that are empty, in which wrong lengths are looked for."""

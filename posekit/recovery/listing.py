@@ -35,20 +35,6 @@ class BodyListing:
         return self.coverage >= 1.0
 
 
-def masses(score: Array, frame: NDArray[np.intp]) -> tuple[Array, NDArray[np.intp]]:
-    """Return what bodies weigh (N,), the likeliest of each frame 1, and the frame of each, counted without gaps (N,).
-
-    Those with a score of minus infinity, or NaN, weigh nothing.
-    """
-    _, group = np.unique(frame, return_inverse=True)
-    group = group.reshape(-1)
-    score = np.where(np.isnan(score), -np.inf, score)
-    highest = np.full(int(group.max(initial=-1)) + 1, -np.inf)
-    np.maximum.at(highest, group, score)
-    with np.errstate(invalid="ignore"):
-        return np.where(np.isfinite(score), np.exp(score - highest[group]), 0.0), group
-
-
 def likeliest(mass: Array, group: NDArray[np.intp], spare: Array) -> NDArray[np.bool_]:
     """Choose the likeliest bodies (N,) of each group, so that what is left weighs no more than may be spared (G,).
 

@@ -16,7 +16,7 @@ from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
 from posekit.settings import ALLOWED_DEVIATIONS
 from posekit.settings.rooting import DETECTED_DEVIATION
-from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import HEAD, JOINTS, N_TRUNK_JOINTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
 JOINT_OFFSET: Final = 0.012
 """Metres: standard deviation of a detector's key points from the figure's joints, at full confidence."""
@@ -50,9 +50,6 @@ but conventions put the neck, on which they hang, at the seventh vertebra, the t
 
 HEAD_METRES: Final = 0.2
 """Metres from the neck to the head's points."""
-
-N_TRUNK_JOINTS: Final = 6
-"""Joints of torso and hips: the first six."""
 
 CONTACT_UNDER_NOISE_METRES: Final = 0.03
 """Metres by which bodies may come nearer than they should, before refinement and after it: depths are off by as much,

@@ -32,14 +32,14 @@ from posekit.recovery.hypotheses import (
     connected,
 )
 from posekit.recovery.key_point_offsets import PIXEL_DEVIATION, joint_offsets
-from posekit.recovery.noise import LEAST_CONFIDENCE, N_TRUNK_JOINTS, Noise
+from posekit.recovery.noise import LEAST_CONFIDENCE, Noise
 from posekit.recovery.refiner import Lifted, Refiner
 from posekit.recovery.seen_trunk import SeenTrunk, with_trunk
 from posekit.refinement import ObservedFrames, RootPrior
 from posekit.settings import RecoverSettings, Tolerance
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.settings.scale import Scale, way_of
-from posekit.skeleton import JOINTS, POINTS
+from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, POINTS
 
 SCALE_DEVIATIONS: Final[Mapping[str, float]] = {"likely": 0.08, "min": 0.08, "stature": 0.03}
 """Relative standard deviation of a scale, by how it was found; one that is given leaves the size as

@@ -36,9 +36,8 @@ from posekit.recovery.survival import LeafOutcomes, drop
 from posekit.recovery.trees import Batch, FrameTrees
 from posekit.refinement import ObservedFrames, Trunks, find_trunks, tolerance_of, under_noise
 from posekit.refinement.tolerance import NoiseTolerance
-from posekit.refinement.trunks import N_TRUNK_JOINTS
 from posekit.settings import ALLOWED_DEVIATIONS, RecoverSettings, Tolerance
-from posekit.skeleton import HEAD, JOINTS, RIGID_SEGMENTS, segment_name
+from posekit.skeleton import HEAD, JOINTS, N_TRUNK_JOINTS, RIGID_SEGMENTS, segment_name
 from posekit.tree import Check, InterpretationTree, Leaves, Loosening, Scope
 from posekit.validators.joint_range import limited
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.geometry import Array
-from posekit.recovery.noise import N_TRUNK_JOINTS
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import JOINT, JOINTS, N_TRUNK_JOINTS
 from posekit.views.person_view import pelvis_fraction
 
 FEWEST_TRUNK_JOINTS: Final = 2

@@ -83,8 +83,7 @@ def follow(
     (2, 5)
     """
     if log_probability is None:
-        with np.errstate(divide="ignore"):
-            log_probability = [np.log(each) for each in recovery.probability]
+        log_probability = _logarithms(recovery)
     return follow_frames(
         recovery.frames,
         log_probability=log_probability,
@@ -129,6 +128,16 @@ def follow_frames(
         searched = [_about_neck(frame) for frame in given]
     paths = best_paths(searched, k=k, model=model, beam=beam, apart=apart, progress=progress)
     return _following(frames, given, paths, k, apart)
+
+
+def ranked_frames(recovery: Recovery) -> list[SurvivorFrame]:
+    """Make the frames of a recovery ready for paths, as `survivor_frames` does, with what they are ranked."""
+    return survivor_frames(recovery.frames, _logarithms(recovery))
+
+
+def _logarithms(recovery: Recovery) -> list[Array]:
+    with np.errstate(divide="ignore"):
+        return [np.log(each) for each in recovery.probability]
 
 
 def survivor_frames(

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.errors import PosekitError
 from posekit.following import Paths, SurvivorFrame, best_paths
+from posekit.formats.keypoints.side_body import ARM_JOINTS, LEG_JOINTS
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
 from posekit.recovery.conductor import recover
 from posekit.recovery.grower import Grower
 from posekit.recovery.person import uncertainty_of
 from posekit.recovery.recovery import Recovery
-from posekit.recovery.sequences import survivor_frames
+from posekit.recovery.sequences import ranked_frames
 from posekit.skeleton import POINT
 
 SWAP_ODDS: Final = 0.01
@@ -41,13 +42,10 @@ FRAMES_TOGETHER: Final = 9
 FEWEST_FRAMES: Final = 3
 """Frames that show a motion."""
 
-BY_FRAME: Final = ("time", "image", "head_image", "confidence", "root", "truth")
-"""What a view has of each frame."""
-
 PAIRS: Final[Mapping[str, tuple[str, ...]]] = {
-    "legs": ("hip", "knee", "ankle"),
-    "arms": ("shoulder", "elbow", "wrist"),
-    "all": ("hip", "knee", "ankle", "shoulder", "elbow", "wrist", "eye", "ear"),
+    "legs": LEG_JOINTS,
+    "arms": ARM_JOINTS,
+    "all": (*LEG_JOINTS, *ARM_JOINTS, "eye", "ear"),
 }
 """Points that a detector exchanges together, without their sides."""
 
@@ -81,7 +79,7 @@ def undo_swaps(recovery: Recovery, *, figure: Figure | None = None) -> Recovery:
         or not any(map(len, recovery.frames))
     ):
         return recovery
-    frames = _costly(recovery)
+    frames = ranked_frames(recovery)
     runs = _runs(grower.view, recovery, best_paths(frames))
     tried = {kind: _tried(recovery, grower, runs, kind) for kind in PAIRS}
     swapped: dict[int, str] = {}
@@ -114,12 +112,6 @@ def swapped_line(recovery: Recovery) -> str:
     return f"left and right exchanged back in frames {each}" if each else ""
 
 
-def _costly(recovery: Recovery) -> list[SurvivorFrame]:
-    """Make frames ready for paths, with what their survivors are ranked."""
-    with np.errstate(divide="ignore"):
-        return survivor_frames(recovery.frames, [np.log(each) for each in recovery.probability])
-
-
 def _tried(
     recovery: Recovery, grower: Grower, runs: Sequence[tuple[list[int], tuple[str, ...]]], kind: str
 ) -> dict[int, SurvivorFrame]:
@@ -134,12 +126,11 @@ def _tried(
     settings = grower.settings.changed(length_deviation=None)
     for start in range(0, len(wanted), FRAMES_TOGETHER):
         part = wanted[start : start + FRAMES_TOGETHER]
-        some = {name: getattr(view, name)[part] for name in BY_FRAME}
         try:
-            other = recover(replace(view, **some), settings, figure=recovery.figure)
+            other = recover(view.take(part), settings, figure=recovery.figure)
         except PosekitError:  # such labels cannot be what they say
             continue
-        found |= {k: one for k, one in zip(part, _costly(other), strict=True) if len(one.joints)}
+        found |= {k: one for k, one in zip(part, ranked_frames(other), strict=True) if len(one.joints)}
     return found
 
 

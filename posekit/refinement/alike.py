@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.refinement.merging import leaders_of_pairs
 from posekit.refinement.refine import BegunRefinement
-from posekit.skeleton import LIMB_JOINTS
+from posekit.skeleton import LIMB_JOINTS, N_TRUNK_JOINTS
+from posekit.tree.distinct import equal_pairs
 from posekit.tree.factors import Rows
-
-TRUNK_JOINTS: Final = slice(0, 6)
-"""The joints of torso and hips, in tree order."""
 
 INDISTINCT_SQUARE: Final = 2.366
 """Chi-square of three degrees of freedom that half of all draws are below: a joint within it is in the ellipsoid that
@@ -41,7 +39,7 @@ def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
     base, of = begun.search.columns
     first = np.searchsorted(base, np.arange(count))
     chi2 = begun.search.bases.found.chi2
-    own_joints, ellipsoids = columns.joints[first, TRUNK_JOINTS], inverse[first, TRUNK_JOINTS]
+    own_joints, ellipsoids = columns.joints[first, :N_TRUNK_JOINTS], inverse[first, :N_TRUNK_JOINTS]
     leader = _leaders(frame[factors.trunk], chi2, own_joints, ellipsoids)
     matched = np.ones(len(factors.trunk_of), dtype=np.bool_)
     keys = [leader[factors.trunk_of]]
@@ -51,7 +49,7 @@ def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
         on, fit = base[of[kind]], begun.limb_chi2[kind]
         alone = _leaders(on, fit, place, ellipsoid)
         # Limbs of a trunk that is as another: the likeliest of that one's that they are as.
-        a, b = _pairs(on, np.where(leader[on] == on, -1, leader[on]))
+        b, a = equal_pairs(np.where(leader[on] == on, -1, leader[on]), on)
         near = _within(place[b] - place[a], ellipsoid[a])
         order = np.lexsort((fit[a[near]], b[near]))
         other, which = np.unique(b[near][order], return_index=True)
@@ -70,21 +68,12 @@ def alike(begun: BegunRefinement, frame: NDArray[np.intp]) -> Rows:
 def _leaders(group: Rows, chi2: Array, place: Array, ellipsoid: Array) -> Rows:
     """Find for each part (n, J, 3) the first of its group, the likeliest first, in whose ellipsoids it is."""
     order = np.argsort(chi2, kind="stable")
-    a, b = _pairs(group[order], group[order])
+    b, a = equal_pairs(group[order], group[order])
     a, b = a[a < b], b[a < b]
     near = _within(place[order[b]] - place[order[a]], ellipsoid[order[a]])
     leader = np.empty_like(order)
     leader[order] = order[leaders_of_pairs(len(order), a[near], b[near])]
     return leader
-
-
-def _pairs(of: Rows, wanted: Rows) -> tuple[Rows, Rows]:
-    """Pair all rows a and b where what a is of is what b wants."""
-    order = np.argsort(of, kind="stable")
-    begin = np.searchsorted(of[order], wanted)
-    count = np.searchsorted(of[order], wanted, side="right") - begin
-    b = np.repeat(np.arange(len(wanted)), count)
-    return order[np.arange(len(b)) + np.repeat(begin - np.cumsum(count) + count, count)], b
 
 
 def _within(apart: Array, ellipsoid: Array) -> NDArray[np.bool_]:

@@ -20,14 +20,11 @@ from posekit.compiled import screen_kinds as kernels
 from posekit.compiled.noise_kernels import LEAST_DEGREES, MIN_COSINE
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.skeleton import JOINTS, PARENTS, TORSO
+from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, PARENTS
 from posekit.tree import Check, Findings, Loosening, Place, Rule
 
 LOOSENED_KINDS = (kernels.OF_ANATOMICAL_LIMB, kernels.OF_LIMB, kernels.OF_NECK, kernels.OF_PELVIS)
 """Screens that know what noise allows."""
-
-N_TRUNK_JOINTS = len(TORSO) + 2
-"""Joints of torso and hips: the first six."""
 
 
 @dataclass(frozen=True, kw_only=True)

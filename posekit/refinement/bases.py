@@ -16,6 +16,7 @@ from posekit.refinement.joint_step import (
     LimbTables,
     TrunkTables,
     gain_of,
+    joint_quadratics,
     joint_step,
     limb_tables,
     trunk_tables,
@@ -66,12 +67,7 @@ class BaseTables(NamedTuple):
 
     def gain(self, base: Rows, slots: Rows) -> Array:
         """Return the decrease of chi2 that trunks (G,) with limbs in some slots (4, G), -1 for none, promise (G,)."""
-        matrix, gradient = self.trunks.matrix[base], self.trunks.gradient[base]
-        for kind in range(4):
-            rows = np.flatnonzero(slots[kind] >= 0)
-            matrix[rows] += self.limbs.matrix[kind, slots[kind, rows]]
-            gradient[rows] += self.limbs.gradient[kind, slots[kind, rows]]
-        return gain_of(matrix, gradient)
+        return gain_of(*joint_quadratics(self.trunks, self.limbs, base, slots))
 
 
 def assemble(

@@ -77,16 +77,13 @@ def joint_step(
     array (4, 2, 2, 3, N)
         The limbs' tangents.
     """
-    matrix, gradient = trunks.matrix[which], trunks.gradient[which]
-    pulls = [np.flatnonzero(columns[k] >= 0) for k in range(4)]
-    for k, rows in enumerate(pulls):
-        matrix[rows] += limbs.matrix[k, columns[k, rows]]
-        gradient[rows] += limbs.gradient[k, columns[k, rows]]
+    matrix, gradient = joint_quadratics(trunks, limbs, which, columns)
     trunk = -np.linalg.solve(matrix, gradient[..., None])
     gain = -np.einsum("nc,nc->n", trunk[..., 0], gradient)
     steps = np.zeros((limbs.step.shape[2], 4, len(which)))
     tangents = np.zeros((4, 2, 2, 3, len(which)))
-    for k, rows in enumerate(pulls):
+    for k in range(4):
+        rows = np.flatnonzero(columns[k] >= 0)
         own = columns[k, rows]
         steps[:, k, rows] = (limbs.step[k, own] + (limbs.slope[k, own] @ trunk[rows])[..., 0]).T
         tangents[k][..., rows] = limbs.tangents[k][..., own]
@@ -94,6 +91,18 @@ def joint_step(
     if trunks.head.shape[1]:
         head = (trunks.head[which] + (trunks.head_slope[which] @ trunk[:, :6])[..., 0]).T
     return PostureStep(np.ascontiguousarray(trunk[..., 0].T), steps, head), gain, tangents
+
+
+def joint_quadratics(
+    trunks: TrunkTables, limbs: LimbTables, which: NDArray[np.intp], columns: NDArray[np.intp]
+) -> tuple[Array, Array]:
+    """Add up trunks (N,) and limbs in some columns (4, N), -1 for none: matrices (N, C, C) and gradients (N, C)."""
+    matrix, gradient = trunks.matrix[which], trunks.gradient[which]
+    for k in range(4):
+        rows = np.flatnonzero(columns[k] >= 0)
+        matrix[rows] += limbs.matrix[k, columns[k, rows]]
+        gradient[rows] += limbs.gradient[k, columns[k, rows]]
+    return matrix, gradient
 
 
 def gain_of(matrix: Array, gradient: Array) -> Array:

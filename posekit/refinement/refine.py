@@ -22,7 +22,7 @@ from posekit.refinement.size import BodySize, size_of
 from posekit.refinement.state import head_points, place, place_limbs, trunk_offsets
 from posekit.refinement.survival import chi2_survival
 from posekit.skeleton import HEAD_POINTS, JOINTS, LIMB_JOINTS
-from posekit.tree.factors import Factors, factor_postures
+from posekit.tree.factors import Factors, factor_postures, whole_bodies
 
 MAX_COORDINATE_METRES = 1e6
 """Metres beyond which a survivor is not refined."""
@@ -199,10 +199,7 @@ class BegunRefinement:
     @property
     def joints(self) -> Array:
         """Survivors (N, 14, 3) put together from these; NaN where one cannot be refined."""
-        joints = np.empty((len(self.frame), len(JOINTS), 3))
-        joints[:, :6] = self.trunks[self.factors.trunk_of]
-        for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
-            joints[:, [middle, end]] = self.limbs[kind][self.factors.limb_of[kind]]
+        joints = whole_bodies(self.trunks, self.limbs, self.factors.trunk_of, self.factors.limb_of)
         joints[~self.placeable] = np.nan
         return joints
 

@@ -19,12 +19,10 @@ from posekit.cameras import Camera
 from posekit.errors import InputError
 from posekit.refinement.optics import optics_of
 from posekit.settings import ALLOWED_DEVIATIONS
-from posekit.skeleton import PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import N_TRUNK_JOINTS, PARENTS, RIGID_SEGMENTS, TREE_SEGMENTS, segment_name
 
 ROUNDING_METRES = 1e-6
 """Metres that the distances inside a found trunk may be off: they come from its own projections."""
-
-TRUNK_JOINTS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +118,7 @@ def tolerance_of(
     excess = {joint: math.hypot(math.sqrt(2) * beside, stretch * length) for joint, length in lengths.items()}
     tangent = max(excess.values())
     turn = {joint: _turn(excess[joint], length) for joint, length in lengths.items()}
-    limb = max(turn[joint] for joint in range(TRUNK_JOINTS, len(PARENTS)))
+    limb = max(turn[joint] for joint in range(N_TRUNK_JOINTS, len(PARENTS)))
     if trunks:
         rigid, trunk = ROUNDING_METRES, _turn(beside, lengths[3])
     else:
@@ -129,7 +127,7 @@ def tolerance_of(
             max(turn[1], turn[3]),
         )
     contact = (
-        max(_cap(lengths[joint], excess[joint]) for joint in range(TRUNK_JOINTS, len(PARENTS))) / deviations
+        max(_cap(lengths[joint], excess[joint]) for joint in range(N_TRUNK_JOINTS, len(PARENTS))) / deviations
         if deviations
         else 0.0
     )

@@ -36,7 +36,7 @@ from posekit.refinement.refined import REJECTION_PROBABILITY
 from posekit.refinement.start import state_of
 from posekit.refinement.state import PostureState, trunk_offsets, turned_by_spine
 from posekit.refinement.survival import chi2_survival
-from posekit.skeleton import JOINTS, PARENTS, TREE_SEGMENTS, segment_name
+from posekit.skeleton import JOINTS, N_TRUNK_JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 
 N_CHOICES = 32
 """Near and far choices of a trunk: two for each joint but the neck."""
@@ -61,9 +61,6 @@ MAX_STEPS_IN_DOUBT = 40
 
 SAME_TRUNK_METRES = 0.01
 """Metres: trunks none of whose joints are farther apart are one."""
-
-N_TRUNK_JOINTS = 6
-"""Joints of torso and hips."""
 
 LIFT_ROUNDING_METRES = 1e-5
 """Metres by which a trunk may be lifted otherwise than it was found: rounding, tangent to a ray."""

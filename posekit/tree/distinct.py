@@ -1,4 +1,4 @@
-"""Which rows of a table are the same."""
+"""Which rows of a table are the same, and which entries of two."""
 
 from __future__ import annotations
 
@@ -31,6 +31,16 @@ def distinct(table: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     if (filled[one[which]] == filled).all():
         return one, which
     return np.arange(len(table)), np.arange(len(table))
+
+
+def equal_pairs(left: NDArray[np.intp], right: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pair each entry of the one with all equal entries of the other, in order: the places of both."""
+    order = np.argsort(right, kind="stable")
+    begin = np.searchsorted(right[order], left)
+    count = np.searchsorted(right[order], left, side="right") - begin
+    row = np.repeat(np.arange(len(left)), count)
+    within = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+    return row, order[begin[row] + within]
 
 
 @cache

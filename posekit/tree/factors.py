@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.skeleton import LIMB_JOINTS
+from posekit.skeleton import JOINTS, LIMB_JOINTS, N_TRUNK_JOINTS
 from posekit.tree.distinct import distinct
 
 Rows = NDArray[np.intp]
@@ -44,7 +44,8 @@ def factor_postures(frames: Rows, postures: Array) -> Factors:
     """
     n = len(postures)
     # Joints are compared to the last bit: leaves of one tree that share a trunk share its very numbers.
-    key = np.concatenate([frames[:, None].astype(np.float64), postures[:, :6].reshape(n, 18)], axis=1)
+    places = postures[:, :N_TRUNK_JOINTS].reshape(n, 3 * N_TRUNK_JOINTS)
+    key = np.concatenate([frames[:, None].astype(np.float64), places], axis=1)
     trunk, trunk_of = distinct(key)
     limb, limb_of = [], np.empty((4, n), dtype=np.intp)
     for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
@@ -58,6 +59,20 @@ def factor_postures(frames: Rows, postures: Array) -> Factors:
         rank[order] = np.arange(len(order))
         limb_of[kind] = rank[which]
     return Factors(trunk, trunk_of, tuple(limb), limb_of)
+
+
+def whole_bodies(
+    trunks: Array, limbs: Sequence[Array], trunk_of: NDArray[Any], limb_of: NDArray[Any]
+) -> Array:
+    """Put bodies (N, 14, 3) together from trunks (T, 6, 3) and, by kind, limbs (L, 2, 3).
+
+    `trunk_of` (N,) and `limb_of` (4, N) say which of these each body has, as of `Factors`.
+    """
+    joints = np.empty((len(trunk_of), len(JOINTS), 3))
+    joints[:, :N_TRUNK_JOINTS] = trunks[trunk_of]
+    for (_, middle, end), some, which in zip(LIMB_JOINTS, limbs, limb_of, strict=True):
+        joints[:, [middle, end]] = some[which]
+    return joints
 
 
 class LimbColumns(NamedTuple):

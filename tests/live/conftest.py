@@ -1,7 +1,5 @@
 """A few noisy pictures of one person, and a tracker of that person."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -42,6 +40,4 @@ def alone(seen: View) -> list[posekit.Recovery]:
 
 def picture(view: View, k: int) -> View:
     """Return one picture of a view."""
-    part = slice(k, k + 1)
-    arrays = ("time", "image", "head_image", "confidence", "root", "truth")
-    return replace(view, **{name: getattr(view, name)[part] for name in arrays})
+    return view.take([k])

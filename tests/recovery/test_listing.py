@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from posekit.body import load_figure
 from posekit.errors import InputError
+from posekit.ranking.ranking import softmax
 from posekit.recovery import Recovery, recover
-from posekit.recovery.listing import likeliest, masses
+from posekit.recovery.listing import likeliest
 from posekit.refinement.merging import MERGE_DISTANCE_METRES
 from posekit.settings import RecoverSettings
 from posekit.synthesis import random_views
@@ -92,7 +93,7 @@ def test_the_fewest_that_hold_the_share_are_chosen(coverage: float) -> None:
     frame = np.repeat([7, 3, 4], [20, 1, 35])
     score = 3.0 * rng.standard_normal(len(frame))
     score[5] = -np.inf
-    mass, group = masses(score, frame)
+    mass, group = softmax(score, frame), np.unique(frame, return_inverse=True)[1].reshape(-1)
     chosen = likeliest(mass, group, np.asarray((1 - coverage) * np.bincount(group, mass)))
     for one in (7, 3, 4):
         own = (frame == one) & np.isfinite(score)

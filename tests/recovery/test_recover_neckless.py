@@ -33,11 +33,6 @@ KEPT = [1, 3, 4]
 REASON = "the neck, from which the tree grows, is not seen"
 
 
-def of_frames(view: View, rows: list[int]) -> View:
-    names = ("time", "image", "head_image", "confidence", "root", "truth")
-    return replace(view, **{name: getattr(view, name)[rows] for name in names})
-
-
 def neckless(view: View, *, rootless: bool = True) -> View:
     image, root = view.image.copy(), view.root.copy()
     image[LOST, 0] = np.nan
@@ -93,7 +88,7 @@ def assert_same(found: Recovery, alone: Recovery) -> None:
 )
 def test_the_others_are_those_of_the_view_without_these_frames(kind: str, rootless: bool) -> None:
     view = kinds()[kind]
-    found, alone = recover(neckless(view, rootless=rootless)), recover(of_frames(view, KEPT))
+    found, alone = recover(neckless(view, rootless=rootless)), recover(view.take(KEPT))
     assert all(map(len, alone.frames))
     assert_same(found, alone)
     paths, theirs = follow(found, k=2), follow(alone, k=2)
@@ -109,7 +104,7 @@ def test_flips_by_hand_stay_with_their_frames() -> None:
     ends = [("right", "elbow"), ("left", "elbow"), ("left", "wrist"), ("right", "wrist"), ("left", "elbow")]
     nearer = [{f"{side}_elbow-{side}_wrist": f"{side}_{end}"} for side, end in ends]
     found = recover(neckless(view), nearer=nearer, checks=("rigid-parts",))
-    alone = recover(of_frames(view, KEPT), nearer=[nearer[k] for k in KEPT], checks=("rigid-parts",))
+    alone = recover(view.take(KEPT), nearer=[nearer[k] for k in KEPT], checks=("rigid-parts",))
     assert_same(found, alone)
     assert all(any(name.startswith("nearer/") for name in found.frames[k].rejected) for k in KEPT)
 
@@ -117,7 +112,7 @@ def test_flips_by_hand_stay_with_their_frames() -> None:
 def test_an_evaluation_counts_them_as_empty() -> None:
     view = kinds()["a lens that distorts"]
     some = evaluate(neckless(view), method=Method(noise=(0.0,))).frames.measured
-    alone = evaluate(of_frames(view, KEPT), method=Method(noise=(0.0,))).frames.measured
+    alone = evaluate(view.take(KEPT), method=Method(noise=(0.0,))).frames.measured
     assert (some.survivors[LOST] == 0).all()
     np.testing.assert_array_equal(some.survivors[KEPT], alone.survivors)
     np.testing.assert_array_equal(some.errors["best"][KEPT], alone.errors["best"])

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from posekit.formats.own.column import column, columns_in
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
-from posekit.skeleton import JOINTS, LIMB_JOINTS
-from posekit.tree.factors import Rows, factor_postures
-
-N_SET_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
-"""The joints of torso and hips: the first six of the tree."""
+from posekit.skeleton import LIMB_JOINTS, N_TRUNK_JOINTS
+from posekit.tree.distinct import equal_pairs
+from posekit.tree.factors import Rows, factor_postures, whole_bodies
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,7 +55,7 @@ class PostureSet:
 
     trunks: Array = column(
         "Neck, shoulders, pelvis and hips of each trunk, OpenCV camera frame, in `unit`; null where not known.",
-        shape=(N_SET_TRUNK_JOINTS, 3),
+        shape=(N_TRUNK_JOINTS, 3),
         length_power=1,
         decimals=0,
         null="row",
@@ -91,7 +89,7 @@ class PostureSet:
     def __post_init__(self) -> None:
         T, L, E = len(self.trunks), len(self.limb_trunk), len(self.excluded)
         shapes: dict[str, tuple[int, ...]] = {
-            "trunks": (T, N_SET_TRUNK_JOINTS, 3),
+            "trunks": (T, N_TRUNK_JOINTS, 3),
             "trunk_chi2": (T,),
             "limb_trunk": (L,),
             "limb_kind": (L,),
@@ -145,7 +143,7 @@ class PostureSet:
         kinds, member = kinds[order], member[order]
         ends = np.array([limb[1:] for limb in LIMB_JOINTS])
         found = PostureSet(
-            trunks=joints[trunk_order, :N_SET_TRUNK_JOINTS],
+            trunks=joints[trunk_order, :N_TRUNK_JOINTS],
             trunk_chi2=np.full(len(trunk_order), np.nan) if trunk_chi2 is None else trunk_chi2[trunk_order],
             limb_trunk=trunk_of[member],
             limb_kind=kinds,
@@ -164,7 +162,7 @@ class PostureSet:
         bodies = np.arange(len(self.trunks))[:, None]
         for kind in range(len(LIMB_JOINTS)):
             own = np.flatnonzero(self.limb_kind == kind)
-            row, limb = _joined(bodies[:, 0], self.limb_trunk[own])
+            row, limb = equal_pairs(bodies[:, 0], self.limb_trunk[own])
             bodies = np.column_stack([bodies[row], own[limb]])
             before, last = bodies[:, 1:-1], bodies[:, -1:]
             pairs = np.minimum(before, last) * limbs + np.maximum(before, last)
@@ -173,11 +171,7 @@ class PostureSet:
 
     def joints(self, bodies: Rows) -> Array:
         """Put bodies (N, 5) of `compose` together (N, 14, 3), camera frame, metres."""
-        joints = np.empty((len(bodies), len(JOINTS), 3))
-        joints[:, :N_SET_TRUNK_JOINTS] = self.trunks[bodies[:, 0]]
-        for kind, (_, middle, end) in enumerate(LIMB_JOINTS):
-            joints[:, [middle, end]] = self.limb_joints[bodies[:, 1 + kind]]
-        return joints
+        return whole_bodies(self.trunks, [self.limb_joints] * len(LIMB_JOINTS), bodies[:, 0], bodies[:, 1:].T)
 
     def chi2(self, bodies: Rows) -> Array:
         """Add up what trunks and limbs of bodies (N, 5) are off (N,)."""
@@ -192,23 +186,13 @@ def _by_first(first: Rows, which: Rows) -> tuple[Rows, Rows]:
     return first[order], place[which]
 
 
-def _joined(left: Rows, right: Rows) -> tuple[Rows, Rows]:
-    """Pair each entry of the one with all equal entries of the other: the places of both."""
-    order = np.argsort(right, kind="stable")
-    begin = np.searchsorted(right[order], left)
-    count = np.searchsorted(right[order], left, side="right") - begin
-    row = np.repeat(np.arange(len(left)), count)
-    within = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-    return row, order[begin[row] + within]
-
-
 def _never_together(trunk: Rows, kind: Rows, limb_of: Rows) -> Rows:
     """List pairs of limbs of one trunk, of two kinds, that no body (4, N) has both of."""
     limbs = len(trunk)
     found = [np.empty(0, dtype=np.intp)]
     for a, b in combinations(range(len(LIMB_JOINTS)), 2):
         one, other = np.flatnonzero(kind == a), np.flatnonzero(kind == b)
-        row, column = _joined(trunk[one], trunk[other])
+        row, column = equal_pairs(trunk[one], trunk[other])
         possible = one[row] * limbs + other[column]
         found.append(possible[~np.isin(possible, limb_of[a] * limbs + limb_of[b])])
     return np.column_stack(np.divmod(np.sort(np.concatenate(found)), max(limbs, 1)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from posekit.settings.recover import MAX_LENGTH_DEVIATION
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS, SEGMENT_NAMES
 
 Array = NDArray[np.float64]
+
+FRAME_ARRAYS: Final = ("time", "image", "head_image", "confidence", "root", "truth")
+"""What a view has of each frame."""
 
 
 def _no_frames() -> Array:
@@ -118,6 +121,10 @@ class View:
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.time)
+
+    def take(self, rows: NDArray[np.intp] | Sequence[int] | slice) -> View:
+        """Return some of its frames."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in FRAME_ARRAYS})
 
     def _check_figure(self) -> None:
         for name, length in self.lengths.items():
