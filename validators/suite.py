@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,9 @@ class Judgement:
         Where a value is outside its bounds by more than the tolerance; False where undecided.
     by_pairs : bool
         Whether its one place stands for all pairs of bodies, which `Report.contacts` lists.
+    over_time : bool
+        Whether it is of a check over time, which says nothing of frames that it does not apply to: they are not
+        undecided for that.
     """
 
     check: str
@@ -42,11 +45,17 @@ class Judgement:
     margin: Array
     violated: NDArray[np.bool_]
     by_pairs: bool = False
+    over_time: bool = False
 
     @property
     def worst(self) -> Array:
         """The smallest margin of each posture (N,); NaN where nothing was decided."""
         return np.asarray(np.fmin.reduce(self.margin, axis=1))
+
+    def of(self, rows: NDArray[np.intp] | slice) -> Judgement:
+        """Return what it says about some of the postures."""
+        names = ("value", "lower", "upper", "margin", "violated")
+        return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
 def worst_margins(checks: Sequence[Check], points: Array, alike: Alike | None = None) -> dict[str, Array]:

@@ -18,6 +18,7 @@ from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
+from posekit.validators.motion.profile import with_profile
 from posekit.validators.ranges import load_ranges
 from posekit.validators.registry import PHYSICAL_CHECKS, chosen_checks, make_checks
 from posekit.validators.robot.figure import FigureConfigurations
@@ -71,6 +72,7 @@ class Validator:
             untrusted=asked.untrusted,
             visuals=asked.bodies == "visual",
         )
+        asked, self.profile = with_profile(asked)
         self.settings = asked
         self.robot = subject if isinstance(subject, Robot) else None
         self._figure = subject if isinstance(subject, Figure) else None
@@ -93,7 +95,7 @@ class Validator:
                 )
         self._chosen = chosen_checks(PHYSICAL_CHECKS if asked.checks is None else asked.checks)
         self.checks = tuple(one.name for one in self._chosen)
-        if not self.checks:
+        if not self.checks and not self.profile.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
         self._options: dict[str, Any] = {
             "ranges": load_ranges(asked.ranges) if isinstance(asked.ranges, str) else asked.ranges,

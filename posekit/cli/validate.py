@@ -24,7 +24,8 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.body import Figure
-    from posekit.formats.own import Postures, Result
+    from posekit.formats.held_postures import HeldPostures
+    from posekit.formats.own import Result
     from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
@@ -52,12 +53,18 @@ VALIDATE_EXAMPLES = examples(
 
 
 class _Input(NamedTuple):
-    """What a file holds: postures or configurations, frames in time, the direction up, the result they are of."""
+    """What a file holds: postures or configurations, and the result that they are of."""
 
-    postures: Postures | NamedConfigurations
-    clip: Any = None
-    up: Array | None = None
+    postures: HeldPostures | NamedConfigurations
     result: Result | None = None
+
+    @property
+    def up(self) -> Array | None:
+        """The direction up, where the file says it."""
+        from posekit.formats.motion import UP_DIRECTIONS
+
+        said = getattr(self.postures, "up", "")
+        return UP_DIRECTIONS[said] if said else None
 
 
 def validate(
@@ -177,6 +184,16 @@ def validate(
     up: Annotated[
         str, option("--up", "AXIS", "Against gravity, for `balance`: +z, +y, … Default: +z, or the file's.")
     ] = "",
+    profile: Annotated[
+        str,
+        option("--profile", "NAME|FILE", "Checks over time and their thresholds: posekit, or a TOML table."),
+    ] = "posekit",
+    ground: Annotated[
+        str,
+        option(
+            "--ground", "HEIGHT", "Where the ground is along up, as 0m. Default: estimated from each clip."
+        ),
+    ] = "",
     fail_over: Annotated[
         str, option("--fail-over", "N|P%", "How many postures, or what share, may be not valid; then exit 0.")
     ] = "0",
@@ -197,7 +214,7 @@ def validate(
         files.check_report_path(output)
     allowed = _allowed(fail_over)
     given = _read(postures)
-    if not _count(given.postures):
+    if not len(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
     judged = ValidateSettings(up=(0.0, 0.0, 1.0) if given.up is None else given.up)
@@ -223,6 +240,8 @@ def validate(
         "srdf": srdf or None,
         "untrusted": None if trusted is None else not trusted,
         "up": _direction(up) if up else None,
+        "profile": profile,
+        "ground": signed_length(ground, "--ground") if ground else None,
     }
     settings = judged.changed(
         rules=rule_numbers(rules),
@@ -266,33 +285,21 @@ def _read(path: Path) -> _Input:
     """Read a file of whatever holds postures or configurations."""
     from posekit.formats.format import Content
     from posekit.formats.held_postures import held_postures, postures_of_result
-    from posekit.formats.motion import UP_DIRECTIONS
     from posekit.formats.own import read_configurations, read_result
     from posekit.formats.recognising import recognise
 
     found = recognise(path)
     if found.holds is Content.RESULT:
         result = read_result(path)
-        return _Input(postures_of_result(result).postures, result=result)
+        return _Input(postures_of_result(result), result)
     if found.holds is Content.CONFIGURATIONS:
         return _Input(read_configurations(path))
-    held = held_postures(path, found)
-    if found.holds is not Content.MOTION:
-        return _Input(held.postures)
-    return _Input(held.postures, held.clip, UP_DIRECTIONS[held.up] if held.up else None)
-
-
-def _count(postures: Postures | NamedConfigurations) -> int:
-    from posekit.formats.own import Postures
-
-    return len(postures.joints) if isinstance(postures, Postures) else len(postures)
+    return _Input(held_postures(path, found))
 
 
 def _clips(given: _Input) -> Any:
     """Return which sequence each posture belongs to: its clip, or one for all."""
-    import numpy as np
-
-    return np.zeros(_count(given.postures), dtype=np.intp) if given.clip is None else given.clip
+    return getattr(given.postures, "clip", None)
 
 
 def _direction(text: str) -> Any:

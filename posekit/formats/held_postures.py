@@ -70,6 +70,12 @@ class HeldPostures:
         """Return the number of postures."""
         return len(self.postures.joints)
 
+    @property
+    def in_time(self) -> bool:
+        """Whether they are frames of motion: of each frame of a clip one posture."""
+        frames = np.stack([self.clip, self.frame], axis=1)
+        return len(self) > 0 and len(np.unique(frames, axis=0)) == len(frames)
+
 
 def held_postures(
     path: Path,

@@ -59,6 +59,10 @@ class ValidateSettings(JudgingSettings):
         Whether the URDF is first loaded in a child process with limits; by default what is not built in is.
     up : array (3,)
         Against gravity, in the frame of the postures: for ``balance``. By default z.
+    profile : str
+        Thresholds of checks over time: ``posekit`` (the default), or the path of a TOML table.
+    ground : float, optional
+        Metres of the ground along the axis that points up; estimated from each clip where not given.
 
     Raises
     ------
@@ -75,6 +79,8 @@ class ValidateSettings(JudgingSettings):
     package_dirs: Sequence[str | Path] = ()
     untrusted: bool | None = None
     up: ArrayLike = (0.0, 0.0, 1.0)
+    profile: str = "posekit"
+    ground: float | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -91,6 +97,8 @@ class ValidateSettings(JudgingSettings):
             if given not in known:
                 expected = ", ".join(one for one in known if one is not None)
                 raise InputError(f"{option}: {given!r}; expected one of {expected}")
+        if self.ground is not None and not math.isfinite(self.ground):
+            raise InputError(f"the ground is at {self.ground!r} m; expected a finite height")
         up = np.asarray(self.up, dtype=np.float64)
         if up.shape != (3,) or not np.isfinite(up).all() or not np.linalg.norm(up) > 0:
             raise InputError(f"up is {self.up!r}; expected a direction, three finite numbers")

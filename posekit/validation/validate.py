@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure
+from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures, Result, ValidationReport
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.formats.own.report import PostureReport
@@ -19,6 +20,7 @@ from posekit.recovery.judged import tolerances_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
 from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
+from posekit.validation.over_time import OverTime, judged_over_time
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
@@ -58,7 +60,7 @@ class _Given:
 
 def validate(
     validator: Validator,
-    postures: Postures | NamedConfigurations,
+    postures: Postures | HeldPostures | NamedConfigurations,
     *,
     settings: Mapping[str, Any] | None = None,
     every: bool = False,
@@ -72,8 +74,8 @@ def validate(
     ----------
     validator : Validator
         What judges, with its settings.
-    postures : Postures or Configurations
-        What is judged.
+    postures : Postures, HeldPostures or NamedConfigurations
+        What is judged; frames in time by the checks over time, too.
     settings : dict, optional
         What else is to be written of what decided the verdicts: the settings of the validator are.
     every : bool
@@ -91,29 +93,37 @@ def validate(
     -------
     posekit.formats.own.ValidationReport
     """
+    over_time = OverTime()
+    if isinstance(postures, HeldPostures):
+        if postures.in_time and validator.profile.checks:
+            over_time = judged_over_time(postures, validator.profile.checks, validator.settings)
+        postures = postures.postures
     if isinstance(postures, NamedConfigurations):
         given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
     else:
         given = _Given(joints=postures.joints, head=postures.head, q=None, sequence=sequence)
     applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
+    applied += [one.check.replace("_", "-") for one in over_time.judgements]
     checks = [name.replace("-", "_") for name in applied]
     places: dict[ReportPlace, int] = {}
     parts: list[VerdictColumns] = []
     listed: list[PostureReport] = []
     all_listed = len(given) <= MAX_LISTED
-    for first, verdicts in _batches(validator, given):
+    for first, of_postures in _batches(validator, given):
+        rows = slice(first, first + len(of_postures.complete))
+        verdicts = of_postures.joined([one.of(rows) for one in over_time.judgements])
         contacts = _contacts(verdicts, distances, every=detail != "verdicts")
         columns = columns_of(verdicts, contacts, places, checks, margins=detail != "verdicts")
         parts.append(columns)
         if detail != "findings" or (not all_listed and len(listed) == MAX_LISTED):
             continue
-        rows = (
+        shown = (
             np.arange(len(columns))
             if all_listed
             else np.flatnonzero(columns.verdict)[: MAX_LISTED - len(listed)]
         )
         listed += list_postures(
-            verdicts, contacts, columns, list(places), rows, every=every, first=None if all_listed else first
+            verdicts, contacts, columns, list(places), shown, every=every, first=None if all_listed else first
         )
     columns = joined(parts, list(places), checks)
     not_valid = len(columns) - columns.summary["valid"]
@@ -123,6 +133,7 @@ def validate(
             "checks": applied,
             **_lengths_of(validator, given),
             **validator.settings.told(),
+            **({"not_asked": over_time.not_asked} if over_time.not_asked else {}),
             **(settings or {}),
         },
         postures=tuple(listed),

@@ -50,7 +50,8 @@ def columns_of(
         if not judgement.where:
             continue  # a robot without limits is inside them
         says_nothing = np.isnan(judgement.worst) & ~judgement.violated.any(axis=1)
-        silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
+        if not judgement.over_time:
+            silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
         if judgement.by_pairs and contacts is not None:
             rows, margin = contacts.posture, contacts.distance - lower_margin(judgement)
             index = _indices(places, [ReportPlace(judgement.check, name, "m") for name in contacts.names])[

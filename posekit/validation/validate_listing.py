@@ -137,6 +137,7 @@ def _judged(judgement: Judgement, rows: NDArray[Any]) -> list[JudgedCheck]:
                     rejects=judgement.violated[at],
                 ),
                 undecided=np.isnan(judgement.margin[at]),
+                over_time=judgement.over_time,
             )
         )
     return parts

@@ -50,6 +50,8 @@ CHANGED_OF_VALIDATION = {
     "package_dirs": ("meshes",),
     "untrusted": True,
     "up": (0.0, -1.0, 0.0),
+    "profile": "mine.toml",
+    "ground": 0.1,
 }
 ALL_CHANGED = [
     (kind, name, value)

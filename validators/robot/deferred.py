@@ -56,6 +56,13 @@ class Deferred(Sequence[Judgement]):
 
         return Deferred([after(maker) for maker in self._makers], self.rejected)
 
+    def joined(self, judgements: Sequence[Judgement]) -> Deferred:
+        """Return them with some that are made by now after them, of the same postures."""
+        rejected = self.rejected.copy()
+        for judgement in judgements:
+            rejected |= judgement.violated.any(axis=1)
+        return Deferred([*self._makers, *(judgement.of for judgement in judgements)], rejected)
+
     def _one(self, place: int) -> Judgement:
         if place not in self._made:
             self._made[place] = self._makers[place](slice(None))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,7 +73,7 @@ class Report:
     def _decided(self) -> NDArray[np.bool_]:
         decided = self.complete.copy()
         for judgement in () if isinstance(self.judgements, Deferred) else self.judgements:
-            if judgement.where:  # a robot without limits is inside them
+            if judgement.where and not judgement.over_time:  # a robot without limits is inside them
                 decided &= ~np.isnan(judgement.worst)
         return decided
 
@@ -91,9 +91,17 @@ class Report:
         """
         worst = np.full(len(self.complete), np.nan)
         for judgement in self.judgements:
+            if judgement.over_time:
+                continue
             each = [1.0 if unit == "deg" else 1.0 / CENTIMETRES_A_DEGREE for unit in judgement.unit]
             worst = np.fmin(worst, np.fmin.reduce(judgement.margin * each, axis=1, initial=np.nan))
         return worst
+
+    def joined(self, judgements: Sequence[Judgement]) -> Report:
+        """Return the report with further judgements of the same postures, as those of checks over time."""
+        own = self.judgements
+        together = own.joined(judgements) if isinstance(own, Deferred) else [*own, *judgements]
+        return replace(self, judgements=together)
 
     def contacts(self, *, nearest: bool | NDArray[np.bool_] = False) -> Contacts:
         """List the pairs of bodies that collide in each posture, with their distances.

@@ -156,6 +156,8 @@ class JudgedCheck:
         Value (N, K), bounds and tolerance.
     undecided : bool array (N, K), optional
         Where nothing is said though there is a value.
+    over_time : bool
+        Whether it is a check over time: where it says nothing of a frame, nothing is listed.
     """
 
     check: str
@@ -163,6 +165,7 @@ class JudgedCheck:
     where: Sequence[str]
     findings: Findings
     undecided: NDArray[np.bool_] | None = None
+    over_time: bool = False
 
 
 def make_report(
@@ -362,6 +365,8 @@ def _list_findings(rows: list[list[Finding]], check: JudgedCheck, every: bool) -
         worst = np.where(undecided, np.inf, margin).argmin(axis=1)
         listed = violated.copy()
         listed[np.arange(len(value)), worst] = True
+    if check.over_time:
+        listed &= ~undecided
     for posture, place in np.argwhere(listed).tolist():
         at = posture, place
         rows[posture].append(
