@@ -44,7 +44,7 @@ def test_nothing_known_is_no_violation() -> None:
 def test_an_unknown_check_or_threshold_is_named(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_text('schema = "posekit.profile/1"\n[checks.speeed]\nfastest = 1\n')
-    with pytest.raises(InputError, match="speeed.*did you mean"):
+    with pytest.raises(InputError, match=r"speeed.*did you mean"):
         load_profile(str(path))
     path.write_text('schema = "posekit.profile/1"\n[checks.speed]\nfast = 1\n')
     with pytest.raises(InputError, match="fast"):

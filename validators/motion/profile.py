@@ -55,8 +55,8 @@ def load_profile(name: str) -> Profile:
     if not name or not Path(name).is_file():
         raise InputError(
             one_line(
-                f"--profile {cut(name)}: no such profile or file; expected {', '.join(BUILT_IN_PROFILES)} or the path of a TOML "
-                "file"
+                f"--profile {cut(name)}: no such profile or file; expected {', '.join(BUILT_IN_PROFILES)} or the "
+                "path of a TOML file"
             )
         )
     return _profile(read_toml(name), name)
