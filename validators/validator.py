@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -172,11 +172,7 @@ class Validator:
         if self._figure is None:
             which = None if sequence is None else _sequence(sequence, len(joints))
             return _report(self._robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
-        figure, suite = self._figure, self._suite
-        if self.lengths == "median" and len(joints):
-            side = shoulders_are_behind(joints) if behind is None else behind
-            figure = figure.scaled(lengths or segment_lengths(joints), behind=side)
-            suite = self._make_suite(figure)
+        figure, suite = self.figure_and_suite(joints, lengths=lengths, behind=behind)
         configurations, distance = figure.configurations(points)
         return Report(
             judgements=judge(suite, points),
@@ -184,6 +180,34 @@ class Validator:
             q=configurations,
             fk_distance=distance,
         )
+
+    def figure_and_suite(
+        self, joints: Array, *, lengths: Mapping[str, float] | None = None, behind: bool | None = None
+    ) -> tuple[Figure, Sequence[Check]]:
+        """Return the stick figure by which postures are judged, and its checks.
+
+        Parameters
+        ----------
+        joints : array (N, 14, 3)
+            The postures, metres: their lengths may be the figure's.
+        lengths, behind
+            As `check` takes them.
+
+        Returns
+        -------
+        figure : Figure
+        suite : sequence of Check
+
+        Raises
+        ------
+        InputError
+            Where a robot judges.
+        """
+        if self.lengths != "median" or not len(joints):
+            return self.figure, self._suite
+        side = shoulders_are_behind(joints) if behind is None else behind
+        figure = self.figure.scaled(lengths or segment_lengths(joints), behind=side)
+        return figure, self._make_suite(figure)
 
     def describe(self) -> dict[str, Any]:
         """List what decides the verdicts besides the options, as reports have it."""
