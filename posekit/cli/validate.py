@@ -36,6 +36,7 @@ SOME_INVALID = 1
 DETAIL_BY_SUFFIX: Final[Mapping[str, Literal["findings", "margins"]]] = {
     ".json": "findings",
     ".csv": "margins",
+    ".parquet": "margins",
 }
 """What a report of each kind shows of every posture; others show what is behind those that are not valid."""
 
@@ -77,7 +78,7 @@ def validate(
         ),
     ],
     output: Annotated[
-        Path | None, option("--output", "REPORT", "The report: .json, .md or .csv.", short="-o")
+        Path | None, option("--output", "REPORT", "The report: .json, .md, .csv or .parquet.", short="-o")
     ] = None,
     urdf: Annotated[
         str,
@@ -259,6 +260,7 @@ def validate(
             every=every,
             sequence=_clips(given) if sequence else None,
             distances=distances,
+            file=str(postures),
             detail=DETAIL_BY_SUFFIX.get("" if output is None else output.suffix.lower(), "verdicts"),
         )
     if output is not None:

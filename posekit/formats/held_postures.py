@@ -58,6 +58,8 @@ class HeldPostures:
         Seconds; NaN where the file does not say them.
     up : str
         The axis that points up, as ``+y``; empty where it is not known.
+    clips : tuple of str
+        The names of the recordings; empty where they have none.
     """
 
     postures: Postures
@@ -65,6 +67,7 @@ class HeldPostures:
     clip: NDArray[np.intp]
     time: Array
     up: str = ""
+    clips: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Return the number of postures."""
@@ -183,6 +186,7 @@ def _of_motion(
         clip=motion.clip.copy(),
         time=motion.time,
         up=motion.up or found_up,
+        clips=motion.clips,
     )
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
+from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.settings import ValidateSettings
 from posekit.validators import Judgement
 from posekit.validators.motion import MotionCheck, MotionClip, judge_motion
@@ -85,6 +86,25 @@ def clips_of(held: HeldPostures, settings: ValidateSettings) -> Iterator[ClipRow
                 ground=settings.ground,
             ),
         )
+
+
+def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
+    """Say which frame of which clip each posture is; None where the file knows no frames."""
+    if len(held) > 1 and not held.frame.any():
+        return None
+    count = int(held.clip.max(initial=0)) + 1
+    names = held.clips if len(held.clips) == count else tuple(map(str, range(count))) if count > 1 else ("",)
+    frames = ReportFrames(
+        clips=[ClipName(file, name) for name in names],
+        clip=held.clip,
+        frame=held.frame.copy(),
+        time=held.time,
+        in_time=held.in_time,
+    )
+    for clip in range(count if count > 1 else 0):  # a file of several clips counts their frames through
+        rows = frames.rows(clip)
+        frames.frame[rows] = np.arange(len(rows))
+    return frames
 
 
 def rate_of(time: NDArray[np.float64]) -> float:

@@ -16,11 +16,13 @@ from posekit.formats.own import Postures, Result, ValidationReport
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.formats.own.report import PostureReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
+from posekit.formats.own.report_frames import ReportFrames
 from posekit.recovery.judged import tolerances_of
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
 from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
-from posekit.validation.over_time import OverTime, judged_over_time
+from posekit.validation.over_time import OverTime, frames_of, judged_over_time
+from posekit.validation.spans import clip_verdicts
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
@@ -67,6 +69,7 @@ def validate(
     sequence: NDArray[np.intp] | None = None,
     distances: bool | None = None,
     detail: Detail = "findings",
+    file: str = "",
 ) -> ValidationReport:
     """Judge a file of postures.
 
@@ -88,13 +91,16 @@ def validate(
     detail : {"findings", "margins", "verdicts"}
         What is wanted of the postures: findings one by one, as JSON has them; the least margin of each, as CSV; or
         the verdicts alone, with what is behind those that are not valid, as summaries and Markdown have them.
+    file : str
+        What reports call the file that they are of.
 
     Returns
     -------
     posekit.formats.own.ValidationReport
     """
-    over_time = OverTime()
+    over_time, frames = OverTime(), None
     if isinstance(postures, HeldPostures):
+        frames = frames_of(postures, file)
         if postures.in_time and validator.profile.checks:
             over_time = judged_over_time(postures, validator.profile.checks, validator.settings)
         postures = postures.postures
@@ -126,6 +132,8 @@ def validate(
             verdicts, contacts, columns, list(places), shown, every=every, first=None if all_listed else first
         )
     columns = joined(parts, list(places), checks)
+    if frames is not None:
+        listed = [_placed(posture, k, frames) for k, posture in enumerate(listed)]
     not_valid = len(columns) - columns.summary["valid"]
     return ValidationReport(
         settings={
@@ -143,6 +151,20 @@ def validate(
         else f"the first {len(listed)} of {not_valid} that are not valid",
         verdicts=None if all_listed and detail == "findings" else columns.letters,
         columns=columns,
+        frames=frames,
+        clips=clip_verdicts(columns, frames) if frames is not None and frames.in_time else None,
+    )
+
+
+def _placed(posture: PostureReport, row: int, frames: ReportFrames) -> PostureReport:
+    """Say of a listed posture which frame it is."""
+    row = row if posture.index is None else posture.index
+    time = float(frames.time[row])
+    return replace(
+        posture,
+        clip=int(frames.clip[row]) if frames.in_time else None,
+        frame=int(frames.frame[row]),
+        time=time if math.isfinite(time) else None,
     )
 
 

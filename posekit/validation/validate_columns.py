@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,8 +43,8 @@ def columns_of(
     if isinstance(judgements, Deferred) and not margins:
         asked = np.flatnonzero(judgements.rejected)
         judgements = judgements.of(asked)
-    worst_place, worst_margin, least = np.full(n, -1, dtype=np.int32), np.full(n, np.nan), np.full(n, np.inf)
-    found: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]] = []
+    worst = _Worst.of(n)
+    found: list[_Judged] = []
     silent = np.where(verdicts.complete, 0, 1).astype(np.int16)
     for judgement in judgements:
         if not judgement.where:
@@ -53,13 +53,17 @@ def columns_of(
         if not judgement.over_time:
             silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
         if judgement.by_pairs and contacts is not None:
-            rows, margin = contacts.posture, contacts.distance - lower_margin(judgement)
-            index = _indices(places, [ReportPlace(judgement.check, name, "m") for name in contacts.names])[
-                contacts.pair
-            ]
-            bad = contacts.violated
-            found.append((rows[bad], index[bad], margin[bad]))
-            _take_least(rows, index, margin, PER_DEGREE["m"], (worst_place, worst_margin, least))
+            index = _indices(places, [ReportPlace(judgement.check, name, "m") for name in contacts.names])
+            lower = lower_margin(judgement)
+            touching = _Judged(
+                contacts.posture,
+                index[contacts.pair],
+                contacts.distance,
+                np.full(len(contacts.distance), lower),
+                contacts.distance - lower,
+            )
+            found.append(touching.of(contacts.violated))
+            worst.take(touching, PER_DEGREE["m"])
             continue
         index = _indices(
             places,
@@ -70,49 +74,88 @@ def columns_of(
         )
         some = np.flatnonzero(judgement.violated.any(axis=1))
         at, columns = np.nonzero(judgement.violated[some])
-        found.append((asked[some[at]], index[columns], judgement.margin[some[at], columns]))
+        found.append(_judged_at(judgement, asked, index, some[at], columns))
         each = np.array([PER_DEGREE.get(unit, 1.0) for unit in judgement.unit])
         scaled = np.where(np.isnan(judgement.margin), np.inf, judgement.margin / each)
         if len(scaled):
             column, every = scaled.argmin(axis=1), np.arange(len(asked))
-            _take_least(
-                asked,
-                index[column],
-                judgement.margin[every, column],
-                each[column],
-                (worst_place, worst_margin, least),
-            )
-    rows = np.concatenate([part[0] for part in found] or [np.zeros(0, dtype=np.int64)])
-    order = np.argsort(rows, kind="stable")
+            worst.take(_judged_at(judgement, asked, index, every, column), each[column])
+    outside = _Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else _NONE
+    outside = outside.of(np.argsort(outside.posture, kind="stable"))
     verdict = np.where(verdicts.invalid, 1, np.where(verdicts.valid, 0, 2)).astype(np.int8)
     return VerdictColumns(
         places=tuple(places),
         verdict=verdict,
         fk_distance=verdicts.fk_distance,
-        worst_place=worst_place,
-        worst_margin=worst_margin,
-        posture=rows[order].astype(np.int64),
-        place=np.concatenate([part[1] for part in found] or [np.zeros(0)])[order].astype(np.int32),
-        margin=np.concatenate([part[2] for part in found] or [np.zeros(0)])[order],
+        worst_place=worst.place,
+        worst_margin=worst.margin,
+        worst_value=worst.value,
+        worst_bound=worst.bound,
+        posture=outside.posture.astype(np.int64),
+        place=outside.place.astype(np.int32),
+        margin=outside.margin,
+        value=outside.value,
+        bound=outside.bound,
         silent=silent,
         checks=tuple(checks),
     )
 
 
-def _take_least(
-    rows: NDArray[Any],
-    place: NDArray[Any],
-    margin: NDArray[Any],
-    per_degree: Any,
-    worst: tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]],
-) -> None:
-    """Take over, in place, the margins that are smaller than the smallest so far; a row may be there more than once."""
-    worst_place, worst_margin, least = worst
-    scaled = np.where(np.isnan(margin), np.inf, margin / per_degree)
-    order = np.argsort(-scaled, kind="stable")  # the smallest last, so that it stays
-    order = order[scaled[order] < least[rows[order]]]
-    at = rows[order]
-    worst_place[at], worst_margin[at], least[at] = place[order], margin[order], scaled[order]
+class _Judged(NamedTuple):
+    """Values that were judged, M of them: of which posture, at which place, with the bound each is nearest to."""
+
+    posture: NDArray[Any]
+    place: NDArray[Any]
+    value: NDArray[np.float64]
+    bound: NDArray[np.float64]
+    margin: NDArray[np.float64]
+
+    def of(self, rows: NDArray[Any]) -> _Judged:
+        """Return some of them."""
+        return _Judged(*(column[rows] for column in self))
+
+
+_NONE: Final = _Judged(*(np.zeros(0) for _ in _Judged._fields))
+
+
+def _judged_at(
+    judgement: Judgement,
+    asked: NDArray[np.intp],
+    index: NDArray[np.int32],
+    rows: NDArray[np.intp],
+    columns: NDArray[np.intp],
+) -> _Judged:
+    """Pick values out of a judgement about the postures `asked`, whose places have these indices."""
+    value, lower, upper = (getattr(judgement, name)[rows, columns] for name in ("value", "lower", "upper"))
+    with np.errstate(invalid="ignore"):  # a bound that is not there is infinite
+        bound = np.where(value - lower <= upper - value, lower, upper)
+    return _Judged(asked[rows], index[columns], value, bound, judgement.margin[rows, columns])
+
+
+class _Worst(NamedTuple):
+    """Of N postures the place with the least margin so far, -1 where there is none."""
+
+    place: NDArray[np.int32]
+    value: NDArray[np.float64]
+    bound: NDArray[np.float64]
+    margin: NDArray[np.float64]
+    least: NDArray[np.float64]
+
+    @classmethod
+    def of(cls, count: int) -> _Worst:
+        """Begin, with nothing known of any posture."""
+        value, bound, margin = (np.full(count, np.nan) for _ in range(3))
+        return cls(np.full(count, -1, dtype=np.int32), value, bound, margin, np.full(count, np.inf))
+
+    def take(self, judged: _Judged, per_degree: Any) -> None:
+        """Take over, in place, the margins smaller than the smallest so far; a row may be there more than once."""
+        scaled = np.where(np.isnan(judged.margin), np.inf, judged.margin / per_degree)
+        order = np.argsort(-scaled, kind="stable")  # the smallest last, so that it stays
+        order = order[scaled[order] < self.least[judged.posture[order]]]
+        at = judged.posture[order]
+        self.least[at] = scaled[order]
+        for name in ("place", "value", "bound", "margin"):
+            getattr(self, name)[at] = getattr(judged, name)[order]
 
 
 def _indices(places: dict[ReportPlace, int], new: list[ReportPlace]) -> NDArray[np.int32]:

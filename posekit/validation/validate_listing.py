@@ -69,7 +69,13 @@ def list_postures(
         if place >= 0:
             at = places[place]
             worst = Worst(
-                check=at.check, where=at.where, margin=float(columns.worst_margin[row]), unit=at.unit
+                check=at.check,
+                where=at.where,
+                unit=at.unit,
+                **{
+                    name: float(getattr(columns, f"worst_{name}")[row])
+                    for name in ("margin", "value", "bound")
+                },
             )
         residual = dict(zip(verdicts.points, verdicts.residual[row].tolist(), strict=True)) if robot else None
         listed.append(

@@ -237,7 +237,7 @@ def test_csv_has_one_row_a_posture(run) -> None:
         rows = list(csv.DictReader(file))
     assert [row["posture"] for row in rows] == ["0", "1", "2", "3"]
     assert [row["verdict"] for row in rows] == ["valid", "invalid", "valid", "valid"]
-    assert rows[1]["violations"] == "joint_range/right_knee_Z=-20 deg"
+    assert rows[1]["violations"] == "joint_range/right_knee_Z=-20 deg (0)"
     assert (rows[1]["worst_margin"], rows[1]["unit"], rows[1]["where"]) == ("-20", "deg", "right_knee_Z")
 
 
@@ -246,7 +246,7 @@ def test_markdown_has_tables_and_settings(run) -> None:
     assert run("q.npz", "--urdf", "human", "-o", "r.md").code == 1
     text = Path("r.md").read_text(encoding="utf-8")
     assert text.startswith("# Validation\n")
-    assert "| 1       | invalid | joint_range/right_knee_Z -20 deg |" in text
+    assert "| 1       | invalid | joint_range/right_knee_Z -20 deg (bound 0) |" in text
     assert "- robot: human" in text
     assert "made up" in text
 

@@ -114,7 +114,9 @@ def test_what_does_not_fit_is_refused(tmp_path):
         make_report(settings={}, verdicts=["valid"], fk_distance=np.zeros(1), judged=[judged()])
     with pytest.raises(InputError, match='verdicts: got "true"; expected valid or invalid or undecided'):
         make_report(settings={}, verdicts=["true"], fk_distance=np.zeros(1), judged=[])
-    with pytest.raises(InputError, match=r'the suffix "\.npz"; expected \.json or \.md or \.csv'):
+    with pytest.raises(
+        InputError, match=r'the suffix "\.npz"; expected \.json or \.md or \.csv or \.parquet'
+    ):
         write_report(tmp_path / "r.npz", a_report())
     assert not list(tmp_path.iterdir())
 
@@ -181,8 +183,10 @@ def test_a_report_without_columns_has_those_that_its_findings_tell():
     assert columns.summary == {"valid": 1, "invalid": 1, "undecided": 1}
     assert columns.letters == "ivu"
     rows = list(columns.rows())
-    assert [[(place.where, margin) for place, margin in row.violations] for row in rows] == [
-        [("b", -1.0), ("c", -1.0)],
+    assert [
+        [(one.place.where, one.value, one.bound, one.margin) for one in row.violations] for row in rows
+    ] == [
+        [("b", 2.0, 1.0, -1.0), ("c", -1.0, 0.0, -1.0)],
         [],
         [],
     ]
@@ -229,7 +233,7 @@ def test_a_name_cannot_break_out_of_its_cell(tmp_path):
     with (tmp_path / "r.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 1
-    assert rows[0]["violations"] == 'c/a|b,"c"\n=1=-1 m'
+    assert rows[0]["violations"] == 'c/a|b,"c"\n=1=2 m (1)'
 
 
 def test_batches_are_counted_through():
@@ -242,10 +246,12 @@ def test_batches_are_counted_through():
             verdict=np.array(verdict, dtype=np.int8),
             fk_distance=np.zeros(n),
             worst_place=np.full(n, -1, dtype=np.int32),
-            worst_margin=np.full(n, np.nan),
+            **{name: np.full(n, np.nan) for name in ("worst_margin", "worst_value", "worst_bound")},
             posture=np.array(posture, dtype=np.int64),
             place=np.array(place, dtype=np.int32),
             margin=np.array(margin, dtype=np.float64),
+            value=np.full(len(margin), np.nan),
+            bound=np.full(len(margin), np.nan),
             silent=np.array([2 if v == 2 else 0 for v in verdict], dtype=np.int16),
             checks=("joint_range", "collision"),
         )

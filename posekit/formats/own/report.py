@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.npz import suffix
+from posekit.formats.own.report_clips import ClipVerdict, clip_document, clip_of_document
 from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns, joined
-from posekit.formats.own.report_csv import csv_lines
+from posekit.formats.own.report_frames import ReportFrames
+from posekit.formats.own.report_rows import csv_lines, write_report_table
 from posekit.formats.own.report_schema import (
     REPORT_SCHEMA,
     VERDICT_NAMES,
@@ -34,7 +36,7 @@ FINDING_NUMBERS = ("value", "lower", "upper", "margin")
 MOST_PLACES = 500
 """Places of one check that the summary of a JSON file counts, the most frequent first."""
 
-REPORT_SUFFIXES = (".json", ".md", ".csv")
+REPORT_SUFFIXES = (".json", ".md", ".csv", ".parquet")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,12 +65,14 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Worst:
-    """The place with the least margin of a posture, and that margin in its unit."""
+    """The place with the least margin of a posture: that margin, what was found there, and the nearer bound."""
 
     check: str
     where: str
     margin: float
     unit: str
+    value: float | None = None
+    bound: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,6 +95,10 @@ class PostureReport:
         Metres that each joint of a robot's fit is off, None where it is unknown.
     undecided_by : sequence of str, optional
         Of an undecided posture, the checks that say nothing, and ``joints`` where some are unknown.
+    clip, frame : int, optional
+        Which clip of the report it is of, and its frame in it, from 0.
+    time : float, optional
+        Seconds.
     """
 
     verdict: Verdict
@@ -100,6 +108,9 @@ class PostureReport:
     worst: Worst | None = None
     residual: Mapping[str, float | None] | None = None
     undecided_by: Sequence[str] | None = None
+    clip: int | None = None
+    frame: int | None = None
+    time: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,6 +131,10 @@ class ValidationReport:
         The first letter of every posture's verdict, where not all are listed.
     columns : VerdictColumns, optional
         All verdicts and violations, for tables and CSV; not in the JSON file.
+    frames : ReportFrames, optional
+        Which frame each posture is; not in the JSON file, whose postures say it.
+    clips : sequence of ClipVerdict, optional
+        The verdicts on clips, of frames in time.
     """
 
     settings: Mapping[str, Any]
@@ -128,6 +143,8 @@ class ValidationReport:
     listed: str | None = None
     verdicts: str | None = None
     columns: VerdictColumns | None = field(default=None, compare=False, repr=False)
+    frames: ReportFrames | None = field(default=None, compare=False, repr=False)
+    clips: Sequence[ClipVerdict] | None = None
 
     def __len__(self) -> int:
         """Count the postures that were judged."""
@@ -227,19 +244,24 @@ def check_report_path(path: str | Path) -> None:
 
 
 def write_report(path: str | Path, report: ValidationReport) -> None:
-    """Write a report, whole or not at all: ``.json``, ``.md`` (tables) or ``.csv`` (one row a posture).
+    """Write a report, whole or not at all: ``.json``, ``.md``, or a row a posture in ``.csv`` or ``.parquet``.
 
     Raises
     ------
     InputError
-        Where the name ends otherwise or the file cannot be written.
+        Where the name ends otherwise, pyarrow is needed and not installed, or the file cannot be written.
     """
     kind = suffix(path, *REPORT_SUFFIXES)
     if kind == ".json":
         write_text(path, json_pieces(_head(report), "postures", _fields(report)))
         return
     columns = columns_of(report)
-    write_lines(path, csv_lines(columns) if kind == ".csv" else markdown_lines(columns, report.settings))
+    if kind == ".parquet":
+        write_report_table(path, columns, report.frames)
+    elif kind == ".csv":
+        write_lines(path, csv_lines(columns, report.frames))
+    else:
+        write_lines(path, markdown_lines(columns, report.settings, report.frames, report.clips))
 
 
 def read_report(path: str | Path) -> ValidationReport:
@@ -258,6 +280,7 @@ def read_report(path: str | Path) -> ValidationReport:
         checks=None if file.checks is None else {name: _count(check) for name, check in file.checks.items()},
         listed=file.listed,
         verdicts=file.verdicts,
+        clips=None if file.clips is None else tuple(clip_of_document(clip) for clip in file.clips),
     )
 
 
@@ -266,20 +289,22 @@ def columns_of(report: ValidationReport) -> VerdictColumns:
     if report.columns is not None:
         return report.columns
     places: dict[ReportPlace, int] = {}
-    violations: list[tuple[int, int, float]] = []
-    worst: list[tuple[int, float]] = []
+    violations: list[tuple[int, int, float, float, float]] = []
+    worst: list[tuple[int, float, float, float]] = []
     for k, posture in enumerate(report.postures):
         for finding in posture.findings:
             place = places.setdefault(ReportPlace(finding.check, finding.where, finding.unit), len(places))
             if finding.verdict == "invalid":
-                violations.append((k, place, math.nan if finding.margin is None else finding.margin))
+                violations.append((k, place, *_nearer(finding)))
         least = posture.worst
         at = None if least is None else ReportPlace(least.check, least.where, least.unit)
         worst.append(
-            (-1, math.nan)
+            (-1, math.nan, math.nan, math.nan)
             if at is None or least is None
-            else (places.setdefault(at, len(places)), least.margin)
+            else (places.setdefault(at, len(places)), _known(least.value), _known(least.bound), least.margin)
         )
+    least_numbers = np.array([numbers for _, *numbers in worst]).reshape(-1, 3).T
+    outside = np.array([numbers for _, _, *numbers in violations]).reshape(-1, 3).T
     checks = list(dict.fromkeys(place.check for place in places))
     part = VerdictColumns(
         places=tuple(places),
@@ -289,15 +314,33 @@ def columns_of(report: ValidationReport) -> VerdictColumns:
         fk_distance=np.array(
             [math.nan if posture.fk_distance is None else posture.fk_distance for posture in report.postures]
         ),
-        worst_place=np.array([place for place, _ in worst], dtype=np.int32),
-        worst_margin=np.array([margin for _, margin in worst]),
-        posture=np.array([k for k, _, _ in violations], dtype=np.int64),
-        place=np.array([place for _, place, _ in violations], dtype=np.int32),
-        margin=np.array([margin for _, _, margin in violations]),
+        worst_place=np.array([place for place, *_ in worst], dtype=np.int32),
+        worst_value=least_numbers[0],
+        worst_bound=least_numbers[1],
+        worst_margin=least_numbers[2],
+        posture=np.array([k for k, *_ in violations], dtype=np.int64),
+        place=np.array([place for _, place, *_ in violations], dtype=np.int32),
+        value=outside[0],
+        bound=outside[1],
+        margin=outside[2],
         silent=np.array([_silent(posture, checks) for posture in report.postures], dtype=np.int16),
         checks=checks,
     )
     return joined([part], part.places, checks)
+
+
+def _nearer(finding: Finding) -> tuple[float, float, float]:
+    """Return what was found, the bound that it is nearest to, and the margin; NaN for what is not known."""
+    value, margin = _known(finding.value), _known(finding.margin)
+    bounds = [bound for bound in (finding.lower, finding.upper) if bound is not None]
+    bound = (
+        min(bounds, key=lambda one: abs(value - one)) if bounds and finding.value is not None else math.nan
+    )
+    return value, bound, margin
+
+
+def _known(value: float | None) -> float:
+    return math.nan if value is None else value
 
 
 def _silent(posture: PostureReport, checks: Sequence[str]) -> int:
@@ -325,6 +368,8 @@ def _head(report: ValidationReport) -> dict[str, Any]:
         head["listed"] = report.listed
     if report.verdicts is not None:
         head["verdicts"] = report.verdicts
+    if report.clips is not None:
+        head["clips"] = [clip_document(clip) for clip in report.clips]
     return head
 
 
@@ -340,9 +385,12 @@ def _posture(posture: PostureFields) -> PostureReport:
         index=posture.index,
         worst=None
         if worst is None
-        else Worst(check=worst.check, where=worst.where, margin=worst.margin, unit=worst.unit),
+        else Worst(**{entry.name: getattr(worst, entry.name) for entry in fields(Worst)}),
         residual=posture.residual,
         undecided_by=None if posture.undecided_by is None else tuple(posture.undecided_by),
+        clip=posture.clip,
+        frame=posture.frame,
+        time=posture.time,
     )
 
 
@@ -396,9 +444,18 @@ def _finding(finding: Finding) -> dict[str, Any]:
 def _fields(report: ValidationReport) -> Iterator[dict[str, Any]]:
     for posture in report.postures:
         entry: dict[str, Any] = {} if posture.index is None else {"index": posture.index}
+        entry |= {
+            name: getattr(posture, name)
+            for name in ("clip", "frame", "time")
+            if getattr(posture, name) is not None
+        }
         entry |= {"verdict": posture.verdict, "fk_distance": _number(posture.fk_distance)}
         if posture.worst is not None:
-            entry["worst"] = vars(posture.worst)
+            entry["worst"] = {
+                name: value
+                for name, value in vars(posture.worst).items()
+                if isinstance(value, str) or _number(value) is not None
+            }
         if posture.residual is not None:
             entry["residual"] = {name: _number(value) for name, value in posture.residual.items()}
         if posture.undecided_by is not None:

@@ -18,6 +18,13 @@ PER_DEGREE: Final[Mapping[str, float]] = {"deg": 1.0, "m": 0.01}
 """What counts as one degree where margins of different units are compared: a centimetre, as at the end of a limb."""
 
 
+NUMBER_COLUMNS: Final = (
+    *("fk_distance", "worst_margin", "worst_value", "worst_bound"),
+    *("margin", "value", "bound"),
+)
+"""The columns of `VerdictColumns` that are numbers with a unit: the first four a posture, the others a violation."""
+
+
 class ReportPlace(NamedTuple):
     """Where a check judges, and the unit of its numbers."""
 
@@ -31,14 +38,23 @@ class ReportPlace(NamedTuple):
         return f"{self.check}/{self.where}"
 
 
+class PlaceValue(NamedTuple):
+    """What was found at a place, the bound that it is nearest to, and how far inside it is (negative: outside)."""
+
+    place: ReportPlace
+    value: float
+    bound: float
+    margin: float
+
+
 class VerdictRow(NamedTuple):
-    """One posture: its verdict, its worst margin and where that is, its violations and their margins, the undecided."""
+    """One posture: its verdict, the place with the least margin, its violations, and what is undecided."""
 
     posture: int
     verdict: Verdict
     fk_distance: float
-    worst: tuple[ReportPlace, float] | None
-    violations: list[tuple[ReportPlace, float]]
+    worst: PlaceValue | None
+    violations: list[PlaceValue]
     undecided_by: list[str]
 
 
@@ -65,10 +81,14 @@ class VerdictColumns:
         Metres.
     worst_place, worst_margin : int array (N,), array (N,)
         The place with the least margin, -1 where nothing was decided, and that margin in its unit.
+    worst_value, worst_bound : array (N,)
+        What was found there, and the bound that it is nearest to.
     posture, place : int array (M,)
         Of each violation; postures in rising order.
     margin : array (M,)
         How far each violation is outside, in the place's unit; negative.
+    value, bound : array (M,)
+        What was found, and the bound that it is beyond; NaN where they are not known.
     silent : int array (N,)
         Bit 0: some joint is unknown; bit k + 1: the k-th check says nothing.
     checks : sequence of str
@@ -80,9 +100,13 @@ class VerdictColumns:
     fk_distance: Array
     worst_place: NDArray[np.int32]
     worst_margin: Array
+    worst_value: Array
+    worst_bound: Array
     posture: NDArray[np.int64]
     place: NDArray[np.int32]
     margin: Array
+    value: Array
+    bound: Array
     silent: NDArray[np.int16]
     checks: Sequence[str] = ()
 
@@ -106,8 +130,9 @@ class VerdictColumns:
         """Go through the postures."""
         starts = np.searchsorted(self.posture, np.arange(len(self) + 1)).tolist()
         verdicts, distances = self.verdict.tolist(), self.fk_distance.tolist()
-        places, margins = self.worst_place.tolist(), self.worst_margin.tolist()
-        where, by = self.place.tolist(), self.margin.tolist()
+        places, where = self.worst_place.tolist(), self.place.tolist()
+        least = np.stack([self.worst_value, self.worst_bound, self.worst_margin], axis=1).tolist()
+        outside = np.stack([self.value, self.bound, self.margin], axis=1).tolist()
         silent = (self.silent != 0).tolist()
         for k, verdict in enumerate(verdicts):
             some = range(starts[k], starts[k + 1])
@@ -115,8 +140,8 @@ class VerdictColumns:
                 posture=k,
                 verdict=VERDICT_NAMES[verdict],
                 fk_distance=distances[k],
-                worst=None if places[k] < 0 else (self.places[places[k]], margins[k]),
-                violations=[(self.places[where[i]], by[i]) for i in some],
+                worst=None if places[k] < 0 else PlaceValue(self.places[places[k]], *least[k]),
+                violations=[PlaceValue(self.places[where[i]], *outside[i]) for i in some],
                 undecided_by=self.silent_checks(k) if silent[k] else [],
             )
 
@@ -153,11 +178,9 @@ def joined(
     firsts = np.cumsum([0, *(len(part) for part in parts)])
     empty: dict[str, NDArray[np.generic]] = {
         "verdict": np.zeros(0, dtype=np.int8),
-        "fk_distance": np.zeros(0),
         "worst_place": np.zeros(0, dtype=np.int32),
-        "worst_margin": np.zeros(0),
         "place": np.zeros(0, dtype=np.int32),
-        "margin": np.zeros(0),
+        **{name: np.zeros(0) for name in NUMBER_COLUMNS},
         "silent": np.zeros(0, dtype=np.int16),
     }
     arrays = {

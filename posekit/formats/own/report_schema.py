@@ -36,6 +36,50 @@ class WorstFields(FileModel):
     where: str
     margin: float
     unit: str
+    value: float | None = Field(default=None, description="What was found there, in `unit`.")
+    bound: float | None = Field(default=None, description="The bound that it is nearest to.")
+
+
+class SpanFields(FileModel):
+    """Neighbouring frames of a clip that one check rejects at one place, or says nothing about."""
+
+    check: str
+    where: str = Field(description="The place; empty where the check says nothing.")
+    unit: str
+    verdict: Literal["invalid", "undecided"]
+    first: Annotated[int, Field(ge=0)] = Field(description="Its first frame, counted from 0 in the clip.")
+    last: Annotated[int, Field(ge=0)] = Field(description="Its last frame, of the span too.")
+    frames: Annotated[int, Field(ge=1)] = Field(description="How many of them are rejected or undecided.")
+    worst_frame: Annotated[int, Field(ge=0)]
+    start: float | None = Field(default=None, description="Seconds of the first frame.")
+    end: float | None = Field(default=None, description="Seconds of the last frame.")
+    value: float | None = Field(default=None, description="What was found in the worst frame, in `unit`.")
+    bound: float | None = Field(default=None, description="The bound that it is beyond.")
+    margin: float | None = Field(default=None, description="By how much; negative.")
+
+
+class ClipFields(FileModel):
+    """One clip."""
+
+    file: str
+    clip: str = Field(description="Its name in the file; empty where it has none.")
+    verdict: Verdict
+    frames: Annotated[int, Field(ge=0)]
+    invalid: Annotated[int, Field(ge=0)] = Field(description="Frames that are rejected.")
+    undecided: Annotated[int, Field(ge=0)]
+    seconds: float | None = None
+    first_frame: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="The first frame that is not valid."
+    )
+    first_by: list[str] = Field(default=[], description="What does not let it pass: check/where.")
+    good: Annotated[list[int], Field(max_length=2)] = Field(
+        default=[],
+        description="First and last frame of the longest span of valid frames; empty where none is.",
+    )
+    spans: Annotated[list[SpanFields], FailFast()] = Field(
+        default=[], description="What is behind the verdict, the worst first."
+    )
+    more_spans: Annotated[int, Field(ge=0)] = Field(default=0, description="Spans that are not listed.")
 
 
 class PostureFields(FileModel):
@@ -58,6 +102,13 @@ class PostureFields(FileModel):
         default=None,
         description="Of an undecided posture: checks that say nothing; joints, where some are unknown.",
     )
+    clip: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="Which of `clips` it is of, from 0."
+    )
+    frame: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="Its frame in that clip, from 0."
+    )
+    time: float | None = Field(default=None, description="Seconds.")
 
 
 class SummaryFields(FileModel):
@@ -88,5 +139,8 @@ class ReportFile(FileModel):
     listed: str | None = Field(default=None, description="Which postures are listed, where not all are.")
     verdicts: Annotated[str, Field(pattern="^[viu]*$")] | None = Field(
         default=None, description="One letter for every posture of the file, where not all are listed."
+    )
+    clips: list[ClipFields] | None = Field(
+        default=None, description="Of frames in time: the verdict on every clip."
     )
     postures: Annotated[list[PostureFields], FailFast()]

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns
+import numpy as np
+
+from posekit.formats.own.report_clips import ClipVerdict, Span
+from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns
+from posekit.formats.own.report_frames import ClipName, ReportFrames
+from posekit.formats.own.report_schema import VERDICT_NAMES
 
 MAX_NAMED_PLACES: Final = 3
 """Places of a check that the table names."""
 
 MAX_SHOWN_POSTURES: Final = 100
 """Postures that are not valid, in a Markdown file."""
+
+MAX_SHOWN_CLIPS: Final = 100
+"""Clips that are not valid, in a Markdown file."""
 
 MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
@@ -42,27 +52,107 @@ def summary_table(columns: VerdictColumns) -> list[str]:
     return lines + _table(head, rows)
 
 
-def markdown_lines(columns: VerdictColumns, settings: Mapping[str, Any]) -> list[str]:
-    """Write a report as Markdown: the summary, the settings, and the first postures that are not valid."""
-    lines = ["# Validation", "", *summary_table(columns), "", "## Settings", ""]
+def markdown_lines(
+    columns: VerdictColumns,
+    settings: Mapping[str, Any],
+    frames: ReportFrames | None = None,
+    clips: Sequence[ClipVerdict] | None = None,
+) -> list[str]:
+    """Write a report as Markdown: summary, clips with the worst first, settings, the first postures not valid.
+
+    Parameters
+    ----------
+    columns : VerdictColumns
+        The verdicts, one a posture.
+    settings : mapping
+        What decided them.
+    frames : ReportFrames, optional
+        Which frame each posture is.
+    clips : sequence of ClipVerdict, optional
+        The verdicts on clips.
+    """
+    lines = ["# Validation", "", *summary_table(columns)]
+    if clips:
+        lines += ["", "## Clips", "", *clip_table(clips)]
+    lines += ["", "## Settings", ""]
     lines += [f"- {_cell(name)}: {_cell(_shown(value))}" for name, value in settings.items()]
-    bad = [row for row in columns.rows() if row.verdict != "valid"]
     lines += ["", "## Postures that are not valid", ""]
-    if not bad:
+    bad = np.flatnonzero(columns.verdict)
+    if not len(bad):
         return [*lines, "None."]
     if len(bad) > MAX_SHOWN_POSTURES:
         lines += [f"The first {MAX_SHOWN_POSTURES} of {len(bad)}.", ""]
+    wanted = set(bad[:MAX_SHOWN_POSTURES].tolist())
     rows = [
         (
             row.posture,
+            *(() if frames is None else _of_frame(frames, row.posture)),
             row.verdict,
-            "" if row.worst is None else _at(*row.worst),
-            "; ".join(_at(place, margin) for place, margin in row.violations)
-            or f"undecided: {', '.join(row.undecided_by)}",
+            "" if row.worst is None else _at(row.worst),
+            "; ".join(map(_at, row.violations)) or f"undecided: {', '.join(row.undecided_by)}",
         )
-        for row in bad[:MAX_SHOWN_POSTURES]
+        for row in columns.rows()
+        if row.posture in wanted
     ]
-    return lines + _table(("posture", "verdict", "least margin", "why"), rows)
+    where = () if frames is None else ("clip", "frame", "time, s")
+    return lines + _table(("posture", *where, "verdict", "least margin", "why"), rows)
+
+
+def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> list[str]:
+    """List clips, the worst first, with the span behind each that is farthest beyond its bound.
+
+    Parameters
+    ----------
+    clips : sequence of ClipVerdict
+        The verdicts on clips.
+    most : int
+        How many are shown.
+    """
+    counts = Counter(clip.verdict for clip in clips)
+    lines = [f"{len(clips)} clips: " + ", ".join(f"{counts[name]} {name}" for name in VERDICT_NAMES), ""]
+    bad = worst_first(clips)
+    if not bad:
+        return lines[:1]
+    if len(bad) > most:
+        lines += [f"The worst {most} of {len(bad)} that are not valid.", ""]
+    head = ("clip", "verdict", "not valid", "first", "worst", "longest good span")
+    return lines + _table(head, [_of_clip(clip) for clip in bad[:most]])
+
+
+def worst_first(clips: Sequence[ClipVerdict]) -> list[ClipVerdict]:
+    """Return the clips that are not valid: invalid ones first, by their share of frames that are not valid."""
+    bad = [clip for clip in clips if clip.verdict != "valid"]
+    return sorted(bad, key=lambda clip: (clip.verdict == "undecided", -clip.rejected_share))
+
+
+def _of_clip(clip: ClipVerdict) -> tuple[object, ...]:
+    return (
+        ClipName(clip.file, clip.clip).name or "0",
+        clip.verdict,
+        f"{clip.invalid + clip.undecided} of {clip.frames} ({clip.rejected_share:.1%})",
+        f"frame {clip.first_frame}: {', '.join(clip.first_by[:MAX_NAMED_PLACES])}",
+        said_of_span(clip.spans[0]) if clip.spans else "",
+        f"{clip.good[0]} to {clip.good[1]}" if clip.good else "none",
+    )
+
+
+def said_of_span(span: Span) -> str:
+    """Word a span: ``speed/right_wrist, frames 10 to 14 (0.33 to 0.47 s), worst 21.3 m/s in 12 (bound 15)``."""
+    time = "" if span.start is None else f" ({span.start:.2f} s)"
+    if span.start is not None and span.end is not None and span.last > span.first:
+        time = f" ({span.start:.2f} to {span.end:.2f} s)"
+    frames = f"frames {span.first} to {span.last}" if span.last > span.first else f"frame {span.first}"
+    said = f"{span.name}, {frames}{time}"
+    if span.value is None:
+        return said if span.verdict == "invalid" else f"{said}, undecided"
+    bound = "" if span.bound is None else f" (bound {span.bound:.4g})"
+    return f"{said}, worst {span.value:.4g} {span.unit} in {span.worst_frame}{bound}"
+
+
+def _of_frame(frames: ReportFrames, posture: int) -> tuple[object, ...]:
+    time = float(frames.time[posture])
+    name = frames.clips[int(frames.clip[posture])].name
+    return name, int(frames.frame[posture]), f"{time:.3f}" if math.isfinite(time) else ""
 
 
 def _most(check: str, count: CheckCount) -> str:
@@ -78,8 +168,11 @@ def _worst(count: CheckCount) -> str:
     return f"posture {index}: {place.where} {margin:.3g} {place.unit}"
 
 
-def _at(place: ReportPlace, margin: float) -> str:
-    return f"{place.name} {margin:.3g} {place.unit}"
+def _at(judged: PlaceValue) -> str:
+    """Word what was found: ``speed/right_wrist 21.3 m/s (bound 15)``."""
+    place = judged.place
+    found = "?" if math.isnan(judged.value) else f"{judged.value:.4g}"
+    return f"{place.name} {found} {place.unit} (bound {judged.bound:.4g})"
 
 
 def _shown(value: object) -> str:

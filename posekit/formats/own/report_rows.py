@@ -1,0 +1,123 @@
+"""Reports as tables: one row a posture, the same columns as CSV and as Parquet."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.formats.own.report_columns import PlaceValue, VerdictColumns
+from posekit.formats.own.report_frames import ReportFrames
+
+ROWS_AT_ONCE: Final = 10_000
+"""Rows of a Parquet file that are held as text at a time."""
+
+FORMULA_STARTS: Final = ("=", "+", "-", "@", "\t", "\r")
+"""What a spreadsheet takes for a formula, at the start of a text."""
+
+
+class ReportRow(NamedTuple):
+    """One posture: what is not known is NaN or empty.
+
+    `frame` is counted from 0 in its clip, `posture` over all; `value`, `bound` and `worst_margin` are in `unit`, of the
+    place with the least margin; `violations` are ``check/where=value unit (bound)``, by semicolons.
+    """
+
+    file: str
+    clip: str
+    frame: int
+    time: float
+    posture: int
+    verdict: str
+    check: str
+    where: str
+    value: float
+    bound: float
+    worst_margin: float
+    unit: str
+    fk_distance: float
+    violations: str
+    undecided_by: str
+
+
+def report_rows(columns: VerdictColumns, frames: ReportFrames | None) -> Iterator[ReportRow]:
+    """Go through the postures of a report.
+
+    Parameters
+    ----------
+    columns : VerdictColumns
+        The verdicts, one a posture.
+    frames : ReportFrames, optional
+        Which frame each is; without, frames are postures.
+    """
+    for row in columns.rows():
+        k, worst = row.posture, row.worst
+        name = ("", "") if frames is None else frames.clips[int(frames.clip[k])]
+        yield ReportRow(
+            *name,
+            k if frames is None else int(frames.frame[k]),
+            math.nan if frames is None else float(frames.time[k]),
+            k,
+            row.verdict,
+            "" if worst is None else worst.place.check,
+            "" if worst is None else worst.place.where,
+            *((math.nan,) * 3 if worst is None else (worst.value, worst.bound, worst.margin)),
+            "" if worst is None else worst.place.unit,
+            row.fk_distance,
+            "; ".join(map(_violation, row.violations)),
+            "; ".join(row.undecided_by),
+        )
+
+
+def csv_lines(columns: VerdictColumns, frames: ReportFrames | None = None) -> Iterator[str]:
+    """Yield the lines (RFC 4180): a head, then every posture; what is not known is empty.
+
+    Texts that a spreadsheet would take for a formula begin with an apostrophe.
+    """
+    yield ",".join(ReportRow._fields)
+    for row in report_rows(columns, frames):
+        text = io.StringIO()
+        csv.writer(text, lineterminator="").writerow([_cell(value) for value in row])
+        yield text.getvalue()
+
+
+def write_report_table(path: str | Path, columns: VerdictColumns, frames: ReportFrames | None = None) -> None:
+    """Write a report as Parquet, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        Where pyarrow is not installed, or the file cannot be written.
+    """
+    from posekit.formats.motion.parquet import write_tables
+
+    write_tables(path, ((table, {}) for table in _tables(report_rows(columns, frames))))
+
+
+def _tables(rows: Iterator[ReportRow]) -> Iterator[dict[str, NDArray[Any]]]:
+    while some := list(islice(rows, ROWS_AT_ONCE)):
+        yield {
+            name: np.array(values)
+            for name, values in zip(ReportRow._fields, zip(*some, strict=True), strict=True)
+        }
+
+
+def _violation(judged: PlaceValue) -> str:
+    at = judged.place
+    found = f"{at.name}={judged.value:.6g} {at.unit}"
+    return f"{found} ({judged.bound:.6g})" if math.isfinite(judged.bound) else found
+
+
+def _cell(value: object) -> object:
+    if isinstance(value, str):
+        return f"'{value}" if value.startswith(FORMULA_STARTS) else value
+    if isinstance(value, float):
+        return f"{value:.6g}" if math.isfinite(value) else ""
+    return value
