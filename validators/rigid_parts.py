@@ -34,8 +34,8 @@ def rigid_parts(
     Parameters
     ----------
     tolerance : float or RigidTolerance
-        Metres by which a distance may be off: all the same, or each its own. Lifted segments, and points of the torso,
-        may be off by the widest.
+        Metres by which a distance may be off: all the same, or each its own. Points of the torso may be off by the
+        widest, the side of its shoulders by theirs.
     mode : {"distances", "side", "placement"}
         ``distances`` compares the four distances inside torso and hips, as the paper does; they cannot tell
         a torso from its mirror image. ``side`` also asks on which side of the line from neck to pelvis the shoulders
@@ -56,7 +56,7 @@ def rigid_parts(
     ]
     if mode == "side":
         offset = figure.shoulder_offset if figure.shoulder_side != "undecided" else math.nan
-        checks.append(TorsoSide(offset=offset, tolerance=allowed.widest))
+        checks.append(TorsoSide(offset=offset, tolerance=allowed.shoulders))
     elif mode == "placement":
         checks.append(
             TorsoPlacement(

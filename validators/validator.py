@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.body import Figure, with_head
+from posekit.body.measured import LIMB_NAMES, MeasuredPerson, figure_of, measured_person
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
-from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
+from posekit.validators.measured import Allowance
 from posekit.validators.motion.profile import with_profile
 from posekit.validators.ranges import load_ranges
 from posekit.validators.registry import PHYSICAL_CHECKS, chosen_checks, make_checks
@@ -83,7 +85,9 @@ class Validator:
             self._robot = RobotValidator(robot=subject, settings=own)
             _ = self._robot.models.limits
             return
-        self.lengths = asked.lengths or "model"
+        # A figure that somebody gives is the body that they mean; the built-in one stands for anybody.
+        anybody = not asked.strict and urdf in (None, STICK_FIGURE)
+        self.lengths = asked.lengths or ("median" if anybody else "model")
         for option, given, known in (
             ("--lengths", self.lengths, ("model", "median")),
             ("--bodies", asked.bodies, ("auto", "urdf")),
@@ -99,14 +103,13 @@ class Validator:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
         self._options: dict[str, Any] = {
             "ranges": load_ranges(asked.ranges) if isinstance(asked.ranges, str) else asked.ranges,
-            "rigid_tolerance": asked.rigid_tolerance,
-            "angle_tolerance": asked.angle_tolerance,
+            "angle_tolerance": asked.angle,
             "rules": asked.rules,
             "thresholds": thresholds_of(asked.walkers),
-            "contact_margin": asked.contact_margin,
             "up": asked.up,
         }
-        self._suite = self._make_suite(subject)
+        self._own_suite = self._make_suite(subject, Allowance(settings=asked.changed(strict=True)))
+        self._person: tuple[tuple[Any, ...], Figure, list[Check]] | None = None
 
     @property
     def figure(self) -> Figure:
@@ -130,8 +133,12 @@ class Validator:
         sequence: ArrayLike | None = None,
         lengths: Mapping[str, float] | None = None,
         behind: bool | None = None,
+        person: MeasuredPerson | None = None,
     ) -> Report:
         """Judge postures, given by their joints or as configurations.
+
+        Postures are taken for frames of one person, whose lengths and measuring noise they tell
+        (`posekit.body.measured`), unless the settings are strict or say otherwise.
 
         Of the stick figure rigid parts, collision, walking and projected ranges judge the posture as it is given; the
         URDF's ranges judge the configuration made from it, and `Report.fk_distance` says how far the two are apart.
@@ -151,6 +158,8 @@ class Validator:
             Segment lengths in place of the postures' medians, metres: those of a whole file that is judged in parts.
         behind : bool, optional
             Likewise, whether the shoulders lie behind the line from neck to pelvis.
+        person : MeasuredPerson, optional
+            All of that, and the measuring noise, of whose recording the postures are a part.
 
         Returns
         -------
@@ -171,8 +180,10 @@ class Validator:
             points[:, len(JOINTS) :] = _points("head", head, len(HEAD_POINTS), len(joints))
         if self._figure is None:
             which = None if sequence is None else _sequence(sequence, len(joints))
+            if person is not None and self.lengths == "median":
+                lengths, behind = person.lengths, person.behind
             return _report(self._robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
-        figure, suite = self.figure_and_suite(joints, lengths=lengths, behind=behind)
+        figure, suite = self.figure_and_suite(joints, lengths=lengths, behind=behind, person=person)
         configurations, distance = figure.configurations(points)
         return Report(
             judgements=judge(suite, points),
@@ -182,15 +193,20 @@ class Validator:
         )
 
     def figure_and_suite(
-        self, joints: Array, *, lengths: Mapping[str, float] | None = None, behind: bool | None = None
+        self,
+        joints: Array,
+        *,
+        lengths: Mapping[str, float] | None = None,
+        behind: bool | None = None,
+        person: MeasuredPerson | None = None,
     ) -> tuple[Figure, Sequence[Check]]:
         """Return the stick figure by which postures are judged, and its checks.
 
         Parameters
         ----------
         joints : array (N, 14, 3)
-            The postures, metres: their lengths may be the figure's.
-        lengths, behind
+            The postures, metres: frames of one person, whose lengths the figure gets.
+        lengths, behind, person
             As `check` takes them.
 
         Returns
@@ -203,11 +219,9 @@ class Validator:
         InputError
             Where a robot judges.
         """
-        if self.lengths != "median" or not len(joints):
-            return self.figure, self._suite
-        side = shoulders_are_behind(joints) if behind is None else behind
-        figure = self.figure.scaled(lengths or segment_lengths(joints), behind=side)
-        return figure, self._make_suite(figure)
+        found = person or measured_person(joints)
+        found = found if lengths is None else replace(found, lengths=lengths)
+        return self._judging(found if behind is None else replace(found, behind=behind))
 
     def describe(self) -> dict[str, Any]:
         """List what decides the verdicts besides the options, as reports have it."""
@@ -239,21 +253,46 @@ class Validator:
             figure=self.figure,
             checks=self.checks,
             ranges=options["ranges"],
-            suite=self._suite,
+            suite=self._own_suite,
             angle_tolerance=options["angle_tolerance"],
-            contact_margin=options["contact_margin"],
+            contact_margin=self.settings.contact_margin,
         )
 
-    def _make_suite(self, figure: Figure) -> list[Check]:
-        return make_checks(
+    def told_of(self, person: MeasuredPerson) -> dict[str, Any]:
+        """Say by what a person's postures are judged, as reports do: whose body, and what is allowed in it."""
+        if self._figure is None:
+            return {}
+        figure = self._judging(person)[0]
+        return {
+            **Allowance(settings=self.settings, person=person).told(figure),
+            "shoulders": figure.shoulder_side,
+            "moved_lengths": dict(figure.moved_lengths),
+        }
+
+    def _judging(self, person: MeasuredPerson) -> tuple[Figure, list[Check]]:
+        """Return figure and checks for a person; the last are kept, for a recording that is judged in parts."""
+        allowed = Allowance(settings=self.settings, person=person)
+        key = tuple(person.lengths.items()), person.behind, tuple(map(allowed.off, ("", *LIMB_NAMES)))
+        if self._person is None or self._person[0] != key:
+            figure = self.figure
+            if self.lengths == "median" and person.lengths:
+                figure = figure_of(figure, person.lengths, person.behind)
+            self._person = key, figure, self._make_suite(figure, allowed)
+        return self._person[1:]
+
+    def _make_suite(self, figure: Figure, allowed: Allowance) -> list[Check]:
+        made = make_checks(
             figure,
             self._chosen,
             rigid_mode="side",
             limbs=True,
             exact=True,
             directions=True,
+            rigid_tolerance=allowed.rigid(figure),
+            contact_margin=allowed.contact_margin,
             **self._options,
         )
+        return allowed.applied(made, figure)
 
 
 def _report(verdict: Verdict) -> Report:

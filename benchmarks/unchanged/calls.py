@@ -130,8 +130,8 @@ def torn() -> Any:
 @call
 def validator() -> Any:
     joints = torn()
-    built_in = posekit.Validator()
-    table1 = posekit.Validator(checks=("joint-range", "walking"), ranges="table1", rules=(1, 2, 3, 4, 5))
+    built_in = posekit.Validator(strict=True)
+    table1 = posekit.Validator(strict=True, checks=("joint-range", "walking"), ranges="table1", rules=(1, 2, 3, 4, 5))
     return [judged(built_in.check(joints)), judged(table1.check(joints)), built_in.describe()]
 
 

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
-LOOSE_ANGLE_DEGREES = 0.1
-"""Degrees of tolerance from which it is said."""
-
 SOME_INVALID = 1
 DETAIL_BY_SUFFIX: Final[Mapping[str, Literal["findings", "margins"]]] = {
     ".json": "findings",
@@ -122,8 +119,8 @@ def validate(
         option(
             "--rigid-tolerance",
             "LENGTH",
-            "How far distances inside rigid parts, and the fit of a robot, may be off. Default: what a result's "
-            "postures were recovered with, 3cm at least.",
+            "How far distances inside rigid parts, and the fit of a robot, may be off. Default: 3cm, more where spines "
+            "bend and noise was measured; what a result's postures were recovered with.",
         ),
     ] = "",
     angle_tolerance: AngleTolerance = None,
@@ -140,10 +137,26 @@ def validate(
         option(
             "--lengths",
             "model|median|each",
-            "Whose segment lengths the model gets: none, the file's medians, each posture's own (robots, slow). "
-            "Default: model for the stick figure, median for robots.",
+            "Whose segment lengths the model gets: none, each recording's medians, each posture's own (robots, slow). "
+            "Default: median; a result's own.",
         ),
     ] = "",
+    noise: Annotated[
+        str,
+        option(
+            "--noise",
+            "LENGTH",
+            "Standard deviation of measured coordinates, as 5mm, for which tolerances allow. Default: estimated "
+            "from the limbs' lengths over time; a result has none.",
+        ),
+    ] = "",
+    strict: Annotated[
+        bool,
+        typer.Option(
+            "--strict",
+            help="Judge postures as those of the figure itself: by its lengths, 3 cm and 0.001 degrees, no noise.",
+        ),
+    ] = False,
     joint_map: Annotated[
         str, option("--joint-map", "FILE|NAME", "Which frames of the robot stand for the joints.")
     ] = "",
@@ -234,6 +247,8 @@ def validate(
         if rigid_tolerance
         else None,
         "angle_tolerance": angle_tolerance,
+        "noise": files.parse_length(noise, name="--noise") if noise else None,
+        "strict": strict or None,
         "contact_margin": signed_length(contact_margin, "--contact-margin") if contact_margin else None,
         "ranges": ranges or None,
         "lengths": lengths or None,
@@ -271,11 +286,8 @@ def validate(
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)
-    if settings.angle_tolerance >= LOOSE_ANGLE_DEGREES or settings.contact_margin < 0:
-        typer.echo(
-            f"judged with {settings.angle_tolerance:g} degrees of tolerance, and {100 * settings.contact_margin:g} cm "
-            "between bodies"
-        )
+    for line in validation.said_of(report, settings):
+        typer.echo(line)
     if output is not None:
         typer.echo(f"written: {output}")
     not_valid = len(columns) - columns.summary["valid"]

@@ -73,7 +73,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     )
     table = ["# posekit demo", "", *table_lines(head, rows)]
     given = read_postures(folder / "seq1.result.json")
-    report = validate(Validator(ranges="urdf"), given)
+    report = validate(Validator(ranges="urdf", strict=True), given)
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
     table += [

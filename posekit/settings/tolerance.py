@@ -35,14 +35,18 @@ class RigidTolerance:
         From each shoulder to the pelvis, metres: what the spine gives when it bends, too.
     hips : float
         From hip to hip, metres. The pelvis is bone; it is off where its depth is, which the spine's length lifts.
+    own : tuple of ((int, int), float)
+        Other segments and what they may be off, metres; those that are not named give as what gives most.
     """
 
     shoulders: float
     sides: float
     hips: float
+    own: tuple[tuple[tuple[int, int], float], ...] = ()
 
     def __post_init__(self) -> None:
-        for name, metres in vars(self).items():
+        named = {"shoulders": self.shoulders, "sides": self.sides, "hips": self.hips}
+        for name, metres in (*named.items(), *((str(segment), each) for segment, each in self.own)):
             if not (math.isfinite(metres) and metres >= 0):
                 raise InputError(
                     f"the rigid tolerance of {name} is {metres!r} m; expected zero or a positive, finite number"
@@ -61,7 +65,7 @@ class RigidTolerance:
     def of(self, segment: tuple[int, int]) -> float:
         """Return what a distance between two joints may be off, metres."""
         if segment not in RIGID_SEGMENTS:
-            return self.widest
+            return dict(self.own).get(segment, self.widest)
         if set(segment) <= {JOINT[name] for name in HIPS}:
             return self.hips
         return self.sides if JOINT["pelvis"] in segment else self.shoulders

@@ -36,16 +36,24 @@ class ValidateSettings(JudgingSettings):
         Rules of walking, 1 to 5. By default 1 and 2.
     walkers : {"paper", "people"}
         Whose thresholds those have: by the paper's word, or as real walkers keep them.
-    rigid_tolerance : float
+    rigid_tolerance : float, optional
         Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off. By
-        default 0.03.
-    angle_tolerance : float
-        Degrees by which the direction of a segment may be off, or a robot's joint outside its limits. By default 0.001.
+        default 0.03, of a figure more where a spine bends and where noise was measured (docs, "Validate").
+    angle_tolerance : float, optional
+        Degrees by which the direction of a segment may be off, or a robot's joint outside its limits. By default of a
+        figure's postures 2, or what their measuring noise asks for where that is more; of all else 0.001.
     contact_margin : float
-        Metres that bodies must keep from each other; negative allows penetration. By default 0.
+        Metres that bodies must keep from each other; negative allows penetration. By default 0. Of a figure's postures
+        it is loosened by measuring noise.
+    noise : float, optional
+        Standard deviation of measured coordinates, metres, by which tolerances that are not given are widened. By
+        default it is estimated from the limbs' lengths over time (`posekit.body.measured`).
     lengths : {"model", "median", "each"}, optional
-        Whose segment lengths the model has: its own (figures unless told otherwise), the medians of the postures
-        (robots unless told otherwise), or each posture's own (robots alone, slow).
+        Whose segment lengths the model has: its own, the medians of the postures (the default), or each posture's own
+        (robots alone, slow).
+    strict : bool
+        Whether postures are judged as those of the model itself: with its lengths, 3 cm and 0.001 degrees, and no
+        noise, where these are not given. By default they are judged as those of people who were measured.
     joint_map : str or JointMap, optional
         Which frames of a robot stand for the joints; found by their names where not given.
     bodies : {"auto", "urdf", "visual", "capsules"}
@@ -70,9 +78,11 @@ class ValidateSettings(JudgingSettings):
         Where one of them is impossible, whatever is judged.
     """
 
-    rigid_tolerance: float = MEASURED_TOLERANCE.rigid
-    angle_tolerance: float = EXACT_TOLERANCE.angle
+    rigid_tolerance: float | None = None
+    angle_tolerance: float | None = None
+    noise: float | None = None
     lengths: Lengths | None = None
+    strict: bool = False
     joint_map: Any = None
     bodies: Bodies = "auto"
     srdf: str | Path | None = None
@@ -87,8 +97,9 @@ class ValidateSettings(JudgingSettings):
         for what, value in (
             ("rigid tolerance", self.rigid_tolerance),
             ("angle tolerance", self.angle_tolerance),
+            ("noise", self.noise),
         ):
-            if not (math.isfinite(value) and value >= 0):
+            if value is not None and not (math.isfinite(value) and value >= 0):
                 raise InputError(f"the {what} is {value!r}; expected zero or a positive, finite number")
         for option, given, known in (
             ("--lengths", self.lengths, (None, *get_args(Lengths))),
@@ -105,14 +116,25 @@ class ValidateSettings(JudgingSettings):
         object.__setattr__(self, "up", tuple(up.tolist()))
         object.__setattr__(self, "package_dirs", tuple(self.package_dirs))
 
+    @property
+    def rigid(self) -> float:
+        """The rigid tolerance, metres, without noise."""
+        return RIGID_TOLERANCE if self.rigid_tolerance is None else self.rigid_tolerance
+
+    @property
+    def angle(self) -> float:
+        """The angle tolerance, degrees, of what was not measured: of configurations, and of robots."""
+        return EXACT_TOLERANCE.angle if self.angle_tolerance is None else self.angle_tolerance
+
     def told(self) -> dict[str, Any]:
         """Say what decided verdicts as a report does: in the words of the command line."""
         return {
             "ranges": self.ranges if isinstance(self.ranges, str) else self.ranges.name,
             "rules": ",".join(map(str, self.rules)),
             "walkers": self.walkers,
-            "rigid_tolerance": f"{100 * self.rigid_tolerance:g}cm",
-            "angle_tolerance": self.angle_tolerance,
+            "strict": self.strict,
+            "rigid_tolerance": f"{100 * self.rigid:g}cm",
+            "angle_tolerance": self.angle,
             "contact_margin": f"{100 * self.contact_margin:g}cm",
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, NamedTuple
 
@@ -18,10 +18,11 @@ from posekit.formats.own.report import PostureReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.recovery.judged import tolerances_of
-from posekit.robots.scaling import segment_lengths, shoulders_are_behind
 from posekit.safe_io.refusal import refusal
 from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
+from posekit.validation.advice import why_most_fail
 from posekit.validation.over_time import OverTime, frames_of, judged_over_time
+from posekit.validation.people import PersonRows, batches, people_of, told_of_people
 from posekit.validation.spans import clip_verdicts
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
@@ -98,9 +99,9 @@ def validate(
     -------
     posekit.formats.own.ValidationReport
     """
-    over_time, frames = OverTime(), None
+    over_time, frames, clip = OverTime(), None, None
     if isinstance(postures, HeldPostures):
-        frames = frames_of(postures, file)
+        frames, clip = frames_of(postures, file), postures.clip
         if postures.in_time and validator.profile.checks:
             over_time = judged_over_time(postures, validator.profile.checks, validator.settings)
         postures = postures.postures
@@ -115,7 +116,11 @@ def validate(
     parts: list[VerdictColumns] = []
     listed: list[PostureReport] = []
     all_listed = len(given) <= MAX_LISTED
-    for first, of_postures in _batches(validator, given):
+    if given.joints is None:
+        people = [PersonRows(slice(0, len(given)), None)]
+    else:  # scaling a robot takes a second: it has the lengths of the whole file
+        people = people_of(given.joints, clip if validator.robot is None else None)
+    for first, of_postures in _batches(validator, given, people):
         rows = slice(first, first + len(of_postures.complete))
         verdicts = of_postures.joined([one.of(rows) for one in over_time.judgements])
         contacts = _contacts(verdicts, distances, every=detail != "verdicts")
@@ -135,15 +140,17 @@ def validate(
     if frames is not None:
         listed = [_placed(posture, k, frames) for k, posture in enumerate(listed)]
     not_valid = len(columns) - columns.summary["valid"]
+    told = {
+        **validator.describe(),
+        "checks": applied,
+        **validator.settings.told(),
+        **_people_told(validator, given, people),
+        **({"not_asked": over_time.not_asked} if over_time.not_asked else {}),
+        **(settings or {}),
+    }
+    why = why_most_fail(columns, told)
     return ValidationReport(
-        settings={
-            **validator.describe(),
-            "checks": applied,
-            **_lengths_of(validator, given),
-            **validator.settings.told(),
-            **({"not_asked": over_time.not_asked} if over_time.not_asked else {}),
-            **(settings or {}),
-        },
+        settings={**told, **({"why": why} if why else {})},
         postures=tuple(listed),
         checks=columns.by_check(),
         listed=None
@@ -228,6 +235,8 @@ def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettin
         rigid_tolerance=max(rigid),
         angle_tolerance=max(angles),
         contact_margin=min(margins),
+        noise=0.0,
+        lengths="model",
         walkers=walkers,
         **({"ranges": ranges} if ranges in ("urdf", *NAMED_TABLES) else {}),
     )
@@ -247,23 +256,18 @@ def _number(settings: Mapping[str, Any], name: str, default: float, *, within: s
     return float(value)
 
 
-def _batches(validator: Validator, given: _Given) -> Iterator[tuple[int, Verdicts]]:
-    """Judge batch by batch; the lengths are those of the whole file."""
-    lengths = behind = None
-    if given.joints is not None and validator.lengths == "median":
-        lengths, behind = segment_lengths(given.joints), shoulders_are_behind(given.joints)
+def _batches(
+    validator: Validator, given: _Given, people: Sequence[PersonRows]
+) -> Iterator[tuple[int, Verdicts]]:
+    """Judge batch by batch; lengths and noise are those of the whole recording."""
     size = POSTURES_AT_ONCE * (CONFIGURATIONS_FACTOR if given.q is not None else 1)
-    for first in range(0, len(given), size):
-        rows = slice(first, first + size)
+    for rows, person in batches(people, size):
         if given.q is not None:
-            yield first, validator.check(q=given.q[rows])
-        elif given.joints is not None:
+            yield rows.start, validator.check(q=given.q[rows])
+        elif given.joints is not None and person is not None:
             head = None if given.head is None else given.head[rows]
             which = None if given.sequence is None else given.sequence[rows]
-            yield (
-                first,
-                validator.check(given.joints[rows], head, sequence=which, lengths=lengths, behind=behind),
-            )
+            yield rows.start, validator.check(given.joints[rows], head, sequence=which, person=person)
 
 
 def _ordered(validator: Validator, given: NamedConfigurations) -> NDArray[np.float64]:
@@ -274,22 +278,15 @@ def _ordered(validator: Validator, given: NamedConfigurations) -> NDArray[np.flo
     return given.in_order_of(names)
 
 
-def _lengths_of(validator: Validator, given: _Given) -> dict[str, Any]:
-    """Say whose lengths the model had."""
+def _people_told(validator: Validator, given: _Given, people: Sequence[PersonRows]) -> dict[str, Any]:
+    """Say whose lengths the model had, and what was allowed."""
     if given.joints is None:
         return {"given": "configurations"}
-    settings: dict[str, Any] = {"given": "joint positions", "lengths_from": validator.lengths}
-    lengths: dict[str, float] = {}
-    if validator.lengths == "median":
-        lengths = segment_lengths(given.joints)
-        settings["lengths"] = {name: round(length, 6) for name, length in lengths.items()}
-    if validator.robot is None:
-        figure = validator.figure
-        if lengths:
-            figure = figure.scaled(lengths, behind=shoulders_are_behind(given.joints))
-        settings["shoulders"] = figure.shoulder_side
-        settings["moved_lengths"] = dict(figure.moved_lengths)
-    return settings
+    return {
+        "given": "joint positions",
+        "lengths_from": validator.lengths,
+        **told_of_people(validator, people),
+    }
 
 
 def _contacts(verdicts: Verdicts, distances: bool | None, *, every: bool) -> Contacts | None:

@@ -143,7 +143,7 @@ def test_standing_is_valid(ranges: str) -> None:
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_views_are_recovered_with_the_truth_among_them(noise: float, rng: np.random.Generator) -> None:
     scene = random_views(MIDDLE, 24, np.random.default_rng(7))
-    scene = scene.select(Validator(MIDDLE, ranges="urdf").check(scene.joints_cam).valid)
+    scene = scene.select(Validator(MIDDLE, ranges="urdf", strict=True).check(scene.joints_cam).valid)
     assert len(scene) >= 12
     headless = np.full((len(scene), 5, 2), np.nan)
     view = replace(view_of(scene), head_image=headless, root=scene.joints_cam[:, 0])

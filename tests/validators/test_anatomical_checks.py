@@ -484,7 +484,7 @@ def test_configurations_are_judged_as_the_postures_they_give() -> None:
     lower, upper = (np.degrees(limit[7:]) for limit in (MODEL.lowerPositionLimit, MODEL.upperPositionLimit))
     q = np.tile(pin.neutral(MODEL), (200, 1))
     q[:, 7:] = np.radians(rng.uniform(0.7 * lower, 0.7 * upper, size=(200, len(lower))))
-    validator = Validator(ranges="anatomical", checks=("joint-range",))
+    validator = Validator(ranges="anatomical", checks=("joint-range",), strict=True)
     of_q = validator.check(q=q).verdicts
     points = FIGURE.forward_kinematics(q)
     assert of_q == validator.check(points[:, :14], points[:, 14:]).verdicts

@@ -87,7 +87,7 @@ def test_a_batch_is_its_postures_one_at_a_time() -> None:
     points = (
         FIGURE.forward_kinematics(random_postures(FIGURE, 40, rng)) + rng.normal(size=(40, 19, 3)) * 0.004
     )
-    validator = Validator()
+    validator = Validator(strict=True)
     together = validator.check(points[:, :14], points[:, 14:])
     assert set(together.verdicts) == {"valid", "invalid"}
     for k in range(40):
@@ -152,7 +152,7 @@ def test_the_limit_itself_is_inside(beyond: float, verdict: str) -> None:
     """A hundredth of a degree: ten times the tolerance for rounding."""
     index = FIGURE.configuration_names.index("pelvis_bending")
     limit = float(np.degrees(FIGURE.model.upperPositionLimit[index]))
-    report = Validator(checks=("joint-range",), ranges="urdf").check(
+    report = Validator(checks=("joint-range",), ranges="urdf", strict=True).check(
         posed(pelvis_bending=limit + beyond)[:, :14]
     )
     assert report.verdicts == [verdict]
@@ -191,7 +191,7 @@ def test_a_limb_of_another_length_is_not_this_body(
     while child:  # all that hangs on it goes along
         joints[0, child] += off * along / np.linalg.norm(along)
         child = next((b for a, b in SEGMENTS if a == child and b > child), 0)
-    report = Validator(checks=("rigid-parts",)).check(joints)
+    report = Validator(checks=("rigid-parts",), strict=True).check(joints)
     assert report.verdicts == [verdict]
     if verdict == "invalid":
         assert rejected_at(report) == {f"rigid_parts/{segment_name(segment)}"}
@@ -201,7 +201,7 @@ def test_the_rigid_tolerance_is_the_callers() -> None:
     joints = STANDING.copy()
     joints[0, JOINT["right_shoulder"]] += [0.0, -0.01, 0.0]
     assert Validator(checks=("rigid-parts",)).check(joints).verdicts == ["valid"]
-    report = Validator(checks=("rigid-parts",), rigid_tolerance=0.005).check(joints)
+    report = Validator(checks=("rigid-parts",), rigid_tolerance=0.005, strict=True).check(joints)
     assert report.verdicts == ["invalid"]
     assert "rigid_parts/right_shoulder-left_shoulder" in rejected_at(report)
 
@@ -299,7 +299,8 @@ def test_another_figure_by_object_and_by_file(tmp_path: Any) -> None:
         validator = Validator(figure)
         assert validator.check(standing).verdicts == ["valid"]
         assert validator.check(STANDING).verdicts == ["invalid"]
-    assert Validator().check(standing).verdicts == ["invalid"]
+    assert Validator(strict=True).check(standing).verdicts == ["invalid"]
+    assert Validator().check(standing).verdicts == ["valid"]
     assert Validator("stick_figure").figure.hash == FIGURE.hash
 
 

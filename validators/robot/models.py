@@ -62,9 +62,7 @@ class JudgedModel:
         """What makes configurations of postures."""
         if self.kinematics is None:
             raise InputError("the robot has no joint map; give one to judge postures")
-        return Fitter(
-            kinematics=self.kinematics, subject=self.subject, tolerance=self.settings.rigid_tolerance
-        )
+        return Fitter(kinematics=self.kinematics, subject=self.subject, tolerance=self.settings.rigid)
 
     @cached_property
     def collision(self) -> SelfCollision:

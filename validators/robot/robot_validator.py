@@ -143,7 +143,7 @@ class RobotValidator:
                 judge_reach(kinematics, targets, fit.judged_residual, tolerance=reach_tolerance(settings))
             )
         if "rigid-parts" in settings.check_names:
-            judgements.append(judge_rigid_parts(kinematics, targets, tolerance=settings.rigid_tolerance))
+            judgements.append(judge_rigid_parts(kinematics, targets, tolerance=settings.rigid))
         judgements += _of_fits(judged, fit, seen=judged.fitter.seen(targets), complete=known)
         return Verdict(judgements, known, fit.judged_q, kinematics.names, fit.judged_residual, [judged])
 
@@ -167,7 +167,7 @@ def _of_configurations(judged: JudgedModel, q: Array) -> Sequence[Judgement]:
         judged.subject,
         judged.collision if "collision" in settings.check_names else None,
         q,
-        tolerance=settings.angle_tolerance if "joint-range" in settings.check_names else None,
+        tolerance=settings.angle if "joint-range" in settings.check_names else None,
     )
     if "balance" in settings.check_names:
         return [*judgements, judged.balance.judge(q)]
@@ -185,7 +185,7 @@ def _of_fits(judged: JudgedModel, fit: Fit, *, seen: Bools, complete: Bools) -> 
             judge_joint_range(
                 judged.subject,
                 fit.judged_q,
-                tolerance=settings.angle_tolerance,
+                tolerance=settings.angle,
                 seen=seen,
                 undecided=far,
                 slack=np.where(

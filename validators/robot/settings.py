@@ -40,7 +40,7 @@ def robot_settings(asked: ValidateSettings) -> ValidateSettings:
 
 def reach_tolerance(settings: ValidateSettings) -> float:
     """Return the metres that a fit may be off."""
-    return max(settings.rigid_tolerance, LEAST_REACH)
+    return max(settings.rigid, LEAST_REACH)
 
 
 def check_robot_names(names: Iterable[str]) -> tuple[str, ...]:

@@ -1,0 +1,117 @@
+"""One sentence about why most postures of a file fail, and what to try; and what was allowed them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Final
+
+import numpy as np
+
+from posekit.formats.own import ValidationReport
+from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
+from posekit.settings import DEFAULT_RANGES, ValidateSettings
+
+FEW_DEGREES: Final = 15.0
+"""Degrees within which somebody may well be more mobile, or a skeleton's joints placed otherwise."""
+
+MANY_METRES: Final = 3.0
+"""Metres: what misses a length by so much is in another unit."""
+
+INVALID_VERDICT: Final = 1
+"""Of a verdict in `VerdictColumns.verdict`."""
+
+
+def why_most_fail(columns: VerdictColumns, told: Mapping[str, Any]) -> str:
+    """Say in one sentence what rejects most of the postures that fail, by how much, and what to try; or nothing.
+
+    Parameters
+    ----------
+    columns : VerdictColumns
+        The verdicts.
+    told : mapping
+        What decided them, as the report says it.
+    """
+    total = int(np.count_nonzero(columns.verdict == INVALID_VERDICT))
+    if not total or not len(columns.place):
+        return ""
+    most = int(np.bincount(columns.place).argmax())
+    mine, place = columns.place == most, columns.places[most]
+    count, by = len(np.unique(columns.posture[mine])), -float(np.median(columns.margin[mine]))
+    whose = "all" if count == total else f"{count} of the {total}"
+    check = place.check.replace("_", "-")
+    return (
+        f"{whose} that are invalid fail by {place.where} ({check}), by {_amount(by, place.unit)} in the median: "
+        f"{_remedy(place, by, told)}"
+    )
+
+
+def _remedy(place: ReportPlace, by: float, told: Mapping[str, Any]) -> str:
+    ours = told.get("urdf") in (None, "stick_figure", "as recovered")
+    if place.check == "joint_range":
+        if ours and told.get("ranges") not in (None, DEFAULT_RANGES):
+            return f"try --ranges {DEFAULT_RANGES}, which real people pass"
+        if by <= FEW_DEGREES:
+            return f"try --angle-tolerance {math.ceil(by)}, or wider limits by --ranges FILE"
+        return "are its axes or its left and right others than supposed? Else give --ranges FILE"
+    if place.check in ("rigid_parts", "reach"):
+        if by > MANY_METRES:
+            return "is the file in another unit? Its lengths are no person's in metres"
+        if told.get("lengths_from") == "model":
+            return "try --lengths median, the person's own"
+        if by <= 0.2:
+            return (
+                f"try --rigid-tolerance {math.ceil(100 * by) + 3}cm; or joints are swapped or broken in these"
+            )
+        return "joints are swapped, broken, or of several people in one recording"
+    if place.check == "collision":
+        return f"try --contact-margin -{math.ceil(100 * by)}cm: bodies are capsules, and flesh gives"
+    if place.check in ("walking", "balance"):
+        return f"leave {place.check} out of --checks where it is not asked for"
+    return "its threshold is one of --profile"
+
+
+def _amount(by: float, unit: str) -> str:
+    if unit == "m":
+        return f"{100 * by:.2g} cm" if by < 1 else f"{by:.3g} m"
+    return f"{by:.2g} {'degrees' if unit == 'deg' else unit}"
+
+
+def said_of(report: ValidationReport, settings: ValidateSettings) -> list[str]:
+    """Say what the postures of a report were allowed, and why most of those that fail do."""
+    told = report.settings
+    lines = []
+    if "noise" in told or "people" in told:
+        lines.append(_allowed(told))
+    elif settings.angle_tolerance is not None or settings.contact_margin < 0:
+        lines.append(f"judged with {settings.angle:g} degrees of tolerance")
+    if told.get("why"):
+        lines.append(str(told["why"]))
+    return lines
+
+
+def _span(low: float, high: float) -> str:
+    return " to ".join(dict.fromkeys((f"{low:.2g}", f"{high:.2g}")))
+
+
+def _allowed(told: Mapping[str, Any]) -> str:
+    """Say lengths, noise and tolerances in a line."""
+    lengths = "the figure's lengths" if told.get("lengths_from") == "model" else "lengths as measured"
+    noise = told.get("noise")
+    if told.get("strict"):
+        known = "strictly"
+    elif isinstance(noise, list):
+        known = f"{_span(1000 * noise[0], 1000 * noise[1])} mm of noise, at most"
+    elif noise is None:
+        known = "noise not known of so few frames"
+    else:
+        known = f"{1000 * noise:.2g} mm of noise"
+    if "torso_tolerance" not in told:
+        return f"judged by {lengths}, {known}"
+    low, high = told["angle_tolerance"]
+    angles = _span(low, high)
+    bones = " to ".join(dict.fromkeys(told["rigid_tolerance"]))
+    return (
+        f"judged by {lengths}, {known}: {angles} degrees, {bones} in bones, {told['torso_tolerance']} in the torso, "
+        f"{told['contact_margin']} between bodies"
+    )

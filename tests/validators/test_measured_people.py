@@ -1,0 +1,103 @@
+"""Defaults for people who were measured: lengths, noise and tolerances that the data tell."""
+
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+
+from posekit.body import load_figure
+from posekit.settings import ValidateSettings
+from posekit.skeleton import JOINT
+from posekit.validators import Validator
+from posekit.validators.measured import Allowance
+
+FIGURE = load_figure()
+STANDING = FIGURE.neutral_points[:14]
+
+
+def standing(count: int, noise: float = 0.0, seed: int = 0) -> np.ndarray:
+    return STANDING + np.random.default_rng(seed).normal(0.0, noise, (count, 14, 3))
+
+
+@pytest.mark.parametrize("noise", [0.001, 0.005, 0.01])
+def test_standing_is_valid_whatever_noise_it_was_measured_with(noise: float) -> None:
+    joints = standing(200, noise)
+    assert Validator().check(joints).valid.mean() >= 0.99
+    if noise == 0.005:
+        assert Validator(strict=True).check(joints).valid.mean() < 0.9
+
+
+def test_an_elbow_that_is_ten_degrees_beyond_its_limit_is_found_under_noise() -> None:
+    """Of 5 mm, for a third of a clip: the limit is -7.9 degrees."""
+    joints = standing(300, 0.005)
+    bent = STANDING.copy()
+    arm = bent[JOINT["right_wrist"]] - bent[JOINT["right_elbow"]]
+    turn = np.radians(-17.9)
+    forward = np.array([1.0, 0.0, 0.0])
+    down = arm / np.linalg.norm(arm)
+    bent[JOINT["right_wrist"]] = bent[JOINT["right_elbow"]] + np.linalg.norm(arm) * (
+        np.cos(turn) * down + np.sin(turn) * forward
+    )
+    joints[100:200] += bent - STANDING
+    report = Validator().check(joints)
+    assert report.invalid[100:200].mean() > 0.8
+    assert report.invalid[:100].mean() <= 0.01
+
+
+def test_people_of_other_sizes_are_valid_by_default_and_strictly_are_not() -> None:
+    small = 0.8 * standing(20)
+    assert Validator().check(small).valid.all()
+    assert Validator(strict=True).check(small).invalid.all()
+
+
+def test_kilometres_are_no_person() -> None:
+    assert Validator().check(1000 * standing(20)).invalid.all()
+
+
+def test_a_clip_of_other_lengths_for_a_while_is_judged_in_all_its_frames() -> None:
+    joints = standing(300, 0.002)
+    joints[100:200, JOINT["left_wrist"]] += [0.0, 0.0, 0.3]
+    report = Validator().check(joints)
+    assert report.invalid.tolist() == [False] * 100 + [True] * 100 + [False] * 100
+
+
+def test_what_is_not_a_number_never_passes() -> None:
+    joints = standing(50, 0.005)
+    joints[10, JOINT["neck"]] = np.nan
+    joints[20] = np.nan
+    report = Validator().check(joints)
+    assert not report.valid[[10, 20]].any()
+    assert report.valid.sum() >= 46
+    assert not Validator().check(np.full((20, 14, 3), np.nan)).valid.any()
+
+
+@pytest.mark.parametrize(
+    "given", [{"rigid_tolerance": 0.01}, {"angle_tolerance": 0.5}, {"noise": 0.0}, {"noise": 0.02}]
+)
+def test_what_is_given_stays_as_it_is(given: dict[str, Any]) -> None:
+    validator = Validator(**given)
+    _, suite = validator.figure_and_suite(standing(100, 0.01))
+    by_name = {check.places[0].segment or check.name: check for check in suite}
+    if "rigid_tolerance" in given:
+        assert by_name["neck-pelvis"].tolerance == 0.01  # type: ignore[attr-defined]
+    if "angle_tolerance" in given:
+        assert by_name["joint_range"].tolerance == 0.5  # type: ignore[attr-defined]
+    if "noise" in given:
+        off = 3 * np.sqrt(2) * given["noise"]
+        bone = by_name["left_knee-left_ankle"].tolerance  # type: ignore[attr-defined]
+        assert bone == pytest.approx(np.hypot(0.03, off))
+
+
+def test_more_noise_never_allows_less() -> None:
+    allowed = [Allowance(settings=ValidateSettings(noise=noise)) for noise in (0.0, 0.001, 0.01)]
+    for one, more in pairwise(allowed):
+        assert more.contact_margin < one.contact_margin
+        assert more.angle("", 0.3) > one.angle("", 0.3)
+        assert more.rigid(FIGURE).widest > one.rigid(FIGURE).widest
+
+
+def test_noise_is_allowed_for_by_three_deviations_of_a_direction() -> None:
+    allowed = Allowance(settings=ValidateSettings(noise=0.005))
+    assert allowed.angle("", 0.25) == pytest.approx(np.hypot(2.0, np.degrees(3 * np.sqrt(2) * 0.005 / 0.25)))
+    assert Allowance(settings=ValidateSettings(strict=True)).angle("", 0.25) == 0.001
