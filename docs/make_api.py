@@ -41,6 +41,7 @@ SECTIONS: Final = (
     ("Articulated objects", "posekit.objects"),
     ("Recovery", "posekit.recovery"),
     ("Live", "posekit.live"),
+    ("The remedy", "posekit.remedy"),
     ("Validation of files", "posekit.validation"),
     ("Conversion", "posekit.conversion"),
     ("Batches", "posekit.batch"),

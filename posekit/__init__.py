@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
     from posekit.recovery.sequences import follow as follow
+    from posekit.remedy import repair as repair
     from posekit.settings import RecoverSettings as RecoverSettings
     from posekit.settings import Tolerance as Tolerance
     from posekit.settings import ValidateSettings as ValidateSettings
@@ -59,6 +60,7 @@ _HOMES = {
     "posekit.formats.opening": ("open",),
     "posekit.live": ("TrackedPosture", "Tracker"),
     "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
+    "posekit.remedy": ("repair",),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),
     "posekit.validators": ("Validator",),
