@@ -25,7 +25,7 @@ from posekit.errors import InputError
 if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.formats.held_postures import HeldPostures
-    from posekit.formats.own import Result
+    from posekit.formats.own import Result, ValidationReport
     from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
@@ -75,7 +75,8 @@ def validate(
         ),
     ],
     output: Annotated[
-        Path | None, option("--output", "REPORT", "The report: .json, .md, .csv or .parquet.", short="-o")
+        Path | None,
+        option("--output", "REPORT", "The report: .json, .md, .csv, .parquet, or .html.", short="-o"),
     ] = None,
     urdf: Annotated[
         str,
@@ -225,7 +226,7 @@ def validate(
 
     if output is not None:
         distinct(postures, output)
-        files.check_report_path(output)
+        _check_report(output)
     allowed = _allowed(fail_over)
     given = _read(postures)
     if not len(given.postures):
@@ -279,7 +280,7 @@ def validate(
             detail=DETAIL_BY_SUFFIX.get("" if output is None else output.suffix.lower(), "verdicts"),
         )
     if output is not None:
-        files.write_report(output, report)
+        _write(output, report)
     changed = closing_line(report.settings.get("moved_lengths", {}))
     if changed:
         typer.echo(f"posekit: warning: {changed}", err=True)
@@ -293,6 +294,29 @@ def validate(
     not_valid = len(columns) - columns.summary["valid"]
     if not_valid > allowed * (len(columns) if "%" in fail_over else 1):
         raise typer.Exit(SOME_INVALID)
+
+
+def _check_report(path: Path) -> None:
+    """Refuse a report's name before the work is done."""
+    from posekit.formats import own as files
+    from posekit.safe_io.writing import check_target
+
+    if path.suffix.lower() == ".html":
+        check_target(path)
+    else:
+        files.check_report_path(path)
+
+
+def _write(path: Path, report: ValidationReport) -> None:
+    """Write a report as its name says: a page, or one of the formats of reports."""
+    from posekit.formats import own as files
+
+    if path.suffix.lower() == ".html":
+        from posekit.viewer.report_page import write_report_page
+
+        write_report_page(path, report)
+    else:
+        files.write_report(path, report)
 
 
 def _read(path: Path) -> _Input:

@@ -92,17 +92,19 @@ def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
     """Say which frame of which clip each posture is; None where the file knows no frames."""
     if len(held) > 1 and not held.frame.any():
         return None
-    count = int(held.clip.max(initial=0)) + 1
-    names = held.clips if len(held.clips) == count else tuple(map(str, range(count))) if count > 1 else ("",)
+    used, clip = np.unique(held.clip, return_inverse=True)
+    named = len(held.clips) > int(used.max(initial=0))
     frames = ReportFrames(
-        clips=[ClipName(file, name) for name in names],
-        clip=held.clip,
+        clips=[
+            ClipName(file, held.clips[k] if named else str(k) if len(used) > 1 else "") for k in used.tolist()
+        ],
+        clip=clip.astype(np.intp),
         frame=held.frame.copy(),
         time=held.time,
         in_time=held.in_time,
     )
-    for clip in range(count if count > 1 else 0):  # a file of several clips counts their frames through
-        rows = frames.rows(clip)
+    for k in range(len(used) if len(used) > 1 else 0):  # a file of several clips counts their frames through
+        rows = frames.rows(k)
         frames.frame[rows] = np.arange(len(rows))
     return frames
 

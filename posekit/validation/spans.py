@@ -42,16 +42,13 @@ def clip_verdicts(columns: VerdictColumns, frames: ReportFrames) -> tuple[ClipVe
     Returns
     -------
     tuple of ClipVerdict
-        In the order of `frames.clips`; clips without frames are left out.
+        In the order of `frames.clips`.
     """
     most = int(np.clip(MOST_SPANS_OF_ALL // max(len(frames.clips), 1), 5, MOST_SPANS))
     firsts = np.searchsorted(columns.posture, np.arange(len(columns) + 1))
-    verdicts = []
-    for clip in range(len(frames.clips)):
-        rows = frames.rows(clip)
-        if len(rows):
-            verdicts.append(_verdict(columns, frames, clip, rows, firsts, most))
-    return tuple(verdicts)
+    return tuple(
+        _verdict(columns, frames, clip, frames.rows(clip), firsts, most) for clip in range(len(frames.clips))
+    )
 
 
 class _Cells(NamedTuple):

@@ -24,6 +24,7 @@ from posekit.validation.advice import why_most_fail
 from posekit.validation.over_time import OverTime, frames_of, judged_over_time
 from posekit.validation.people import PersonRows, batches, people_of, told_of_people
 from posekit.validation.spans import clip_verdicts
+from posekit.validation.stills import stills_of
 from posekit.validation.validate_columns import columns_of
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Report as Verdicts
@@ -99,9 +100,10 @@ def validate(
     -------
     posekit.formats.own.ValidationReport
     """
-    over_time, frames, clip = OverTime(), None, None
+    over_time, frames, clip, held = OverTime(), None, None, None
     if isinstance(postures, HeldPostures):
-        frames, clip = frames_of(postures, file), postures.clip
+        held, clip = postures, postures.clip
+        frames = frames_of(postures, file)
         if postures.in_time and validator.profile.checks:
             over_time = judged_over_time(postures, validator.profile.checks, validator.settings)
         postures = postures.postures
@@ -139,6 +141,7 @@ def validate(
     columns = joined(parts, list(places), checks)
     if frames is not None:
         listed = [_placed(posture, k, frames) for k, posture in enumerate(listed)]
+    clips = clip_verdicts(columns, frames) if frames is not None and frames.in_time else None
     not_valid = len(columns) - columns.summary["valid"]
     told = {
         **validator.describe(),
@@ -159,7 +162,8 @@ def validate(
         verdicts=None if all_listed and detail == "findings" else columns.letters,
         columns=columns,
         frames=frames,
-        clips=clip_verdicts(columns, frames) if frames is not None and frames.in_time else None,
+        clips=clips,
+        stills=stills_of(clips, held) if clips and held is not None else (),
     )
 
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from posekit.body.capsules import CAPSULE_AXES
 from posekit.skeleton import HIPS, JOINT, TORSO
 
 RIGID_JOINTS = {"torso": TORSO, "hips": HIPS}
+LIMB_ENDS: Mapping[str, tuple[str, ...]] = {
+    "arm": ("shoulder", "elbow", "wrist"),
+    "leg": ("hip", "knee", "ankle"),
+    **dict.fromkeys(("foot", "toe", "heel"), ("ankle",)),
+}
 KNEE_JOINTS = ("right_knee", "left_knee")
 
 
@@ -51,9 +57,8 @@ def _joints(part: str) -> list[str]:
     """Return the joint of that name; of a limb or a side (walking's rules) all its joints."""
     if part in JOINT:
         return [part]
-    limbs = {"arm": ("shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle")}
     side, _, limb = part.rpartition("_")
-    names: tuple[str, ...] = limbs.get(limb.removesuffix("s"), ())
+    names = LIMB_ENDS.get(limb.removesuffix("s"), ())
     if part in ("right", "left"):  # rule 2: arm and leg of that side
         side, names = part, ("elbow", "knee")
     sides = [side] if side else ["right", "left"]

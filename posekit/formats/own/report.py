@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own.npz import suffix
-from posekit.formats.own.report_clips import ClipVerdict, clip_document, clip_of_document
+from posekit.formats.own.report_clips import ClipVerdict, Still, clip_document, clip_of_document
 from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_rows import csv_lines, write_report_table
@@ -135,6 +135,8 @@ class ValidationReport:
         Which frame each posture is; not in the JSON file, whose postures say it.
     clips : sequence of ClipVerdict, optional
         The verdicts on clips, of frames in time.
+    stills : sequence of sequences of Still
+        Of each clip, frames that can be drawn; not in the JSON file.
     """
 
     settings: Mapping[str, Any]
@@ -145,6 +147,7 @@ class ValidationReport:
     columns: VerdictColumns | None = field(default=None, compare=False, repr=False)
     frames: ReportFrames | None = field(default=None, compare=False, repr=False)
     clips: Sequence[ClipVerdict] | None = None
+    stills: Sequence[Sequence[Still]] = field(default=(), compare=False, repr=False)
 
     def __len__(self) -> int:
         """Count the postures that were judged."""

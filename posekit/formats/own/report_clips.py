@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from posekit.formats.own.report_schema import ClipFields, Verdict
 
@@ -99,6 +102,18 @@ class ClipVerdict:
     def rejected_share(self) -> float:
         """The share of frames that are not valid."""
         return (self.invalid + self.undecided) / max(self.frames, 1)
+
+
+class Still(NamedTuple):
+    """A frame of a clip as it can be drawn: metres, z up, around its own middle.
+
+    `points` (14 or 19, 3) are the joints, and the head's points where they are known; `before` those of the frame
+    before, in the same place, or None.
+    """
+
+    frame: int
+    points: NDArray[np.float32]
+    before: NDArray[np.float32] | None
 
 
 def clip_document(clip: ClipVerdict) -> dict[str, Any]:
