@@ -8,6 +8,7 @@ File Formats Explained* (University of Sheffield, CS-01-11); the course notes CS
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Final
 
 from posekit.formats.motion.bvh_reading import BvhReading, examine_bvh, read_bvh
@@ -22,5 +23,6 @@ BVH_FORMAT: Final = MotionFormat(
     suffixes=(".bvh",),
     looks_like=lambda given: given.start.lstrip().startswith(b"HIERARCHY"),
     read=read_bvh,
+    read_recorded=partial(read_bvh, as_recorded=True),
     write_configurations=write_bvh,
 )

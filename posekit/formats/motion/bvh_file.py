@@ -45,8 +45,15 @@ class BvhFile:
     values: Array
 
 
-def open_bvh(path: str | Path) -> BvhFile:
+def open_bvh(path: str | Path, *, as_recorded: bool = False) -> BvhFile:
     """Read a BVH file as it stands.
+
+    Parameters
+    ----------
+    path : path
+        The file to read.
+    as_recorded : bool
+        Whether ``Frame Time`` may be none, as 0: it is NaN then.
 
     Raises
     ------
@@ -65,7 +72,7 @@ def open_bvh(path: str | Path) -> BvhFile:
         line = _line(text, motion.end()) + 1
         expected = "Frames: and Frame Time: after MOTION"
         raise refusal(path, f"line {line}", "something else", expected, "add the two lines")
-    frames, frame_time = _declared(path, *head.groups())
+    frames, frame_time = _declared(path, *head.groups(), as_recorded)
     if hierarchy.width == 0:
         raise refusal(path, "CHANNELS", "none", "the channels of one joint at least", "nothing moves in it")
     values = _numbers(path, text, head.end())
@@ -77,7 +84,7 @@ def open_bvh(path: str | Path) -> BvhFile:
     )
 
 
-def _declared(path: str | Path, frames: str, frame_time: str) -> tuple[int, float]:
+def _declared(path: str | Path, frames: str, frame_time: str, as_recorded: bool) -> tuple[int, float]:
     if not (frames.isascii() and frames.isdigit() and len(frames) < 13 and int(frames) > 0):
         raise refusal(path, "Frames", shown(frames), "a positive whole number")
     try:
@@ -85,6 +92,8 @@ def _declared(path: str | Path, frames: str, frame_time: str) -> tuple[int, floa
     except ValueError:
         seconds = np.nan
     if not 1e-6 <= seconds <= 1e6:
+        if as_recorded:
+            return int(frames), np.nan
         expected = "the seconds from frame to frame, 1e-6 to 1e6"
         raise refusal(path, "Frame Time", shown(frame_time), expected)
     return int(frames), seconds

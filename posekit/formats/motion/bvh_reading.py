@@ -34,14 +34,24 @@ class BvhReading(NamedTuple):
 
 
 def read_bvh(
-    path: str | Path, unit: str | None = None, *, up: str | None = None, absolute: bool | None = None
+    path: str | Path,
+    unit: str | None = None,
+    *,
+    up: str | None = None,
+    absolute: bool | None = None,
+    as_recorded: bool = False,
 ) -> Motion:
     """Read a BVH file: its joints and End Sites in every frame; see `examine_bvh`."""
-    return examine_bvh(path, unit, up=up, absolute=absolute).motion
+    return examine_bvh(path, unit, up=up, absolute=absolute, as_recorded=as_recorded).motion
 
 
 def examine_bvh(
-    path: str | Path, unit: str | None = None, *, up: str | None = None, absolute: bool | None = None
+    path: str | Path,
+    unit: str | None = None,
+    *,
+    up: str | None = None,
+    absolute: bool | None = None,
+    as_recorded: bool = False,
 ) -> BvhReading:
     """Read a BVH file, and say what was guessed.
 
@@ -56,6 +66,8 @@ def examine_bvh(
         ``+x`` … ``-z``; y if not given, unless the body stands along another axis.
     absolute : bool, optional
         Whether position channels stand in place of the offsets; told by the numbers if not given.
+    as_recorded : bool
+        Whether ``Frame Time`` may be none: then no time is known.
 
     Returns
     -------
@@ -70,7 +82,7 @@ def examine_bvh(
     for given, valid, what in ((unit, METRES_IN_UNIT, "unit"), (up, UP_DIRECTIONS, "up")):
         if given is not None and given not in valid:
             raise refusal(path, what, shown(given), " or ".join(valid), "state one of them")
-    file = open_bvh(path)
+    file = open_bvh(path, as_recorded=as_recorded)
     if absolute is None:
         absolute = positions_are_absolute(file)
     points = points_of(file, absolute=absolute)
@@ -90,5 +102,8 @@ def examine_bvh(
         rate=1.0 / file.frame_time,
         up=guessed_up(points, names) if up is None else up,
         source=str(path),
+        as_recorded=as_recorded,
+        told=() if up is None else ("up",),
+        said=(f"lengths are in {scale.name}: {scale.why}",),
     )
     return BvhReading(motion, scale, absolute)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 import tempfile
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +33,7 @@ _LONGEST_NAME: Final = 127
 _SCREEN_X: Final = {"x": "+Y", "y": "+Z", "z": "+X"}
 
 
-def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
+def read_c3d(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
     """Read the points of a C3D file; analogue channels are left out, and time begins at 0.
 
     Parameters
@@ -41,6 +42,8 @@ def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
         The file to read.
     unit : str, optional
         Instead of ``POINT:UNITS``.
+    as_recorded : bool
+        Whether ``POINT:RATE`` may be missing or none.
 
     Raises
     ------
@@ -49,7 +52,7 @@ def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
     """
     data = read_bytes(path, limit=MAX_BYTES, too_large="split it by frames")
     content = decode_c3d(path, data)
-    rate = _rate(path, content)
+    rate = _rate(path, content, as_recorded)
     frames, count, _ = content.points.shape
     return Motion(
         names=_names(path, content.parameters, count),
@@ -58,6 +61,8 @@ def read_c3d(path: str | Path, unit: str | None = None) -> Motion:
         rate=rate,
         up=_up(content.parameters),
         source=str(path),
+        as_recorded=as_recorded,
+        told=("unit", "up") if _up(content.parameters) else ("unit",),
     )
 
 
@@ -129,10 +134,12 @@ def _check_writable(path: str | Path, motion: Motion) -> None:
         raise refusal(path, "time", got, "evenly spaced frames", remedy)
 
 
-def _rate(path: str | Path, content: C3dContent) -> float:
+def _rate(path: str | Path, content: C3dContent, as_recorded: bool) -> float:
     told = content.parameters.get("POINT:RATE")
     rates = [content.rate] if told is None else [*told.numbers[:1].tolist(), content.rate]
     rate = next((rate for rate in rates if math.isfinite(rate) and rate > 0), None)
+    if rate is None and as_recorded:
+        return math.nan
     if rate is None:
         raise refusal(path, "POINT:RATE", shown(content.rate), "frames a second, above 0")
     return rate
@@ -183,6 +190,7 @@ C3D_FORMAT: Final = MotionFormat(
     title="C3D, binary files of motion capture (written with the extra c3d)",
     suffixes=(".c3d",),
     read=read_c3d,
+    read_recorded=partial(read_c3d, as_recorded=True),
     write_points=write_c3d,
     looks_like=_looks_like,
 )

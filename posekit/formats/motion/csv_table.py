@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final
@@ -36,7 +37,7 @@ _CHUNK: Final = 20_000
 """Rows that are held as text at a time."""
 
 
-def read_csv_motion(path: str | Path, unit: str | None = None) -> Motion:
+def read_csv_motion(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
     """Read points from a CSV, long or wide.
 
     Parameters
@@ -45,13 +46,15 @@ def read_csv_motion(path: str | Path, unit: str | None = None) -> Motion:
         The file to read.
     unit : str, optional
         Of the coordinates; metres if not given.
+    as_recorded : bool
+        Whether times may be missing, stand still or go back.
 
     Raises
     ------
     InputError
         Where it is no such table, a row is short, a cell no number, or the frames are out of order.
     """
-    return motion_of(read_columns(path, number_columns), str(path), unit)
+    return motion_of(read_columns(path, number_columns), str(path), unit, as_recorded=as_recorded)
 
 
 def write_csv_motion(path: str | Path, motion: Motion, *, long: bool = False) -> None:
@@ -178,6 +181,7 @@ CSV_FORMAT: Final = MotionFormat(
     title="CSV, a row a frame (time, neck_x, …) or a row a point (frame, time, name, x, y, z)",
     suffixes=(".csv",),
     read=read_csv_motion,
+    read_recorded=partial(read_csv_motion, as_recorded=True),
     write_points=write_csv_motion,
     looks_like=_looks_like,
 )

@@ -49,4 +49,12 @@ def figure_motion(
     points = figure.forward_kinematics(np.where(np.isnan(q), 0.0, q))
     points[known_nodes(figure, q)[:, POINT_NODES] == 0] = np.nan
     rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 1.0
-    return Motion(names=POINTS, points=points, time=time, rate=float(rate), up=up, source=str(path))
+    return Motion(
+        names=POINTS,
+        points=points,
+        time=time,
+        rate=float(rate),
+        up=up,
+        source=str(path),
+        told=("unit", "up") if up else ("unit",),
+    )

@@ -71,6 +71,7 @@ def read_glb(path: str | Path, unit: str | None = None) -> Motion:
         rate=rate_of(time),
         up="+y",
         source=str(path),
+        told=("up",),
     )
 
 

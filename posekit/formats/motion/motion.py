@@ -47,6 +47,13 @@ class Motion:
         What is done in each clip; empty where the file does not say.
     rates : array (C,), optional
         Frames a second of each clip; `rate` for all where not given.
+    as_recorded : bool
+        Whether times may stand still or go back, and times and rates may be NaN, not known: what is judged is taken as
+        it is, what is converted is not.
+    told : tuple of str
+        What the file itself says, of ``unit``, ``up``: the rest was taken for what is customary.
+    said : tuple of str
+        What was found out about the file, a sentence each.
 
     Raises
     ------
@@ -65,6 +72,9 @@ class Motion:
     clips: tuple[str, ...] = ("",)
     actions: tuple[str, ...] = ()
     rates: Array = field(default_factory=lambda: np.empty(0))
+    as_recorded: bool = False
+    told: tuple[str, ...] = ()
+    said: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         points = np.array(self.points, dtype=np.float64)
@@ -77,7 +87,8 @@ class Motion:
                 f"{self.source}: points have shape {points.shape}; expected ({len(time)}, {len(self.names)}, 3): "
                 "frames, names, three coordinates"
             )
-        if not np.isfinite(time).all() or not (np.isfinite(self.rate) and self.rate > 0):
+        known = np.isfinite(time).all() and np.isfinite(self.rate)
+        if np.isinf(time).any() or not (self.as_recorded or known) or self.rate <= 0:
             raise refusal(self.source, "rate", shown(float(self.rate)), "a positive rate, finite times")
         check_distinct(self.source, "names", self.names)
         unknown = np.isnan(points)
@@ -91,7 +102,8 @@ class Motion:
         if rates.shape == (0,):
             rates = np.full(len(self.clips), float(self.rate))
         self._check_clips(clip, rates)
-        self._check_order(time, clip)
+        if not self.as_recorded:
+            self._check_order(time, clip)
         for name, values in (("points", points), ("time", time), ("clip", clip), ("rates", rates)):
             values.flags.writeable = False
             object.__setattr__(self, name, values)
@@ -123,6 +135,9 @@ class Motion:
             source=self.source,
             clips=(name,),
             actions=(self.actions[index],),
+            as_recorded=self.as_recorded,
+            told=self.told,
+            said=self.said,
         )
 
     def _check_clips(self, clip: NDArray[np.intp], rates: Array) -> None:
@@ -135,7 +150,8 @@ class Motion:
             raise refusal(
                 self.source, "clip", f"clips {first} to {last}", f"0 to {count - 1}, as clips are named"
             )
-        if rates.shape != (count,) or not (np.isfinite(rates) & (rates > 0)).all():
+        known = np.isfinite(rates) | self.as_recorded
+        if rates.shape != (count,) or np.isinf(rates).any() or not (known & ~(rates <= 0)).all():
             expected = f"{count} positive rates, one a clip"
             raise refusal(self.source, "rates", shown(rates.tolist()), expected, "correct them")
         if self.up and self.up not in UP_DIRECTIONS:

@@ -31,6 +31,9 @@ class MotionFormat(Format):
     read : callable, optional
         ``read(path, unit)`` reads a file; `unit` is one of `METRES_IN_UNIT`, or None for what the file says or, where
         files do not say it, what is customary. Missing where a file alone does not give points.
+    read_recorded : callable, optional
+        Reads as `read` does, and takes times that do not ascend, and a rate that is missing or none, as they are: see
+        `Motion.as_recorded`. Missing where `read` finds no such times.
     write_points : callable, optional
         ``write_points(path, motion)`` writes points, whole or not at all.
     write_configurations : callable, optional
@@ -40,6 +43,7 @@ class MotionFormat(Format):
 
     holds: Content = Content.MOTION
     read: ReadMotion | None = None
+    read_recorded: ReadMotion | None = None
     write_points: WritePoints | None = None
     write_configurations: WriteConfigurations | None = None
 

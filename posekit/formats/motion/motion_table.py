@@ -55,6 +55,8 @@ def motion_of(
     unit: str | None = None,
     up: str = "",
     rate: float | None = None,
+    *,
+    as_recorded: bool = False,
 ) -> Motion:
     """Make a motion of a table's columns.
 
@@ -68,6 +70,8 @@ def motion_of(
         Of the coordinates; metres if not given.
     up, rate : str, float, optional
         Where the file says them; else the rate is that of the times.
+    as_recorded : bool
+        Whether times may be missing, stand still or go back.
 
     Raises
     ------
@@ -78,16 +82,19 @@ def motion_of(
     if "survivor" in columns:
         remedy = "read it as survivors, or choose one of each frame"
         raise refusal(source, "columns", "survivor", "points of one posture a frame", remedy)
-    if "time" not in columns:
+    if "time" not in columns and not as_recorded:
         raise refusal(source, "columns", _listed(columns), "a column time, seconds", "add it")
-    if len(columns["time"]) == 0:
+    count = len(next(iter(columns.values()), ()))
+    if count == 0:
         raise refusal(source, "", "no rows", "a row a frame", "check how it was written")
+    columns = {"time": np.full(count, np.nan), **columns}
     names, points, rows = (
         _long(columns, source) if set(LONG_COLUMNS) <= set(columns) else _wide(columns, source)
     )
     time = np.asarray(columns["time"], dtype=np.float64)[rows]
     clips, clip = _clips(columns, rows)
-    rates = np.array([rate or rate_of(time[clip == index]) for index in range(len(clips))])
+    told_by = recorded_rate if as_recorded else rate_of
+    rates = np.array([rate or told_by(time[clip == index]) for index in range(len(clips))])
     return Motion(
         names=names,
         points=METRES_IN_UNIT[unit or "m"] * points,
@@ -98,6 +105,8 @@ def motion_of(
         clip=clip,
         clips=clips,
         rates=rates,
+        as_recorded=as_recorded,
+        told=("up",) if up else (),
     )
 
 
@@ -140,6 +149,15 @@ def rate_of(time: Array) -> float:
     return float(round(rate)) if round(rate) and abs(rate - round(rate)) < 1e-4 * rate else rate
 
 
+def recorded_rate(time: Array) -> float:
+    """Return the frames a second of times in whatever order, by their median step ahead; NaN where none is known."""
+    steps = np.diff(time)
+    ahead = steps[steps > 0]
+    if not len(ahead):
+        return float("nan")
+    return rate_of(np.cumsum(ahead)) if len(ahead) == len(steps) > 1 else float(1 / np.median(ahead))
+
+
 def _wide(columns: Mapping[str, Column], source: str) -> tuple[tuple[str, ...], Array, NDArray[np.intp]]:
     names = points_in(list(columns))
     if not names or len(names) > MAX_POINTS:
@@ -165,7 +183,7 @@ def _long(columns: Mapping[str, Column], source: str) -> tuple[tuple[str, ...], 
     time = np.asarray(columns["time"], dtype=np.float64)
     frame = np.asarray(columns.get("frame", time), dtype=np.float64)
     _, clip = _clips(columns, np.arange(len(time)))
-    if not np.isfinite(frame).all() or not np.isfinite(time).all():
+    if not np.isfinite(frame).all() or np.isnan(time).any() != np.isnan(time).all():
         raise refusal(
             source, "frame", "a row without frame or time", "both in every row", "complete the rows"
         )
@@ -174,7 +192,7 @@ def _long(columns: Mapping[str, Column], source: str) -> tuple[tuple[str, ...], 
     rows = np.flatnonzero(new)
     if len(np.unique(np.stack([clip[rows], frame[rows]]), axis=1).T) != len(rows):
         raise refusal(source, "frame", "a frame whose rows are apart", "rows in order", "sort them by frame")
-    if (time != time[rows][index]).any():
+    if ((time != time[rows][index]) & np.isfinite(time)).any():
         row = int(np.argmax(time != time[rows][index]))
         raise refusal(source, f"row {row + 1}", f"time {time[row]:g} s", "one time a frame")
     if len(names) > MAX_POINTS or len(rows) * len(names) * 3 > MAX_VALUES:

@@ -1,7 +1,7 @@
 """NPZ: NumPy's own archives, without pickles: captures in clips, posekit's postures, and plain arrays with names.
 
 Keys: ``joints`` or ``points`` (T, P, 3), floats, NaN where one is missing; ``joint_names`` or ``names`` (P,); how fast,
-as ``clip_fps`` (one a clip or one for all), ``rate`` or ``time`` (T,), seconds; and optionally ``clip`` (T,),
+as ``clip_fps`` (one a clip or one for all), ``fps``, ``rate`` or ``time`` (T,), seconds; and optionally ``clip`` (T,),
 ``clip_names``, ``clip_action`` (C,), ``up`` (``+z``; a capture with ``clip_fps`` has y up where it does not say),
 ``unit`` (``m``). Files of schema ``posekit.postures/1`` have no time: their frames count as a second each.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,7 +22,7 @@ from posekit.formats.cameras.camera_format import is_intrinsics
 from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
-from posekit.formats.motion.motion_table import rate_of
+from posekit.formats.motion.motion_table import rate_of, recorded_rate
 from posekit.geometry import Array
 from posekit.safe_io import open_npz, refusal, replacing, shown
 from posekit.skeleton import HEAD_POINTS, JOINTS
@@ -33,13 +34,15 @@ _POINTS: Final[tuple[str, ...]] = ("joints", "points")
 _NAMES: Final[tuple[str, ...]] = ("joint_names", "names")
 _KEYS: Final[tuple[str, ...]] = (
     *(*_POINTS, *_NAMES, "head", "schema", "time", "rate", "up", "unit"),
-    *("clip", "clip_names", "clip_action", "clip_fps"),
+    *("clip", "clip_names", "clip_action", "clip_fps", "fps"),
 )
+_RATES: Final[tuple[str, ...]] = ("clip_fps", "rate", "fps")
+"""Where the frames a second stand."""
 
 Arrays = Mapping[str, NDArray[Any]]
 
 
-def read_npz(path: str | Path, unit: str | None = None) -> Motion:
+def read_npz(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
     """Read points from an NPZ.
 
     Parameters
@@ -48,6 +51,8 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
         The file to read.
     unit : str, optional
         Instead of the file's; metres where neither says.
+    as_recorded : bool
+        Whether times may stand still or go back, and the rate may be missing or none.
 
     Raises
     ------
@@ -62,7 +67,7 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
     scale = METRES_IN_UNIT[unit or _word(path, arrays, "unit", "m", tuple(METRES_IN_UNIT))]
     up = _word(path, arrays, "up", "+y" if "clip_fps" in arrays else "", ("", *UP_DIRECTIONS))
     clip, clips, actions = _clips(path, arrays, len(points))
-    time, rates = _time(path, arrays, clip, len(clips), schema)
+    time, rates = _time(path, arrays, clip, len(clips), schema, as_recorded=as_recorded)
     return Motion(
         names=names,
         points=scale * points,
@@ -74,6 +79,8 @@ def read_npz(path: str | Path, unit: str | None = None) -> Motion:
         clips=clips,
         actions=actions,
         rates=rates,
+        as_recorded=as_recorded,
+        told=tuple(key for key in ("unit", "up") if arrays.get(key, np.array("")).any()),
     )
 
 
@@ -137,10 +144,16 @@ def _clips(
 
 
 def _time(
-    path: str | Path, arrays: Arrays, clip: NDArray[np.intp], clips: int, schema: str
+    path: str | Path,
+    arrays: Arrays,
+    clip: NDArray[np.intp],
+    clips: int,
+    schema: str,
+    *,
+    as_recorded: bool,
 ) -> tuple[Array, Array]:
     """Return the time of each frame and the rate of each clip."""
-    key = next((key for key in ("clip_fps", "rate") if key in arrays), None)
+    key = next((key for key in _RATES if key in arrays), None)
     time = arrays.get("time")
     if time is not None and (time.dtype.kind not in "fiu" or time.shape != clip.shape):
         raise _wrong(path, "time", _kind(time), f"numbers ({len(clip)},), seconds")
@@ -149,10 +162,16 @@ def _time(
         if fps.dtype.kind not in "fiu" or fps.shape not in {(), (1,), (clips,)}:
             raise _wrong(path, key, _kind(fps), f"numbers ({clips},), one a clip")
         rates = np.broadcast_to(fps.astype(np.float64), (clips,)).copy()
-        if not (np.isfinite(rates) & (rates > 0)).all():
+        positive = np.isfinite(rates) & (rates > 0)
+        if as_recorded:
+            rates[~positive] = np.nan
+        elif not positive.all():
             raise _wrong(path, key, shown(rates.tolist()[:5]), "positive, finite frames a second")
     elif time is not None:
-        rates = np.array([rate_of(time[clip == index].astype(np.float64)) for index in range(clips)])
+        told_by = recorded_rate if as_recorded else rate_of
+        rates = np.array([told_by(time[clip == index].astype(np.float64)) for index in range(clips)])
+    elif as_recorded:
+        rates = np.full(clips, np.nan)
     elif schema:
         rates = np.ones(clips)
     else:
@@ -212,6 +231,7 @@ NPZ_FORMAT: Final = MotionFormat(
     title="NPZ, NumPy arrays: captures in clips, posekit's postures, plain points with names",
     suffixes=(".npz",),
     read=read_npz,
+    read_recorded=partial(read_npz, as_recorded=True),
     write_points=write_npz,
     looks_like=_looks_like,
 )

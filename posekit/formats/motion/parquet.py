@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,7 +33,7 @@ ROWS_A_PIECE: Final = 65_536
 """Rows of one piece that is written."""
 
 
-def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
+def read_parquet(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
     """Read points from a Parquet file, long or wide, as a whole.
 
     Parameters
@@ -41,6 +42,8 @@ def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
         The file to read.
     unit : str, optional
         Of the coordinates; metres if not given.
+    as_recorded : bool
+        Whether times may be missing, stand still or go back.
 
     Raises
     ------
@@ -51,7 +54,7 @@ def read_parquet(path: str | Path, unit: str | None = None) -> Motion:
     with opened(path) as file:
         columns = columns_of(path, file)
         up = _up(file.schema_arrow)
-    return motion_of(columns, str(path), unit, up)
+    return motion_of(columns, str(path), unit, up, as_recorded=as_recorded)
 
 
 def read_parquet_pieces(path: str | Path, unit: str | None = None) -> Iterator[Motion]:
@@ -215,6 +218,7 @@ PARQUET_FORMAT: Final = MotionFormat(
     title="Parquet, a row a frame or a row a point (needs the extra parquet)",
     suffixes=(".parquet", ".pq"),
     read=read_parquet,
+    read_recorded=partial(read_parquet, as_recorded=True),
     write_points=write_parquet,
     looks_like=lambda given: given.start.startswith(b"PAR1"),
 )

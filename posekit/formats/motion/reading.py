@@ -25,7 +25,12 @@ def motion_formats() -> dict[str, MotionFormat]:
 
 
 def read_motion(
-    path: str | Path, format: str | None = None, *, unit: str | None = None, up: str | None = None
+    path: str | Path,
+    format: str | None = None,
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    as_recorded: bool = False,
 ) -> Motion:
     """Read named points over time.
 
@@ -39,6 +44,8 @@ def read_motion(
         ``m``, ``cm``, ``mm`` or ``in``: instead of what the file says or is taken to be in.
     up : str, optional
         The axis that points up, ``+y``: instead of what the file says. Points are not turned.
+    as_recorded : bool
+        Whether it is taken as it is: times in whatever order or not known, and points of any size.
 
     Raises
     ------
@@ -55,10 +62,11 @@ def read_motion(
         got = f"{chosen.name}: {chosen.title}"
         expected = f"points: {', '.join(one.name for one in motion_formats().values() if one.read)}"
         raise refusal(path, "format", got, expected, "choose a file of points")
-    motion = chosen.read(Path(path), unit)
-    if unit is None:
+    read = chosen.read_recorded if as_recorded and chosen.read_recorded else chosen.read
+    motion = read(Path(path), unit)
+    if unit is None and not as_recorded:
         check_size(motion)
-    return motion if up is None else replace(motion, up=up)
+    return motion if up is None else replace(motion, up=up, told=(*motion.told, "up"))
 
 
 def write_motion(path: str | Path, motion: Motion, format: str | None = None) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Final
@@ -40,7 +41,7 @@ _CHUNK: Final = 4096
 """Rows that are held as text at a time."""
 
 
-def read_trc(path: str | Path, unit: str | None = None) -> Motion:
+def read_trc(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
     """Read a TRC file.
 
     Parameters
@@ -49,6 +50,8 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
         The file to read.
     unit : str, optional
         Instead of the one in the header.
+    as_recorded : bool
+        Whether frames may be out of order, and ``DataRate`` missing.
 
     Raises
     ------
@@ -58,7 +61,7 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
     """
     text = read_text(path, limit=MAX_BYTES, too_large="split it by frames")
     lines = text.splitlines()
-    header = _header(path, lines)
+    header = _header(path, lines, as_recorded)
     scale = METRES_IN_UNIT[unit or header.unit]
     body = [
         (number, line) for number, line in enumerate(lines[header.rows :], header.rows + 1) if line.strip()
@@ -79,7 +82,7 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
         line = body[int(np.argmax(vague))][0]
         raise refusal(path, f"line {line}", "a frame or time that is missing", "both in every row")
     back = np.flatnonzero(np.diff(values[:, 0]) <= 0)
-    if len(back):
+    if len(back) and not as_recorded:
         row = int(back[0]) + 1
         got = f"frame {values[row, 0]:g} after {values[row - 1, 0]:g}"
         raise refusal(path, f"line {body[row][0]}", got, "frames in order", "sort the rows, each frame once")
@@ -90,6 +93,8 @@ def read_trc(path: str | Path, unit: str | None = None) -> Motion:
         rate=header.rate,
         up="+y",
         source=str(path),
+        as_recorded=as_recorded,
+        told=("unit",),
     )
 
 
@@ -135,7 +140,7 @@ class _Header:
     """Lines before the data."""
 
 
-def _header(path: str | Path, lines: Sequence[str]) -> _Header:
+def _header(path: str | Path, lines: Sequence[str], as_recorded: bool) -> _Header:
     if len(lines) < 5 or not lines[0].startswith("PathFileType"):
         raise refusal(
             path, "", "no TRC file", "a first line PathFileType, and five lines of header", "check the format"
@@ -156,8 +161,10 @@ def _header(path: str | Path, lines: Sequence[str]) -> _Header:
         raise refusal(path, "NumMarkers", got, "as many as names", "correct one of the two")
     rate = _float(fields.get("DataRate", ""))
     if rate is None or rate <= 0:
-        got = shown(fields.get("DataRate"))
-        raise refusal(path, "DataRate", got, "frames a second, above 0", "write it into line 3")
+        if not as_recorded:
+            got = shown(fields.get("DataRate"))
+            raise refusal(path, "DataRate", got, "frames a second, above 0", "write it into line 3")
+        rate = math.nan
     unit = _UNIT_NAMES.get(fields.get("Units", "").casefold())
     if unit is None:
         expected = f"one of {', '.join(_UNIT_NAMES)}"
@@ -208,6 +215,7 @@ TRC_FORMAT: Final = MotionFormat(
     title="TRC, marker positions of OpenSim, Pose2Sim and Motion Analysis",
     suffixes=(".trc",),
     read=read_trc,
+    read_recorded=partial(read_trc, as_recorded=True),
     write_points=write_trc,
     looks_like=lambda given: given.start.startswith(b"PathFileType"),
 )
