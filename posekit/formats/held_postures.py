@@ -2,34 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import load_figure
-from posekit.errors import InputError
 from posekit.formats.format import Content
-from posekit.formats.motion import SurvivorTable, guess_up, postures_of, read_motion, read_survivors
-from posekit.formats.motion.motion_format import MotionFormat
+from posekit.formats.held import HeldPostures
+from posekit.formats.motion import SurvivorTable, read_survivors
+from posekit.formats.motion.body_size import body_unit
 from posekit.formats.own import (
     NamedConfigurations,
     Postures,
     Result,
     View,
-    read_configurations,
     read_postures,
     read_result,
     read_view,
 )
 from posekit.formats.recognising import Recognised
-from posekit.formats.registry import formats, names
+from posekit.formats.registry import names as format_names
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 from posekit.skeleton import JOINTS
+
+if TYPE_CHECKING:
+    from posekit.robots.kinematics import Kinematics
+
+__all__ = [
+    "POSTURE_CONTENTS",
+    "HeldPostures",
+    "configurations_of",
+    "held_configurations",
+    "held_postures",
+    "mapped_positions",
+    "postures_of_result",
+]
 
 POSTURE_CONTENTS: Final = (
     Content.POSTURES,
@@ -42,44 +55,6 @@ POSTURE_CONTENTS: Final = (
 """What files hold that have postures in them."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class HeldPostures:
-    """Postures of a file, N of them.
-
-    Parameters
-    ----------
-    postures : Postures
-        Metres, in the file's own world or its camera's frame.
-    frame : int array (N,)
-        The frame that each posture is of; all 0 where the file knows no frames.
-    clip : int array (N,)
-        The recording that each posture is of, from 0.
-    time : array (N,)
-        Seconds; NaN where the file does not say them.
-    up : str
-        The axis that points up, as ``+y``; empty where it is not known.
-    clips : tuple of str
-        The names of the recordings; empty where they have none.
-    """
-
-    postures: Postures
-    frame: NDArray[np.intp]
-    clip: NDArray[np.intp]
-    time: Array
-    up: str = ""
-    clips: tuple[str, ...] = ()
-
-    def __len__(self) -> int:
-        """Return the number of postures."""
-        return len(self.postures.joints)
-
-    @property
-    def in_time(self) -> bool:
-        """Whether they are frames of motion: of each frame of a clip one posture."""
-        frames = np.stack([self.clip, self.frame], axis=1)
-        return len(self) > 0 and len(np.unique(frames, axis=0)) == len(frames)
-
-
 def held_postures(
     path: Path,
     found: Recognised,
@@ -87,6 +62,7 @@ def held_postures(
     layout: SkeletonMap | None = None,
     unit: str | float | None = None,
     up: str | None = None,
+    rate: float | None = None,
 ) -> HeldPostures:
     """Read the postures of a file.
 
@@ -102,6 +78,8 @@ def held_postures(
         Of motion: what lengths are in, instead of what the file says.
     up : str, optional
         Of motion: the axis that points up, instead of what the file says.
+    rate : float, optional
+        Of motion and configurations: frames a second, instead of what the file says.
 
     Raises
     ------
@@ -109,19 +87,47 @@ def held_postures(
         Where it cannot be read, or holds no postures: the formats that do are named.
     """
     if found.holds is Content.POSTURES:
-        return _at_once(read_postures(path))
+        return _at_once(read_postures(path), path, told=found.schema != "")
     if found.holds is Content.RESULT:
         return postures_of_result(read_result(path))
     if found.holds is Content.CONFIGURATIONS:
-        return _of_configurations(read_configurations(path))
+        figure = load_figure()  # angles alone do not say lengths: the built-in figure's, whose z points up
+        variables = tuple(figure.configuration_names)
+        return held_configurations(configurations_of(path, found, rate), variables, figure.forward_kinematics)
     if found.holds is Content.SURVIVORS:
         return _of_table(read_survivors(path))
     if found.holds is Content.MOTION:
-        return _of_motion(path, found, layout, None if unit is None else str(unit), up)
+        from posekit.formats.held_motion import held_motion, read_recorded
+
+        unit = None if unit is None else str(unit)
+        recorded = read_recorded(path, found, unit=unit, up=up)
+        return held_motion(recorded, layout=layout, unit=unit, up=up, rate=rate)
     if found.holds is Content.VIEW:
         return _of_truth(path, read_view(path))
-    known = ", ".join(names(*POSTURE_CONTENTS))
+    known = ", ".join(format_names(*POSTURE_CONTENTS))
     raise refusal(path, "", found.title, f"postures, as they are in {known}", "give another file")
+
+
+def configurations_of(path: Path, found: Recognised, rate: float | None = None) -> NamedConfigurations:
+    """Read configurations of a robot, in any format that holds them.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    found : Recognised
+        What it is.
+    rate : float, optional
+        Frames a second, instead of what the file says.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be read.
+    """
+    one = found.only(path)
+    read: NamedConfigurations = one.read(path)  # type: ignore[attr-defined]
+    return read if rate is None else replace(read, time=np.arange(len(read)) / rate)
 
 
 def postures_of_result(result: Result) -> HeldPostures:
@@ -138,56 +144,71 @@ def postures_of_result(result: Result) -> HeldPostures:
     return _held(Postures(joints=joints), np.repeat(np.arange(len(counts)), counts), time)
 
 
-def _of_configurations(configurations: NamedConfigurations) -> HeldPostures:
-    """Place the joints of the built-in figure, whose z points up: angles alone do not say lengths."""
-    figure = load_figure()
-    points = figure.forward_kinematics(configurations.in_order_of(tuple(figure.configuration_names)))
+def held_configurations(
+    configurations: NamedConfigurations, names: Sequence[str], positions: Callable[[Array], Array]
+) -> HeldPostures:
+    """Place the joints of a robot's configurations by forward kinematics, so that its ground and feet can be judged.
+
+    Parameters
+    ----------
+    configurations : NamedConfigurations
+        As a file has them.
+    names : sequence of str (nq,)
+        The robot's ``configuration_names``.
+    positions : callable
+        Forward kinematics: from q (N, nq) in the robot's order to points (N, 19, 3) in the order of
+        `posekit.skeleton.POINTS`, metres, NaN where the robot has none.
+
+    Raises
+    ------
+    InputError
+        Where the configurations are not that robot's.
+    """
+    q = configurations.in_order_of(names)
+    points = positions(q)
+    head = points[:, len(JOINTS) :]
     count = len(points)
     return HeldPostures(
-        postures=Postures(joints=points[:, : len(JOINTS)], head=points[:, len(JOINTS) :]),
+        postures=Postures(joints=points[:, : len(JOINTS)], head=head if np.isfinite(head).any() else None),
         frame=np.arange(count),
         clip=np.zeros(count, dtype=np.intp),
-        time=np.full(count, np.nan),
+        time=configurations.time if len(configurations.time) else np.full(count, np.nan),
         up="+z",
+        said=configurations.said,
+        q=q,
     )
+
+
+def mapped_positions(kinematics: Kinematics, q: Array) -> Array:
+    """Place a robot's points: q (N, nq) to (N, 19, 3), NaN for points that it has not.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        Of its joint map: see `posekit.robots.joint_map.JointMap.kinematics`.
+    q : array (N, nq)
+        In the robot's order.
+    """
+    from posekit.robots.joint_map import postures_of as mapped
+
+    return mapped(kinematics.positions(q), kinematics)
 
 
 def _held(postures: Postures, frame: NDArray[np.intp], time: Array) -> HeldPostures:
     return HeldPostures(postures=postures, frame=frame, clip=np.zeros(len(frame), dtype=np.intp), time=time)
 
 
-def _at_once(postures: Postures) -> HeldPostures:
+def _at_once(postures: Postures, path: Path, *, told: bool) -> HeldPostures:
+    """Take postures whose unit is metres where the schema says so, and else told by their size."""
     count = len(postures.joints)
-    return _held(postures, np.zeros(count, dtype=np.intp), np.full(count, np.nan))
-
-
-def _of_motion(
-    path: Path, found: Recognised, layout: SkeletonMap | None, unit: str | None, up: str | None
-) -> HeldPostures:
-    one = found.only(path)
-    if not one.reads:
-        expected = ", ".join(
-            known.name for known in formats(Content.MOTION) if isinstance(known, MotionFormat) and known.read
-        )
-        raise refusal(
-            path, "format", f"{one.name}: {one.title}", f"points: {expected}", "choose a file of points"
-        )
-    motion = read_motion(path, one.name, unit=unit, up=up)
-    postures = postures_of(motion, layout)
-    if not motion.up:
-        try:
-            found_up = guess_up(postures.joints, motion.source)
-        except InputError:  # nobody stands: whoever needs to know which way is up has to say it
-            found_up = ""
-    head = postures.head if np.isfinite(postures.head).any() else None
-    return HeldPostures(
-        postures=Postures(joints=postures.joints, head=head),
-        frame=np.arange(len(motion)),
-        clip=motion.clip.copy(),
-        time=motion.time,
-        up=motion.up or found_up,
-        clips=motion.clips,
-    )
+    held = _held(postures, np.zeros(count, dtype=np.intp), np.full(count, np.nan))
+    size = body_unit(postures.joints, str(path), told=told)
+    if size.metres == 1.0:
+        return held
+    head = None if postures.head is None else size.metres * postures.head
+    scaled = Postures(joints=size.metres * postures.joints, head=head)
+    said = f"lengths are taken as {size.name}: so the body is {size.stature:.2f} m tall"
+    return replace(held, postures=scaled, unit=size.name, said=(said,))
 
 
 def _of_table(table: SurvivorTable) -> HeldPostures:

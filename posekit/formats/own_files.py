@@ -8,7 +8,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.formats.format import Content, Format
-from posekit.formats.given_file import GivenFile
+from posekit.formats.given_file import MAX_DECLARED, GivenFile
+from posekit.safe_io import open_npz
+from posekit.skeleton import POINTS
 
 BATCH_FILE: Final = "batch.json"
 """The file by which the folder of a batch is known."""
@@ -73,8 +75,17 @@ def _is_urdf(given: GivenFile) -> bool:
 
 def _has_only_joints(given: GivenFile) -> bool:
     """Tell arrays of postures from motion's, which have times, and names where their points are others."""
-    timed = given.arrays & {"clip_fps", "rate", "time"} and given.arrays & {"joint_names", "names"}
-    return given.schema == "" and "joints" in given.arrays and not timed
+    timed = given.arrays & {"clip_fps", "rate", "fps", "time"} and given.arrays & {"joint_names", "names"}
+    return given.schema == "" and "joints" in given.arrays and not timed and not _names_others(given)
+
+
+def _names_others(given: GivenFile) -> bool:
+    """Tell whether most of an archive's joints have other names than ours: it is motion whose times are missing."""
+    if "joint_names" not in given.arrays:
+        return False
+    with open_npz(given.path, limit=MAX_DECLARED) as archive:
+        named = set(archive.array("joint_names", "U", None).reshape(-1).tolist())
+    return 2 * len(named & set(POINTS)) < len(named)
 
 
 def _has_only_q(given: GivenFile) -> bool:

@@ -72,7 +72,7 @@ def open_bvh(path: str | Path, *, as_recorded: bool = False) -> BvhFile:
         line = _line(text, motion.end()) + 1
         expected = "Frames: and Frame Time: after MOTION"
         raise refusal(path, f"line {line}", "something else", expected, "add the two lines")
-    frames, frame_time = _declared(path, *head.groups(), as_recorded)
+    frames, frame_time = _declared(path, head[1], head[2], as_recorded)
     if hierarchy.width == 0:
         raise refusal(path, "CHANNELS", "none", "the channels of one joint at least", "nothing moves in it")
     values = _numbers(path, text, head.end())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -36,11 +36,17 @@ class NamedConfigurations:
         The variables in the file's order; None where it does not name them.
     source : str
         What to call them in errors.
+    time : array (N,)
+        Seconds; empty where the file says none.
+    said : tuple of str
+        What was found out about the file, a sentence each.
     """
 
     q: Array
     names: tuple[str, ...] | None = None
     source: str = "q"
+    time: Array = field(default_factory=lambda: np.empty(0))
+    said: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         """Count the configurations."""

@@ -1,0 +1,93 @@
+"""Which way is up, by how bodies stand and by the ground under them, against what a file says."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.errors import InputError
+from posekit.formats.motion.motion import UP_DIRECTIONS
+from posekit.formats.motion.postures_up import guess_up
+from posekit.geometry import Array
+from posekit.safe_io import refusal
+
+FLAT_METRES: Final = 0.15
+"""How much the lowest joint of a body that stays on a level ground goes up and down: an ankle's rise in a step."""
+STEEP_METRES: Final = 0.6
+"""How much it must go along another axis for that axis not to be up: more than from a crouch to the tips of the
+toes."""
+SPREAD_PERCENTS: Final = (5, 95)
+
+
+class FoundUp(NamedTuple):
+    """The axis that points up, empty where it is not known, and a sentence that says from what."""
+
+    up: str
+    said: str = ""
+
+
+def find_up(joints: Array, clip: NDArray[np.intp], up: str, source: str, *, told: bool) -> FoundUp:
+    """Tell which way is up.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        In tree order, metres.
+    clip : int array (T,)
+        The recording of each frame.
+    up : str
+        What the file says, or what is customary; empty where it is neither.
+    source : str
+        What to call it in errors.
+    told : bool
+        Whether the file itself says it.
+
+    Raises
+    ------
+    InputError
+        Where the file's own word is another than how bodies stand, and the ground is against it too.
+    """
+    try:
+        stands = guess_up(joints, source)
+    except InputError:
+        stands = ""
+    if stands and stands == up:
+        return FoundUp(up)
+    flat = {name: ground_spread(joints, clip, name) for name in UP_DIRECTIONS}
+    if not stands:
+        level = [name for name, spread in flat.items() if spread < FLAT_METRES]
+        others = [spread for name, spread in flat.items() if level and name[1] != level[0][1]]
+        if not up and len(level) == 1 and min(others, default=0.0) > STEEP_METRES:
+            return FoundUp(level[0], f"{level[0]} is up by the ground: the lowest joint stays level along it")
+        return FoundUp(up)
+    if not told:
+        return FoundUp(stands, f"{stands} is up by how bodies stand")
+    if flat[up] > STEEP_METRES and flat[stands] < FLAT_METRES:
+        got = f"{up}, by the file's own word, along which the lowest joint goes {flat[up]:.1f} m"
+        expected = f"an axis along which feet stay level: {stands}, along which bodies stand"
+        raise refusal(source, "up", got, expected, f"state it: --up {up} or --up {stands}")
+    return FoundUp(up, f"{up} is up by the file's own word, though bodies stand along {stands} (--up)")
+
+
+def ground_spread(joints: Array, clip: NDArray[np.intp], up: str) -> float:
+    """Return how much the lowest joint goes along an axis, metres: from the 5th to the 95th percentile of a clip.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres.
+    clip : int array (T,)
+        The recording of each frame: of several the median counts.
+    up : str
+        One of `UP_DIRECTIONS`.
+    """
+    lowest = np.fmin.reduce(joints @ UP_DIRECTIONS[up], axis=1)
+    spreads = []
+    for index in np.unique(clip):
+        known = lowest[(clip == index) & np.isfinite(lowest)]
+        if len(known):
+            low, high = np.percentile(known, SPREAD_PERCENTS)
+            spreads.append(float(high - low))
+    return float(np.median(spreads)) if spreads else float("inf")
