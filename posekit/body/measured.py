@@ -24,9 +24,9 @@ import numpy as np
 from posekit.body.anthropometry.postures import DEVIATION_OF_MAD
 from posekit.body.figure import Figure
 from posekit.errors import FigureError
-from posekit.geometry import Array
+from posekit.geometry import Array, cross
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
-from posekit.skeleton import SEGMENT_NAMES, SEGMENTS
+from posekit.skeleton import JOINT, SEGMENT_NAMES, SEGMENTS, SIDES
 
 LIMB_NAMES: Final = tuple(
     name for name in SEGMENT_NAMES if name.endswith(("elbow", "wrist", "knee", "ankle"))
@@ -36,6 +36,9 @@ LIMB_SEGMENTS: Final = tuple(SEGMENTS[SEGMENT_NAMES.index(name)] for name in LIM
 LEAST_FRAMES: Final = 10
 """Frames from which noise is estimated: of ten frames and eight limbs it is within a quarter of the true one."""
 
+
+BENT_METRES: Final = 0.04
+"""Metres that both knees together are before the middles between hip and ankle in a frame that tells the side."""
 
 WORST_OF_USUAL: Final = 3.0
 """Times the usual noise that the worst limb's is believed to be."""
@@ -86,10 +89,33 @@ def measured_person(joints: Array) -> MeasuredPerson:
     by_limb = noise_by_limb(joints)
     return MeasuredPerson(
         lengths=segment_lengths(joints),
-        behind=shoulders_are_behind(joints),
-        noise=float(np.median(list(by_limb.values()))) if by_limb else math.nan,
+        behind=shoulders_are_behind(_unswapped(joints)),
+        noise=usual_noise(by_limb),
         noise_by_limb=by_limb,
     )
+
+
+def usual_noise(by_limb: Mapping[str, float]) -> float:
+    """Return the noise of most limbs, metres; NaN where none was seen."""
+    return float(np.median(list(by_limb.values()))) if by_limb else math.nan
+
+
+def _unswapped(joints: Array) -> Array:
+    """Leave out frames whose left and right are exchanged: their knees, where they bend, bend forward.
+
+    Of few frames with bent knees, or none that bends that way, all are kept.
+    """
+    neck, pelvis, right, left = (
+        joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_shoulder", "left_shoulder")
+    )
+    forward = cross(pelvis - neck, left - right)
+    bent = np.zeros(len(joints))
+    for side in SIDES:
+        hip, knee, ankle = (joints[:, JOINT[f"{side}_{name}"]] for name in ("hip", "knee", "ankle"))
+        bent += np.einsum("ni,ni->n", knee - (hip + ankle) / 2, forward)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        bent /= np.linalg.norm(forward, axis=1)
+    return joints[bent > BENT_METRES] if np.sum(bent > BENT_METRES) >= LEAST_FRAMES else joints
 
 
 def noise_by_limb(joints: Array) -> dict[str, float]:
@@ -110,7 +136,7 @@ def noise_by_limb(joints: Array) -> dict[str, float]:
     """
     starts, ends = np.array(LIMB_SEGMENTS).T
     length = np.linalg.norm(joints[:, ends] - joints[:, starts], axis=-1)
-    noise = {}
+    noise: dict[str, float] = {}
     for name, column in zip(LIMB_NAMES, length.T, strict=True):
         known = column[np.isfinite(column)]
         if len(known) >= LEAST_FRAMES:

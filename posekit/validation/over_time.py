@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.measured import noise_by_limb, usual_noise
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own.report_frames import ClipName, ReportFrames
@@ -84,6 +85,7 @@ def clips_of(held: HeldPostures, settings: ValidateSettings) -> Iterator[ClipRow
                 rate=rate_of(held.time[rows]),
                 up=up,
                 ground=settings.ground,
+                noise=_noise_of(held.postures.joints[rows], settings),
             ),
         )
 
@@ -107,6 +109,13 @@ def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
         rows = frames.rows(k)
         frames.frame[rows] = np.arange(len(rows))
     return frames
+
+
+def _noise_of(joints: NDArray[np.float64], settings: ValidateSettings) -> float:
+    """Return the measuring noise of a clip, metres; 0 where none is known."""
+    if settings.noise is not None or settings.strict:
+        return settings.noise or 0.0
+    return float(np.nan_to_num(usual_noise(noise_by_limb(joints))))
 
 
 def rate_of(time: NDArray[np.float64]) -> float:

@@ -4,11 +4,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
 from posekit.settings import ValidateSettings
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, JOINTS, urdf_joint_name
 from posekit.validators import Validator
 from posekit.validators.measured import Allowance
 
@@ -101,3 +102,26 @@ def test_noise_is_allowed_for_by_three_deviations_of_a_direction() -> None:
     allowed = Allowance(settings=ValidateSettings(noise=0.005))
     assert allowed.angle("", 0.25) == pytest.approx(np.hypot(2.0, np.degrees(3 * np.sqrt(2) * 0.005 / 0.25)))
     assert Allowance(settings=ValidateSettings(strict=True)).angle("", 0.25) == 0.001
+
+
+OTHER_SIDE = {"right": "left", "left": "right"}
+SWAPPED = [JOINT["_".join(OTHER_SIDE.get(part, part) for part in name.split("_"))] for name in JOINTS]
+
+
+def test_left_and_right_that_are_swapped_in_most_frames_leave_the_others_valid() -> None:
+    q = np.tile(pin.neutral(FIGURE.model), (150, 1))
+    for side in OTHER_SIDE:
+        for angle, degrees in ((f"{side}_hip.flexion", 30.0), (f"{side}_knee.flexion", 50.0)):
+            q[:, FIGURE.configuration_names.index(urdf_joint_name(angle))] = np.radians(degrees)
+    joints = FIGURE.forward_kinematics(q)[:, :14] + np.random.default_rng(0).normal(0.0, 0.002, (150, 14, 3))
+    joints[30:130] = joints[30:130][:, SWAPPED]
+    report = Validator().check(joints)
+    assert report.invalid[30:130].all()
+    assert not report.invalid[:30].any() and not report.invalid[130:].any()
+
+
+def test_lengths_that_a_robot_cannot_have_are_findings_of_its_frames() -> None:
+    joints = standing(5)
+    joints[:, JOINT["left_wrist"]] = joints[:, JOINT["left_elbow"]]
+    assert Validator("human").check(joints).verdicts == ["invalid"] * 5
+    assert Validator("human").check(np.zeros((2, 14, 3))).verdicts == ["invalid"] * 2

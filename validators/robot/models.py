@@ -141,11 +141,14 @@ class Models:
         own, rigid = model_lengths(self.kinematics), self._rigid_segments
         return all(abs(lengths.get(name, own[name]) - own[name]) < SAME_LENGTH for name in rigid)
 
-    def can_have(self, lengths: Mapping[str, float]) -> bool:
-        """Tell whether the model can be scaled to such lengths: what has no size, or a giant's, is no body."""
-        own = model_lengths(self.kinematics)
-        ratios = [lengths.get(name, length) / length for name, length in own.items() if length > 0]
-        return all(RATIO_BOUNDS[0] < ratio < RATIO_BOUNDS[1] for ratio in ratios)
+    def possible(self, lengths: Mapping[str, float]) -> dict[str, float]:
+        """Return those of some lengths that the model can be scaled to: what has no size, or a giant's, is no body."""
+        own, (low, high) = model_lengths(self.kinematics), RATIO_BOUNDS
+        return {
+            name: length
+            for name, length in lengths.items()
+            if not own.get(name, 0.0) > 0 or low < length / own[name] < high
+        }
 
     @cached_property
     def _rigid_segments(self) -> tuple[str, ...]:

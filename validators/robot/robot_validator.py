@@ -155,9 +155,13 @@ class RobotValidator:
         lengths = segment_lengths(postures) if lengths is None else lengths
         if self.models.has_lengths(lengths):
             return self.models.mapped
-        if self.settings.lengths == "each" and not self.models.can_have(lengths):
+        possible = self.models.possible(lengths)
+        if len(possible) < len(lengths) and (self.settings.lengths == "each" or not any(lengths.values())):
             return self.models.mapped  # no body: its rigid parts say so
-        return self.models.with_lengths(lengths, shoulders_are_behind(postures) if behind is None else behind)
+        # Of some that are impossible, rigid parts say it; where all are, it is another unit, and that is refused.
+        return self.models.with_lengths(
+            possible or lengths, shoulders_are_behind(postures) if behind is None else behind
+        )
 
 
 def _of_configurations(judged: JudgedModel, q: Array) -> Sequence[Judgement]:
