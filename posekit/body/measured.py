@@ -4,12 +4,12 @@ Bones keep their length, so what the length of a limb's segment scatters over ti
 person moves. Two ends that are measured with independent errors of standard deviation :math:`\sigma` in each coordinate
 have, to first order in :math:`\sigma` over the length, a distance of standard deviation :math:`\sqrt 2\,\sigma`:
 
-.. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{med}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
+.. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 
-over the eight segments i of arms and legs. The median absolute deviation (Rousseeuw & Croux 1993, "Alternatives to the
-median absolute deviation", J Am Stat Assoc 88:1273) and the median over segments are those of most frames and most
-limbs: a span of swapped or broken frames, and one limb that drifts, do not change them by much. A recording that was
-fitted to a skeleton has bones of constant length and tells no noise this way.
+over the eight segments i of arms and legs, of which the mean of the middle half is taken. The median absolute deviation
+(Rousseeuw & Croux 1993, "Alternatives to the median absolute deviation", J Am Stat Assoc 88:1273) and the middle half of
+the segments are those of most frames and most limbs: a span of swapped or broken frames, and limbs that drift, do not
+change them by much. A recording that was fitted to a skeleton has bones of constant length and tells no noise this way.
 """
 
 from __future__ import annotations
@@ -96,8 +96,10 @@ def measured_person(joints: Array) -> MeasuredPerson:
 
 
 def usual_noise(by_limb: Mapping[str, float]) -> float:
-    """Return the noise of most limbs, metres; NaN where none was seen."""
-    return float(np.median(list(by_limb.values()))) if by_limb else math.nan
+    """Return the mean of the middle half of some limbs' noise, metres; NaN where none was seen."""
+    each = sorted(by_limb.values())
+    outer = len(each) // 4
+    return float(np.mean(each[outer : len(each) - outer])) if each else math.nan
 
 
 def _unswapped(joints: Array) -> Array:
