@@ -15,6 +15,7 @@ from posekit.formats.format import Content
 from posekit.formats.held import HeldPostures
 from posekit.formats.motion import SurvivorTable, read_survivors
 from posekit.formats.motion.body_size import body_unit
+from posekit.formats.motion.configuration_format import ConfigurationFormat
 from posekit.formats.own import (
     NamedConfigurations,
     Postures,
@@ -24,6 +25,7 @@ from posekit.formats.own import (
     read_result,
     read_view,
 )
+from posekit.formats.own_files import OwnFormat
 from posekit.formats.recognising import Recognised
 from posekit.formats.registry import names as format_names
 from posekit.formats.skeleton_maps import SkeletonMap
@@ -126,7 +128,9 @@ def configurations_of(path: Path, found: Recognised, rate: float | None = None) 
         Where it cannot be read.
     """
     one = found.only(path)
-    read: NamedConfigurations = one.read(path)  # type: ignore[attr-defined]
+    if not isinstance(one, OwnFormat | ConfigurationFormat):
+        raise refusal(path, "", found.title, "configurations of a robot", "give another file")
+    read: NamedConfigurations = one.read(path)
     return read if rate is None else replace(read, time=np.arange(len(read)) / rate)
 
 

@@ -104,6 +104,10 @@ def open(
         cameras = read_cameras(path, found.only(path).name, unit=unit)
         return choose_camera(cameras) if as_ == "camera" else cameras
     own = found.only(path)
+    if wanted is Content.CONFIGURATIONS:
+        from posekit.formats.held_postures import configurations_of
+
+        return configurations_of(path, found)
     if isinstance(own, OwnFormat) and own.reads:
         return own.read(path)
     raise refusal(

@@ -44,6 +44,10 @@ BUILT_IN: Final[Mapping[Content, Mapping[str, tuple[str, ...]]]] = {
         "motion.glb:GLB_FORMAT": (".glb",),
         "motion.urdf_folder:URDF_FORMAT": (FOLDER_SUFFIX,),
     },
+    Content.CONFIGURATIONS: {
+        "motion.robot_table:ROBOT_NPZ_FORMAT": (".npz",),
+        "motion.robot_csv:ROBOT_CSV_FORMAT": (".csv",),
+    },
     Content.CAMERAS: {
         "cameras.opencv_file:OPENCV_FORMAT": (".yaml", ".yml", ".xml", ".json"),
         "cameras.npz:NPZ_CAMERA_FORMAT": (".npz",),

@@ -12,11 +12,11 @@ from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras
 from posekit.formats.format import Content
+from posekit.formats.held_postures import configurations_of
 from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people
 from posekit.formats.markdown import table_lines
 from posekit.formats.motion import Motion, guess_up, motion_format, postures_of, read_motion, read_survivors
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
-from posekit.formats.own.postures_q import read_configurations
 from posekit.formats.recognising import recognise
 from posekit.formats.skeleton_maps import LANDMARK_ORDER, load_skeleton_map
 from posekit.geometry import Array
@@ -64,7 +64,7 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
             f"{robot.model.njoints - 1} joints, {robot.model.nq} numbers in a configuration, {bodies} collision bodies",
         ]
     if what.holds is Content.CONFIGURATIONS:
-        found = read_configurations(path)
+        found = configurations_of(path, what)
         named = f" of {_listed(found.names)}" if found.names else ""
         return [*lines, f"{len(found)} configurations{named}"]
     return lines

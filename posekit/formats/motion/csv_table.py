@@ -29,6 +29,7 @@ from posekit.formats.motion.motion_table import (
     number_columns,
     wide_columns,
 )
+from posekit.formats.motion.robot_columns import has_root_turn
 from posekit.safe_io import cut, one_line, read_text, refusal, replacing, shown
 
 MAX_BYTES: Final = 500_000_000
@@ -173,7 +174,8 @@ def _is_number(cell: str) -> bool:
 def _looks_like(given: GivenFile) -> bool:
     """Look at the names in the first line; of a first line that is long, at the part that was read."""
     first = given.start.partition(b"\n")[0].decode("utf-8", "replace").lstrip("\ufeff")
-    return is_motion([name.strip().strip('"') for name in first.split(_delimiter(first))])
+    names = [name.strip().strip('"') for name in first.split(_delimiter(first))]
+    return is_motion(names) and not has_root_turn(names)
 
 
 CSV_FORMAT: Final = MotionFormat(

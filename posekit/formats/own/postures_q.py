@@ -76,11 +76,16 @@ class NamedConfigurations:
             if self.q.shape[1] != len(own):
                 remedy = "check which robot it is; configuration_names says what is in which place"
                 raise refusal(self.source, "q", f"{self.q.shape[1]} variables", f"{len(names)}", remedy)
+        own = tuple(name if name in names else f"{name}_joint" for name in own)  # as some tables shorten them
         for name in own:
             if name not in names:
                 expected = "a variable of the robot"
                 raise refusal(
-                    self.source, "configuration_names", shown(name), expected, nearest(name, names)[:200]
+                    self.source,
+                    "configuration_names",
+                    shown(name.removesuffix("_joint")),
+                    expected,
+                    nearest(name, names)[:200],
                 )
         wanted = names[len(ROOT_NAMES) :] if rooted and not set(own) & set(ROOT_NAMES) else names
         missing = [name for name in wanted if name not in own]
@@ -103,7 +108,7 @@ def read_configurations(path: str | Path) -> NamedConfigurations:
     ----------
     path : path
         JSON of schema ``posekit.configurations/1``; or an NPZ with ``q`` (N, K) and, where its order is not the
-        robot's, ``configuration_names`` (K,).
+        robot's, ``configuration_names`` (K,); and perhaps ``time`` (N,), seconds, or ``rate``.
 
     Raises
     ------
@@ -154,12 +159,21 @@ def _from_archive(archive: Archive) -> NamedConfigurations:
     names: tuple[str, ...] | None = None
     if "configuration_names" in archive.names:
         names = tuple(archive.array("configuration_names", "U", (None,)).tolist())
-    return _checked(archive.path, q, names)
+    time = np.empty(0)
+    if "time" in archive.names:
+        time = archive.array("time", "iuf", (len(q),)).astype(np.float64)
+    elif rate := next((name for name in ("rate", "fps") if name in archive.names), ""):
+        value = float(archive.array(rate, "iuf", ()))
+        time = np.arange(len(q)) / value if 0 < value < np.inf else np.full(len(q), np.nan)
+    return _checked(archive.path, q, names, time)
 
 
-def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> NamedConfigurations:
-    if np.isinf(q).any():
-        raise not_finite(path, "q", q)
+def _checked(
+    path: str | Path, q: Array, names: tuple[str, ...] | None, time: Array | None = None
+) -> NamedConfigurations:
+    for name, values in (("q", q), ("time", np.empty(0) if time is None else time)):
+        if np.isinf(values).any():
+            raise not_finite(path, name, values)
     if names is not None and len(names) != q.shape[1]:
         expected = f"{q.shape[1]}, one a variable of q"
         raise refusal(path, "configuration_names", f"{len(names)} names", expected, "name each once")
@@ -167,4 +181,4 @@ def _checked(path: str | Path, q: Array, names: tuple[str, ...] | None) -> Named
         raise refusal(
             path, "configuration_names", "a name twice", "each variable once", "remove one of the two"
         )
-    return NamedConfigurations(q=q, names=names, source=str(path))
+    return NamedConfigurations(q=q, names=names, source=str(path), time=np.empty(0) if time is None else time)
