@@ -322,8 +322,8 @@ def _write(path: Path, report: ValidationReport) -> None:
 def _read(path: Path) -> _Input:
     """Read a file of whatever holds postures or configurations."""
     from posekit.formats.format import Content
-    from posekit.formats.held_postures import held_postures, postures_of_result
-    from posekit.formats.own import read_configurations, read_result
+    from posekit.formats.held_postures import configurations_of, held_postures, postures_of_result
+    from posekit.formats.own import read_result
     from posekit.formats.recognising import recognise
 
     found = recognise(path)
@@ -331,7 +331,7 @@ def _read(path: Path) -> _Input:
         result = read_result(path)
         return _Input(postures_of_result(result), result)
     if found.holds is Content.CONFIGURATIONS:
-        return _Input(read_configurations(path))
+        return _Input(configurations_of(path, found))
     return _Input(held_postures(path, found))
 
 

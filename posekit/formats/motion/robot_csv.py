@@ -65,7 +65,7 @@ def _of_rows(path: Path, text: str, width: int) -> RobotColumns:
 def _of_names(path: Path, names: Sequence[str]) -> RobotColumns:
     roles = robot_roles(names)
     turned = next((name for name in names if DEGREES.fullmatch(name)), None)
-    if len(roles["turn"]) < 4 or len(roles["place"]) < 3 or turned is not None:
+    if len(roles["turn"]) < 4 or len(roles["place"]) < 3:
         got = f"{shown(turned)}: angles in degrees" if turned is not None else "a root without quaternion"
         expected = "root_pos_x … root_pos_z in metres, root_rot_x … root_rot_w, joints in radians"
         raise refusal(path, "columns", got, expected, "convert it")

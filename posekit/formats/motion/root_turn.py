@@ -15,6 +15,9 @@ UPRIGHT_COSINE, FALLEN_COSINE = 0.8, 0.5
 """Cosines between the root's z axis and the world's, medians over the frames, by which one order stands and the other
 does not."""
 ORDERS: Final = ("xyzw", "wxyz")
+CUSTOMARY: Final = "xyzw"
+"""As GMR, TWIST2 and PHUMA write ``root_rot`` and ``root_ori``; taken where the robot stands by both: then it looks
+along x all the time, or by the other order just the other way."""
 
 
 class RootTurn(NamedTuple):
@@ -39,7 +42,7 @@ def root_turn(values: Array, order: str, source: str, field: str) -> RootTurn:
     Raises
     ------
     InputError
-        Where they are not of unit length, or neither order, or both, let the robot stand.
+        Where they are not of unit length, or the robot stands by neither order.
     """
     length = np.linalg.norm(values, axis=1)
     known = np.isfinite(length)
@@ -52,13 +55,14 @@ def root_turn(values: Array, order: str, source: str, field: str) -> RootTurn:
     if order:
         return RootTurn(_in_order(values, order), "")
     stands = {name: upright(_in_order(values[known], name)) for name in ORDERS}
-    best, other = sorted(ORDERS, key=lambda name: -stands[name])
-    if stands[best] < UPRIGHT_COSINE or stands[other] > FALLEN_COSINE:
-        got = "a quaternion whose order is not said, and which stands in either or in neither"
-        remedy = f"name the array {field}_xyzw or {field}_wxyz"
-        raise refusal(source, field, got, "x, y, z, w or w, x, y, z", remedy)
-    said = f"{field} is taken as {', '.join(best)}: so the robot stands"
-    return RootTurn(_in_order(values, best), said)
+    if stands[CUSTOMARY] >= UPRIGHT_COSINE:
+        how = "so the robot stands" if stands["wxyz"] < UPRIGHT_COSINE else "as is customary; it stands by both"
+        return RootTurn(_in_order(values, CUSTOMARY), f"{field} is taken as x, y, z, w: {how}")
+    if stands["wxyz"] >= UPRIGHT_COSINE and stands[CUSTOMARY] <= FALLEN_COSINE:
+        return RootTurn(_in_order(values, "wxyz"), f"{field} is taken as w, x, y, z: so the robot stands")
+    got = "a quaternion whose order is not said, and by which the robot does not stand"
+    remedy = f"name the array {field}_xyzw or {field}_wxyz"
+    raise refusal(source, field, got, "x, y, z, w or w, x, y, z", remedy)
 
 
 def upright(quaternion: Array) -> float:
