@@ -16,6 +16,7 @@ from posekit.body.measured import LIMB_NAMES, MeasuredPerson, figure_of, measure
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
+from posekit.robots.kinematics import Kinematics
 from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
@@ -233,6 +234,11 @@ class Validator:
     def configuration_names(self) -> tuple[str, ...]:
         """A name for each entry of q, in the order in which `check` takes it."""
         return self.robot.configuration_names if self.robot is not None else self.figure.configuration_names
+
+    @property
+    def kinematics(self) -> Kinematics | None:
+        """The joints of a robot, by its joint map; None of the stick figure, and of a robot that has none."""
+        return self._robot.models.own.kinematics if self.robot is not None else None
 
     def _check_configurations(self, q: ArrayLike) -> Report:
         if self._figure is None:

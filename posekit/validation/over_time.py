@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.body.measured import noise_by_limb, usual_noise
@@ -15,6 +16,7 @@ from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.settings import ValidateSettings
+from posekit.validation.robot_motion import moves_of
 from posekit.validators import Judgement
 from posekit.validators.motion import MotionCheck, MotionClip, judge_motion
 
@@ -43,7 +45,11 @@ class OverTime:
 
 
 def judged_over_time(
-    held: HeldPostures, checks: Sequence[MotionCheck], settings: ValidateSettings
+    held: HeldPostures,
+    checks: Sequence[MotionCheck],
+    settings: ValidateSettings,
+    *,
+    model: pin.Model | None = None,
 ) -> OverTime:
     """Ask checks over time about all clips of a file.
 
@@ -55,10 +61,12 @@ def judged_over_time(
         With their thresholds.
     settings : ValidateSettings
         What else was asked: which way is up, where the ground is.
+    model : pinocchio.Model, optional
+        Of a robot whose configurations they are.
     """
     parts: dict[str, list[tuple[NDArray[np.intp], Judgement]]] = {}
     reasons: dict[str, Counter[str]] = {}
-    for rows, clip in clips_of(held, settings):
+    for rows, clip in clips_of(held, settings, model):
         verdict = judge_motion(checks, clip)
         for judgement in verdict.judgements:
             parts.setdefault(judgement.check, []).append((rows, judgement))
@@ -70,9 +78,13 @@ def judged_over_time(
     )
 
 
-def clips_of(held: HeldPostures, settings: ValidateSettings) -> Iterator[ClipRows]:
+def clips_of(
+    held: HeldPostures, settings: ValidateSettings, model: pin.Model | None = None
+) -> Iterator[ClipRows]:
     """Go through the clips of a file."""
-    up = UP_DIRECTIONS[held.up] if held.up else None
+    # Where each frame has its own origin there is no ground, and nothing goes anywhere.
+    up = UP_DIRECTIONS[held.up] if held.up and held.in_world else None
+    names = () if model is None else tuple(model.names)[1:]
     for index in range(int(held.clip.max(initial=-1)) + 1):
         rows = np.flatnonzero(held.clip == index)
         head = held.postures.head
@@ -86,6 +98,7 @@ def clips_of(held: HeldPostures, settings: ValidateSettings) -> Iterator[ClipRow
                 up=up,
                 ground=settings.ground,
                 noise=_noise_of(held.postures.joints[rows], settings),
+                **moves_of(model, held.q[rows] if held.q.size else held.q, held.time[rows], names),
             ),
         )
 

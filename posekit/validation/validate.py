@@ -23,6 +23,7 @@ from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
 from posekit.validation.advice import why_most_fail
 from posekit.validation.over_time import OverTime, frames_of, judged_over_time
 from posekit.validation.people import PersonRows, batches, people_of, told_of_people
+from posekit.validation.robot_motion import placed
 from posekit.validation.spans import clip_verdicts
 from posekit.validation.stills import stills_of
 from posekit.validation.validate_columns import columns_of
@@ -108,6 +109,15 @@ def validate(
             over_time = judged_over_time(postures, validator.profile.checks, validator.settings)
         postures = postures.postures
     if isinstance(postures, NamedConfigurations):
+        if len(postures.time):
+            held = placed(validator, postures)
+            frames, clip = frames_of(held, file), held.clip
+            over_time = judged_over_time(
+                held,
+                validator.profile.checks,
+                validator.settings,
+                model=validator.robot and validator.robot.model,
+            )
         given = _Given(joints=None, head=None, q=_ordered(validator, postures), sequence=None)
     else:
         given = _Given(joints=postures.joints, head=postures.head, q=None, sequence=sequence)

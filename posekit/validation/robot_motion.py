@@ -1,0 +1,81 @@
+"""A robot's configurations over time: where its joints are, and how fast they move."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from posekit.formats.held import HeldPostures
+from posekit.formats.held_postures import held_configurations, mapped_positions
+from posekit.formats.own.postures_q import NamedConfigurations
+from posekit.geometry import Array
+from posekit.robots.configuration_space import ConfigurationSpace
+from posekit.skeleton import POINTS
+from posekit.validators import Validator
+
+
+def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPostures:
+    """Place the joints of configurations by the model that judges them, so that ground and feet can be judged.
+
+    Parameters
+    ----------
+    validator : Validator
+        Of the figure or robot whose configurations they are. Of a robot without joint map no joint is known.
+    configurations : NamedConfigurations
+        As a file has them.
+
+    Raises
+    ------
+    InputError
+        Where they are not that robot's.
+    """
+    names = validator.configuration_names
+    if validator.robot is None:
+        return held_configurations(configurations, names, validator.figure.forward_kinematics)
+    kinematics = validator.kinematics
+    if kinematics is None:
+        return held_configurations(configurations, names, _nowhere)
+    return held_configurations(configurations, names, partial(mapped_positions, kinematics))
+
+
+def moves_of(
+    model: pin.Model | None, q: Array, time: NDArray[np.float64], names: tuple[str, ...]
+) -> dict[str, Any]:
+    """Return what a clip has of a robot: its configurations, velocities (T, nv) and their limits (nv,).
+
+    A frame's velocity is that of the step to it, on the manifold of the configurations; NaN in the first, and where its
+    time is not known or not after the one before.
+
+    Parameters
+    ----------
+    model : pinocchio.Model or None
+        The robot's; nothing is said where there is none.
+    q : array (T, nq)
+        Of one clip.
+    time : array (T,)
+        Seconds.
+    names : tuple of str
+        The names of its joints in Pinocchio's order, the free-flyer first.
+    """
+    if model is None or not q.size:
+        return {}
+    velocity = np.full((len(q), model.nv), np.nan)
+    step = np.diff(time)
+    ahead = np.flatnonzero(step > 0)
+    if len(ahead):
+        moved = ConfigurationSpace(model).difference(q[ahead], q[ahead + 1])
+        velocity[ahead + 1] = moved / step[ahead, None]
+    called = [""] * model.nv
+    for joint, name in enumerate(names, 1):
+        for k in range(model.nvs[joint]):
+            called[model.idx_vs[joint] + k] = name if model.nvs[joint] == 1 else f"{name}.{k}"
+    fastest = np.array(model.velocityLimit, dtype=np.float64)
+    return {"q": q, "velocity": velocity, "fastest": fastest, "velocity_names": tuple(called)}
+
+
+def _nowhere(q: Array) -> Array:
+    return np.full((len(q), len(POINTS), 3), np.nan)
