@@ -7,9 +7,9 @@ have, to first order in :math:`\sigma` over the length, a distance of standard d
 .. math:: \hat\sigma = \frac{1.4826}{\sqrt 2}\,\mathrm{mid}_i\,\mathrm{med}_t\,|l_i(t) - \mathrm{med}_t\,l_i|
 
 over the eight segments i of arms and legs, of which the mean of the middle half is taken. The median absolute deviation
-(Rousseeuw & Croux 1993, "Alternatives to the median absolute deviation", J Am Stat Assoc 88:1273) and the middle half of
-the segments are those of most frames and most limbs: a span of swapped or broken frames, and limbs that drift, do not
-change them by much. A recording that was fitted to a skeleton has bones of constant length and tells no noise this way.
+(Rousseeuw & Croux 1993, "Alternatives to the median absolute deviation", J Am Stat Assoc 88:1273) and the middle half
+are those of most frames and most limbs: a span of swapped or broken frames, and limbs that drift, do not change them by
+much. A recording that was fitted to a skeleton has bones of constant length and tells no noise this way.
 """
 
 from __future__ import annotations
