@@ -242,7 +242,7 @@ def by_refiner(scene: SyntheticScene, image: np.ndarray, pixels: float, lengths:
 def legal(ranges: str, views: int) -> SyntheticScene:
     """Return random views whose true postures are inside some ranges, heads too."""
     scene = random_views(load_figure(), views * VIEWS_PER_POSTURE_INSIDE[ranges], np.random.default_rng(0))
-    validator = Validator(ranges=ranges, checks=("joint-range",))
+    validator = Validator(ranges=ranges, checks=("joint-range",), strict=True)
     verdicts = np.array(validator.check(scene.joints_cam, scene.head_cam).verdicts)
     return scene.select(np.flatnonzero(verdicts == "valid")[:views])
 

@@ -98,7 +98,7 @@ def write_held(figure: Figure, counterparts: dict[str, Counterpart], folder: Pat
 
 def synthetic(figure: Figure, counterparts: dict[str, Counterpart], n: int, seed: int) -> None:
     postures = labelled_postures(figure, n, np.random.default_rng(seed))
-    ours = Validator(figure).check(postures.joints)
+    ours = Validator(figure, strict=True).check(postures.joints)
     angles = in_human_order(figure, postures.joints)
     with tempfile.TemporaryDirectory() as folder:
         held = write_held(figure, counterparts, Path(folder))

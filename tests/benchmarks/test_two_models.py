@@ -66,7 +66,7 @@ def labelled(figure: Figure) -> Labelled:
 @pytest.fixture(scope="module")
 def judged(figure: Figure, labelled: Labelled, held: Path) -> tuple[Report, Report]:
     human = Validator(HUMAN_NAME, ranges=str(held))
-    return Validator(figure, ranges="urdf").check(labelled.joints), human.check(
+    return Validator(figure, ranges="urdf", strict=True).check(labelled.joints), human.check(
         labelled.joints, lengths=figure.lengths
     )
 

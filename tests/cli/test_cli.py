@@ -244,7 +244,7 @@ def test_validate_judges_by_a_figure_from_a_file(run, write) -> None:
     short.write("short.urdf")
     np.savez("p.npz", joints=short.neutral_points[None, :14])
     assert run("validate", "p.npz", "-o", "r.json", "--urdf", "short.urdf").code == 0
-    assert run("validate", "p.npz", "-o", "r.json", "--urdf", "stick_figure").code == 1
+    assert run("validate", "p.npz", "-o", "r.json", "--urdf", "stick_figure", "--strict").code == 1
 
 
 def test_postures_with_heads_are_judged_with_them(run) -> None:

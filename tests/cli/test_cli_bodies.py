@@ -62,8 +62,9 @@ def test_mirror_images_of_torsos_are_not_certified(run) -> None:
     mirrored = standing * [-1, 1, 1]  # of a posture that is its own mirror image but for the torso
     for points, code in ((standing, 0), (mirrored, 1)):
         write_postures("p.json", Postures(joints=points))
-        assert run("validate", "p.json", "--rigid-tolerance", "1mm", "--checks", "rigid-parts").code == code
-    outcome = run("validate", "p.json", "--checks", "rigid-parts", "-o", "report.json")
+        options = ("--rigid-tolerance", "1mm", "--checks", "rigid-parts", "--strict")
+        assert run("validate", "p.json", *options).code == code
+    outcome = run("validate", "p.json", "--checks", "rigid-parts", "--strict", "-o", "report.json")
     assert "rigid_parts/torso 1" in outcome.out
     assert json.loads(Path("report.json").read_text(encoding="utf-8"))["settings"]["shoulders"] == "front"
 
