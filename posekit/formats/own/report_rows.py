@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -77,15 +77,17 @@ def report_rows(columns: VerdictColumns, frames: ReportFrames | None) -> Iterato
 
 
 def csv_lines(columns: VerdictColumns, frames: ReportFrames | None = None) -> Iterator[str]:
-    """Yield the lines (RFC 4180): a head, then every posture; what is not known is empty.
-
-    Texts that a spreadsheet would take for a formula begin with an apostrophe.
-    """
+    """Yield the lines (RFC 4180): a head, then every posture; what is not known is empty."""
     yield ",".join(ReportRow._fields)
     for row in report_rows(columns, frames):
-        text = io.StringIO()
-        csv.writer(text, lineterminator="").writerow([_cell(value) for value in row])
-        yield text.getvalue()
+        yield csv_line(row)
+
+
+def csv_line(cells: Iterable[object]) -> str:
+    """Spell one line: numbers shortly, NaN and None empty, and texts so that a spreadsheet takes none for a formula."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="").writerow([_cell(value) for value in cells])
+    return text.getvalue()
 
 
 def write_report_table(path: str | Path, columns: VerdictColumns, frames: ReportFrames | None = None) -> None:
