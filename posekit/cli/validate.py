@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -20,23 +18,17 @@ from posekit.cli.options import (
     signed_length,
     split,
 )
+from posekit.cli.validate_output import ValidateOutput, parse_fail_over
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.body import Figure
     from posekit.formats.held_postures import HeldPostures
-    from posekit.formats.own import Result, ValidationReport
+    from posekit.formats.own import Result
     from posekit.formats.own.postures_q import NamedConfigurations
     from posekit.geometry import Array
 
 SOME_INVALID = 1
-DETAIL_BY_SUFFIX: Final[Mapping[str, Literal["findings", "margins"]]] = {
-    ".json": "findings",
-    ".csv": "margins",
-    ".parquet": "margins",
-}
-"""What a report of each kind shows of every posture; others show what is behind those that are not valid."""
-
 UP_AXES = {
     f"{sign}{axis}": (k, -1.0 if sign == "-" else 1.0)
     for k, axis in enumerate("xyz")
@@ -210,8 +202,33 @@ def validate(
         ),
     ] = "",
     fail_over: Annotated[
-        str, option("--fail-over", "N|P%", "How many postures, or what share, may be not valid; then exit 0.")
+        str,
+        option(
+            "--fail-over",
+            "N|P%|N clips|P% clips",
+            "How many postures or clips, or what share, may be not valid; then exit 0.",
+        ),
     ] = "0",
+    page: Annotated[
+        Path | None, option("--page", "FILE.html", "The page of the report, beside --output.")
+    ] = None,
+    timeline: Annotated[
+        Path | None,
+        option(
+            "--timeline", "FILE|DIR", "Timelines of the worst clips (PNG, SVG, PDF), or a folder: one a clip."
+        ),
+    ] = None,
+    keep: Annotated[
+        Path | None, option("--keep", "DIR", "A new folder for the clips that pass, in their own format.")
+    ] = None,
+    keep_spans: Annotated[
+        float | None,
+        option(
+            "--keep-spans",
+            "SECONDS",
+            "Keep the longest good span of other clips too, where it takes as long.",
+        ),
+    ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
     ] = False,
@@ -224,10 +241,10 @@ def validate(
     from posekit.formats.own.report_table import summary_table
     from posekit.settings import DEFAULT_RANGES, ValidateSettings
 
-    if output is not None:
-        distinct(postures, output)
-        _check_report(output)
-    allowed = _allowed(fail_over)
+    outputs = ValidateOutput(report=output, page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
+    distinct(postures, output, page, timeline)
+    outputs.check()
+    allowed = parse_fail_over(fail_over)
     given = _read(postures)
     if not len(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
@@ -277,10 +294,9 @@ def validate(
             sequence=_clips(given) if sequence else None,
             distances=distances,
             file=str(postures),
-            detail=DETAIL_BY_SUFFIX.get("" if output is None else output.suffix.lower(), "verdicts"),
+            detail=outputs.detail,
         )
-    if output is not None:
-        _write(output, report)
+    written = list(outputs.write(report))
     changed = closing_line(report.settings.get("moved_lengths", {}))
     if changed:
         typer.echo(f"posekit: warning: {changed}", err=True)
@@ -289,34 +305,10 @@ def validate(
         typer.echo(line)
     for line in validation.said_of(report, settings):
         typer.echo(line)
-    if output is not None:
-        typer.echo(f"written: {output}")
-    not_valid = len(columns) - columns.summary["valid"]
-    if not_valid > allowed * (len(columns) if "%" in fail_over else 1):
+    for line in written:
+        typer.echo(line)
+    if allowed.exceeded(report):
         raise typer.Exit(SOME_INVALID)
-
-
-def _check_report(path: Path) -> None:
-    """Refuse a report's name before the work is done."""
-    from posekit.formats import own as files
-    from posekit.safe_io.writing import check_target
-
-    if path.suffix.lower() == ".html":
-        check_target(path)
-    else:
-        files.check_report_path(path)
-
-
-def _write(path: Path, report: ValidationReport) -> None:
-    """Write a report as its name says: a page, or one of the formats of reports."""
-    from posekit.formats import own as files
-
-    if path.suffix.lower() == ".html":
-        from posekit.viewer.report_page import write_report_page
-
-        write_report_page(path, report)
-    else:
-        files.write_report(path, report)
 
 
 def _read(path: Path) -> _Input:
@@ -346,15 +338,3 @@ def _direction(text: str) -> Any:
         raise InputError(f"--up: {text!r}; expected one of +x, -x, +y, -y, +z, -z")
     axis, sign = UP_AXES[text]
     return tuple(sign if k == axis else 0.0 for k in range(3))
-
-
-def _allowed(text: str) -> float:
-    """Read how many postures, or what share of them, may be not valid."""
-    try:
-        number = float(text.removesuffix("%"))
-    except ValueError:
-        number = math.nan
-    share = text.endswith("%")
-    if not 0 <= number < math.inf or (share and number > 100) or (not share and number != int(number)):
-        raise InputError(f"--fail-over: {text!r}; expected a number of postures, as 10, or a share, as 1%")
-    return number / 100 if share else number
