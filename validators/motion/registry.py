@@ -5,11 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
+from posekit.validators.motion.acceleration import JointAcceleration
+from posekit.validators.motion.drift import Drift
+from posekit.validators.motion.frozen import Frozen
+from posekit.validators.motion.jerk import JointJerk
+from posekit.validators.motion.jitter import Jitter
+from posekit.validators.motion.joint_velocity import JointVelocity
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.penetration import Penetration
+from posekit.validators.motion.repeated import Repeated
 from posekit.validators.motion.speed import JointSpeed
+from posekit.validators.motion.swap import Swap
+from posekit.validators.motion.teleport import Teleport
+from posekit.validators.motion.timing import Timing
 
 MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
-    check.name: check for check in (Penetration, JointSpeed)
+    check.name: check
+    for check in (
+        Timing,
+        Frozen,
+        Repeated,
+        Swap,
+        Teleport,
+        JointSpeed,
+        JointAcceleration,
+        JointJerk,
+        Jitter,
+        Drift,
+        JointVelocity,
+        Penetration,
+    )
 }
 """In the order in which they are reported."""

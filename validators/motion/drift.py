@@ -1,0 +1,81 @@
+"""Whether lengths of limbs stay what they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from posekit.geometry import Array
+from posekit.skeleton import JOINTS, LIMB_JOINTS
+from posekit.tree import Findings
+from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.explained import explained
+from posekit.validators.motion.motion_check import MotionCheck
+from posekit.validators.motion.timeline import norm
+
+SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
+"""Upper arms, forearms, thighs and shanks, by their two joints."""
+
+WINDOW: Final = 5
+"""Frames whose median length is judged: one frame's is no drift."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift(MotionCheck):
+    """Whether a limb's segment is longer or shorter than it mostly is in the clip.
+
+    Parameters
+    ----------
+    share : float
+        Of its median length, either way.
+    """
+
+    name = "drift"
+    unit = "1"
+    meaning = "a limb's segment is longer or shorter than it mostly is in the clip"
+
+    share: float = 0.025
+
+    def places(self, clip: MotionClip) -> tuple[str, ...]:
+        """Name the segments; see `MotionCheck`."""
+        del clip
+        return tuple(f"{JOINTS[start]}-{JOINTS[end]}" for start, end in SEGMENTS)
+
+    def judge(self, clip: MotionClip) -> Findings:
+        """Measure by what share lengths are off their medians; see `MotionCheck`."""
+        found = explained(clip)
+        starts, ends = (list(one) for one in zip(*SEGMENTS, strict=True))
+        lengths = norm(found.joints[:, ends] - found.joints[:, starts])
+        usual = _median(lengths)
+        usual = np.where(usual > 0, usual, np.nan)
+        return Findings(
+            value=found.timeline.of_frames(_smooth(lengths) / usual - 1.0),
+            lower=np.array(-self.share),
+            upper=np.array(self.share),
+            # A length has the noise of its two ends, the median of five frames about half of it.
+            tolerance=3.0 * clip.noise / np.where(np.isfinite(usual), usual, 1.0),
+        )
+
+
+def _median(lengths: Array) -> Array:
+    """Return the median of each column (K,) of what is known; NaN where nothing is."""
+    found = np.full(lengths.shape[1], np.nan)
+    for k, column in enumerate(lengths.T):
+        known = column[np.isfinite(column)]
+        if len(known):
+            found[k] = np.median(known)
+    return found
+
+
+def _smooth(lengths: Array) -> Array:
+    """Return medians over five slots (S, K): unknown lengths are what they were, edges stay where they are."""
+    half = WINDOW // 2
+    slots = np.arange(len(lengths))[:, None]
+    last = np.maximum.accumulate(np.where(np.isfinite(lengths), slots, 0), axis=0)
+    held = np.take_along_axis(lengths, last, axis=0)
+    padded = np.pad(held, ((half, half), (0, 0)), mode="edge")
+    smooth = np.median(sliding_window_view(padded, WINDOW, axis=0), axis=-1)
+    return np.where(np.isfinite(lengths), smooth, np.nan)

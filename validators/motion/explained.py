@@ -1,0 +1,95 @@
+"""What is wrong with a clip's frames as such, each thing named once; what is left is judged as motion.
+
+A jump breaks bounds of speed, acceleration and jerk, too; so do labels that are exchanged, and frames in a wrong
+order. So there is an order: times, then frames that are others again, then the order that the motion itself has, then
+right and left, then jumps. Each sees what those before it left over, and the checks of motion see what they all left:
+joints with right and left put right, in slots of even time, NaN where another check has named the frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.duplicates import duplicates
+from posekit.validators.motion.jumps import Jumps, jumps_of
+from posekit.validators.motion.order import displaced
+from posekit.validators.motion.sides import exchanged_pairs, put_right
+from posekit.validators.motion.timeline import Timeline, timeline_of
+
+JUMP_METRES: Final = 0.06
+"""By so much a frame must jump to be left out of what is judged as motion; the bound of `teleport` is the
+profile's."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Explained:
+    """What was found in T frames, and what motion is left in S slots.
+
+    Parameters
+    ----------
+    timeline : Timeline
+        Where frames are in time.
+    repeats : int array (T,)
+        How many frames in a row are the one before again, at each of them.
+    displaced : int array (T,)
+        Frames by which the motion says that each is out of its place.
+    exchanged : bool array (T, 6)
+        Pairs whose right and left are exchanged.
+    jumps : Jumps
+        Of slots.
+    joints : array (S, 14, 3)
+        What is left.
+    """
+
+    timeline: Timeline
+    repeats: NDArray[np.intp]
+    displaced: NDArray[np.intp]
+    exchanged: NDArray[np.bool_]
+    jumps: Jumps
+    joints: Array
+
+
+_KNOWN: Final[WeakKeyDictionary[MotionClip, Explained]] = WeakKeyDictionary()
+
+
+def explained(clip: MotionClip) -> Explained:
+    """Find what is wrong with the frames of a clip; of one clip once."""
+    if clip not in _KNOWN:
+        _KNOWN[clip] = _explain(clip)
+    return _KNOWN[clip]
+
+
+def _explain(clip: MotionClip) -> Explained:
+    timeline = timeline_of(clip)
+    # Frames without a place in time come last, and nothing is said of them.
+    order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")
+    back = np.argsort(order)
+    joints = clip.joints[order]
+    repeats = duplicates(joints)
+    joints = np.where((repeats > 0)[:, None, None], np.nan, joints) if repeats.any() else joints
+    known = repeats == 0
+    places = np.zeros(len(joints), dtype=np.intp)
+    places[known] = displaced(joints[known])
+    if places.any():
+        joints = np.where((places != 0)[:, None, None], np.nan, joints)
+    kept = known & (places == 0)
+    exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
+    exchanged[kept] = exchanged_pairs(joints[kept], clip.feet[order][kept], clip.head[order][kept])
+    joints = timeline.spread(put_right(joints, exchanged)[back])
+    jumps = jumps_of(joints)
+    jumped = (jumps.joint > JUMP_METRES) | (jumps.body > JUMP_METRES)[:, None]
+    return Explained(
+        timeline=timeline,
+        repeats=repeats[back],
+        displaced=places[back],
+        exchanged=exchanged[back],
+        jumps=jumps,
+        joints=np.where(jumped[..., None], np.nan, joints) if jumped.any() else joints,
+    )

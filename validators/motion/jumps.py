@@ -1,0 +1,101 @@
+"""How far joints, and the body, are from where the frames before and after them say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.validators.motion.timeline import centred, filtered, norm
+
+SIDES: Final = 3
+"""Frames on either side that a jump is told by."""
+
+JOINT_MISFITS, STEP_MISFITS, END_MISFITS = 3.0, 5.0, 5.0
+"""Times by which the neighbours' own misfit is taken off a jump: of a joint or body that comes back, of a body that
+stays moved, and at an end of the clip. Fast motion at few frames a second fits no smooth curve, and is no jump."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Jumps:
+    """Metres of (T,) frames, above what the neighbours' own misfit explains; NaN where they are not known.
+
+    Parameters
+    ----------
+    joint : array (T, 14)
+        Of single joints, beside the body's.
+    body : array (T,)
+        Of the body: the median joint.
+    """
+
+    joint: Array
+    body: Array
+
+
+class _Filter(NamedTuple):
+    """Weights of a jump (K,), and of what neighbours are off from a smooth curve (2, K), a unit of length each."""
+
+    jump: Array
+    misfit: Array
+
+
+def _filter(times: Array, degree: int, jumped: NDArray[np.bool_]) -> _Filter:
+    """Fit a polynomial and a jump of some of the frames by least squares: two degrees of freedom are left."""
+    design = np.column_stack([np.vander(times, degree + 1, increasing=True), jumped])
+    return _Filter(
+        jump=np.linalg.pinv(design)[-1],
+        misfit=np.linalg.svd(design)[0][:, design.shape[1] :].T / np.sqrt(2.0),
+    )
+
+
+_SPIKE: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
+_STEP: Final = _filter(np.arange(-2.5, 3.0), 2, np.arange(6) > 2)
+_END: Final = np.array([1.0, -3.0, 3.0, -1.0])
+
+
+def jumps_of(joints: Array) -> Jumps:
+    """Measure the jumps of joints in slots of even time (S, 14, 3).
+
+    Notes
+    -----
+    A jump of one frame is how far it is from the cubic through three frames on either side; a step is the offset
+    between the two sides of a parabola through six, said of the first frame after it; at an end it is the third
+    difference. All less some times the misfit of the neighbours themselves.
+    """
+    count = len(joints)
+    offset, misfit = _measured(joints, _SPIKE, count)
+    shift, shift_misfit = _measured(joints, _STEP, count)
+    body = _middle(offset)
+    alone = norm(body) - JOINT_MISFITS * _middle(misfit)
+    moved = norm(_middle(shift)) - STEP_MISFITS * _middle(shift_misfit)
+    joint = norm(offset) - JOINT_MISFITS * misfit
+    beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
+    joint = np.where((alone > 0)[:, None], np.minimum(beside, joint), joint)
+    if count > 2 * SIDES:
+        third = norm(filtered(joints, _END))
+        joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
+        joint[-1] = third[-1] - END_MISFITS * third[-3:-1].max(axis=0)
+    return Jumps(joint=joint, body=np.fmax(alone, moved))
+
+
+def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
+    """Return jumps (S, 14, 3) and misfits (S, 14), said of the fourth frame of the filter."""
+    parts = [filtered(joints, weights) for weights in by.misfit]
+    misfit = np.sqrt(sum(np.einsum("tji,tji->tj", part, part) for part in parts))
+    return centred(filtered(joints, by.jump), count, SIDES), centred(misfit, count, SIDES)
+
+
+def _middle(values: Array) -> Array:
+    """Return the median over joints of (S, 14, ...): of those that are known."""
+    known = np.isfinite(values)
+    if known.all() or not known.any():
+        return np.asarray(np.median(values, axis=1))
+    ordered = np.sort(values, axis=1)  # what is not known comes last
+    number = known.sum(axis=1, keepdims=True)
+    low, high = (
+        np.take_along_axis(ordered, np.maximum(k, 0), axis=1) for k in ((number - 1) // 2, number // 2)
+    )
+    return np.asarray(((low + np.where(number % 2, low, high)) / 2.0)[:, 0])

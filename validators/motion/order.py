@@ -1,0 +1,115 @@
+"""Frames whose order is not that in which they were taken, seen by the motion alone."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.validators.motion.timeline import norm
+
+LONGEST_STRETCH: Final = 600
+"""Frames that are put into order at once; longer stretches are taken in parts."""
+
+SHORTER: Final = 0.6
+"""Of the way through a stretch as it is: another order is the right one where its way is shorter than this share of
+it."""
+
+LEAST_FRAMES: Final = 3
+"""Out of place in a stretch before it counts."""
+
+LEAST_METRES: Final = 0.005
+"""A joint that moves less between frames does not say in which order they come."""
+
+NEAR: Final = 3
+"""Frames between two turns back that are one stretch."""
+
+
+def displaced(joints: Array) -> NDArray[np.intp]:
+    """Say by how many frames each frame is out of its place (T,): 0 where the motion goes on evenly.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres, frame after frame.
+
+    Notes
+    -----
+    Frames in a wrong order make most joints turn back from step to step. A stretch of such frames is put into the
+    order that goes from its first neighbour to its last by the shortest way (nearest neighbour, then moves of single
+    frames); where that way is less than six tenths of the given one, the frames were out of order. Noise makes joints
+    turn back, too, but no order of noisy frames is much shorter than another.
+    """
+    count = len(joints)
+    places = np.zeros(count, dtype=np.intp)
+    if count < LEAST_FRAMES + 2:
+        return places
+    steps = np.diff(joints, axis=0)
+    dots = np.einsum("tji,tji->tj", steps[1:], steps[:-1])
+    moving = (norm(steps[1:]) > LEAST_METRES) & (norm(steps[:-1]) > LEAST_METRES)
+    backward = ((dots < 0) & moving).sum(axis=1)
+    turning = np.zeros(count, dtype=np.bool_)
+    turning[1:-1] = (backward * 2 > moving.sum(axis=1)) & (moving.sum(axis=1) * 2 >= joints.shape[1])
+    for first, last in _stretches(turning):
+        rows = np.arange(max(first - 2, 0), min(last + 3, count))
+        rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
+        if len(rows) >= LEAST_FRAMES + 2:
+            order = _shortest(joints[rows].reshape(len(rows), -1))
+            places[rows[order]] = rows - rows[order]
+    return places
+
+
+def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Return first and last of the stretches in which frames turn back, three of them or more."""
+    at = np.flatnonzero(turning)
+    if not len(at):
+        return []
+    found = []
+    for part in np.split(at, np.flatnonzero(np.diff(at) > NEAR) + 1):
+        for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
+            last = min(first + LONGEST_STRETCH - 1, int(part[-1]))
+            if np.count_nonzero((part >= first) & (part <= last)) >= LEAST_FRAMES - 1:
+                found.append((first, last))
+    return found
+
+
+def _shortest(points: Array) -> NDArray[np.intp]:
+    """Return an order (N,) of points (N, K) with a short way from first to last; the given one where none is."""
+    squares = (points**2).sum(axis=1)
+    ways = np.sqrt(np.maximum(squares[:, None] + squares - 2 * points @ points.T, 0.0))
+    given = np.arange(len(points))
+    order, rest = [0], set(range(1, len(points) - 1))
+    while rest:
+        nearest = min(rest, key=lambda k: ways[order[-1], k])
+        order.append(nearest)
+        rest.remove(nearest)
+    best = _with_moves(np.array([*order, len(points) - 1]), ways)
+    out_of_place = np.count_nonzero(best != given) >= LEAST_FRAMES
+    return best if out_of_place and _length(best, ways) < SHORTER * _length(given, ways) else given
+
+
+def _with_moves(order: NDArray[np.intp], ways: Array) -> NDArray[np.intp]:
+    """Move single points to where the way is shortest, while that helps."""
+    for _ in range(2 * len(order)):
+        gains = np.zeros(len(order))
+        between = ways[order[:-1], order[1:]]
+        gains[1:-1] = between[:-1] + between[1:] - ways[order[:-2], order[2:]]
+        moved = False
+        for at in np.argsort(-gains)[: max(4, len(order) // 8)]:
+            if not 0 < at < len(order) - 1:
+                continue
+            point, without = order[at], np.delete(order, at)
+            costs = ways[without[:-1], point] + ways[point, without[1:]] - ways[without[:-1], without[1:]]
+            to = int(costs.argmin())
+            if costs[to] < gains[at] - 1e-9:
+                order, moved = np.insert(without, to + 1, point), True
+                break
+        if not moved:
+            break
+    return order
+
+
+def _length(order: NDArray[np.intp], ways: Array) -> float:
+    return float(ways[order[:-1], order[1:]].sum())

@@ -1,0 +1,176 @@
+"""Which of two joints is the right one: by where they were, by lengths, by which way a body faces.
+
+Each of six pairs of joints (shoulders, elbows, wrists, hips, knees, ankles) is, in every frame, as labelled or
+exchanged. The 64 states of a frame have an energy: of the parts that join pairs, of the direction in which the body
+faces, of how far right and left are from where they were. The least of a clip is found by dynamic programming over
+the stretches between frames in which some pair seems to turn over (Viterbi 1967, IEEE Trans. Inf. Theory 13).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.skeleton import JOINT
+from posekit.validators.motion.timeline import norm
+
+PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+"""What is there on the right and on the left."""
+
+RIGHT: Final = tuple(JOINT[f"right_{name}"] for name in PAIRS)
+LEFT: Final = tuple(JOINT[f"left_{name}"] for name in PAIRS)
+
+_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
+"""Which pairs are exchanged (64, 6)."""
+
+_LIMBS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
+"""Pairs that a segment of a limb joins."""
+
+LENGTH_SHARE: Final = 0.1
+"""Of a length: by so much it must fit better before it is full evidence of how two pairs go together."""
+
+TORN_METRES: Final = 0.02
+"""A limb whose length is mostly off its median by so much has ends of two limbs."""
+
+BEND_METRES: Final = 0.03
+"""A knee or a toe so far before the line of its leg is full evidence of which way the hips face."""
+
+APART_METRES: Final = 0.1
+"""Two joints so far apart are full evidence of which is which in the next frame; nearer ones may change places."""
+
+TURNING_COST: Final = 1.0
+"""Frames of evidence that a pair must bring to be exchanged from one frame to the next."""
+
+CONTINUITY_WEIGHT: Final = 6.0
+"""Frames of evidence that one step between frames is worth."""
+
+EXCHANGED_COST: Final = 0.03
+"""Frames of evidence against a pair's being exchanged, a frame: labels are more often right than wrong."""
+
+
+def exchanged_pairs(joints: Array, feet: Array, head: Array) -> NDArray[np.bool_]:
+    """Say which of `PAIRS` have right and left exchanged (T, 6).
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Metres, one after the other in time; NaN is no evidence.
+    feet : array (T, 4, 3)
+        Right and left toe, right and left heel.
+    head : array (T, 5, 3)
+        Nose, eyes and ears.
+    """
+    count = len(joints)
+    if not count:
+        return np.zeros((0, 6), dtype=np.bool_)
+    across = joints[:, RIGHT] - joints[:, LEFT]
+    together, hips, shoulders = _evidence(joints, across, feet, head)
+    continuity = _continuity(across)
+    firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | ~known_before(across)]))
+    sums = [np.add.reduceat(one, firsts, axis=0) for one in (together, hips, shoulders)]
+    lengths = np.diff(np.append(firsts, count))
+    relations = [_STATES[:, first] != _STATES[:, second] for first, second in (*_LIMBS, (0, 3))]
+    energy = EXCHANGED_COST * lengths[:, None] * _STATES.sum(axis=1)
+    for k, apart in enumerate(relations):
+        energy = energy + sums[0][:, k, None] * np.where(apart, -1.0, 1.0)
+    energy = energy - sums[1][:, None] * np.where(_STATES[:, 3], -1.0, 1.0)
+    energy = energy - sums[2][:, None] * np.where(_STATES[:, 0], -1.0, 1.0)
+    chosen = _least(energy, continuity[firsts[1:] - 1])
+    return np.asarray(np.repeat(_STATES[chosen].astype(np.bool_), lengths, axis=0))
+
+
+def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
+    """Exchange right and left of joints (T, 14, 3) at pairs (T, 6)."""
+    if not swapped.any():
+        return points
+    mended = points.copy()
+    for k, (right, left) in enumerate(zip(RIGHT, LEFT, strict=True)):
+        rows = swapped[:, k]
+        mended[rows, right], mended[rows, left] = points[rows, left], points[rows, right]
+    return mended
+
+
+def known_before(across: Array) -> NDArray[np.bool_]:
+    """Say between which frames something says how pairs go on (T - 1,)."""
+    known = np.isfinite(across[..., 0])
+    return np.asarray((known[1:] & known[:-1]).any(axis=1))
+
+
+def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[Array, Array, Array]:
+    """Return, in -1 to 1 a frame, what says that pairs go as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
+    together = np.zeros((len(joints), 5))
+    for k, (first, second) in enumerate(_LIMBS):
+        straight, crossed = (
+            np.stack([norm(joints[:, a[first]] - joints[:, b[second]]) for a, b in sides], axis=1)
+            for sides in (((RIGHT, RIGHT), (LEFT, LEFT)), ((RIGHT, LEFT), (LEFT, RIGHT)))
+        )
+        length = _length(straight, crossed)
+        off, off_crossed = (np.abs(one - length).sum(axis=1) for one in (straight, crossed))
+        together[:, k] = _sure((off - off_crossed) / (LENGTH_SHARE * np.fmax(length, 1e-9)))
+    trunk = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
+    across_shoulders, across_hips = across[:, 0], across[:, 3]
+    sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
+    together[:, 4] = _sure(-np.einsum("ti,ti->t", across_shoulders, across_hips) / sizes * 2.0)
+    forward = _unit(np.cross(trunk, across_hips))
+    bends = []
+    for right in (RIGHT, LEFT):
+        hip, knee, ankle = (joints[:, right[k]] for k in (3, 4, 5))
+        # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
+        bends.append(np.einsum("ti,ti->t", knee - (hip + ankle) / 2.0, forward))
+    toes = np.einsum("tki,ti->tk", feet[:, :2] - joints[:, [RIGHT[5], LEFT[5]]], forward)
+    hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * BEND_METRES))
+    hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * BEND_METRES))
+    facing = _unit(np.cross(trunk, across_shoulders))
+    nose = np.einsum("ti,ti->t", head[:, 0] - (head[:, 3] + head[:, 4]) / 2.0, facing)
+    return together, hips, _sure(nose / BEND_METRES)
+
+
+def _length(straight: Array, crossed: Array) -> float:
+    """Return a segment's median length: crossed, where as labelled it spreads and crossed it does not."""
+    middles = [_median(one) for one in (straight, crossed)]
+    spreads = [
+        _median(np.abs(one - middle)) for one, middle in zip((straight, crossed), middles, strict=True)
+    ]
+    torn = spreads[0] > TORN_METRES and spreads[1] < spreads[0] / 2
+    return middles[torn]
+
+
+def _median(lengths: Array) -> float:
+    known = lengths[np.isfinite(lengths)]
+    return float(np.median(known)) if len(known) else np.nan
+
+
+def _sure(evidence: Array) -> Array:
+    """Bound evidence to -1 and 1; what is not known is none."""
+    return np.asarray(np.nan_to_num(np.clip(evidence, -1.0, 1.0)))
+
+
+def _unit(vectors: Array) -> Array:
+    return np.asarray(vectors / np.maximum(norm(vectors), 1e-9)[..., None])
+
+
+def _continuity(across: Array) -> Array:
+    """Return what says that a pair turned over since the frame before (T - 1, 6), -1 to 1."""
+    dots = np.einsum("tki,tki->tk", across[1:], across[:-1])
+    sizes = norm(across[1:]) * norm(across[:-1])
+    return np.asarray(np.nan_to_num(-dots / np.maximum(sizes, APART_METRES**2)))
+
+
+def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
+    """Return the states (N,) of least energy: (N, 64), and what says that pairs turned over between (N - 1, 6)."""
+    differs = (_STATES[:, None] != _STATES[None]).astype(np.float64)
+    back = np.zeros(energy.shape, dtype=np.intp)
+    least = energy[0]
+    for k in range(1, len(energy)):
+        cost = TURNING_COST - 2.0 * CONTINUITY_WEIGHT * turned[k - 1]
+        ways = least[:, None] + differs @ cost
+        back[k] = ways.argmin(axis=0)
+        least = ways.min(axis=0) + energy[k]
+    chosen = np.empty(len(energy), dtype=np.intp)
+    chosen[-1] = int(least.argmin())
+    for k in range(len(energy) - 1, 0, -1):
+        chosen[k - 1] = back[k, chosen[k]]
+    return chosen

@@ -1,0 +1,93 @@
+"""Frames on an even grid of time: so that a gap is a gap, and neighbours are neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.validators.motion.clip import MotionClip
+
+LONGEST_GAP: Final = 16
+"""Slots that a gap is given at most: longer ones say nothing more."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Timeline:
+    """Which slot of an even grid each frame of a clip is in, and what its time stamps say of it.
+
+    Parameters
+    ----------
+    slots : int array (T,)
+        Ascending with time, one step of the clip's rate each; -1 for a frame whose time another has.
+    count : int
+        The number of slots.
+    place : int array (T,)
+        Frames by which each is out of its place in time.
+    missing : array (T,)
+        Steps that lie between a frame and the one before it in time, beyond one; NaN where time says nothing.
+    """
+
+    slots: NDArray[np.intp]
+    count: int
+    place: NDArray[np.intp]
+    missing: Array
+
+    def spread(self, values: Array) -> Array:
+        """Put values of frames (T, ...) into their slots (S, ...); NaN where a slot has no frame."""
+        found = np.full((self.count, *values.shape[1:]), np.nan)
+        placed = self.slots >= 0
+        found[self.slots[placed]] = values[placed]
+        return found
+
+    def of_frames(self, values: Array) -> Array:
+        """Return, for each frame, what is in its slot: (S, ...) to (T, ...); NaN where it has none."""
+        found = np.asarray(values, dtype=np.float64)[self.slots]
+        found[self.slots < 0] = np.nan
+        return found
+
+
+def timeline_of(clip: MotionClip) -> Timeline:
+    """Place the frames of a clip by their times, or one after the other where those say nothing."""
+    count = len(clip)
+    frames = np.arange(count)
+    if not clip.step > 0 or not np.isfinite(clip.time).all():
+        return Timeline(
+            slots=frames, count=count, place=np.zeros(count, dtype=np.intp), missing=np.full(count, np.nan)
+        )
+    order = np.argsort(clip.time, kind="stable")
+    steps = np.diff(clip.time[order], prepend=clip.time[order[:1]] - clip.step) / clip.step
+    # A stamp that is a quarter of a step off is still in its slot: videos have such; one that is no later has none.
+    ways = np.clip(np.round(steps), 0, LONGEST_GAP).astype(np.intp)
+    ways[(ways == 0) & (steps > 0.25)] = 1
+    ways[:1] = 1
+    slots, missing, place = np.empty(count, dtype=np.intp), np.empty(count), np.empty(count, dtype=np.intp)
+    slots[order] = np.where(ways > 0, np.cumsum(ways) - 1, -1)
+    missing[order] = steps - 1.0
+    place[order] = frames - order
+    return Timeline(slots=slots, count=int(slots.max(initial=-1)) + 1, place=place, missing=missing)
+
+
+def filtered(points: Array, weights: Array) -> Array:
+    """Sum `weights` (K,) over K neighbouring slots of (S, ...): (S - K + 1, ...)."""
+    room = max(len(points) - len(weights) + 1, 0)
+    total = np.zeros((room, *points.shape[1:]))
+    for k, weight in enumerate(weights):
+        if weight:
+            total += weight * points[k : k + room]
+    return total
+
+
+def centred(values: Array, count: int, first: int) -> Array:
+    """Lay the output of a filter (N, ...) amid NaN (count, ...), from some frame on."""
+    found = np.full((count, *values.shape[1:]), np.nan)
+    found[first : first + len(values)] = values[: max(count - first, 0)]
+    return found
+
+
+def norm(vectors: Array) -> Array:
+    """Return the lengths of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.einsum("...i,...i->...", vectors, vectors)))
