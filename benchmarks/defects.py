@@ -83,6 +83,10 @@ class Defect:
         The least and the most frames of its span; 0 means all of the clip.
     grounded : bool
         Whether a foot must stand in all frames of its span.
+    rate : float
+        Frames a second that a clip must have for it to be told.
+    share : float
+        Of a clip that may be wrong: what is off in most frames is what a clip usually has.
     """
 
     name: str
@@ -93,6 +97,8 @@ class Defect:
     put: Callable[[MotionClip, Span, float, np.random.Generator], Broken | None]
     frames: tuple[int, int] = (15, 60)
     grounded: bool = False
+    rate: float = 0.0
+    share: float = 1.0
 
 
 def every_point(clip: MotionClip, change: Callable[[Array], Array]) -> MotionClip:
@@ -432,6 +438,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             sizes=(0.1, 0.05, 0.03, 0.02),
             asked=0.05,
             put=drift,
+            share=0.4,
         ),
         Defect(
             name="jitter",
@@ -440,6 +447,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             sizes=(0.02, 0.01, 0.005, 0.003),
             asked=0.01,
             put=jitter,
+            rate=25.0,
         ),
         Defect(
             name="jitter of a joint",
@@ -448,6 +456,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             sizes=(0.02, 0.01, 0.005, 0.003),
             asked=0.01,
             put=joint_jitter,
+            rate=25.0,
         ),
         Defect(
             name="frozen",
@@ -539,11 +548,15 @@ def draw(
 def _span(clip: MotionClip, kind: Defect, rng: np.random.Generator) -> Span | None:
     if kind.frames == _WHOLE:
         return 0, len(clip) - 1
+    if clip.rate < kind.rate:
+        return None
     room = len(clip) - 2 * MARGIN_FRAMES
     least, most = kind.frames
     if room < least:
         return None
     count = int(rng.integers(least, min(most, room) + 1))
+    if count > kind.share * len(clip):
+        return None
     first = MARGIN_FRAMES + int(rng.integers(room - count + 1))
     if kind.grounded and not standing(clip)[first : first + count].all():
         return None

@@ -131,7 +131,9 @@ def torn() -> Any:
 def validator() -> Any:
     joints = torn()
     built_in = posekit.Validator(strict=True)
-    table1 = posekit.Validator(strict=True, checks=("joint-range", "walking"), ranges="table1", rules=(1, 2, 3, 4, 5))
+    table1 = posekit.Validator(
+        strict=True, checks=("joint-range", "walking"), ranges="table1", rules=(1, 2, 3, 4, 5)
+    )
     return [judged(built_in.check(joints)), judged(table1.check(joints)), built_in.describe()]
 
 

@@ -16,11 +16,14 @@ from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm
 
-SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
+LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
 """Upper arms, forearms, thighs and shanks, by their two joints."""
 
-WINDOW: Final = 5
-"""Frames whose median length is judged: one frame's is no drift."""
+DRIFT_FRAMES: Final = 5
+"""Whose median length is judged: one frame's is no drift."""
+
+SHAKEN_METRES: Final = 0.004
+"""A joint that trembles by more makes lengths tremble: `jitter` names that."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,40 +45,39 @@ class Drift(MotionCheck):
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the segments; see `MotionCheck`."""
         del clip
-        return tuple(f"{JOINTS[start]}-{JOINTS[end]}" for start, end in SEGMENTS)
+        return tuple(f"{JOINTS[start]}-{JOINTS[end]}" for start, end in LIMB_SEGMENTS)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure by what share lengths are off their medians; see `MotionCheck`."""
         found = explained(clip)
-        starts, ends = (list(one) for one in zip(*SEGMENTS, strict=True))
+        starts, ends = (list(one) for one in zip(*LIMB_SEGMENTS, strict=True))
         lengths = norm(found.joints[:, ends] - found.joints[:, starts])
-        usual = _median(lengths)
-        usual = np.where(usual > 0, usual, np.nan)
+        usual = _usual(lengths)
+        shaken = np.maximum(found.trembling[:, starts], found.trembling[:, ends])
+        shaken = np.where(shaken > SHAKEN_METRES, shaken, 0.0)
         return Findings(
             value=found.timeline.of_frames(_smooth(lengths) / usual - 1.0),
             lower=np.array(-self.share),
             upper=np.array(self.share),
             # A length has the noise of its two ends, the median of five frames about half of it.
-            tolerance=3.0 * clip.noise / np.where(np.isfinite(usual), usual, 1.0),
+            tolerance=found.timeline.of_frames(
+                3.0 * np.fmax(shaken, clip.noise) / np.where(usual > 0, usual, 1.0)
+            ),
         )
 
 
-def _median(lengths: Array) -> Array:
-    """Return the median of each column (K,) of what is known; NaN where nothing is."""
-    found = np.full(lengths.shape[1], np.nan)
-    for k, column in enumerate(lengths.T):
-        known = column[np.isfinite(column)]
-        if len(known):
-            found[k] = np.median(known)
-    return found
+def _usual(lengths: Array) -> Array:
+    """Return the median length of each segment (K,); NaN where none is known."""
+    known = [column[column > 0] for column in lengths.T]
+    return np.array([np.median(one) if len(one) else np.nan for one in known])
 
 
 def _smooth(lengths: Array) -> Array:
     """Return medians over five slots (S, K): unknown lengths are what they were, edges stay where they are."""
-    half = WINDOW // 2
+    half = DRIFT_FRAMES // 2
     slots = np.arange(len(lengths))[:, None]
     last = np.maximum.accumulate(np.where(np.isfinite(lengths), slots, 0), axis=0)
     held = np.take_along_axis(lengths, last, axis=0)
     padded = np.pad(held, ((half, half), (0, 0)), mode="edge")
-    smooth = np.median(sliding_window_view(padded, WINDOW, axis=0), axis=-1)
+    smooth = np.median(sliding_window_view(padded, DRIFT_FRAMES, axis=0), axis=-1)
     return np.where(np.isfinite(lengths), smooth, np.nan)

@@ -17,7 +17,7 @@ MOVED_METRES: Final = 1e-3
 """The body moves where its fastest joint goes farther than this in a frame: coarse rounding alone makes no
 duplicate."""
 
-NEIGHBOURS: Final = 3
+NEAR_FRAMES: Final = 3
 """Frames before and after a run in which the body must move."""
 
 
@@ -46,7 +46,7 @@ def duplicates(joints: Array) -> NDArray[np.intp]:
     same = alike & (fastest < SAME_METRES)
     edges = np.flatnonzero(np.diff(same, prepend=False, append=False))
     for first, last in zip(edges[::2], edges[1::2], strict=True):
-        before, after = fastest[max(first - NEIGHBOURS, 0) : first], fastest[last : last + NEIGHBOURS]
+        before, after = fastest[max(first - NEAR_FRAMES, 0) : first], fastest[last : last + NEAR_FRAMES]
         moving = [part.max() > MOVED_METRES for part in (before, after) if len(part)]
         if moving and all(moving):
             lengths[first + 1 : last + 1] = last - first

@@ -9,6 +9,7 @@ joints with right and left put right, in slots of even time, NaN where another c
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
 from weakref import WeakKeyDictionary
 
@@ -22,6 +23,7 @@ from posekit.validators.motion.jumps import Jumps, jumps_of
 from posekit.validators.motion.order import displaced
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, timeline_of
+from posekit.validators.motion.trembling import trembling_of
 
 JUMP_METRES: Final = 0.06
 """By so much a frame must jump to be left out of what is judged as motion; the bound of `teleport` is the
@@ -54,6 +56,11 @@ class Explained:
     exchanged: NDArray[np.bool_]
     jumps: Jumps
     joints: Array
+
+    @cached_property
+    def trembling(self) -> Array:
+        """How much joints tremble in slots (S, 14), metres."""
+        return trembling_of(self.joints)
 
 
 _KNOWN: Final[WeakKeyDictionary[MotionClip, Explained]] = WeakKeyDictionary()

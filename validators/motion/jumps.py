@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.validators.motion.timeline import centred, filtered, norm
 
-SIDES: Final = 3
+SIDE_FRAMES: Final = 3
 """Frames on either side that a jump is told by."""
 
-JOINT_MISFITS, STEP_MISFITS, END_MISFITS = 3.0, 5.0, 5.0
+JOINT_MISFITS, STEP_MISFITS, END_MISFITS = 3.0, 3.0, 5.0
 """Times by which the neighbours' own misfit is taken off a jump: of a joint or body that comes back, of a body that
 stays moved, and at an end of the clip. Fast motion at few frames a second fits no smooth curve, and is no jump."""
 
@@ -51,9 +51,9 @@ def _filter(times: Array, degree: int, jumped: NDArray[np.bool_]) -> _Filter:
     )
 
 
-_SPIKE: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
-_STEP: Final = _filter(np.arange(-2.5, 3.0), 2, np.arange(6) > 2)
-_END: Final = np.array([1.0, -3.0, 3.0, -1.0])
+_ONE_FRAME: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
+_FROM_NOW_ON: Final = _filter(np.arange(-2.5, 3.0), 2, np.arange(6) > 2)
+_THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
 def jumps_of(joints: Array) -> Jumps:
@@ -66,16 +66,16 @@ def jumps_of(joints: Array) -> Jumps:
     difference. All less some times the misfit of the neighbours themselves.
     """
     count = len(joints)
-    offset, misfit = _measured(joints, _SPIKE, count)
-    shift, shift_misfit = _measured(joints, _STEP, count)
+    offset, misfit = _measured(joints, _ONE_FRAME, count)
+    shift, shift_misfit = _measured(joints, _FROM_NOW_ON, count)
     body = _middle(offset)
     alone = norm(body) - JOINT_MISFITS * _middle(misfit)
     moved = norm(_middle(shift)) - STEP_MISFITS * _middle(shift_misfit)
     joint = norm(offset) - JOINT_MISFITS * misfit
     beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
     joint = np.where((alone > 0)[:, None], np.minimum(beside, joint), joint)
-    if count > 2 * SIDES:
-        third = norm(filtered(joints, _END))
+    if count > 2 * SIDE_FRAMES:
+        third = norm(filtered(joints, _THIRD_DIFFERENCE))
         joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
         joint[-1] = third[-1] - END_MISFITS * third[-3:-1].max(axis=0)
     return Jumps(joint=joint, body=np.fmax(alone, moved))
@@ -85,7 +85,7 @@ def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
     """Return jumps (S, 14, 3) and misfits (S, 14), said of the fourth frame of the filter."""
     parts = [filtered(joints, weights) for weights in by.misfit]
     misfit = np.sqrt(sum(np.einsum("tji,tji->tj", part, part) for part in parts))
-    return centred(filtered(joints, by.jump), count, SIDES), centred(misfit, count, SIDES)
+    return centred(filtered(joints, by.jump), count, SIDE_FRAMES), centred(misfit, count, SIDE_FRAMES)
 
 
 def _middle(values: Array) -> Array:

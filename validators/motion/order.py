@@ -13,7 +13,7 @@ from posekit.validators.motion.timeline import norm
 LONGEST_STRETCH: Final = 600
 """Frames that are put into order at once; longer stretches are taken in parts."""
 
-SHORTER: Final = 0.6
+SHORTER_SHARE: Final = 0.6
 """Of the way through a stretch as it is: another order is the right one where its way is shorter than this share of
 it."""
 
@@ -23,8 +23,11 @@ LEAST_FRAMES: Final = 3
 LEAST_METRES: Final = 0.005
 """A joint that moves less between frames does not say in which order they come."""
 
-NEAR: Final = 3
+TURNS_APART: Final = 10
 """Frames between two turns back that are one stretch."""
+
+AROUND_FRAMES: Final = 4
+"""Before and after a stretch that are put into order with it: its ends are to be in their places."""
 
 
 def displaced(joints: Array) -> NDArray[np.intp]:
@@ -53,7 +56,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
     turning = np.zeros(count, dtype=np.bool_)
     turning[1:-1] = (backward * 2 > moving.sum(axis=1)) & (moving.sum(axis=1) * 2 >= joints.shape[1])
     for first, last in _stretches(turning):
-        rows = np.arange(max(first - 2, 0), min(last + 3, count))
+        rows = np.arange(max(first - AROUND_FRAMES, 0), min(last + AROUND_FRAMES + 1, count))
         rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
         if len(rows) >= LEAST_FRAMES + 2:
             order = _shortest(joints[rows].reshape(len(rows), -1))
@@ -67,7 +70,7 @@ def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:
     if not len(at):
         return []
     found = []
-    for part in np.split(at, np.flatnonzero(np.diff(at) > NEAR) + 1):
+    for part in np.split(at, np.flatnonzero(np.diff(at) > TURNS_APART) + 1):
         for first in range(int(part[0]), int(part[-1]) + 1, LONGEST_STRETCH):
             last = min(first + LONGEST_STRETCH - 1, int(part[-1]))
             if np.count_nonzero((part >= first) & (part <= last)) >= LEAST_FRAMES - 1:
@@ -87,7 +90,7 @@ def _shortest(points: Array) -> NDArray[np.intp]:
         rest.remove(nearest)
     best = _with_moves(np.array([*order, len(points) - 1]), ways)
     out_of_place = np.count_nonzero(best != given) >= LEAST_FRAMES
-    return best if out_of_place and _length(best, ways) < SHORTER * _length(given, ways) else given
+    return best if out_of_place and _length(best, ways) < SHORTER_SHARE * _length(given, ways) else given
 
 
 def _with_moves(order: NDArray[np.intp], ways: Array) -> NDArray[np.intp]:

@@ -17,16 +17,16 @@ from posekit.geometry import Array
 from posekit.skeleton import JOINT
 from posekit.validators.motion.timeline import norm
 
-PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
+SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
 """What is there on the right and on the left."""
 
-RIGHT: Final = tuple(JOINT[f"right_{name}"] for name in PAIRS)
-LEFT: Final = tuple(JOINT[f"left_{name}"] for name in PAIRS)
+RIGHT_JOINTS: Final = tuple(JOINT[f"right_{name}"] for name in SIDE_PAIRS)
+LEFT_JOINTS: Final = tuple(JOINT[f"left_{name}"] for name in SIDE_PAIRS)
 
-_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
+_PAIR_STATES: Final = (np.arange(64)[:, None] >> np.arange(6)) & 1
 """Which pairs are exchanged (64, 6)."""
 
-_LIMBS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
+_LIMB_LINKS: Final = ((0, 1), (1, 2), (3, 4), (4, 5))
 """Pairs that a segment of a limb joins."""
 
 LENGTH_SHARE: Final = 0.1
@@ -52,7 +52,7 @@ EXCHANGED_COST: Final = 0.03
 
 
 def exchanged_pairs(joints: Array, feet: Array, head: Array) -> NDArray[np.bool_]:
-    """Say which of `PAIRS` have right and left exchanged (T, 6).
+    """Say which of `SIDE_PAIRS` have right and left exchanged (T, 6).
 
     Parameters
     ----------
@@ -66,20 +66,22 @@ def exchanged_pairs(joints: Array, feet: Array, head: Array) -> NDArray[np.bool_
     count = len(joints)
     if not count:
         return np.zeros((0, 6), dtype=np.bool_)
-    across = joints[:, RIGHT] - joints[:, LEFT]
+    across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
     together, hips, shoulders = _evidence(joints, across, feet, head)
     continuity = _continuity(across)
     firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | ~known_before(across)]))
     sums = [np.add.reduceat(one, firsts, axis=0) for one in (together, hips, shoulders)]
     lengths = np.diff(np.append(firsts, count))
-    relations = [_STATES[:, first] != _STATES[:, second] for first, second in (*_LIMBS, (0, 3))]
-    energy = EXCHANGED_COST * lengths[:, None] * _STATES.sum(axis=1)
+    relations = [
+        _PAIR_STATES[:, first] != _PAIR_STATES[:, second] for first, second in (*_LIMB_LINKS, (0, 3))
+    ]
+    energy = EXCHANGED_COST * lengths[:, None] * _PAIR_STATES.sum(axis=1)
     for k, apart in enumerate(relations):
         energy = energy + sums[0][:, k, None] * np.where(apart, -1.0, 1.0)
-    energy = energy - sums[1][:, None] * np.where(_STATES[:, 3], -1.0, 1.0)
-    energy = energy - sums[2][:, None] * np.where(_STATES[:, 0], -1.0, 1.0)
+    energy = energy - sums[1][:, None] * np.where(_PAIR_STATES[:, 3], -1.0, 1.0)
+    energy = energy - sums[2][:, None] * np.where(_PAIR_STATES[:, 0], -1.0, 1.0)
     chosen = _least(energy, continuity[firsts[1:] - 1])
-    return np.asarray(np.repeat(_STATES[chosen].astype(np.bool_), lengths, axis=0))
+    return np.asarray(np.repeat(_PAIR_STATES[chosen].astype(np.bool_), lengths, axis=0))
 
 
 def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
@@ -87,7 +89,7 @@ def put_right(points: Array, swapped: NDArray[np.bool_]) -> Array:
     if not swapped.any():
         return points
     mended = points.copy()
-    for k, (right, left) in enumerate(zip(RIGHT, LEFT, strict=True)):
+    for k, (right, left) in enumerate(zip(RIGHT_JOINTS, LEFT_JOINTS, strict=True)):
         rows = swapped[:, k]
         mended[rows, right], mended[rows, left] = points[rows, left], points[rows, right]
     return mended
@@ -102,10 +104,13 @@ def known_before(across: Array) -> NDArray[np.bool_]:
 def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[Array, Array, Array]:
     """Return, in -1 to 1 a frame, what says that pairs go as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
     together = np.zeros((len(joints), 5))
-    for k, (first, second) in enumerate(_LIMBS):
+    for k, (first, second) in enumerate(_LIMB_LINKS):
         straight, crossed = (
             np.stack([norm(joints[:, a[first]] - joints[:, b[second]]) for a, b in sides], axis=1)
-            for sides in (((RIGHT, RIGHT), (LEFT, LEFT)), ((RIGHT, LEFT), (LEFT, RIGHT)))
+            for sides in (
+                ((RIGHT_JOINTS, RIGHT_JOINTS), (LEFT_JOINTS, LEFT_JOINTS)),
+                ((RIGHT_JOINTS, LEFT_JOINTS), (LEFT_JOINTS, RIGHT_JOINTS)),
+            )
         )
         length = _length(straight, crossed)
         off, off_crossed = (np.abs(one - length).sum(axis=1) for one in (straight, crossed))
@@ -116,11 +121,11 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[A
     together[:, 4] = _sure(-np.einsum("ti,ti->t", across_shoulders, across_hips) / sizes * 2.0)
     forward = _unit(np.cross(trunk, across_hips))
     bends = []
-    for right in (RIGHT, LEFT):
+    for right in (RIGHT_JOINTS, LEFT_JOINTS):
         hip, knee, ankle = (joints[:, right[k]] for k in (3, 4, 5))
         # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
         bends.append(np.einsum("ti,ti->t", knee - (hip + ankle) / 2.0, forward))
-    toes = np.einsum("tki,ti->tk", feet[:, :2] - joints[:, [RIGHT[5], LEFT[5]]], forward)
+    toes = np.einsum("tki,ti->tk", feet[:, :2] - joints[:, [RIGHT_JOINTS[5], LEFT_JOINTS[5]]], forward)
     hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * BEND_METRES))
     hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * BEND_METRES))
     facing = _unit(np.cross(trunk, across_shoulders))
@@ -161,7 +166,7 @@ def _continuity(across: Array) -> Array:
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
     """Return the states (N,) of least energy: (N, 64), and what says that pairs turned over between (N - 1, 6)."""
-    differs = (_STATES[:, None] != _STATES[None]).astype(np.float64)
+    differs = (_PAIR_STATES[:, None] != _PAIR_STATES[None]).astype(np.float64)
     back = np.zeros(energy.shape, dtype=np.intp)
     least = energy[0]
     for k in range(1, len(energy)):

@@ -10,7 +10,7 @@ from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
-from posekit.validators.motion.sides import PAIRS
+from posekit.validators.motion.sides import SIDE_PAIRS
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Swap(MotionCheck):
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the pairs; see `MotionCheck`."""
         del clip
-        return PAIRS
+        return SIDE_PAIRS
 
     def judge(self, clip: MotionClip) -> Findings:
         """Say 1 where a pair is exchanged and 0 where it is as labelled; see `MotionCheck`."""
