@@ -52,6 +52,10 @@ class ValidateOutput:
             "findings" if suffix == ".json" else "margins" if suffix in (".csv", ".parquet") else "verdicts"
         )
 
+    @property
+    def _of_clips(self) -> str:
+        return "--timeline" if self.keep is None else "--keep"
+
     def check(self) -> None:
         """Refuse names that cannot be written before the work is done."""
         from posekit.formats.own.npz import suffix
@@ -88,6 +92,7 @@ class ValidateOutput:
         """
         from posekit.formats import own as files
 
+        clips = () if self.timeline is None and self.keep is None else clips_of_report(report, self._of_clips)
         pages = [path for path in (self.report, self.page) if path is not None]
         for path in pages:
             if path.suffix.lower() == PAGE_SUFFIX:
@@ -100,12 +105,11 @@ class ValidateOutput:
         if self.timeline is not None:
             from posekit.viewer.plots.timeline_plot import write_timelines
 
-            count = write_timelines(self.timeline, clips_of_report(report, "--timeline"))
-            yield f"written: {self.timeline}, {count} of {len(report.clips or ())} clips"
+            count = write_timelines(self.timeline, clips)
+            yield f"written: {self.timeline}, {count} of {len(clips)} clips"
         if self.keep is not None and report.frames is not None:
             from posekit.validation.keep import keep_clips
 
-            clips = clips_of_report(report, "--keep")
             kept = keep_clips(self.keep, clips, report.frames, spans=self.keep_spans)
             yield f"written: {self.keep}, {kept.said}"
 
