@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import re
 from importlib import resources
 from pathlib import Path
 from typing import Final
@@ -18,14 +19,16 @@ REPORT_POLICY: Final = "default-src 'none'; script-src 'unsafe-inline'; style-sr
 
 def report_page_html(report: ValidationReport, *, title: str = "Validation") -> str:
     """Make the page, as text; see `write_report_page`."""
-    data = script_json(page_report(report, title=title))
-    return (
-        _file("report.html")
-        .replace("{policy}", REPORT_POLICY)
-        .replace("{title}", html.escape(title))
-        .replace("{style}", _file("report.css"))
-        .replace("{scripts}", "\n".join((_file("stick.js"), _file("report.js"))))
-        .replace("{data}", data)
+    parts = {
+        "policy": REPORT_POLICY,
+        "title": html.escape(title),
+        "style": _file("report.css"),
+        "scripts": "\n".join((_file("stick.js"), _file("report.js"))),
+        "data": script_json(page_report(report, title=title)),
+    }
+    # In one pass: what is put in is not looked through again.
+    return re.sub(
+        r"\{(policy|title|style|scripts|data)\}", lambda found: parts[found[1]], _file("report.html")
     )
 
 
