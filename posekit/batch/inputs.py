@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from posekit.errors import InputError
 from posekit.formats.format import Content
-from posekit.formats.recognising import recognise
+from posekit.formats.listing import Wanted, listed
 from posekit.safe_io import cut, refusal
-from posekit.safe_io.regular_file import unreadable
 
 INPUT_SUFFIXES: Final = (".json", ".csv", ".h5", ".npz", ".parquet", ".pq")
 """Of the files in a folder that are taken; others in it are somebody else's."""
@@ -73,10 +71,8 @@ def list_inputs(given: Sequence[Path], output: Path, root: Path | None = None) -
     InputError
         Where one is not there or cannot be listed, or there is none.
     """
-    found: dict[Path, Path] = {}
-    for one in given:
-        for path in _of(one, output.resolve()):
-            found.setdefault(path.resolve(), path)
+    wanted = Wanted(suffixes=INPUT_SUFFIXES, contents=(Content.KEY_POINTS,))
+    found = listed(given, wanted, output)
     if not found:
         names = ", ".join(str(one) for one in given)
         raise refusal(
@@ -86,50 +82,8 @@ def list_inputs(given: Sequence[Path], output: Path, root: Path | None = None) -
             f"views or key points: {', '.join(INPUT_SUFFIXES)}",
             "name the files, or a folder of them",
         )
-    places = sorted(found)
+    places = sorted(path.resolve() for path in found)
     if root is None or not any(place.is_relative_to(root) for place in places):
         root = Path(os.path.commonpath([place.parent for place in places]))
     named = {Path(os.path.relpath(place, root)).as_posix(): place for place in places}
     return Listing(root=root, inputs=tuple(Input(name=name, path=named[name]) for name in sorted(named)))
-
-
-def _of(path: Path, output: Path) -> Iterator[Path]:
-    """List the inputs of one argument."""
-    try:
-        folder = path.is_dir()
-        there = path.exists()
-    except (OSError, ValueError) as error:
-        raise unreadable(path, error) from None
-    if not there:
-        raise refusal(path, "", "no such file or folder", "an input that is there", "check the name")
-    if not folder:
-        yield path
-    elif path.resolve() != output:
-        yield from _of_folder(path, output)
-
-
-def _of_folder(folder: Path, output: Path) -> Iterator[Path]:
-    """List the inputs of a folder: itself, or what is in it."""
-    try:
-        entries = sorted(one for one in folder.iterdir() if not one.name.startswith("."))
-    except OSError as error:
-        raise refusal(
-            folder, "", cut(error.strerror or str(error)), "a readable folder", "check its permissions"
-        ) from None
-    if any(one.suffix.lower() == ".json" and one.is_file() for one in entries) and _is_recording(folder):
-        yield folder
-        return
-    for one in entries:
-        if one.is_dir():
-            if one.resolve() != output and not one.is_symlink():
-                yield from _of_folder(one, output)
-        elif one.suffix.lower() in INPUT_SUFFIXES:
-            yield one
-
-
-def _is_recording(folder: Path) -> bool:
-    """Tell whether a folder's JSON files are the pictures of one recording, by the first of them."""
-    try:
-        return recognise(folder).holds is Content.KEY_POINTS
-    except InputError:
-        return False

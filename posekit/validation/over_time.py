@@ -2,13 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import NamedTuple
-
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.body.measured import noise_by_limb, usual_noise
@@ -17,90 +11,38 @@ from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.settings import ValidateSettings
 from posekit.validation.robot_motion import moves_of
-from posekit.validators import Judgement
-from posekit.validators.motion import MotionCheck, MotionClip, judge_motion
+from posekit.validators import Validator
+from posekit.validators.motion import MotionClip
 
 
-class ClipRows(NamedTuple):
-    """A clip, and which of the given postures are its frames."""
-
-    rows: NDArray[np.intp]
-    clip: MotionClip
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class OverTime:
-    """What checks over time say of N postures.
-
-    Parameters
-    ----------
-    judgements : sequence of Judgement
-        A row a posture; NaN in clips that a check does not apply to.
-    not_asked : mapping
-        By check and reason, of how many clips it was not asked.
-    """
-
-    judgements: Sequence[Judgement] = ()
-    not_asked: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
-
-
-def judged_over_time(
-    held: HeldPostures,
-    checks: Sequence[MotionCheck],
-    settings: ValidateSettings,
-    *,
-    model: pin.Model | None = None,
-) -> OverTime:
-    """Ask checks over time about all clips of a file.
+def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) -> MotionClip:
+    """Make a clip of some postures of a file, as checks over time see it.
 
     Parameters
     ----------
     held : HeldPostures
         What the file holds.
-    checks : sequence of MotionCheck
-        With their thresholds.
-    settings : ValidateSettings
-        What else was asked: which way is up, where the ground is.
-    model : pinocchio.Model, optional
-        Of a robot whose configurations they are.
+    rows : int array (T,)
+        Which of its postures are the clip's frames, in their order.
+    validator : Validator
+        What else was asked: where the ground is, how large the noise; and the robot of configurations.
     """
-    parts: dict[str, list[tuple[NDArray[np.intp], Judgement]]] = {}
-    reasons: dict[str, Counter[str]] = {}
-    for rows, clip in clips_of(held, settings, model):
-        verdict = judge_motion(checks, clip)
-        for judgement in verdict.judgements:
-            parts.setdefault(judgement.check, []).append((rows, judgement))
-        for name, reason in verdict.not_asked.items():
-            reasons.setdefault(name, Counter())[reason] += 1
-    return OverTime(
-        judgements=[_together(found, len(held)) for found in parts.values()],
-        not_asked={name: dict(counts) for name, counts in reasons.items()},
-    )
-
-
-def clips_of(
-    held: HeldPostures, settings: ValidateSettings, model: pin.Model | None = None
-) -> Iterator[ClipRows]:
-    """Go through the clips of a file."""
-    # Where each frame has its own origin there is no ground, and nothing goes anywhere.
-    up = UP_DIRECTIONS[held.up] if held.up and held.in_world else None
+    settings = validator.settings
+    joints, head, time = held.postures.joints[rows], held.postures.head, held.time[rows]
+    model = None if validator.robot is None or not held.q.size else validator.robot.model
     names = () if model is None else tuple(model.names)[1:]
-    for index in range(int(held.clip.max(initial=-1)) + 1):
-        rows = np.flatnonzero(held.clip == index)
-        head = held.postures.head
-        yield ClipRows(
-            rows,
-            MotionClip(
-                joints=held.postures.joints[rows],
-                head=np.empty(0) if head is None else head[rows],
-                time=held.time[rows],
-                rate=rate_of(held.time[rows]),
-                up=up,
-                ground=settings.ground,
-                noise=_noise_of(held.postures.joints[rows], settings),
-                **moves_of(model, held.q[rows] if held.q.size else held.q, held.time[rows], names),
-            ),
-        )
+    moves = moves_of(model, held.q[rows] if held.q.size else held.q, time, names)
+    return MotionClip(
+        joints=joints,
+        head=np.empty(0) if head is None else head[rows],
+        time=time,
+        rate=rate_of(time),
+        # Where each frame has its own origin there is no ground, and nothing goes anywhere.
+        up=UP_DIRECTIONS[held.up] if held.up and held.in_world else None,
+        ground=settings.ground,
+        noise=_noise_of(joints, settings),
+        **moves,
+    )
 
 
 def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
@@ -136,27 +78,3 @@ def rate_of(time: NDArray[np.float64]) -> float:
     steps = np.diff(time)
     known = steps[np.isfinite(steps) & (steps > 0)]
     return float(1.0 / np.median(known)) if len(known) else np.nan
-
-
-def _together(found: Sequence[tuple[NDArray[np.intp], Judgement]], count: int) -> Judgement:
-    """Lay what a check says of each clip over all postures; places are matched by their names."""
-    places = list(dict.fromkeys(where for _, one in found for where in one.where))
-    numbers = {name: np.full((count, len(places)), np.nan) for name in ("value", "lower", "upper", "margin")}
-    violated = np.zeros((count, len(places)), dtype=np.bool_)
-    for rows, one in found:
-        at = rows[:, None], np.array([places.index(where) for where in one.where], dtype=np.intp)
-        for name, array in numbers.items():
-            array[at] = getattr(one, name)
-        violated[at] = one.violated
-    first = found[0][1]
-    return Judgement(
-        check=first.check,
-        where=tuple(places),
-        unit=(first.unit[0],) * len(places),
-        value=numbers["value"],
-        lower=numbers["lower"],
-        upper=numbers["upper"],
-        margin=numbers["margin"],
-        violated=violated,
-        over_time=True,
-    )

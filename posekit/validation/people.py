@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -15,14 +14,14 @@ MAX_TOLD_PEOPLE: Final = 1000
 """Recordings of which a report says by what they were judged, one by one."""
 
 
-class PersonRows(NamedTuple):
-    """Postures in a row that are of one person, who is None where it is not asked."""
+class Recording(NamedTuple):
+    """Which postures of a file are of one recording, and their person, who is None where it is not asked."""
 
-    rows: slice
+    rows: NDArray[np.intp]
     person: MeasuredPerson | None
 
 
-def people_of(joints: NDArray[np.float64], clip: NDArray[np.intp] | None) -> list[PersonRows]:
+def recordings_of(joints: NDArray[np.float64], clip: NDArray[np.intp] | None) -> list[Recording]:
     """Measure the person of each recording.
 
     Parameters
@@ -33,39 +32,55 @@ def people_of(joints: NDArray[np.float64], clip: NDArray[np.intp] | None) -> lis
         Which recording each posture is of; one of all if not given.
     """
     if clip is None or not len(clip):
-        return [PersonRows(slice(0, len(joints)), measured_person(joints))]
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(clip)) + 1])
-    ends = np.append(starts[1:], len(clip))
-    in_one = len(starts) == len(np.unique(clip))
-    people: dict[int, MeasuredPerson] = {}
-    found = []
-    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
-        which = int(clip[start])
-        if which not in people:
-            people[which] = measured_person(joints[start:end] if in_one else joints[clip == which])
-        found.append(PersonRows(slice(start, end), people[which]))
-    return found
+        return [Recording(np.arange(len(joints)), measured_person(joints))]
+    order = np.argsort(clip, kind="stable")
+    parts = np.split(order, np.flatnonzero(np.diff(clip[order])) + 1)
+    return [Recording(rows, measured_person(joints[rows])) for rows in parts]
 
 
-def batches(stretches: Sequence[PersonRows], size: int) -> Iterator[PersonRows]:
-    """Cut stretches into batches of at most so many postures."""
-    for rows, person in stretches:
-        for first in range(rows.start, rows.stop, size):
-            yield PersonRows(slice(first, min(first + size, rows.stop)), person)
+class PeopleTold:
+    """By what the people of files were judged: of one their lengths; of more each, and the widest."""
 
+    def __init__(self) -> None:
+        self.count = 0
+        self._each: list[dict[str, Any]] = []
+        self._lengths: dict[str, float] | None = None
+        self._least = np.inf
+        self._most: dict[str, Any] | None = None
 
-def told_of_people(validator: Validator, stretches: Sequence[PersonRows]) -> dict[str, Any]:
-    """Say by what the people of a file were judged: of one their lengths; of more each, and the widest."""
-    people = {id(person): person for _, person in stretches if person is not None}
-    told = [validator.told_of(person) for person in people.values()]
-    if len(told) == 1:
-        (person,) = people.values()
-        measured = validator.lengths == "median"
-        lengths = {name: round(length, 6) for name, length in person.lengths.items()} if measured else None
-        return told[0] if lengths is None else {"lengths": lengths, **told[0]}
-    known = [one for one in told if one.get("noise") is not None]
-    if not known:
-        return {"people": told[:MAX_TOLD_PEOPLE]}
-    most = max(known, key=lambda one: one["noise"])
-    noise = [min(one["noise"] for one in known), most["noise"]]
-    return {**most, "moved_lengths": {}, "noise": noise, "people": told[:MAX_TOLD_PEOPLE]}
+    def add(self, validator: Validator, person: MeasuredPerson) -> None:
+        """Note one, right after the judging: a validator keeps the last person's figure."""
+        told = validator.told_of(person)
+        if not self.count and validator.lengths == "median":
+            self._lengths = {name: round(length, 6) for name, length in person.lengths.items()}
+        self._note([told], 1)
+
+    def join(self, others: PeopleTold) -> None:
+        """Note those of another file."""
+        if not self.count:
+            self._lengths = others._lengths
+        extremes = [] if others._most is None else [{"noise": others._least}, others._most]
+        self._note(others._each, others.count, extremes)
+
+    def _note(
+        self, told: list[dict[str, Any]], count: int, extremes: list[dict[str, Any]] | None = None
+    ) -> None:
+        self.count += count
+        self._each += told[: MAX_TOLD_PEOPLE - len(self._each)]
+        for one in told if extremes is None else extremes:
+            noise = one.get("noise")
+            if noise is None:
+                continue
+            self._least = min(self._least, noise)
+            if len(one) > 1 and (self._most is None or noise > self._most["noise"]):
+                self._most = one
+
+    def told(self) -> dict[str, Any]:
+        """Say it as reports do."""
+        if self.count <= 1:
+            lengths = {} if self._lengths is None else {"lengths": self._lengths}
+            return {**lengths, **(self._each[0] if self._each else {})}
+        if self._most is None:
+            return {"people": self._each} if any(self._each) else {}
+        noise = [self._least, self._most["noise"]]
+        return {**self._most, "moved_lengths": {}, "noise": noise, "people": self._each}

@@ -29,7 +29,9 @@ MOST_SPANS_OF_ALL: Final = 20_000
 _INVALID, _UNDECIDED = VERDICT_NAMES.index("invalid"), VERDICT_NAMES.index("undecided")
 
 
-def clip_verdicts(columns: VerdictColumns, frames: ReportFrames) -> tuple[ClipVerdict, ...]:
+def clip_verdicts(
+    columns: VerdictColumns, frames: ReportFrames, *, of: int | None = None
+) -> tuple[ClipVerdict, ...]:
     """Judge clips by their frames.
 
     Parameters
@@ -37,14 +39,16 @@ def clip_verdicts(columns: VerdictColumns, frames: ReportFrames) -> tuple[ClipVe
     columns : VerdictColumns
         What was found in each frame.
     frames : ReportFrames
-        Which clip and frame each row is; one row a frame.
+        Which clip and frame each row is. Where several rows are of one frame, clips have no spans.
+    of : int, optional
+        Of how many clips these are a part: the more, the fewer spans of each are listed.
 
     Returns
     -------
     tuple of ClipVerdict
         In the order of `frames.clips`.
     """
-    most = int(np.clip(MOST_SPANS_OF_ALL // max(len(frames.clips), 1), 5, MOST_SPANS))
+    most = int(np.clip(MOST_SPANS_OF_ALL // max(of or len(frames.clips), 1), 5, MOST_SPANS))
     firsts = np.searchsorted(columns.posture, np.arange(len(columns) + 1))
     return tuple(
         _verdict(columns, frames, clip, frames.rows(clip), firsts, most) for clip in range(len(frames.clips))
@@ -70,13 +74,15 @@ def _verdict(
     verdict, time = columns.verdict[rows], frames.time[rows]
     rate = rate_of(time)
     gap = max(MERGED_FRAMES, round(MERGED_SECONDS * rate)) if np.isfinite(rate) else MERGED_FRAMES
-    found = sorted(
+    spans = (
         [
             *_invalid_spans(columns, frames, rows, firsts, gap),
             *_undecided_spans(columns, frames, rows, gap),
-        ],
-        key=_badness,
+        ]
+        if frames.in_time
+        else []
     )
+    found = sorted(spans, key=_badness)
     bad = np.flatnonzero(verdict)
     counts = np.bincount(verdict, minlength=len(VERDICT_NAMES)).tolist()
     good = longest_run(verdict == 0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -98,6 +99,30 @@ def columns_of(
         bound=outside.bound,
         silent=silent,
         checks=tuple(checks),
+    )
+
+
+def in_order(columns: VerdictColumns, parts: Sequence[NDArray[np.intp]]) -> VerdictColumns:
+    """Put the columns of a file's parts, one after the other, in the order of the file.
+
+    Parameters
+    ----------
+    columns : VerdictColumns
+        Of the parts.
+    parts : sequence of int array
+        Which postures of the file each part has.
+    """
+    rows = np.concatenate([np.zeros(0, dtype=np.intp), *parts])
+    if (np.diff(rows) == 1).all():
+        return columns
+    place, posture = np.argsort(rows), rows[columns.posture]
+    order = np.argsort(posture, kind="stable")
+    each = ("verdict", "fk_distance", "worst_place", "worst_margin", "worst_value", "worst_bound", "silent")
+    return replace(
+        columns,
+        posture=posture[order],
+        **{name: getattr(columns, name)[place] for name in each},
+        **{name: getattr(columns, name)[order] for name in ("place", "margin", "value", "bound")},
     )
 
 
