@@ -133,9 +133,10 @@ def margins_of(check: Check, points: Array) -> Array:
     An axial rotation that a check judges less strictly, because the limb is almost straight, counts less.
     """
     found = check.judge(points)
-    margin = found.margin - INSIDE_BOUNDS.get(check.unit, 0.0)
-    tolerance = np.broadcast_to(np.asarray(found.tolerance, dtype=np.float64), margin.shape)
+    tolerance = np.broadcast_to(np.asarray(found.tolerance, dtype=np.float64), found.value.shape)
+    margin = found.margin + tolerance
     least = tolerance.min(axis=1, keepdims=True)
     share = np.divide(least, tolerance, out=np.ones_like(margin), where=tolerance > least)
-    margin = margin * share * (METRES_A_DEGREE if check.unit == "deg" else 1.0)
+    margin = margin * share - INSIDE_BOUNDS.get(check.unit, 0.0)
+    margin = margin * (METRES_A_DEGREE if check.unit == "deg" else 1.0)
     return np.where(np.isnan(margin), np.inf, margin)

@@ -49,7 +49,7 @@ def nearest_valid(target: Array, suite: Sequence[Check], weight: Array, start: A
     weight : array (N, 19)
         Of squared distances.
     start : array (N, 19, 3), optional
-        Where the search starts, and whose lengths count; the target unless told otherwise.
+        Legal postures from which alone the search starts, and whose lengths count.
 
     Returns
     -------
@@ -60,12 +60,16 @@ def nearest_valid(target: Array, suite: Sequence[Check], weight: Array, start: A
     placed = np.flatnonzero(np.isfinite(out[:, list(TORSO_AND_HIPS)]).all(axis=(1, 2)))
     for first in range(0, len(placed), AT_ONCE):
         rows = placed[first : first + AT_ONCE]
-        out[rows] = _of_batch(target[rows], out[rows], suite, weight[rows])
+        if start is None:
+            out[rows] = _of_batch(target[rows], suite, weight[rows])
+        else:
+            turning = MarginConstraints(checks=[check for check in suite if not check.rigid])
+            out[rows], _ = nearest(target[rows], out[rows], weight[rows], turning)
     return out
 
 
-def _of_batch(target: Array, start: Array, suite: Sequence[Check], weight: Array) -> Array:
-    out = start.copy()
+def _of_batch(target: Array, suite: Sequence[Check], weight: Array) -> Array:
+    out = target.copy()
     rigid = MarginConstraints(checks=[check for check in suite if check.rigid], free=True)
     turning = MarginConstraints(checks=[check for check in suite if not check.rigid])
     off = _violated(rigid, out)

@@ -18,6 +18,7 @@ from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, LIMB_JOINTS, SEGMENTS, 
 from posekit.validators import Validator
 
 FIGURE = load_figure()
+STRICT = Validator(strict=True)
 CENTIMETRE = 0.01
 AS_NEAR = 2e-3
 """Metres: the distance from a posture hardly changes along what it is projected onto."""
@@ -59,7 +60,7 @@ def illegal() -> Array:
 @cache
 def repaired_illegal() -> Repaired:
     """Return what they are repaired to."""
-    return posekit.repair(illegal())
+    return posekit.repair(illegal(), STRICT)
 
 
 def lengths_of(postures: Array) -> Array:
@@ -70,14 +71,14 @@ def lengths_of(postures: Array) -> Array:
 
 def test_constructions_are_illegal() -> None:
     """Every posture of these tests is rejected, and the one they are made from is not."""
-    assert Validator().check(illegal()).invalid.all()
-    assert Validator().check(standing()[None, :14]).valid.all()
+    assert STRICT.check(illegal()).invalid.all()
+    assert STRICT.check(standing()[None, :14]).valid.all()
 
 
 def test_legal_postures_come_back_as_they_were() -> None:
     """What passes is not touched."""
     joints = standing()[None, :14]
-    repaired = posekit.repair(joints)
+    repaired = posekit.repair(joints, STRICT)
     np.testing.assert_array_equal(repaired.joints, joints)
     assert repaired.spans == () and repaired.left == ()
     assert not repaired.changed.any()
@@ -86,21 +87,21 @@ def test_legal_postures_come_back_as_they_were() -> None:
 @pytest.mark.parametrize("ranges", ["anatomical", "urdf"])
 def test_illegal_postures_come_back_valid_by_a_fresh_validator(ranges: str) -> None:
     """A validator that has not seen them before passes them."""
-    repaired = posekit.repair(illegal(), Validator(ranges=ranges))
-    assert Validator(ranges=ranges).check(repaired.joints).valid.all()
+    repaired = posekit.repair(illegal(), Validator(ranges=ranges, strict=True))
+    assert Validator(ranges=ranges, strict=True).check(repaired.joints).valid.all()
     assert repaired.valid.all() and repaired.left == ()
 
 
 def test_repairing_again_changes_nothing() -> None:
     """A repaired posture is a legal one."""
     once = repaired_illegal()
-    np.testing.assert_array_equal(posekit.repair(once.joints).joints, once.joints)
+    np.testing.assert_array_equal(posekit.repair(once.joints, STRICT).joints, once.joints)
 
 
 def test_lengths_that_were_right_stay() -> None:
     """Turned pieces keep their lengths; a length that was wrong comes within its tolerance."""
     given = illegal()
-    before, after = lengths_of(given), lengths_of(posekit.repair(given).joints)
+    before, after = lengths_of(given), lengths_of(posekit.repair(given, STRICT).joints)
     np.testing.assert_allclose(after[[0, 1, 3]], before[[0, 1, 3]], rtol=0, atol=1e-12)
     own = np.array(list(FIGURE.lengths.values()))
     assert (np.abs(after - own) <= 0.03).all()
@@ -112,7 +113,7 @@ def test_mirror_images_are_repaired_alike() -> None:
     mirrored = (illegal() * [1, -1, 1])[:, exchanged]
     repaired = repaired_illegal().joints
     np.testing.assert_allclose(
-        posekit.repair(mirrored).joints, (repaired * [1, -1, 1])[:, exchanged], rtol=0, atol=AS_NEAR
+        posekit.repair(mirrored, STRICT).joints, (repaired * [1, -1, 1])[:, exchanged], rtol=0, atol=AS_NEAR
     )
 
 
@@ -121,7 +122,7 @@ def test_a_turned_and_shifted_world_changes_nothing() -> None:
     R, shift = rotation_from_vector(np.array([0.3, -1.2, 0.7])), np.array([2.0, -1.0, 0.5])
     repaired = repaired_illegal().joints
     np.testing.assert_allclose(
-        posekit.repair(illegal() @ R.T + shift).joints, repaired @ R.T + shift, rtol=0, atol=AS_NEAR
+        posekit.repair(illegal() @ R.T + shift, STRICT).joints, repaired @ R.T + shift, rtol=0, atol=AS_NEAR
     )
 
 
@@ -130,8 +131,8 @@ def test_a_turned_and_shifted_world_changes_nothing() -> None:
 def test_the_change_is_no_more_than_to_a_known_legal_posture(degrees: float, limb: int) -> None:
     """The straight limb is legal: the nearest legal posture is not farther."""
     given, straight = hinge_beyond(degrees + 10, limb), hinge_beyond(0, limb)
-    assert Validator().check(straight[None]).valid.all()
-    repaired = posekit.repair(given).joints[0]
+    assert STRICT.check(straight[None]).valid.all()
+    repaired = posekit.repair(given, STRICT).joints[0]
     assert np.linalg.norm(repaired - given) <= np.linalg.norm(straight - given) + 1e-6
 
 
@@ -153,7 +154,9 @@ def test_weights_say_which_joints_move_less() -> None:
     weights = np.ones(14)
     weights[JOINT["right_wrist"]] = 100.0
     wrist = [
-        np.linalg.norm(posekit.repair(given, weights=one).joints[0] - given, axis=-1)[JOINT["right_wrist"]]
+        np.linalg.norm(posekit.repair(given, STRICT, weights=one).joints[0] - given, axis=-1)[
+            JOINT["right_wrist"]
+        ]
         for one in (None, weights)
     ]
     assert wrist[1] < 0.5 * wrist[0]
@@ -164,8 +167,8 @@ def test_the_head_moves_as_one_piece() -> None:
     points = standing()
     turn = rotation_from_vector(np.array([0.0, 0.0, np.radians(140.0)]))
     head = points[0] + (points[14:] - points[0]) @ turn.T
-    assert Validator().check(points[None, :14], head[None]).invalid.all()
-    repaired = posekit.repair(points[:14], head=head[None])
+    assert STRICT.check(points[None, :14], head[None]).invalid.all()
+    repaired = posekit.repair(points[:14], STRICT, head=head[None])
     assert repaired.head is not None and repaired.valid.all()
     gaps = [np.linalg.norm(one[:, None] - one, axis=-1) for one in (head, repaired.head[0])]
     np.testing.assert_allclose(gaps[1], gaps[0], rtol=0, atol=1e-12)
@@ -177,10 +180,10 @@ def test_unknown_joints_stay_unknown() -> None:
     given = np.stack([hinge_beyond(20, 3), hinge_beyond(20, 3)])
     given[0, JOINT["left_wrist"]] = np.nan
     given[1, JOINT["neck"]] = np.nan
-    repaired = posekit.repair(given)
+    repaired = posekit.repair(given, STRICT)
     assert np.array_equal(np.isnan(repaired.joints), np.isnan(given))
     np.testing.assert_array_equal(repaired.joints[1], given[1])
-    assert not Validator().check(repaired.joints).invalid[0]
+    assert not STRICT.check(repaired.joints).invalid[0]
 
 
 def test_a_robot_is_sent_to_its_configurations() -> None:
@@ -203,7 +206,7 @@ def test_jacobians_are_differences() -> None:
 def test_linearised_margins_are_differences() -> None:
     """Slopes of margins are those of turning pieces."""
     points = np.concatenate([illegal()[1], standing()[14:]])[None]
-    _, suite = Validator().figure_and_suite(points[:, :14])
+    _, suite = STRICT.figure_and_suite(points[:, :14])
     constraints = MarginConstraints(checks=[check for check in suite if not check.rigid])
     found = constraints.linearised(points, jacobian_of(points))
     margin = np.concatenate(

@@ -1,0 +1,80 @@
+"""The body over the ground: lifted, lowered, or moved along it so that feet which stand stay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.remedy.record import runs
+
+Bools = NDArray[np.bool_]
+
+SMOOTH_SECONDS: Final = 0.3
+"""Seconds over which the height by which a body is shifted changes."""
+
+STANDING_PERCENT: Final = 50
+"""Of the heights of frames that are right: where the lowest point usually is."""
+
+
+def grounded(points: Array, bad: Bools, up: Array, rate: float) -> Array:
+    """Shift spans of frames along up, so that their lowest points are where those of the other frames are.
+
+    Parameters
+    ----------
+    points : array (T, P, 3)
+        All points, metres.
+    bad : bool array (T,)
+        Frames that float or sink.
+    up : array (3,)
+        Against gravity.
+    rate : float
+        Frames a second.
+    """
+    out = points.copy()
+    lowest = np.nanmin(points @ up, axis=1)
+    usual = np.percentile(lowest[~bad], STANDING_PERCENT) if (~bad).any() else None
+    width = max(int(SMOOTH_SECONDS * rate) | 1, 1)
+    for first, last in runs(bad):
+        level = usual if usual is not None else 0.0
+        needed = level - lowest[first : last + 1]
+        by = _over(np.mean, _over(np.median, needed, width), width)
+        out[first : last + 1] += by[:, None, None] * up
+    return out
+
+
+def held_feet(points: Array, feet: Sequence[tuple[int, ...]], bad: Bools, up: Array) -> Array:
+    """Move the body along the ground against what standing feet slide; what comes after stays where it then is.
+
+    Parameters
+    ----------
+    points : array (T, P, 3)
+        All points, metres.
+    feet : sequence of 2 tuples of int
+        The points of the right and the left foot, the best first.
+    bad : bool array (T, 2)
+        In which frames which foot slides while it stands.
+    up : array (3,)
+        Against gravity.
+    """
+    step = np.zeros((len(points), 3))
+    slip = np.full((len(points), 2, 3), np.nan)
+    for side, candidates in enumerate(feet):
+        known = [k for k in candidates if np.isfinite(points[:, k]).all()]
+        if known:
+            way = np.diff(points[:, known[0]], axis=0, prepend=points[:1, known[0]])
+            slip[:, side] = way - (way @ up)[:, None] * up
+    rows = bad.any(axis=1)
+    weight = np.where(bad[..., None] & np.isfinite(slip), 1.0, 0.0)
+    total = weight.sum(axis=1)
+    step[rows] = (np.nan_to_num(slip) * weight).sum(axis=1)[rows] / np.maximum(total[rows], 1.0)
+    return points - np.cumsum(step, axis=0)[:, None]
+
+
+def _over(function: Callable[..., Array], values: Array, width: int) -> Array:
+    """Return a function of an odd number of values around each of (T,); the outer ones stand for what is beyond."""
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(function(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))

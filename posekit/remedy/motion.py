@@ -1,0 +1,239 @@
+"""A motion: remedies for what checks over time reject, then the nearest legal postures, tied over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body.measured import MeasuredPerson, measured_person
+from posekit.geometry import Array
+from posekit.remedy.between import interpolated, smoothed
+from posekit.remedy.exchange import MARKS, exchanged
+from posekit.remedy.ground import grounded, held_feet
+from posekit.remedy.lengths import with_lengths
+from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENT_NAMES
+from posekit.validators import Judgement, Validator
+from posekit.validators.motion import MotionClip, judge_motion
+from posekit.validators.motion.clip import FEET_POINTS
+
+Bools = NDArray[np.bool_]
+
+MOTION_ROUNDS: Final = 3
+"""How often all remedies are tried in turn."""
+
+STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
+"""Of smoothing, least first."""
+
+FEET_OF_SIDES: Final = tuple(
+    tuple(MARKS.index(name) for name in (f"{side}_toe", f"{side}_ankle")) for side in ("right", "left")
+)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Rejected:
+    """What checks over time reject of a clip.
+
+    Parameters
+    ----------
+    judgements : mapping
+        By the name of the check.
+    count : int
+        Frames that some of them rejects, each check's counted.
+    """
+
+    judgements: Mapping[str, Judgement]
+    count: int
+
+    def frames(self, *checks: str) -> Bools | None:
+        """Return which frames some of these checks reject (T,); None where none does."""
+        found = [self.judgements[name].violated.any(axis=1) for name in checks if name in self.judgements]
+        every = np.logical_or.reduce(found) if found else None
+        return every if every is not None and every.any() else None
+
+    def places(self, names: Sequence[str], *checks: str) -> Bools | None:
+        """Return which frames and places of these names they reject (T, K); all where a place has another name."""
+        frames = self.frames(*checks)
+        if frames is None:
+            return None
+        out = np.zeros((len(frames), len(names)), dtype=np.bool_)
+        for check in checks:
+            if check not in self.judgements:
+                continue
+            one = self.judgements[check]
+            for k, where in enumerate(one.where):
+                columns = [names.index(where)] if where in names else list(range(len(names)))
+                out[:, columns] |= one.violated[:, k, None]
+        return out
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MotionRepair:
+    """A motion as far as it is repaired.
+
+    Parameters
+    ----------
+    points : array (T, 23, 3)
+        In the order of `posekit.remedy.exchange.MARKS`.
+    steps : list of (str, array (T, 14))
+        What was done, and how far each joint moved, metres.
+    """
+
+    points: Array
+    steps: list[tuple[str, Array]]
+
+
+def clip_points(clip: MotionClip) -> Array:
+    """Return all points of a clip (T, 23, 3)."""
+    return np.concatenate([clip.joints, clip.head, clip.feet], axis=1)
+
+
+def clip_with(clip: MotionClip, points: Array) -> MotionClip:
+    """Return a clip with other points."""
+    joints, head, feet = np.split(points, [len(JOINTS), len(POINTS)], axis=1)
+    return replace(clip, joints=joints, head=head, feet=feet)
+
+
+def repair_over_time(clip: MotionClip, validator: Validator, person: MeasuredPerson | None) -> MotionRepair:
+    """Undo what checks over time reject, as far as that lessens what they reject."""
+    points = clip_points(clip)
+    steps: list[tuple[str, Array]] = []
+    found = _rejected(validator, clip)
+    for _ in range(MOTION_ROUNDS):
+        before = found.count
+        for name, remedy in REMEDIES:
+            if not found.count:
+                return MotionRepair(points=points, steps=steps)
+            tried = remedy(clip_with(clip, points), points, found, person or measured_person(points[:, :14]))
+            for new in tried:
+                there = _rejected(validator, clip_with(clip, new))
+                if there.count < found.count:
+                    way = np.nan_to_num(np.linalg.norm(new - points, axis=-1))[:, : len(JOINTS)]
+                    steps.append((name, way))
+                    points, found = new, there
+                    break
+        if found.count >= before:
+            break
+    return MotionRepair(points=points, steps=steps)
+
+
+def _rejected(validator: Validator, clip: MotionClip) -> Rejected:
+    judged = judge_motion(validator.profile.checks, clip).judgements
+    names = {one.check.replace("_", "-"): one for one in judged}
+    return Rejected(judgements=names, count=sum(int(one.violated.any(axis=1).sum()) for one in judged))
+
+
+Remedy = Callable[[MotionClip, Array, Rejected, MeasuredPerson], Sequence[Array]]
+"""From a clip, its points, what is rejected and whose body it is to points that may be better, the best first."""
+
+
+def _exchange(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    del clip, person
+    bad = found.frames("swap")
+    return [] if bad is None else [exchanged(points, bad)]
+
+
+def _interpolate(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    """Interpolate jumps of joints, jumps of the body, and frames that stand still."""
+    del clip, person
+    tried = []
+    still = found.frames("frozen", "repeated")
+    if still is not None:
+        tried.append(_whole(points, still))
+    jumps = found.places(JOINTS, "teleport")
+    if jumps is not None:
+        for bad in (jumps, jumps & np.roll(jumps, -1, axis=0), jumps & ~np.roll(jumps, 1, axis=0)):
+            whole = _whole(points, np.asarray(bad.any(axis=1)))
+            some, own = points.copy(), np.concatenate([bad, np.zeros((len(bad), 9), dtype=bool)], axis=1)
+            some[own] = whole[own]
+            tried += [some, whole]
+        tried.append(_stepped_back(points, np.asarray(jumps.any(axis=1))))
+    return tried
+
+
+def _whole(points: Array, bad: Bools) -> Array:
+    out = points.copy()
+    out[:, : len(POINTS)] = interpolated(points[:, : len(POINTS)], bad)
+    return _feet_along(points, out)
+
+
+def _stepped_back(points: Array, bad: Bools) -> Array:
+    """Move all that comes after a jump of the body back to where it would have gone on."""
+    out = points.copy()
+    for at in np.flatnonzero(bad & ~np.roll(bad, 1)).tolist():
+        if 1 < at < len(points) - 1:
+            way = np.nanmedian(np.diff(out[at - 2 : at + 2, : len(JOINTS)], axis=0), axis=1)
+            out[at:] -= way[1] - (way[0] + way[2]) / 2
+    return out
+
+
+def _lengthen(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    del clip
+    bad = found.places(SEGMENT_NAMES, "drift")
+    return [] if bad is None else [with_lengths(points, bad, person.lengths)]
+
+
+def _smooth(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    del clip, person
+    bad = found.places(JOINTS, "jitter", "acceleration", "jerk")
+    if bad is None:
+        return []
+    loose = np.concatenate([bad, np.repeat(np.asarray(bad.any(axis=1))[:, None], 9, axis=1)], axis=1)
+    if not bad.all(axis=1).any():
+        loose[:, len(JOINTS) :] = False
+    tried = []
+    for strength in STRENGTHS:
+        out = points.copy()
+        for mark in np.flatnonzero(loose.any(axis=0)).tolist():
+            if np.isfinite(out[:, mark]).all():
+                out[:, mark] = smoothed(out[:, mark], loose[:, mark], strength)
+        tried.append(out)
+    return tried
+
+
+def _shift(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    del person
+    bad = found.frames("floating", "penetration", "support")
+    if bad is None or clip.up is None:
+        return []
+    return [grounded(points, bad, clip.up, clip.rate if np.isfinite(clip.rate) else 30.0)]
+
+
+def _hold(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    del person
+    sides = ("right", "left")
+    frames = found.frames("sliding", "skating")
+    if frames is None or clip.up is None:
+        return []
+    bad = np.zeros((len(points), 2), dtype=np.bool_)
+    for check in ("sliding", "skating"):
+        if check not in found.judgements:
+            continue
+        one = found.judgements[check]
+        for k, where in enumerate(one.where):
+            for side, name in enumerate(sides):
+                if name in where or not any(other in where for other in sides):
+                    bad[:, side] |= one.violated[:, k]
+    return [held_feet(points, FEET_OF_SIDES, bad, clip.up)]
+
+
+def _feet_along(before: Array, after: Array) -> Array:
+    """Move toes and heels as their ankles were moved."""
+    for k, name in enumerate(FEET_POINTS):
+        ankle = JOINT[f"{name.split('_')[0]}_ankle"]
+        after[:, len(POINTS) + k] += after[:, ankle] - before[:, ankle]
+    return after
+
+
+REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
+    ("exchanged", _exchange),
+    ("lengthened", _lengthen),
+    ("interpolated", _interpolate),
+    ("smoothed", _smooth),
+    ("shifted", _shift),
+    ("held", _hold),
+)
+"""In the order in which they are tried: labels first, then single frames, then spans."""
