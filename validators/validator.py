@@ -24,11 +24,13 @@ from posekit.validators.measured import Allowance
 from posekit.validators.motion.profile import with_profile
 from posekit.validators.ranges import load_ranges
 from posekit.validators.registry import PHYSICAL_CHECKS, chosen_checks, make_checks
+from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.figure import FigureConfigurations
 from posekit.validators.robot.load import STICK_FIGURE, load_subject
 from posekit.validators.robot.report import Report
 from posekit.validators.robot.robot_validator import RobotValidator, Verdict
 from posekit.validators.robot.settings import robot_settings
+from posekit.validators.robot.subject import Subject
 from posekit.validators.suite import judge
 from posekit.validators.walking import thresholds_of
 
@@ -251,6 +253,12 @@ class Validator:
             fk_distance=np.zeros(len(checked)),
             colliders=(self._configurations.collision,) if "collision" in self.checks else (),
         )
+
+    @property
+    def configured(self) -> tuple[Subject, SelfCollision | None]:
+        """The model whose configurations are judged, and what judges its collisions where they are asked about."""
+        judged = self._configurations if self._figure is not None else self._robot.models.own
+        return judged.subject, judged.collision if "collision" in self.checks else None
 
     @cached_property
     def _configurations(self) -> FigureConfigurations:

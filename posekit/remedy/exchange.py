@@ -13,7 +13,7 @@ from posekit.remedy.record import runs
 from posekit.skeleton import POINTS, other_side
 from posekit.validators.motion.clip import FEET_POINTS
 
-MARKS: Final = (*POINTS, *FEET_POINTS)
+CLIP_MARKS: Final = (*POINTS, *FEET_POINTS)
 """All points of a clip: joints, head, feet."""
 
 ARM_PARTS: Final = ("shoulder", "elbow", "wrist")
@@ -40,13 +40,13 @@ def exchanged(points: Array, bad: NDArray[np.bool_]) -> Array:
     Parameters
     ----------
     points : array (T, 23, 3)
-        In the order of `MARKS`.
+        In the order of `CLIP_MARKS`.
     bad : bool array (T,)
         Where labels are exchanged.
     """
     out = points.copy()
     for first, last in runs(bad):
-        best = _jumps(out, first, last, np.arange(len(MARKS)))
+        best = _jumps(out, first, last, np.arange(len(CLIP_MARKS)))
         chosen = None
         for parts, begin, end in product(
             EXCHANGED_PARTS,
@@ -57,8 +57,8 @@ def exchanged(points: Array, bad: NDArray[np.bool_]) -> Array:
                 continue
             order = np.array(
                 [
-                    MARKS.index(other_side(name)) if any(part in name for part in parts) else k
-                    for k, name in enumerate(MARKS)
+                    CLIP_MARKS.index(other_side(name)) if any(part in name for part in parts) else k
+                    for k, name in enumerate(CLIP_MARKS)
                 ]
             )
             jumps = _jumps(out, begin, end, order)

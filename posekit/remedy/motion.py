@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from posekit.body.measured import MeasuredPerson, measured_person
 from posekit.geometry import Array
 from posekit.remedy.between import interpolated, smoothed
-from posekit.remedy.exchange import MARKS, exchanged
+from posekit.remedy.exchange import CLIP_MARKS, exchanged
 from posekit.remedy.ground import grounded, held_feet
 from posekit.remedy.lengths import with_lengths
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENT_NAMES
@@ -25,11 +25,11 @@ Bools = NDArray[np.bool_]
 MOTION_ROUNDS: Final = 3
 """How often all remedies are tried in turn."""
 
-STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
+SMOOTHING_STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
 """Of smoothing, least first."""
 
 FEET_OF_SIDES: Final = tuple(
-    tuple(MARKS.index(name) for name in (f"{side}_toe", f"{side}_ankle")) for side in ("right", "left")
+    tuple(CLIP_MARKS.index(name) for name in (f"{side}_toe", f"{side}_ankle")) for side in ("right", "left")
 )
 
 
@@ -77,7 +77,7 @@ class MotionRepair:
     Parameters
     ----------
     points : array (T, 23, 3)
-        In the order of `posekit.remedy.exchange.MARKS`.
+        In the order of `posekit.remedy.exchange.CLIP_MARKS`.
     steps : list of (str, array (T, 14))
         What was done, and how far each joint moved, metres.
     """
@@ -104,7 +104,7 @@ def repair_over_time(clip: MotionClip, validator: Validator, person: MeasuredPer
     found = _rejected(validator, clip)
     for _ in range(MOTION_ROUNDS):
         before = found.count
-        for name, remedy in REMEDIES:
+        for name, remedy in MOTION_REMEDIES:
             if not found.count:
                 return MotionRepair(points=points, steps=steps)
             tried = remedy(clip_with(clip, points), points, found, person or measured_person(points[:, :14]))
@@ -185,7 +185,7 @@ def _smooth(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPe
     if not bad.all(axis=1).any():
         loose[:, len(JOINTS) :] = False
     tried = []
-    for strength in STRENGTHS:
+    for strength in SMOOTHING_STRENGTHS:
         out = points.copy()
         for mark in np.flatnonzero(loose.any(axis=0)).tolist():
             if np.isfinite(out[:, mark]).all():
@@ -228,7 +228,7 @@ def _feet_along(before: Array, after: Array) -> Array:
     return after
 
 
-REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
+MOTION_REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
     ("exchanged", _exchange),
     ("lengthened", _lengthen),
     ("interpolated", _interpolate),

@@ -90,11 +90,8 @@ class NearestPosture:
         solved = np.linalg.solve(stiff, right)
         alone, pulled = -solved[..., 0], solved[..., 1:]
         dual = slope @ pulled
-        dual = dual + (DUAL_SOFTNESS * np.maximum(1.0, np.einsum("nii->ni", dual)))[:, :, None] * np.eye(
-            dual.shape[1]
-        )
         offset = value + (slope @ alone[..., None])[..., 0]
-        force = _bounded(dual, offset)
+        force = bounded_forces(dual, offset)
         step = alone + (pulled @ force[..., None])[..., 0]
         longest = np.abs(step).max(axis=1)
         share = np.minimum(1.0, MAX_TURN / np.maximum(longest, 1e-300))
@@ -115,12 +112,24 @@ class NearestPosture:
         return (moved(state[0], step),)
 
 
-def _bounded(dual: Array, offset: Array) -> Array:
-    """Minimise f'Mf / 2 + o'f over forces (N, K) between 0 and the penalty."""
+def bounded_forces(dual: Array, offset: Array, most: float = BOUND_PENALTY) -> Array:
+    """Minimise f'Mf / 2 + o'f over forces (N, K) between 0 and the penalty of a bound.
+
+    Parameters
+    ----------
+    dual : array (N, K, K)
+        M.
+    offset : array (N, K)
+        o: margins without forces.
+    most : float
+        The penalty.
+    """
+    soft = DUAL_SOFTNESS * np.maximum(1.0, np.einsum("nii->ni", dual))
+    dual = dual + soft[:, :, None] * np.eye(dual.shape[1])
     force = np.zeros_like(offset)
     for _ in range(DUAL_ROUNDS):
         gradient = offset + (dual @ force[..., None])[..., 0]
-        change = limited_step(dual, gradient, -force, BOUND_PENALTY - force)
+        change = limited_step(dual, gradient, -force, most - force)
         force = force + change
         if np.abs(change).max(initial=0.0) < 1e-12:
             break

@@ -1,0 +1,86 @@
+"""Laws of the remedy for configurations of robots."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from posekit.errors import InputError
+from posekit.geometry import Array
+from posekit.remedy import Repaired, repair_configurations
+from posekit.remedy.configurations import NearestConfiguration
+from posekit.validators import Validator
+
+PANDA = Validator("panda")
+
+
+def draw(count: int = 12, beyond: float = 0.2) -> Array:
+    """Return configurations of a Panda, some joints beyond their limits by up to so many radians."""
+    model = PANDA.configured[0].model
+    rng = np.random.default_rng(0)
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    return np.asarray(rng.uniform(low - beyond, high + beyond, (count, model.nq)))
+
+
+@cache
+def repaired_draw() -> Repaired:
+    """Return what they are repaired to."""
+    return repair_configurations(draw(), PANDA)
+
+
+def test_configurations_come_back_valid_by_a_fresh_validator() -> None:
+    """Limits and contacts pass one that has not seen them."""
+    given, repaired = draw(), repaired_draw()
+    assert PANDA.check(q=given).invalid.sum() > 8
+    assert repaired.q is not None
+    assert Validator("panda").check(q=repaired.q).valid.all()
+    assert repaired.valid.all() and repaired.left == ()
+
+
+def test_legal_configurations_come_back_as_they_were() -> None:
+    """A repaired one is legal, and is not touched again."""
+    once = repaired_draw().q
+    assert once is not None
+    again = repair_configurations(once, PANDA)
+    assert again.q is not None and again.spans == ()
+    np.testing.assert_array_equal(again.q, once)
+
+
+def test_limits_alone_are_clamped() -> None:
+    """Without contact nothing is nearer than each joint at its own limit."""
+    judge = Validator("panda", checks=["joint-range"])
+    model = judge.configured[0].model
+    repaired = repair_configurations(draw(), judge)
+    assert repaired.q is not None
+    clamped = np.clip(draw(), model.lowerPositionLimit, model.upperPositionLimit)
+    np.testing.assert_allclose(repaired.q, clamped, rtol=0, atol=1e-6)
+
+
+def test_spans_name_joints_with_their_units() -> None:
+    """Fingers slide, the others turn."""
+    units = {span.place: span.unit for span in repaired_draw().spans}
+    assert units["panda_joint1"] == "rad" and units["panda_finger_joint1"] == "m"
+
+
+def test_slopes_of_distances_are_differences() -> None:
+    """A pair's distance changes by its slope times the step."""
+    judge = Validator("human")
+    subject, collision = judge.configured
+    nearest = NearestConfiguration(subject=subject, collision=collision)
+    rng = np.random.default_rng(3)
+    q = np.asarray(pin.neutral(subject.model))
+    q[subject.index] += rng.uniform(-0.5, 0.5, len(subject.index))
+    value, slope = nearest._contacts(q)
+    step = 1e-6 * rng.normal(size=nearest.space.nv)
+    after, _ = nearest._contacts(nearest.space.integrate(q[None], step[None])[0])
+    assert len(value)
+    np.testing.assert_allclose(after - value, slope @ step, rtol=0, atol=1e-9)
+
+
+def test_what_is_no_configuration_is_refused() -> None:
+    """A width that is not the model's is named."""
+    with pytest.raises(InputError, match="nq|shape"):
+        repair_configurations(np.zeros((1, 3)), PANDA)
