@@ -77,12 +77,13 @@ def repair_configurations(q: ArrayLike, validator: Validator) -> Repaired:
 
     Examples
     --------
-    >>> import numpy as np, posekit
+    >>> import pinocchio, posekit
     >>> from posekit.remedy import repair_configurations
     >>> panda = posekit.Validator("panda")
-    >>> q = np.array([[0.0, 0.0, 0.0, 0.5, 0.0, 1.5, 0.0, 0.02, 0.02]])  # its fourth joint ends at -0.07
+    >>> q = pinocchio.neutral(panda.robot.model)[None]
+    >>> q[0, 10] = 0.5  # its fourth joint ends at -0.07
     >>> repaired = repair_configurations(q, panda)
-    >>> bool(panda.check(q=repaired.q).valid.all()), round(float(repaired.q[0, 3]), 2)
+    >>> bool(panda.check(q=repaired.q).valid.all()), round(float(repaired.q[0, 10]), 2)
     (True, -0.07)
     """
     subject, collision = validator.configured
