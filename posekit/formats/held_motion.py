@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.formats.format import Content
 from posekit.formats.held import HeldPostures
 from posekit.formats.motion import Motion, postures_of, read_motion
+from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
 from posekit.formats.motion.body_size import BodyUnit, body_unit, stature_of
 from posekit.formats.motion.ground_up import find_up
 from posekit.formats.motion.motion_format import MotionFormat
@@ -28,7 +30,14 @@ ORIGIN_METRES: Final = 0.03
 """How far from the origin the middle of the hips is where each frame has its own."""
 
 
-def read_recorded(path: Path, found: Recognised, *, unit: str | None = None, up: str | None = None) -> Motion:
+def read_recorded(
+    path: Path,
+    found: Recognised,
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    body_model: Path | None = None,
+) -> Motion:
     """Read motion as it was recorded.
 
     Parameters
@@ -39,6 +48,8 @@ def read_recorded(path: Path, found: Recognised, *, unit: str | None = None, up:
         What it is.
     unit, up : str, optional
         Instead of what the file says.
+    body_model : Path, optional
+        Of the angles of a body model: the model's NPZ.
 
     Raises
     ------
@@ -53,6 +64,9 @@ def read_recorded(path: Path, found: Recognised, *, unit: str | None = None, up:
         raise refusal(
             path, "format", f"{one.name}: {one.title}", f"points: {expected}", "choose a file of points"
         )
+    if one is AMASS_FORMAT:
+        motion = read_amass(path, body_model)
+        return motion if up is None else replace(motion, up=up, told=(*motion.told, "up"))
     return read_motion(path, one.name, unit=unit, up=up, as_recorded=True)
 
 

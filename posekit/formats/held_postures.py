@@ -65,6 +65,7 @@ def held_postures(
     unit: str | float | None = None,
     up: str | None = None,
     rate: float | None = None,
+    body_model: Path | None = None,
 ) -> HeldPostures:
     """Read the postures of a file.
 
@@ -82,6 +83,8 @@ def held_postures(
         Of motion: the axis that points up, instead of what the file says.
     rate : float, optional
         Of motion and configurations: frames a second, instead of what the file says.
+    body_model : Path, optional
+        Of the angles of a body model, as AMASS has them: the model's NPZ.
 
     Raises
     ------
@@ -102,7 +105,7 @@ def held_postures(
         from posekit.formats.held_motion import held_motion, read_recorded
 
         unit = None if unit is None else str(unit)
-        recorded = read_recorded(path, found, unit=unit, up=up)
+        recorded = read_recorded(path, found, unit=unit, up=up, body_model=body_model)
         return held_motion(recorded, layout=layout, unit=unit, up=up, rate=rate)
     if found.holds is Content.VIEW:
         return _of_truth(path, read_view(path))

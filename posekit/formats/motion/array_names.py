@@ -1,4 +1,4 @@
-"""The names of arrays by which an NPZ is told to hold a robot's motion."""
+"""The names of arrays by which an NPZ is told to hold a robot's motion, or a body model's."""
 
 from __future__ import annotations
 
@@ -28,3 +28,8 @@ def holds_robot(names: frozenset[str]) -> bool:
     """Tell whether arrays are of a robot's configurations: joints, and a root's turn."""
     turned = names & {*TURNS_IN_ORDER, *(turns for _, turns in BODIES)}
     return "qpos" in names or bool(turned and names & set(JOINTS))
+
+
+def holds_body_angles(names: frozenset[str]) -> bool:
+    """Tell whether arrays are the angles of a body model."""
+    return "trans" in names and ("poses" in names or {"root_orient", "pose_body"} <= names)

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from posekit.errors import InputError
 from posekit.formats.cameras.camera_format import is_intrinsics
 from posekit.formats.given_file import GivenFile
-from posekit.formats.motion.array_names import holds_robot
+from posekit.formats.motion.array_names import holds_body_angles, holds_robot
 from posekit.formats.motion.motion import UP_DIRECTIONS, Motion
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.motion.motion_table import rate_of, recorded_rate
@@ -222,11 +222,11 @@ def _kind(array: NDArray[Any]) -> str:
 
 
 def _looks_like(given: GivenFile) -> bool:
-    """Take every archive for motion that is not a camera's or a robot's: the reader says which arrays it misses."""
+    """Take every archive for points that is of nothing else: the reader says which arrays it misses."""
     if not given.start.startswith(b"PK\x03\x04"):
         return False
     return bool(given.arrays & set(_POINTS)) or not (
-        any(map(is_intrinsics, given.arrays)) or holds_robot(given.arrays)
+        any(map(is_intrinsics, given.arrays)) or holds_robot(given.arrays) or holds_body_angles(given.arrays)
     )
 
 

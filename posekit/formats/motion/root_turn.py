@@ -56,7 +56,9 @@ def root_turn(values: Array, order: str, source: str, field: str) -> RootTurn:
         return RootTurn(_in_order(values, order), "")
     stands = {name: upright(_in_order(values[known], name)) for name in ORDERS}
     if stands[CUSTOMARY] >= UPRIGHT_COSINE:
-        how = "so the robot stands" if stands["wxyz"] < UPRIGHT_COSINE else "as is customary; it stands by both"
+        how = (
+            "so the robot stands" if stands["wxyz"] < UPRIGHT_COSINE else "as is customary; it stands by both"
+        )
         return RootTurn(_in_order(values, CUSTOMARY), f"{field} is taken as x, y, z, w: {how}")
     if stands["wxyz"] >= UPRIGHT_COSINE and stands[CUSTOMARY] <= FALLEN_COSINE:
         return RootTurn(_in_order(values, "wxyz"), f"{field} is taken as w, x, y, z: so the robot stands")
