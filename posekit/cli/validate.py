@@ -191,6 +191,19 @@ def validate(
     up: Annotated[
         str, option("--up", "AXIS", "Against gravity, for `balance`: +z, +y, … Default: +z, or the file's.")
     ] = "",
+    unit: Annotated[
+        str,
+        option(
+            "--unit", "m|cm|mm|in", "What lengths of motion are in. Default: the file's, or told by size."
+        ),
+    ] = "",
+    rate: Annotated[
+        float | None, option("--rate", "HZ", "Frames a second of motion, where the file says none.")
+    ] = None,
+    body_model: Annotated[
+        Path | None,
+        option("--body-model", "FILE.npz", "Your SMPL, SMPL+H or SMPL-X, for files of angles as AMASS's."),
+    ] = None,
     profile: Annotated[
         str,
         option("--profile", "NAME|FILE", "Checks over time and their thresholds: posekit, or a TOML table."),
@@ -245,7 +258,7 @@ def validate(
     distinct(postures, output, page, timeline)
     outputs.check()
     allowed = parse_fail_over(fail_over)
-    given = _read(postures)
+    given = _read(postures, unit=unit, up=up, rate=rate, body_model=body_model)
     if not len(given.postures):
         raise InputError(f"{postures}: it holds no posture; nothing can be judged; expected at least one")
     figure: str | Figure = urdf or "stick_figure"
@@ -303,7 +316,7 @@ def validate(
     columns = columns_of(report)
     for line in summary_table(columns):
         typer.echo(line)
-    for line in validation.said_of(report, settings):
+    for line in (*getattr(given.postures, "said", ()), *validation.said_of(report, settings)):
         typer.echo(line)
     for line in written:
         typer.echo(line)
@@ -311,20 +324,26 @@ def validate(
         raise typer.Exit(SOME_INVALID)
 
 
-def _read(path: Path) -> _Input:
+def _read(path: Path, *, unit: str, up: str, rate: float | None, body_model: Path | None) -> _Input:
     """Read a file of whatever holds postures or configurations."""
     from posekit.formats.format import Content
     from posekit.formats.held_postures import configurations_of, held_postures, postures_of_result
     from posekit.formats.own import read_result
     from posekit.formats.recognising import recognise
 
+    if rate is not None and not 0 < rate < float("inf"):
+        raise InputError(f"--rate: {rate:g}; expected frames a second, above 0")
+    if up:
+        _direction(up)
     found = recognise(path)
     if found.holds is Content.RESULT:
         result = read_result(path)
         return _Input(postures_of_result(result), result)
     if found.holds is Content.CONFIGURATIONS:
-        return _Input(configurations_of(path, found))
-    return _Input(held_postures(path, found))
+        return _Input(configurations_of(path, found, rate))
+    way = up if not up or up[0] in "+-" else f"+{up}"
+    held = held_postures(path, found, unit=unit or None, up=way or None, rate=rate, body_model=body_model)
+    return _Input(held)
 
 
 def _clips(given: _Input) -> Any:
