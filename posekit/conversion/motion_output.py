@@ -85,11 +85,11 @@ def by_suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix == ".json":
         return "postures"
-    named = [one.name for one in motion_formats().values() if suffix in one.suffixes]
+    named = [one.name for one in motion_formats().values() if one.writes and suffix in one.suffixes]
     if not suffix:
         named = [one.name for one in motion_formats().values() if not one.suffixes]
     if len(named) != 1:
-        known = ", ".join(end for one in motion_formats().values() for end in one.suffixes)
+        known = ", ".join(end for one in motion_formats().values() if one.writes for end in one.suffixes)
         expected = f"one of {known}, .json; or none, for a folder with the person's URDF"
         raise refusal(path, "", f"a name that ends in {suffix}", expected, "name it so, or say --to")
     return named[0]

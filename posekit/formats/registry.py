@@ -38,11 +38,11 @@ BUILT_IN: Final[Mapping[Content, Mapping[str, tuple[str, ...]]]] = {
         "motion.c3d:C3D_FORMAT": (".c3d",),
         "motion.csv_table:CSV_FORMAT": (".csv",),
         "motion.npz:NPZ_FORMAT": (".npz",),
-        "motion.amass:AMASS_FORMAT": (".npz",),
         "motion.parquet:PARQUET_FORMAT": (".parquet", ".pq"),
         "motion.mot:MOT_FORMAT": (".mot", ".sto"),
         "motion.bvh:BVH_FORMAT": (".bvh",),
         "motion.glb:GLB_FORMAT": (".glb",),
+        "motion.amass:AMASS_FORMAT": (".npz",),
         "motion.urdf_folder:URDF_FORMAT": (FOLDER_SUFFIX,),
     },
     Content.CONFIGURATIONS: {

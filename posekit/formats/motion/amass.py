@@ -19,14 +19,18 @@ from posekit.formats.motion.array_names import RATES, holds_body_angles
 from posekit.formats.motion.body_model import BODY_JOINTS, BODY_PARENTS, BodyModel, read_body_model
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
-from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.geometry import Array
 from posekit.geometry.rotations import rotation_from_vector
 from posekit.safe_io import open_npz, refusal
 
 MAX_BYTES: Final = 2_000_000_000
 FRAMERATES: Final = ("mocap_framerate", "mocap_frame_rate", *RATES)
-SKELETON: Final = "smpl_22"
+NAMES: Final = (
+    *("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle"),
+    *("right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head"),
+    *("left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"),
+)
+"""The joints of the body in the order of SMPL, SMPL+H and SMPL-X."""
 Arrays = Mapping[str, NDArray[Any]]
 _KEYS: Final = ("poses", "root_orient", "pose_body", "trans", "betas", *FRAMERATES)
 
@@ -63,7 +67,7 @@ def read_amass(path: str | Path, body_model: str | Path | None = None) -> Motion
     if "betas" not in arrays:
         said.append("the file says no shape (betas): the person is the body model's mean")
     return Motion(
-        names=load_skeleton_map(SKELETON).points,
+        names=NAMES,
         points=placed_joints(model, poses, trans, betas),
         time=np.arange(len(poses)) / rate,
         rate=rate,

@@ -155,8 +155,9 @@ def _by_suffix(path: str | Path) -> MotionFormat:
     suffix = Path(path).suffix.lower()
     if not suffix:
         return _of_folders(Path(path))
-    named = [one for one in motion_formats().values() if suffix in one.suffixes]
+    written = [one for one in motion_formats().values() if one.writes]
+    named = [one for one in written if suffix in one.suffixes]
     if len(named) != 1:
-        known = ", ".join(end for one in motion_formats().values() for end in one.suffixes)
+        known = ", ".join(end for one in written for end in one.suffixes)
         raise refusal(path, "format", shown(suffix), f"one of {known}", "name the file so, or say --to")
     return named[0]
