@@ -438,7 +438,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             sizes=(0.1, 0.05, 0.03, 0.02),
             asked=0.05,
             put=drift,
-            share=0.4,
+            share=0.35,
         ),
         Defect(
             name="jitter",

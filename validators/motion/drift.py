@@ -22,7 +22,7 @@ LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2],
 DRIFT_FRAMES: Final = 5
 """Whose median length is judged: one frame's is no drift."""
 
-SHAKEN_METRES: Final = 0.004
+SHAKEN_METRES: Final = 0.0025
 """A joint that trembles by more makes lengths tremble: `jitter` names that."""
 
 

@@ -20,7 +20,7 @@ from posekit.geometry import Array
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.duplicates import duplicates
 from posekit.validators.motion.jumps import Jumps, jumps_of
-from posekit.validators.motion.order import displaced
+from posekit.validators.motion.order import displaced, stretches_of
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, timeline_of
 from posekit.validators.motion.trembling import trembling_of
@@ -84,9 +84,10 @@ def _explain(clip: MotionClip) -> Explained:
     known = repeats == 0
     places = np.zeros(len(joints), dtype=np.intp)
     places[known] = displaced(joints[known])
+    rearranged = stretches_of(places)
     if places.any():
-        joints = np.where((places != 0)[:, None, None], np.nan, joints)
-    kept = known & (places == 0)
+        joints = np.where(rearranged[:, None, None], np.nan, joints)
+    kept = known & ~rearranged
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
     exchanged[kept] = exchanged_pairs(joints[kept], clip.feet[order][kept], clip.head[order][kept])
     joints = timeline.spread(put_right(joints, exchanged)[back])

@@ -23,6 +23,9 @@ LEAST_FRAMES: Final = 3
 LEAST_METRES: Final = 0.005
 """A joint that moves less between frames does not say in which order they come."""
 
+LEAST_JOINTS: Final = 3
+"""That move: one or two that turn back tremble."""
+
 TURNS_APART: Final = 10
 """Frames between two turns back that are one stretch."""
 
@@ -54,7 +57,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
     moving = (norm(steps[1:]) > LEAST_METRES) & (norm(steps[:-1]) > LEAST_METRES)
     backward = ((dots < 0) & moving).sum(axis=1)
     turning = np.zeros(count, dtype=np.bool_)
-    turning[1:-1] = (backward * 2 > moving.sum(axis=1)) & (moving.sum(axis=1) * 2 >= joints.shape[1])
+    turning[1:-1] = (backward * 2 > moving.sum(axis=1)) & (moving.sum(axis=1) >= LEAST_JOINTS)
     for first, last in _stretches(turning):
         rows = np.arange(max(first - AROUND_FRAMES, 0), min(last + AROUND_FRAMES + 1, count))
         rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
@@ -62,6 +65,15 @@ def displaced(joints: Array) -> NDArray[np.intp]:
             order = _shortest(joints[rows].reshape(len(rows), -1))
             places[rows[order]] = rows - rows[order]
     return places
+
+
+def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:
+    """Say which frames are in a stretch with frames out of place (T,): those that are in theirs by chance, too."""
+    at = np.flatnonzero(places)
+    inside = np.zeros(len(places), dtype=np.bool_)
+    for part in np.split(at, np.flatnonzero(np.diff(at) > TURNS_APART) + 1) if len(at) else []:
+        inside[part[0] : part[-1] + 1] = True
+    return inside
 
 
 def _stretches(turning: NDArray[np.bool_]) -> list[tuple[int, int]]:

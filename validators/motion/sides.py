@@ -134,13 +134,20 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[A
 
 
 def _length(straight: Array, crossed: Array) -> float:
-    """Return a segment's median length: crossed, where as labelled it spreads and crossed it does not."""
-    middles = [_median(one) for one in (straight, crossed)]
-    spreads = [
-        _median(np.abs(one - middle)) for one, middle in zip((straight, crossed), middles, strict=True)
-    ]
-    torn = spreads[0] > TORN_METRES and spreads[1] < spreads[0] / 2
-    return middles[torn]
+    """Return a segment's length: the median as labelled or, where that spreads, what most lengths are together at.
+
+    The right length is half of all lengths, as labelled and crossed, whatever share of a clip is exchanged: the
+    middle of the shortest interval with two fifths of them (Robertson & Cryer 1974, J. Am. Stat. Assoc. 69,
+    1012-1016).
+    """
+    middle = _median(straight)
+    if not _median(np.abs(straight - middle)) > TORN_METRES:
+        return middle
+    every = np.sort(np.concatenate([straight, crossed], axis=None))
+    every = every[np.isfinite(every)]
+    within = max(2 * len(every) // 5, 1)
+    start = int((every[within:] - every[: len(every) - within]).argmin())
+    return float(every[start + within // 2])
 
 
 def _median(lengths: Array) -> float:

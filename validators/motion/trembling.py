@@ -24,11 +24,14 @@ MEDIAN_OF_THREE: Final = 1.5382
 NEAR_FRAMES: Final = 4
 """Between two stretches that are one."""
 
-EDGE_FRAMES: Final = 14
+EDGE_FRAMES: Final = 20
 """By which the edges of a stretch are looked for, either way."""
 
 OUTSIDE_FRAMES: Final = 40
 """Before and after a stretch that say how much joints tremble outside it."""
+
+LEAST_SHARE, FEW_FRAMES_SHARE = 0.1, 0.3
+"""Of the trembling inside that there is outside at least; and where a few frames are all that says so."""
 
 MOST_EVIDENCE: Final = 6.0
 """Of one joint in one frame that it trembles, or not: natural logarithm of a ratio of likelihoods."""
@@ -81,8 +84,9 @@ def _edges(rough: Array, first: int, last: int) -> tuple[int, int]:
     low, high = max(first - EDGE_FRAMES, 0), min(last + EDGE_FRAMES, len(rough) - 1)
     beyond = np.r_[max(first - OUTSIDE_FRAMES, 0) : max(first - 2, 0), last + 3 : last + OUTSIDE_FRAMES]
     outside = rough[beyond[beyond < len(rough)]]
+    share = LEAST_SHARE if len(outside) >= TREMBLING_FRAMES else FEW_FRAMES_SHARE
     inside = _spread(rough[first : last + 1])
-    outside_spread = np.clip(_spread(outside) if len(outside) else 0.0, 0.05 * inside, 0.6 * inside)
+    outside_spread = np.clip(_spread(outside) if len(outside) else 0.0, share * inside, 0.6 * inside)
     ratio = 3.0 * np.log(outside_spread / inside) + rough[low : high + 1] ** 2 / 2.0 * (
         outside_spread**-2.0 - inside**-2.0
     )
