@@ -16,6 +16,9 @@ Bools = NDArray[np.bool_]
 SMOOTH_SECONDS: Final = 0.3
 """Seconds over which the height by which a body is shifted changes."""
 
+MOST_SHIFT_METRES: Final = 0.5
+"""Metres: a body that is farther from the ground is not meant to stand on it, or up is another way."""
+
 STANDING_PERCENT: Final = 50
 """Of the heights of frames that are right: where the lowest point usually is."""
 
@@ -42,7 +45,8 @@ def grounded(points: Array, bad: Bools, up: Array, rate: float) -> Array:
         level = usual if usual is not None else 0.0
         needed = level - lowest[first : last + 1]
         by = _over(np.mean, _over(np.median, needed, width), width)
-        out[first : last + 1] += by[:, None, None] * up
+        if np.abs(by).max() <= MOST_SHIFT_METRES:
+            out[first : last + 1] += by[:, None, None] * up
     return out
 
 

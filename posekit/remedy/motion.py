@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,11 +78,14 @@ class MotionRepair:
     ----------
     points : array (T, 23, 3)
         In the order of `posekit.remedy.exchange.CLIP_MARKS`.
+    time : array (T,)
+        Seconds, in the order of the frames.
     steps : list of (str, array (T, 14))
         What was done, and how far each joint moved, metres.
     """
 
     points: Array
+    time: Array
     steps: list[tuple[str, Array]]
 
 
@@ -99,25 +102,57 @@ def clip_with(clip: MotionClip, points: Array) -> MotionClip:
 
 def repair_over_time(clip: MotionClip, validator: Validator, person: MeasuredPerson | None) -> MotionRepair:
     """Undo what checks over time reject, as far as that lessens what they reject."""
-    points = clip_points(clip)
-    steps: list[tuple[str, Array]] = []
+    points, steps = clip_points(clip), _Steps([])
     found = _rejected(validator, clip)
+    for tried in _in_order(clip, found):
+        there = _rejected(validator, tried)
+        if there.count < found.count:
+            new = clip_points(tried)
+            steps.add("reordered", points, new)
+            clip, points, found = tried, new, there
+            break
     for _ in range(MOTION_ROUNDS):
         before = found.count
         for name, remedy in MOTION_REMEDIES:
             if not found.count:
-                return MotionRepair(points=points, steps=steps)
-            tried = remedy(clip_with(clip, points), points, found, person or measured_person(points[:, :14]))
-            for new in tried:
+                break
+            whose = person or measured_person(points[:, : len(JOINTS)])
+            for new in remedy(clip_with(clip, points), points, found, whose):
                 there = _rejected(validator, clip_with(clip, new))
                 if there.count < found.count:
-                    way = np.nan_to_num(np.linalg.norm(new - points, axis=-1))[:, : len(JOINTS)]
-                    steps.append((name, way))
+                    steps.add(name, points, new)
                     points, found = new, there
                     break
-        if found.count >= before:
+        if found.count >= before or not found.count:
             break
-    return MotionRepair(points=points, steps=steps)
+    return MotionRepair(points=points, time=clip.time, steps=steps.taken)
+
+
+class _Steps(NamedTuple):
+    """What was done, and how far each joint moved (T, 14), metres."""
+
+    taken: list[tuple[str, Array]]
+
+    def add(self, name: str, before: Array, after: Array) -> None:
+        way = np.nan_to_num(np.linalg.norm(after - before, axis=-1))
+        self.taken.append((name, way[:, : len(JOINTS)]))
+
+
+def _in_order(clip: MotionClip, found: Rejected) -> Iterator[MotionClip]:
+    """Put frames in the order of their times or, where these are in order, of the motion."""
+    if found.frames("timing") is None:
+        return
+    if (np.diff(clip.time) < 0).any():
+        order = np.argsort(clip.time, kind="stable")
+        yield replace(clip_with(clip, clip_points(clip)[order]), time=clip.time[order])
+        return
+    one = found.judgements["timing"]
+    if "order" not in one.where:
+        return
+    away = np.nan_to_num(one.value[:, one.where.index("order")])
+    for sign in (-1.0, 1.0):
+        order = np.argsort(np.arange(len(clip)) + sign * away, kind="stable")
+        yield clip_with(clip, clip_points(clip)[order])
 
 
 def _rejected(validator: Validator, clip: MotionClip) -> Rejected:

@@ -24,7 +24,8 @@ class RepairedSpan:
     Parameters
     ----------
     remedy : str
-        What was done: ``turned``, ``shifted``, ``interpolated``, ``exchanged``, ``smoothed``, ``held``, ``lengthened``.
+        What was done: ``turned``, ``shifted``, ``interpolated``, ``exchanged``, ``smoothed``, ``held``, ``lengthened``,
+        ``reordered``.
     place : str
         The joint, of a robot the joint of its URDF.
     first, last : int
@@ -88,6 +89,8 @@ class Repaired:
         The head's points, where they were given.
     q : array (N, nq), optional
         Of a robot, its configurations.
+    time : array (N,), optional
+        Of a motion, the times of its frames, seconds: in order, where frames were put in order.
     spans : tuple of RepairedSpan
         What was changed, most first.
     left : tuple of UnrepairedFrame
@@ -99,6 +102,7 @@ class Repaired:
     joints: Array
     head: Array | None = None
     q: Array | None = None
+    time: Array | None = None
     spans: tuple[RepairedSpan, ...]
     left: tuple[UnrepairedFrame, ...]
     valid: NDArray[np.bool_]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -89,10 +90,10 @@ def repair(
         points = with_head(joints)
         if head is not None:
             points[:, len(JOINTS) :] = head
-        start, steps = points, []
+        start, steps, time = points, [], None
     else:
         done = repair_over_time(clip, judge, person)
-        points, start, steps = clip_points(clip), done.points, done.steps
+        points, start, steps, time = clip_points(clip), done.points, done.steps, done.time.copy()
     weight = np.tile(joint_weights(), (len(points), 1))
     if weights is not None:
         weight[:, : len(JOINTS)] = weights
@@ -103,7 +104,9 @@ def repair(
     if clip is not None:
         out = start.copy()
         out[:, : len(POINTS)] = legal.points
-        over_time = judge_motion(judge.profile.checks, clip_with(clip, out)).judgements
+        over_time = judge_motion(
+            judge.profile.checks, clip_with(replace(clip, time=done.time), out)
+        ).judgements
         judgements += over_time
         for one in over_time:
             valid &= ~one.violated.any(axis=1)
@@ -111,6 +114,7 @@ def repair(
     return Repaired(
         joints=legal.points[:, : len(JOINTS)].copy(),
         head=legal.points[:, len(JOINTS) :].copy() if has_head else None,
+        time=time,
         spans=tuple(sorted(spans, key=lambda span: -span.most)),
         left=left_of(judgements),
         valid=valid,
