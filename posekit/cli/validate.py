@@ -251,7 +251,7 @@ def validate(
     from posekit.body.closing import closing_line
     from posekit.formats import own as files
     from posekit.formats.own.report import columns_of
-    from posekit.formats.own.report_table import summary_table
+    from posekit.formats.own.report_table import clip_lines, summary_table
     from posekit.settings import DEFAULT_RANGES, ValidateSettings
 
     outputs = ValidateOutput(report=output, page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
@@ -315,6 +315,8 @@ def validate(
         typer.echo(f"posekit: warning: {changed}", err=True)
     columns = columns_of(report)
     for line in summary_table(columns):
+        typer.echo(line)
+    for line in clip_lines(report.clips) if report.clips else ():
         typer.echo(line)
     for line in (*getattr(given.postures, "said", ()), *validation.said_of(report, settings)):
         typer.echo(line)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Final, NamedTuple
 
@@ -12,6 +13,7 @@ from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import PER_DEGREE, VerdictColumns
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES
+from posekit.geometry import Array
 from posekit.validation.over_time import rate_of
 
 MERGED_SECONDS: Final = 0.1
@@ -21,7 +23,10 @@ MERGED_FRAMES: Final = 3
 """The same in frames, where the rate is not known; and the least."""
 
 MOST_SPANS: Final = 100
-"""Spans that are listed of a clip, the worst first."""
+"""Spans that are listed of a clip: the worst of each check."""
+
+MOST_NAMED_PLACES: Final = 10
+"""Places of a span that are named."""
 
 MOST_SPANS_OF_ALL: Final = 20_000
 """Spans that are listed of all clips of a report; each has five at least."""
@@ -74,7 +79,7 @@ def _verdict(
     verdict, time = columns.verdict[rows], frames.time[rows]
     rate = rate_of(time)
     gap = max(MERGED_FRAMES, round(MERGED_SECONDS * rate)) if np.isfinite(rate) else MERGED_FRAMES
-    spans = (
+    found = (
         [
             *_invalid_spans(columns, frames, rows, firsts, gap),
             *_undecided_spans(columns, frames, rows, gap),
@@ -82,7 +87,6 @@ def _verdict(
         if frames.in_time
         else []
     )
-    found = sorted(spans, key=_badness)
     bad = np.flatnonzero(verdict)
     counts = np.bincount(verdict, minlength=len(VERDICT_NAMES)).tolist()
     good = longest_run(verdict == 0)
@@ -96,7 +100,7 @@ def _verdict(
         frames=len(rows),
         invalid=counts[_INVALID],
         undecided=counts[_UNDECIDED],
-        spans=tuple(found[:most]),
+        spans=_listed(found, most),
         more_spans=max(len(found) - most, 0),
         first_frame=None if first is None else int(frames.frame[first]),
         first_by=() if first is None else tuple(_behind(columns, first, firsts)),
@@ -117,8 +121,27 @@ def longest_run(good: NDArray[np.bool_]) -> tuple[int, int] | None:
 
 def _badness(span: Span) -> tuple[bool, float, int]:
     """Order spans: what is rejected first, of those what is farthest beyond its bound."""
-    beyond = 0.0 if span.margin is None else span.margin / PER_DEGREE.get(span.unit, 1.0)
+    margin, bound = (np.array([np.nan if x is None else x]) for x in (span.margin, span.bound))
+    beyond = float(np.nan_to_num(_beyond(margin, bound, span.unit))[0])
     return span.verdict == "undecided", beyond, span.first
+
+
+def _beyond(margin: Array, bound: Array, unit: str) -> Array:
+    """Return margins as they are compared: 10 degrees or centimetres count as much as the bound of another unit."""
+    if unit in PER_DEGREE:
+        return margin / (10 * PER_DEGREE[unit])
+    return margin / np.where(np.abs(bound) > 0, np.abs(bound), 1.0)
+
+
+def _listed(spans: Sequence[Span], most: int) -> tuple[Span, ...]:
+    """Choose spans, of each check as many as there is room for, and list the worst first."""
+    ranks: Counter[str] = Counter()
+    ranked = []
+    for span in sorted(spans, key=_badness):
+        ranked.append((ranks[span.check], span))
+        ranks[span.check] += 1
+    chosen = sorted(ranked, key=lambda pair: pair[0])[:most]
+    return tuple(sorted((span for _, span in chosen), key=_badness))
 
 
 def _behind(columns: VerdictColumns, row: int, firsts: NDArray[np.intp]) -> Sequence[str]:
@@ -137,14 +160,20 @@ def _invalid_spans(
     at = np.repeat(np.arange(len(rows)), counts)
     offset = np.arange(len(at)) - np.repeat(np.cumsum(counts) - counts, counts)
     index = firsts[rows[at]] + offset
-    for first, last, cells in _runs(_Cells(at, columns.place[index].astype(np.intp), index), gap):
-        place = columns.places[int(cells.what[0])]
-        worst = int(np.argmin(np.where(np.isnan(columns.margin[cells.row]), 0.0, columns.margin[cells.row])))
-        k = int(cells.row[worst])
+    checks = np.array([columns.checks.index(place.check) for place in columns.places], dtype=np.intp)
+    what = checks[columns.place[index]] if len(checks) else at
+    for first, last, cells in _runs(_Cells(at, what, index), gap):
+        margin, bound = columns.margin[cells.row], columns.bound[cells.row]
+        unit = columns.places[int(columns.place[cells.row[0]])].unit
+        order = np.argsort(np.nan_to_num(_beyond(margin, bound, unit)), kind="stable")
+        k, worst = int(cells.row[order[0]]), int(order[0])
+        place = columns.places[int(columns.place[k])]
+        named = dict.fromkeys(columns.place[cells.row[order]].tolist())
         yield Span(
             check=place.check,
             where=place.where,
             unit=place.unit,
+            places=tuple(columns.places[one].where for one in named)[:MOST_NAMED_PLACES],
             verdict="invalid",
             first=int(frames.frame[rows[first]]),
             last=int(frames.frame[rows[last]]),

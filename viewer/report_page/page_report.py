@@ -25,7 +25,7 @@ MOST_DETAILED_CLIPS: Final = 200
 MOST_NAMED_CLIPS: Final = 2000
 """Further clips that are not valid and are named."""
 
-MOST_PAGE_SPANS: Final = 60
+MOST_PAGE_SPANS: Final = 100
 """Spans of a clip that the page has, the worst first."""
 
 MOST_SETTING_CHARACTERS: Final = 2000
@@ -124,7 +124,8 @@ def _span(span: Span) -> dict[str, Any]:
     return {
         **{name: getattr(span, name) for name in ("check", "where", "unit", "verdict", "first", "last")},
         "worst": span.worst_frame,
-        "joints": _joints(f"{span.check}/{span.where}"),
+        "places": list(span.places),
+        "joints": sorted({joint for where in span.places for joint in _joints(f"{span.check}/{where}")}),
         **rounded,
     }
 
@@ -133,7 +134,7 @@ def _joints(reason: str) -> list[int]:
     """Return which joints a finding is about: those that it names, or the ends of the links that it names."""
     found = culprit(reason)
     ends = [point for link in found.links for axis in CAPSULE_AXES[link] for point in axis]
-    return sorted({*(JOINT[name] for name in found.joints), *ends})
+    return [*(JOINT[name] for name in found.joints), *ends]
 
 
 def _millimetres(points: np.ndarray[Any, Any] | None) -> list[list[int] | None] | None:

@@ -85,6 +85,7 @@ function showClip(clip, skeleton) {
     buttons.querySelectorAll("button").forEach((button, j) => button.setAttribute("aria-pressed", String(j === k)));
     const facts = [["check", spanName(span)], ["verdict", span.verdict], ["frames", `${span.first} to ${span.last}`]];
     if (span.start !== null && span.end !== null) facts.push(["time", `${span.start} to ${span.end} s`]);
+    if (span.places.length > 1) facts.push(["places", span.places.join(", ")]);
     facts.push(["worst in frame", String(span.worst)]);
     if (span.verdict === "invalid") facts.push(["value", withUnit(span.value, span.unit)], ["bound", withUnit(span.bound, span.unit)]);
     const list = make("dl", {}, ...facts.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));

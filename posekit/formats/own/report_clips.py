@@ -14,12 +14,12 @@ from posekit.formats.own.report_schema import ClipFields, Verdict
 
 @dataclass(frozen=True, kw_only=True)
 class Span:
-    """Neighbouring frames of a clip that one check rejects at one place, or says nothing about.
+    """Neighbouring frames of a clip that one check rejects, or says nothing about.
 
     Parameters
     ----------
     check, where, unit : str
-        The check, its place, and the unit of the numbers; no place where it says nothing.
+        The check, its worst place, and the unit of the numbers; no place where it says nothing.
     verdict : str
         ``invalid`` or ``undecided``.
     first, last : int
@@ -32,6 +32,8 @@ class Span:
         Seconds of the first and the last frame.
     value, bound, margin : float or None
         What was found in the worst frame, the bound that it is beyond, and by how much, negative.
+    places : sequence of str
+        All places that the check rejects in the span, the worst first; ten at most.
     """
 
     check: str
@@ -47,6 +49,7 @@ class Span:
     value: float | None = None
     bound: float | None = None
     margin: float | None = None
+    places: Sequence[str] = ()
 
     @property
     def name(self) -> str:
@@ -125,5 +128,8 @@ def clip_document(clip: ClipVerdict) -> dict[str, Any]:
 def clip_of_document(given: ClipFields) -> ClipVerdict:
     """Read a clip's verdict from a report."""
     own = {one.name: getattr(given, one.name) for one in fields(ClipVerdict)}
-    spans = tuple(Span(**{one.name: getattr(span, one.name) for one in fields(Span)}) for span in given.spans)
+    spans = tuple(
+        Span(**{one.name: getattr(span, one.name) for one in fields(Span)} | {"places": tuple(span.places)})
+        for span in given.spans
+    )
     return ClipVerdict(**own | {"spans": spans, "first_by": tuple(given.first_by), "good": tuple(given.good)})

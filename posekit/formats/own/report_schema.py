@@ -41,10 +41,10 @@ class WorstFields(FileModel):
 
 
 class SpanFields(FileModel):
-    """Neighbouring frames of a clip that one check rejects at one place, or says nothing about."""
+    """Neighbouring frames of a clip that one check rejects, or says nothing about."""
 
     check: str
-    where: str = Field(description="The place; empty where the check says nothing.")
+    where: str = Field(description="The worst place; empty where the check says nothing.")
     unit: str
     verdict: Literal["invalid", "undecided"]
     first: Annotated[int, Field(ge=0)] = Field(description="Its first frame, counted from 0 in the clip.")
@@ -56,6 +56,7 @@ class SpanFields(FileModel):
     value: float | None = Field(default=None, description="What was found in the worst frame, in `unit`.")
     bound: float | None = Field(default=None, description="The bound that it is beyond.")
     margin: float | None = Field(default=None, description="By how much; negative.")
+    places: list[str] = Field(default=[], description="All its places, the worst first; ten at most.")
 
 
 class ClipFields(FileModel):

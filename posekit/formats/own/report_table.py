@@ -23,6 +23,9 @@ MAX_SHOWN_POSTURES: Final = 100
 MAX_SHOWN_CLIPS: Final = 100
 """Clips that are not valid, in a Markdown file."""
 
+MAX_TERMINAL_CLIPS: Final = 5
+"""Clips that are not valid, on the terminal."""
+
 MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
 
@@ -119,6 +122,24 @@ def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> lis
     return lines + _table(head, [_of_clip(clip) for clip in bad[:most]])
 
 
+def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> list[str]:
+    """Count the clips, and name the worst of those that are not valid, a line each.
+
+    Parameters
+    ----------
+    clips : sequence of ClipVerdict
+        The verdicts on clips.
+    most : int
+        How many are named.
+    """
+    bad = worst_first(clips)
+    lines = clip_table(clips)[:1]
+    for clip in bad[:most]:
+        name, verdict, share, *_, worst, good = map(str, _of_clip(clip))
+        lines.append(_cell(f"  {name}: {verdict}, {share} not valid; {worst}; longest good span {good}"))
+    return [*lines, f"  and {len(bad) - most} more"] if len(bad) > most else lines
+
+
 def worst_first(clips: Sequence[ClipVerdict]) -> list[ClipVerdict]:
     """Return the clips that are not valid: invalid ones first, by their share of frames that are not valid."""
     bad = [clip for clip in clips if clip.verdict != "valid"]
@@ -142,7 +163,8 @@ def said_of_span(span: Span) -> str:
     if span.start is not None and span.end is not None and span.last > span.first:
         time = f" ({span.start:.2f} to {span.end:.2f} s)"
     frames = f"frames {span.first} to {span.last}" if span.last > span.first else f"frame {span.first}"
-    said = f"{span.name}, {frames}{time}"
+    more = f" and {len(span.places) - 1} more" if len(span.places) > 1 else ""
+    said = f"{span.name}{more}, {frames}{time}"
     if span.value is None:
         return said if span.verdict == "invalid" else f"{said}, undecided"
     bound = "" if span.bound is None else f" (bound {span.bound:.4g})"
