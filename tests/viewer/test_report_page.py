@@ -29,6 +29,7 @@ def a_span(first: int, last: int, **changes) -> Span:
         "check": "speed",
         "where": "right_wrist",
         "unit": "m/s",
+        "verdict": "invalid",
         "worst_frame": first,
         "places": ("right_wrist",),
     }
