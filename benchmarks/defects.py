@@ -312,8 +312,9 @@ def another_unit(clip: MotionClip, span: Span, size: float, rng: np.random.Gener
 
 
 def another_up(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
-    """Turn the body by degrees about a horizontal axis; what is said to be up stays."""
-    axis, angle = _horizontal(clip, rng), np.radians(size)
+    """Turn the body by degrees about a horizontal axis of the coordinates; what is said to be up stays."""
+    horizontal = np.eye(3)[np.abs(up_of(clip)) < 0.5]
+    axis, angle = horizontal[int(rng.integers(2))], np.radians(size)
     cross = np.cross(np.eye(3), axis)
     turn = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
     return Broken(clip=every_point(clip, lambda points: points @ turn), span=span)

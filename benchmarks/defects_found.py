@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from benchmarks.clean_clips import CleanClip, clean_clips
 from benchmarks.defects import DEFECTS, DefectCase, draw
+from benchmarks.defects_in_files import FOUND_IN_FILES, rejected_in_file
 from posekit.formats.markdown import table_lines
 from posekit.validators.motion import MotionClip, judge_motion, load_profile
 
@@ -45,10 +46,15 @@ def is_found(case: DefectCase, frames: Mapping[str, NDArray[np.bool_]]) -> bool:
     )
 
 
+def _rejected_of(case: DefectCase) -> dict[str, NDArray[np.bool_]]:
+    by_file = set(DEFECTS[case.kind].checks) & set(FOUND_IN_FILES)
+    return rejected_in_file(case.clip) if by_file else rejected(case.clip)
+
+
 @cache
 def _asked(kind: str) -> bool:
-    """Say whether a check over time of the profile names a kind."""
-    names = {check.name for check in load_profile("posekit").checks}
+    """Say whether something names a kind."""
+    names = {*FOUND_IN_FILES, *(check.name for check in load_profile("posekit").checks)}
     return bool(names & set(DEFECTS[kind].checks))
 
 
@@ -83,7 +89,7 @@ def print_found(drawn: Sequence[DefectCase], *, missed: bool) -> None:
     found: dict[tuple[str, float], list[bool]] = defaultdict(list)
     others: dict[tuple[str, float], Counter[str]] = defaultdict(Counter)
     for case in drawn:
-        frames, key = rejected(case.clip), (case.kind, case.size)
+        frames, key = _rejected_of(case), (case.kind, case.size)
         found[key].append(is_found(case, frames))
         others[key].update(
             name for name, at in frames.items() if at.any() and name not in DEFECTS[case.kind].checks
