@@ -27,6 +27,8 @@ JOINTS: Final = (
 )
 HEAD_POINTS: Final = ("nose", "right_eye", "left_eye", "right_ear", "left_ear")
 POINTS: Final = JOINTS + HEAD_POINTS
+FEET_POINTS: Final = ("right_toe", "left_toe", "right_heel", "left_heel")
+"""No joints of the figure: what a file may have besides, and a foot stands on."""
 SIDES: Final = ("right", "left")
 
 JOINT: Final = {name: index for index, name in enumerate(JOINTS)}

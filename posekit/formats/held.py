@@ -36,6 +36,8 @@ class HeldPostures:
         nothing is known of the ground, or of where the body goes.
     said : tuple of str
         What was recognised, and from what, a sentence each: for people.
+    feet : array (N, 4, 3)
+        Toes and heels in the order of `posekit.skeleton.FEET_POINTS`, metres; empty where there are none.
     q : array (N, nq)
         Configurations of the robot whose postures they are; empty where there is none.
     """
@@ -49,6 +51,7 @@ class HeldPostures:
     unit: str = "m"
     in_world: bool = True
     said: tuple[str, ...] = ()
+    feet: Array = field(default_factory=lambda: np.empty(0))
     q: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def __len__(self) -> int:

@@ -124,6 +124,7 @@ def held_motion(
         unit=size.name,
         in_world=in_world,
         said=tuple(said),
+        feet=size.metres * found.feet,
     )
 
 

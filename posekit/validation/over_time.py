@@ -35,6 +35,7 @@ def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) ->
     return MotionClip(
         joints=joints,
         head=np.empty(0) if head is None else head[rows],
+        feet=held.feet[rows] if held.feet.size else held.feet,
         time=time,
         rate=rate_of(time),
         # Where each frame has its own origin there is no ground, and nothing goes anywhere.

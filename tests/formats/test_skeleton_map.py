@@ -280,3 +280,15 @@ def test_a_map_that_is_not_there_is_refused_in_one_line(name: str) -> None:
     with pytest.raises(InputError) as caught:
         load_skeleton_map(name)
     assert "\n" not in str(caught.value)
+
+
+def test_feet_are_picked_by_their_names_and_change_sides_with_the_rest() -> None:
+    layout = load_skeleton_map("body_25")
+    values = np.random.default_rng(0).normal(size=(3, len(layout.points), 2))
+    feet = layout.gather_feet(values)
+    np.testing.assert_array_equal(feet[:, 0], values[:, layout.points.index("RBigToe")])
+    np.testing.assert_array_equal(layout.swapped().gather_feet(values), feet[:, [1, 0, 3, 2]])
+    order = np.arange(len(layout.points))[::-1]
+    over = layout.over([layout.points[k] for k in order])
+    np.testing.assert_array_equal(over.gather_feet(values[:, order]), feet)
+    assert np.isnan(load_skeleton_map("coco_17").gather_feet(values[:, :17])).all()

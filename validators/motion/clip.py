@@ -9,10 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.skeleton import HEAD_POINTS, JOINTS
-
-FEET_POINTS = ("right_toe", "left_toe", "right_heel", "left_heel")
-"""The feet's points in their order."""
+from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,7 +27,7 @@ class MotionClip:
     head : array (T, 5, 3), optional
         Nose, eyes and ears.
     feet : array (T, 4, 3), optional
-        In the order of `FEET_POINTS`; NaN where the file has none.
+        In the order of `posekit.skeleton.FEET_POINTS`; NaN where the file has none.
     up : array (3,), optional
         Against gravity; None where it is not known.
     ground : float, optional

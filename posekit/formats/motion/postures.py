@@ -50,6 +50,8 @@ class MotionPostures:
         The joints that no point of the file is, placed from shoulders and hips.
     layout : SkeletonMap
         The map.
+    feet : array (T, 4, 3)
+        Toes and heels in the order of `posekit.skeleton.FEET_POINTS`, metres; NaN where the file has none.
     """
 
     joints: Array
@@ -57,9 +59,10 @@ class MotionPostures:
     landmarks: Array
     derived: tuple[str, ...]
     layout: SkeletonMap
+    feet: Array
 
     def __post_init__(self) -> None:
-        for array in (self.joints, self.head, self.landmarks):
+        for array in (self.joints, self.head, self.landmarks, self.feet):
             array.flags.writeable = False
 
 
@@ -107,6 +110,7 @@ def postures_of(
         landmarks=landmarks,
         derived=derived,
         layout=layout,
+        feet=layout.gather_feet(motion.points, motion.names),
     )
 
 

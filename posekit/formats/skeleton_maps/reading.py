@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Final
 
 from posekit.formats.skeleton_maps.skeleton_map import LANDMARK_ORDER, SkeletonMap, plain
 from posekit.safe_io import nearest, refusal, shown
-from posekit.skeleton import other_side
+from posekit.skeleton import FEET_POINTS, other_side
 
 if TYPE_CHECKING:
     from posekit.tables.skeleton_map import SkeletonMapTable
@@ -63,13 +64,25 @@ def skeleton_map_of(table: SkeletonMapTable, name: str) -> SkeletonMap:
     if alike:
         expected = "names that differ in their letters and digits"
         raise refusal(name, "points", shown(alike[0]), expected, "rename it")
-    landmarks = {landmark: tuple(parts) for landmark, parts in table.landmarks.items()}
+    landmarks = _placed(table.landmarks, "landmarks", LANDMARK_ORDER, points, name)
+    feet = _placed(table.feet, "feet", FEET_POINTS, points, name)
+    return SkeletonMap(
+        name=name,
+        points=points,
+        landmarks=MappingProxyType(landmarks),
+        source=table.source,
+        feet=MappingProxyType(feet),
+    )
+
+
+def _placed(
+    table: Mapping[str, Sequence[str]], title: str, order: Sequence[str], points: Sequence[str], name: str
+) -> dict[str, tuple[str, ...]]:
+    landmarks = {landmark: tuple(parts) for landmark, parts in table.items()}
     for landmark, parts in landmarks.items():
-        field = f"landmarks.{landmark}"
-        if landmark not in LANDMARK_ORDER:
-            raise refusal(
-                name, field, "an unknown landmark", "a known one", nearest(landmark, LANDMARK_ORDER)
-            )
+        field = f"{title}.{landmark}"
+        if landmark not in order:
+            raise refusal(name, field, "an unknown landmark", "a known one", nearest(landmark, order))
         if len(set(parts)) != len(parts):
             raise refusal(name, field, shown(parts), "each name once", "remove the repeated one")
         unknown = [part for part in parts if points and part not in points]
@@ -78,4 +91,4 @@ def skeleton_map_of(table: SkeletonMapTable, name: str) -> SkeletonMap:
         if other_side(landmark) != landmark and landmarks.get(other_side(landmark)) == parts:
             got = f"{shown(parts)}, as {other_side(landmark)}"
             raise refusal(name, field, got, "points of its own for each side", "correct one of the two")
-    return SkeletonMap(name=name, points=points, landmarks=MappingProxyType(landmarks), source=table.source)
+    return landmarks

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
 
 from posekit.geometry import Array
-from posekit.skeleton import POINTS, other_side
+from posekit.skeleton import FEET_POINTS, POINTS, other_side
 
 LANDMARK_ORDER: Final = (*POINTS, "mid_shoulders", "mid_hips")
 """What a map can name: the 14 joints, the head's five points, and the girdles' middles.
@@ -35,12 +35,15 @@ class SkeletonMap:
         Landmark of `LANDMARK_ORDER` to the names of the points whose mean it is, mostly one.
     source : str
         Who says so: a citation.
+    feet : mapping
+        Toes and heels, by `posekit.skeleton.FEET_POINTS`, to the points whose mean they are.
     """
 
     name: str
     points: tuple[str, ...]
     landmarks: Mapping[str, tuple[str, ...]]
     source: str = ""
+    feet: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def needed(self) -> tuple[str, ...]:
@@ -63,13 +66,11 @@ class SkeletonMap:
         array (..., 21, n)
             In the order of `LANDMARK_ORDER`; NaN where the format has none, or one of the points of a mean is missing.
         """
-        column = {plain(name): k for k, name in reversed(list(enumerate(names or self.points)))}
-        found = np.full((*values.shape[:-2], len(LANDMARK_ORDER), values.shape[-1]), np.nan)
-        for landmark, parts in self.landmarks.items():
-            columns = [column[plain(part)] for part in parts if plain(part) in column]
-            if len(columns) == len(parts):
-                found[..., LANDMARK_INDEX[landmark], :] = values[..., columns, :].mean(axis=-2)
-        return found
+        return _gathered(self.landmarks, LANDMARK_ORDER, values, names or self.points)
+
+    def gather_feet(self, values: Array, names: Sequence[str] = ()) -> Array:
+        """Pick toes and heels (..., 4, n) out of a format's points, as `gather` does; NaN where the format has none."""
+        return _gathered(self.feet, FEET_POINTS, values, names or self.points)
 
     def over(self, names: Sequence[str]) -> SkeletonMap:
         """Lay the map over the points of a file that names them itself, in the file's order.
@@ -85,12 +86,17 @@ class SkeletonMap:
             Its `points` are the file's names; landmarks whose points are not all there are left out.
         """
         there = {plain(name): name for name in reversed(names)}
-        landmarks = {
-            landmark: tuple(there[plain(part)] for part in parts)
-            for landmark, parts in self.landmarks.items()
-            if all(plain(part) in there for part in parts)
-        }
-        return SkeletonMap(name=self.name, points=tuple(names), landmarks=landmarks, source=self.source)
+        landmarks, feet = (
+            {
+                landmark: tuple(there[plain(part)] for part in parts)
+                for landmark, parts in placed.items()
+                if all(plain(part) in there for part in parts)
+            }
+            for placed in (self.landmarks, self.feet)
+        )
+        return SkeletonMap(
+            name=self.name, points=tuple(names), landmarks=landmarks, source=self.source, feet=feet
+        )
 
     def swapped(self) -> SkeletonMap:
         """Exchange left and right, for files that have them the wrong way round."""
@@ -99,7 +105,20 @@ class SkeletonMap:
             points=self.points,
             landmarks={other_side(landmark): parts for landmark, parts in self.landmarks.items()},
             source=self.source,
+            feet={other_side(point): parts for point, parts in self.feet.items()},
         )
+
+
+def _gathered(
+    placed: Mapping[str, tuple[str, ...]], order: Sequence[str], values: Array, names: Sequence[str]
+) -> Array:
+    column = {plain(name): k for k, name in reversed(list(enumerate(names)))}
+    found = np.full((*values.shape[:-2], len(order), values.shape[-1]), np.nan)
+    for landmark, parts in placed.items():
+        columns = [column[plain(part)] for part in parts if plain(part) in column]
+        if len(columns) == len(parts):
+            found[..., order.index(landmark), :] = values[..., columns, :].mean(axis=-2)
+    return found
 
 
 def plain(name: str) -> str:
