@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.skeleton import FEET_POINTS as FEET_POINTS
-from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
