@@ -41,7 +41,9 @@ def stills_of(clips: Sequence[ClipVerdict], held: HeldPostures) -> tuple[tuple[S
     stills = []
     for k, clip in enumerate(clips):
         rows = frames.rows(k)
-        wanted = list(dict.fromkeys(span.worst_frame for span in clip.spans))[:MOST_STILLS]
+        known = set(frames.frame[rows][np.isfinite(points[rows]).any(axis=(1, 2))].tolist())
+        worst = dict.fromkeys(span.worst_frame for span in clip.spans)
+        wanted = [frame for frame in worst if frame in known][:MOST_STILLS]
         at = [int(np.flatnonzero(frames.frame[rows] == frame)[0]) for frame in wanted]
         stills.append(
             tuple(_still(points, rows, one, frame, R_up) for one, frame in zip(at, wanted, strict=True))

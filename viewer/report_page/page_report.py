@@ -12,7 +12,7 @@ import numpy as np
 from posekit.body.capsules import CAPSULE_AXES
 from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_clips import ClipVerdict, Span, Still
-from posekit.formats.own.report_columns import VerdictColumns
+from posekit.formats.own.report_columns import VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName
 from posekit.formats.own.report_table import worst_first
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, SEGMENTS
@@ -122,7 +122,8 @@ def _span(span: Span) -> dict[str, Any]:
         )
     }
     return {
-        **{name: getattr(span, name) for name in ("check", "where", "unit", "verdict", "first", "last")},
+        **{name: getattr(span, name) for name in ("check", "where", "verdict", "first", "last")},
+        "unit": "" if span.unit == "1" else span.unit,
         "worst": span.worst_frame,
         "places": list(span.places),
         "joints": sorted({joint for where in span.places for joint in _joints(f"{span.check}/{where}")}),
@@ -152,7 +153,7 @@ def _postures(columns: VerdictColumns) -> list[dict[str, Any]]:
             "posture": row.posture,
             "verdict": row.verdict,
             "why": [
-                f"{one.place.name} {one.value:.4g} {one.place.unit} (bound {one.bound:.4g})"
+                f"{one.place.name} {measured(one.value, one.place.unit)} (bound {one.bound:.4g})"
                 for one in row.violations
                 if math.isfinite(one.value)
             ][:5]

@@ -100,10 +100,12 @@ def _cut_text(source: Path, target: str | Path, rows: NDArray[np.intp], count: i
     head = table.head.match(text)
     if head is None:
         return False
-    lines = [line for line in text[head.end() :].split("\n") if line.strip()]
+    start = head.group()
+    lines = _filled(text[head.end() :])
+    if len(lines) == count - 1 and source.suffix.lower() == ".csv":  # a table without names
+        start, lines = "", _filled(text)
     if len(lines) != count:
         return False
-    start = head.group()
     if table.counts is not None:
         start = table.counts.sub(lambda found: f"{found[1]}{len(rows)}", start)
     elif source.suffix.lower() == ".trc":
@@ -113,6 +115,11 @@ def _cut_text(source: Path, target: str | Path, rows: NDArray[np.intp], count: i
         for row in rows.tolist():
             file.write(f"{lines[row]}\n".encode())
     return True
+
+
+def _filled(text: str) -> list[str]:
+    """Part text into its lines, but for empty ones."""
+    return [line for line in text.split("\n") if line.strip()]
 
 
 def _counted_trc(head: str, count: int) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,6 +24,12 @@ NUMBER_COLUMNS: Final = (
     *("margin", "value", "bound"),
 )
 """The columns of `VerdictColumns` that are numbers with a unit: the first four a posture, the others a violation."""
+
+
+def measured(value: float, unit: str, digits: int = 4) -> str:
+    """Word a number and its unit: ``21.3 m/s``; a ratio, whose unit is 1, has none, and ``?`` is not known."""
+    number = f"{value:.{digits}g}" if math.isfinite(value) else "?"
+    return number if unit == "1" else f"{number} {unit}"
 
 
 class ReportPlace(NamedTuple):

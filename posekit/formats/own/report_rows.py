@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.report_columns import PlaceValue, VerdictColumns
+from posekit.formats.own.report_columns import PlaceValue, VerdictColumns, measured
 from posekit.formats.own.report_frames import ReportFrames
 
 ROWS_AT_ONCE: Final = 10_000
@@ -113,7 +113,7 @@ def _tables(rows: Iterator[ReportRow]) -> Iterator[dict[str, NDArray[Any]]]:
 
 def _violation(judged: PlaceValue) -> str:
     at = judged.place
-    found = f"{at.name}={judged.value:.6g} {at.unit}"
+    found = f"{at.name}={measured(judged.value, at.unit, 6)}"
     return f"{found} ({judged.bound:.6g})" if math.isfinite(judged.bound) else found
 
 

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.formats.own.report_clips import ClipVerdict, Span
-from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns
+from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES
 
@@ -168,7 +168,7 @@ def said_of_span(span: Span) -> str:
     if span.value is None:
         return said if span.verdict == "invalid" else f"{said}, undecided"
     bound = "" if span.bound is None else f" (bound {span.bound:.4g})"
-    return f"{said}, worst {span.value:.4g} {span.unit} in {span.worst_frame}{bound}"
+    return f"{said}, worst {measured(span.value, span.unit)} in {span.worst_frame}{bound}"
 
 
 def _of_frame(frames: ReportFrames, posture: int) -> tuple[object, ...]:
@@ -187,14 +187,12 @@ def _worst(count: CheckCount) -> str:
     if count.worst is None:
         return ""
     index, place, margin = count.worst
-    return f"posture {index}: {place.where} {margin:.3g} {place.unit}"
+    return f"posture {index}: {place.where} {measured(margin, place.unit, 3)}"
 
 
 def _at(judged: PlaceValue) -> str:
     """Word what was found: ``speed/right_wrist 21.3 m/s (bound 15)``."""
-    place = judged.place
-    found = "?" if math.isnan(judged.value) else f"{judged.value:.4g}"
-    return f"{place.name} {found} {place.unit} (bound {judged.bound:.4g})"
+    return f"{judged.place.name} {measured(judged.value, judged.place.unit)} (bound {judged.bound:.4g})"
 
 
 def _shown(value: object) -> str:
