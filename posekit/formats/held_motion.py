@@ -14,8 +14,10 @@ from posekit.formats.held import HeldPostures
 from posekit.formats.motion import Motion, postures_of, read_motion
 from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
 from posekit.formats.motion.body_size import BodyUnit, body_unit, stature_of
+from posekit.formats.motion.detected import read_detected
 from posekit.formats.motion.ground_up import find_up
 from posekit.formats.motion.motion_format import MotionFormat
+from posekit.formats.motion.people_in_motion import people_apart
 from posekit.formats.own import Postures
 from posekit.formats.recognising import Recognised
 from posekit.formats.registry import formats
@@ -57,6 +59,9 @@ def read_recorded(
         Where it cannot be read, or its format carries no points.
     """
     one = found.only(path)
+    if found.holds is Content.KEY_POINTS:
+        detected = read_detected(path, one.name, unit)
+        return detected if up is None else replace(detected, up=up, told=(*detected.told, "up"))
     if not one.reads:
         expected = ", ".join(
             known.name for known in formats(Content.MOTION) if isinstance(known, MotionFormat) and known.read
@@ -96,6 +101,7 @@ def held_motion(
     InputError
         Where nobody's points are in it, or unit or up are not what the file says.
     """
+    motion = people_apart(motion)
     found = postures_of(motion, layout)
     if unit is None:
         size = body_unit(found.joints, motion.source, told="unit" in motion.told)

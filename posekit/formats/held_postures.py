@@ -46,6 +46,8 @@ __all__ = [
     "postures_of_result",
 ]
 
+DETECTORS: Final = ("mediapipe", "mmpose", "mmpose-list")
+"""Formats of key points whose files may have points in space, too."""
 POSTURE_CONTENTS: Final = (
     Content.POSTURES,
     Content.RESULT,
@@ -101,7 +103,9 @@ def held_postures(
         return held_configurations(configurations_of(path, found, rate), variables, figure.forward_kinematics)
     if found.holds is Content.SURVIVORS:
         return _of_table(read_survivors(path))
-    if found.holds is Content.MOTION:
+    if found.holds is Content.MOTION or (
+        found.holds is Content.KEY_POINTS and len(found.formats) == 1 and found.formats[0].name in DETECTORS
+    ):
         from posekit.formats.held_motion import held_motion, read_recorded
 
         unit = None if unit is None else str(unit)

@@ -43,6 +43,8 @@ BUILT_IN: Final[Mapping[Content, Mapping[str, tuple[str, ...]]]] = {
         "motion.bvh:BVH_FORMAT": (".bvh",),
         "motion.glb:GLB_FORMAT": (".glb",),
         "motion.amass:AMASS_FORMAT": (".npz",),
+        "motion.npy:NPY_FORMAT": (".npy",),
+        "motion.caliscope:CALISCOPE_FORMAT": (".csv",),
         "motion.urdf_folder:URDF_FORMAT": (FOLDER_SUFFIX,),
     },
     Content.CONFIGURATIONS: {

@@ -193,6 +193,36 @@ def open_npz(path: str | Path, *, limit: int = MAX_ARRAYS) -> Iterator[Archive]:
             raise unreadable(path, error) from None
 
 
+def read_npy(path: str | Path, kinds: str, *, limit: int = MAX_ARRAYS) -> NDArray[Any]:
+    """Read the one array of an NPY.
+
+    Parameters
+    ----------
+    path : path
+        A ``.npy`` file.
+    kinds : str
+        NumPy's letters of the dtypes that are accepted, ``"iuf"``.
+    limit : int
+        Bytes that it may have.
+
+    Raises
+    ------
+    InputError
+        Where it is no such file, or holds pickles, or another number of bytes than it declares.
+    """
+    with open_file(path, limit=limit) as file:
+        shape, fortran, dtype = _header(path, "", file)
+        if dtype.hasobject or dtype.kind not in kinds or dtype.itemsize == 0:
+            remedy = "save it again as such; pickles are not read"
+            raise refusal(path, "", f"dtype {dtype}", _KINDS[kinds], remedy)
+        data = file.read(limit + 1)
+    length = math.prod(shape) * dtype.itemsize
+    if len(data) != length or min(shape, default=0) < 0:
+        remedy = "write the file again: it is damaged"
+        raise refusal(path, "", f"{len(data):,} bytes", f"{length:,} for shape {shape}", remedy)
+    return _values(path, "", data, dtype).reshape(shape, order="F" if fortran else "C")
+
+
 def _check_directory(path: str | Path, archive: zipfile.ZipFile, limit: int) -> None:
     members = archive.infolist()
     if len(members) > MAX_MEMBERS:

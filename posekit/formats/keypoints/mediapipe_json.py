@@ -44,7 +44,7 @@ PICTURE_HEIGHT_NAMES = ("imageheight", "frameheight", "videoheight", "height", "
 
 def looks_like_landmarks(document: object) -> bool:
     """Tell whether something in it looks like landmarks of MediaPipe: {x, y, …} under a name that is used for them."""
-    frame = next(iter(_frames(document)), None)
+    frame = next(iter(frames_of_document(document)), None)
     for candidate in (frame, *_first_full(document)):
         if isinstance(candidate, dict):
             field = one_of(candidate, (*PICTURE_LANDMARKS_NAMES, *WORLD_LANDMARKS_NAMES))
@@ -61,7 +61,7 @@ def looks_like_landmarks(document: object) -> bool:
 
 def _first_full(document: object) -> list[object]:
     """Return the first frame with somebody in it: the first ones may be empty."""
-    for frame in _frames(document):
+    for frame in frames_of_document(document):
         if isinstance(frame, dict) and any(
             frame.get(field) for field in frame if plain(str(field)) in PICTURE_LANDMARKS_NAMES + PEOPLE_NAMES
         ):
@@ -85,7 +85,7 @@ def _holds_landmarks(value: object) -> bool:
     return _is_named(value)
 
 
-def _frames(document: object) -> list[Any]:
+def frames_of_document(document: object) -> list[Any]:
     """Return the frames of a document: a list of them, an object that has one, or one frame alone."""
     if isinstance(document, list):
         return [document] if document and (_is_named(document[0]) or _is_point(document[0])) else document
@@ -105,7 +105,7 @@ def add_document(rows: DetectionRows, document: object, name: str) -> None:
     InputError
         Where a frame holds what are no landmarks, or world landmarks alone.
     """
-    frames = _frames(document)
+    frames = frames_of_document(document)
     size = _size(document)
     labels: list[str] = []
     times: list[float] = []

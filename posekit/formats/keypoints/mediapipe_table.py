@@ -56,6 +56,8 @@ _COUNTED = re.compile(
 def looks_like_table(text: str) -> bool:
     """Tell by the first line whether it is a table of MediaPipe's landmarks."""
     header = _header(text)
+    if any(name.endswith("_ncams") for name in header):
+        return False  # points in space that were triangulated from these
     return _is_long(header) or len(_columns(header)) >= MIN_NAMED_LANDMARKS
 
 

@@ -42,7 +42,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
         info = document.get("instance_info") if isinstance(document, dict) else None
         if not isinstance(info, list):
             raise refusal(path, "instance_info", shown(info), "a list", "save it with --save-predictions")
-        found = _names(path, document.get("meta_info"))
+        found = names_of_points(path, document.get("meta_info"))
         if names and found != names:
             raise refusal(
                 path, "meta_info", "other points than the files before", "the same", "split the folder"
@@ -58,7 +58,7 @@ def read(given: GivenFile, layout: SkeletonMap | None) -> KeyPoints:
     return rows.keypoints("mmpose", by_names(names, layout, given.path))
 
 
-def _names(path: Path, meta: object) -> list[str]:
+def names_of_points(path: Path, meta: object) -> list[str]:
     """Return the points' names in their order."""
     field = "meta_info.keypoint_id2name"
     table = meta.get("keypoint_id2name") if isinstance(meta, dict) else None

@@ -24,6 +24,7 @@ from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.motion_table import (
     Column,
     is_motion,
+    is_triangulated,
     long_columns,
     motion_of,
     number_columns,
@@ -175,7 +176,7 @@ def _looks_like(given: GivenFile) -> bool:
     """Look at the names in the first line; of a first line that is long, at the part that was read."""
     first = given.start.partition(b"\n")[0].decode("utf-8", "replace").lstrip("\ufeff")
     names = [name.strip().strip('"') for name in first.split(_delimiter(first))]
-    return is_motion(names) and not has_root_turn(names)
+    return (is_motion(names) or is_triangulated(names)) and not has_root_turn(names)
 
 
 CSV_FORMAT: Final = MotionFormat(

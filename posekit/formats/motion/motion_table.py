@@ -49,6 +49,12 @@ def is_motion(columns: Sequence[str]) -> bool:
     return set(LONG_COLUMNS) <= set(columns) or bool(points_in(columns))
 
 
+def is_triangulated(columns: Sequence[str]) -> bool:
+    """Tell whether columns are points that were triangulated, a row a frame, without times: anipose's, caliscope's."""
+    counted = bool({"fnum", "sync_index"} & set(columns)) or any(name.endswith("_ncams") for name in columns)
+    return counted and "survivor" not in columns and bool(points_in(columns))
+
+
 def motion_of(
     columns: Mapping[str, Column],
     source: str,
