@@ -46,7 +46,7 @@ __all__ = [
     "postures_of_result",
 ]
 
-DETECTORS: Final = ("mediapipe", "mmpose", "mmpose-list")
+SPATIAL_DETECTORS: Final = ("mediapipe", "mmpose", "mmpose-list")
 """Formats of key points whose files may have points in space, too."""
 POSTURE_CONTENTS: Final = (
     Content.POSTURES,
@@ -104,7 +104,9 @@ def held_postures(
     if found.holds is Content.SURVIVORS:
         return _of_table(read_survivors(path))
     if found.holds is Content.MOTION or (
-        found.holds is Content.KEY_POINTS and len(found.formats) == 1 and found.formats[0].name in DETECTORS
+        found.holds is Content.KEY_POINTS
+        and len(found.formats) == 1
+        and found.formats[0].name in SPATIAL_DETECTORS
     ):
         from posekit.formats.held_motion import held_motion, read_recorded
 

@@ -15,7 +15,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.motion.array_names import RATES, holds_body_angles
+from posekit.formats.motion.array_names import RATE_NAMES, holds_body_angles
 from posekit.formats.motion.body_model import BODY_JOINTS, BODY_PARENTS, BodyModel, read_body_model
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
@@ -24,15 +24,15 @@ from posekit.geometry.rotations import rotation_from_vector
 from posekit.safe_io import open_npz, refusal
 
 MAX_BYTES: Final = 2_000_000_000
-FRAMERATES: Final = ("mocap_framerate", "mocap_frame_rate", *RATES)
-NAMES: Final = (
+FRAME_RATES: Final = ("mocap_framerate", "mocap_frame_rate", *RATE_NAMES)
+SMPL_NAMES: Final = (
     *("pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "left_ankle"),
     *("right_ankle", "spine3", "left_foot", "right_foot", "neck", "left_collar", "right_collar", "head"),
     *("left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist"),
 )
 """The joints of the body in the order of SMPL, SMPL+H and SMPL-X."""
 Arrays = Mapping[str, NDArray[Any]]
-_KEYS: Final = ("poses", "root_orient", "pose_body", "trans", "betas", *FRAMERATES)
+_KEYS: Final = ("poses", "root_orient", "pose_body", "trans", "betas", *FRAME_RATES)
 
 
 def read_amass(path: str | Path, body_model: str | Path | None = None) -> Motion:
@@ -67,7 +67,7 @@ def read_amass(path: str | Path, body_model: str | Path | None = None) -> Motion
     if "betas" not in arrays:
         said.append("the file says no shape (betas): the person is the body model's mean")
     return Motion(
-        names=NAMES,
+        names=SMPL_NAMES,
         points=placed_joints(model, poses, trans, betas),
         time=np.arange(len(poses)) / rate,
         rate=rate,
@@ -146,7 +146,7 @@ def _betas(path: str | Path, arrays: Arrays) -> Array:
 
 def _rate(arrays: Arrays) -> float:
     """Return the frames a second; NaN where the file says none that is above 0."""
-    found = next((arrays[name] for name in FRAMERATES if name in arrays), np.empty(0))
+    found = next((arrays[name] for name in FRAME_RATES if name in arrays), np.empty(0))
     rate = float(found.reshape(-1)[0]) if found.size == 1 else np.nan
     return rate if 0 < rate < np.inf else float("nan")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Final
 
-from posekit.formats.motion.root_turn import ORDERS
+from posekit.formats.motion.root_turn import QUATERNION_ORDERS
 
-PLACES: Final = (
+ROOT_PLACES: Final = (
     "root_pos",
     "root_trans",
     "root_position",
@@ -14,20 +14,31 @@ PLACES: Final = (
     "root_trans_offset",
     "base_pos",
 )
-TURNS: Final = ("root_rot", "root_ori", "root_quat", "root_quaternion", "root_orientation", "base_quat")
-JOINTS: Final = ("dof_pos", "dof_positions", "dof", "dofs", "joint_pos", "joint_positions", "joint_angles")
+ROOT_TURNS: Final = ("root_rot", "root_ori", "root_quat", "root_quaternion", "root_orientation", "base_quat")
+JOINT_ANGLES: Final = (
+    "dof_pos",
+    "dof_positions",
+    "dof",
+    "dofs",
+    "joint_pos",
+    "joint_positions",
+    "joint_angles",
+)
 JOINT_NAMES: Final = ("dof_names", "joint_names", "joints_list")
-RATES: Final = ("fps", "rate", "frame_rate", "framerate")
-BODIES: Final = (("body_positions", "body_rotations"), ("body_pos_w", "body_quat_w"))
+RATE_NAMES: Final = ("fps", "rate", "frame_rate", "framerate")
+BODY_ARRAYS: Final = (("body_positions", "body_rotations"), ("body_pos_w", "body_quat_w"))
 """All bodies' places and turns, as simulators record them: quaternions are w, x, y, z (Isaac Lab, *Motion files*)."""
-TURNS_IN_ORDER: Final = (*TURNS, *(f"{name}_{order}" for name in TURNS for order in ORDERS))
+ROOT_TURNS_IN_ORDER: Final = (
+    *ROOT_TURNS,
+    *(f"{name}_{order}" for name in ROOT_TURNS for order in QUATERNION_ORDERS),
+)
 """The same, and with the order of the quaternion behind."""
 
 
 def holds_robot(names: frozenset[str]) -> bool:
     """Tell whether arrays are of a robot's configurations: joints, and a root's turn."""
-    turned = names & {*TURNS_IN_ORDER, *(turns for _, turns in BODIES)}
-    return "qpos" in names or bool(turned and names & set(JOINTS))
+    turned = names & {*ROOT_TURNS_IN_ORDER, *(turns for _, turns in BODY_ARRAYS)}
+    return "qpos" in names or bool(turned and names & set(JOINT_ANGLES))
 
 
 def holds_body_angles(names: frozenset[str]) -> bool:

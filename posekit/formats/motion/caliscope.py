@@ -18,7 +18,7 @@ from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import refusal
 
-COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
+TABLE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
 
 
 def read_caliscope(path: str | Path, unit: str | None = None, *, as_recorded: bool = False) -> Motion:
@@ -40,9 +40,9 @@ def read_caliscope(path: str | Path, unit: str | None = None, *, as_recorded: bo
     """
     if not as_recorded:
         raise refusal(path, "", "no frame rate", "one", "save it as CSV with time, or TRC")
-    columns = read_columns(path, lambda names: COLUMNS)
+    columns = read_columns(path, lambda names: TABLE_COLUMNS)
     names = load_skeleton_map("mediapipe_33").points
-    values = np.stack([np.asarray(columns[name], dtype=np.float64) for name in COLUMNS], axis=1)
+    values = np.stack([np.asarray(columns[name], dtype=np.float64) for name in TABLE_COLUMNS], axis=1)
     body = values[(values[:, 1] >= 0) & (values[:, 1] < len(names)) & np.isfinite(values).all(axis=1)]
     if not len(body):
         raise refusal(path, "point_id", "no point of the body", f"some of 0 to {len(names) - 1}")
@@ -67,7 +67,7 @@ CALISCOPE_FORMAT: Final = MotionFormat(
     name="caliscope",
     title="Caliscope's triangulated points: sync_index, point_id, x_coord, y_coord, z_coord",
     suffixes=(".csv",),
-    looks_like=lambda given: set(COLUMNS) <= given.columns,
+    looks_like=lambda given: set(TABLE_COLUMNS) <= given.columns,
     read=read_caliscope,
     read_recorded=partial(read_caliscope, as_recorded=True),
 )

@@ -15,7 +15,7 @@ _TURN: Final = re.compile(
 )
 _TIME: Final = ("time", "t", "timestamp", "time_s")
 _COUNTS: Final = ("frame", "index", "")
-DEGREES: Final = re.compile(r"(?:root|base|pelvis)_?(?:rotate|rot|euler)_?[xyz]|.*\(deg\)", re.IGNORECASE)
+IN_DEGREES: Final = re.compile(r"(?:root|base|pelvis)_?(?:rotate|rot|euler)_?[xyz]|.*\(deg\)", re.IGNORECASE)
 """Angles that are no quaternion and no radians."""
 
 

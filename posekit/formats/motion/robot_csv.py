@@ -20,7 +20,7 @@ from posekit.formats.given_file import GivenFile
 from posekit.formats.motion.configuration_format import ConfigurationFormat
 from posekit.formats.motion.csv_table import MAX_BYTES, read_columns
 from posekit.formats.motion.number_rows import numbers_of
-from posekit.formats.motion.robot_columns import DEGREES, robot_roles
+from posekit.formats.motion.robot_columns import IN_DEGREES, robot_roles
 from posekit.formats.motion.robot_table import RobotColumns, configurations_of_columns, joint_name
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.geometry import Array
@@ -64,7 +64,7 @@ def _of_rows(path: Path, text: str, width: int) -> RobotColumns:
 
 def _of_names(path: Path, names: Sequence[str]) -> RobotColumns:
     roles = robot_roles(names)
-    turned = next((name for name in names if DEGREES.fullmatch(name)), None)
+    turned = next((name for name in names if IN_DEGREES.fullmatch(name)), None)
     if len(roles["turn"]) < 4 or len(roles["place"]) < 3:
         got = f"{shown(turned)}: angles in degrees" if turned is not None else "a root without quaternion"
         expected = "root_pos_x … root_pos_z in metres, root_rot_x … root_rot_w, joints in radians"
@@ -109,7 +109,7 @@ def is_robot_table(cells: Sequence[str]) -> bool:
     if _are_numbers(cells):
         return len(cells) >= LEAST_COLUMNS
     roles = robot_roles(cells)
-    degrees = sum(DEGREES.fullmatch(name) is not None for name in cells) >= 3
+    degrees = sum(IN_DEGREES.fullmatch(name) is not None for name in cells) >= 3
     return bool(roles["joint"]) and (len(roles["turn"]) == 4 or degrees) and "survivor" not in cells
 
 

@@ -20,16 +20,16 @@ from numpy.typing import NDArray
 
 from posekit.errors import InputError
 from posekit.formats.motion.array_names import (
-    BODIES,
+    BODY_ARRAYS,
+    JOINT_ANGLES,
     JOINT_NAMES,
-    JOINTS,
-    PLACES,
-    RATES,
-    TURNS_IN_ORDER,
+    RATE_NAMES,
+    ROOT_PLACES,
+    ROOT_TURNS_IN_ORDER,
     holds_robot,
 )
 from posekit.formats.motion.configuration_format import ConfigurationFormat
-from posekit.formats.motion.root_turn import ORDERS, root_turn
+from posekit.formats.motion.root_turn import QUATERNION_ORDERS, root_turn
 from posekit.formats.own.postures_q import ROOT_NAMES, NamedConfigurations
 from posekit.geometry import Array
 from posekit.safe_io import cut, open_npz, refusal
@@ -64,9 +64,18 @@ def read_robot_npz(path: Path) -> NamedConfigurations:
         Where arrays are missing or of other shapes, hold pickles or infinite numbers, or the order of quaternions or
         joints cannot be told.
     """
-    wanted = (*PLACES, *TURNS_IN_ORDER, *JOINTS, *JOINT_NAMES, *RATES, "time", "qpos", "body_names")
+    wanted = (
+        *ROOT_PLACES,
+        *ROOT_TURNS_IN_ORDER,
+        *JOINT_ANGLES,
+        *JOINT_NAMES,
+        *RATE_NAMES,
+        "time",
+        "qpos",
+        "body_names",
+    )
     with open_npz(path, limit=MAX_BYTES) as archive:
-        names = [*wanted, *(name for pair in BODIES for name in pair)]
+        names = [*wanted, *(name for pair in BODY_ARRAYS for name in pair)]
         arrays = {name: archive.array(name, "iufU", None) for name in names if name in archive.names}
     return configurations_of_columns(_of_arrays(path, arrays), str(path))
 
@@ -113,7 +122,7 @@ def _of_arrays(path: Path, arrays: Mapping[str, NDArray[Any]]) -> RobotColumns:
         place, turn, joints = qpos[:, :3], qpos[:, 3:7], qpos[:, 7:]
         order, turn_name = "wxyz", "qpos[3:7]"
     else:
-        joints = _numbers(path, arrays, _first(path, arrays, JOINTS), (None, None))
+        joints = _numbers(path, arrays, _first(path, arrays, JOINT_ANGLES), (None, None))
         place, turn, order, turn_name = _root(path, arrays, len(joints), bool(names))
     if names and len(names) != joints.shape[1]:
         raise _wrong(path, "joint names", f"{len(names)} names", f"{joints.shape[1]}, one a joint")
@@ -124,7 +133,7 @@ def _root(
     path: Path, arrays: Mapping[str, NDArray[Any]], frames: int, named: bool
 ) -> tuple[Array, Array, str, str]:
     """Return the root's place and turn, the turn's order, and its name."""
-    for places, turns in BODIES:
+    for places, turns in BODY_ARRAYS:
         if places in arrays and turns in arrays:
             if not named:
                 got = "joints without names, in the order of a simulator"
@@ -134,9 +143,9 @@ def _root(
             if not place.shape[1]:
                 raise _wrong(path, places, "no body", "the root first")
             return place[:, 0], turn[:, 0], "wxyz", turns
-    place = _numbers(path, arrays, _first(path, arrays, PLACES), (frames, 3))
-    turn_name = _first(path, arrays, TURNS_IN_ORDER)
-    order = next((one for one in ORDERS if turn_name.endswith(one)), "")
+    place = _numbers(path, arrays, _first(path, arrays, ROOT_PLACES), (frames, 3))
+    turn_name = _first(path, arrays, ROOT_TURNS_IN_ORDER)
+    order = next((one for one in QUATERNION_ORDERS if turn_name.endswith(one)), "")
     return place, _numbers(path, arrays, turn_name, (frames, 4)), order, turn_name
 
 
@@ -154,7 +163,7 @@ def _names(path: Path, arrays: Mapping[str, NDArray[Any]]) -> tuple[str, ...]:
 def _time(path: Path, arrays: Mapping[str, NDArray[Any]], frames: int) -> Array:
     if "time" in arrays:
         return _numbers(path, arrays, "time", (frames,))
-    key = next((name for name in RATES if name in arrays), None)
+    key = next((name for name in RATE_NAMES if name in arrays), None)
     if key is None:
         return np.full(frames, np.nan)
     if arrays[key].dtype.kind not in "iuf" or arrays[key].size != 1:

@@ -14,8 +14,8 @@ UNIT_LENGTH_ERROR: Final = 0.01
 UPRIGHT_COSINE, FALLEN_COSINE = 0.8, 0.5
 """Cosines between the root's z axis and the world's, medians over the frames, by which one order stands and the other
 does not."""
-ORDERS: Final = ("xyzw", "wxyz")
-CUSTOMARY: Final = "xyzw"
+QUATERNION_ORDERS: Final = ("xyzw", "wxyz")
+CUSTOMARY_ORDER: Final = "xyzw"
 """As GMR, TWIST2 and PHUMA write ``root_rot`` and ``root_ori``; taken where the robot stands by both: then it looks
 along x all the time, or by the other order just the other way."""
 
@@ -54,13 +54,13 @@ def root_turn(values: Array, order: str, source: str, field: str) -> RootTurn:
     values = values / np.where(known, length, 1.0)[:, None]
     if order:
         return RootTurn(_in_order(values, order), "")
-    stands = {name: upright(_in_order(values[known], name)) for name in ORDERS}
-    if stands[CUSTOMARY] >= UPRIGHT_COSINE:
+    stands = {name: upright(_in_order(values[known], name)) for name in QUATERNION_ORDERS}
+    if stands[CUSTOMARY_ORDER] >= UPRIGHT_COSINE:
         how = (
             "so the robot stands" if stands["wxyz"] < UPRIGHT_COSINE else "as is customary; it stands by both"
         )
-        return RootTurn(_in_order(values, CUSTOMARY), f"{field} is taken as x, y, z, w: {how}")
-    if stands["wxyz"] >= UPRIGHT_COSINE and stands[CUSTOMARY] <= FALLEN_COSINE:
+        return RootTurn(_in_order(values, CUSTOMARY_ORDER), f"{field} is taken as x, y, z, w: {how}")
+    if stands["wxyz"] >= UPRIGHT_COSINE and stands[CUSTOMARY_ORDER] <= FALLEN_COSINE:
         return RootTurn(_in_order(values, "wxyz"), f"{field} is taken as w, x, y, z: so the robot stands")
     got = "a quaternion whose order is not said, and by which the robot does not stand"
     remedy = f"name the array {field}_xyzw or {field}_wxyz"

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from posekit.formats.motion.amass import NAMES as SMPL_NAMES
+from posekit.formats.motion.amass import SMPL_NAMES
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import refusal
