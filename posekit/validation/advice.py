@@ -15,6 +15,12 @@ from posekit.settings import DEFAULT_RANGES, ValidateSettings
 FEW_DEGREES: Final = 15.0
 """Degrees within which somebody may well be more mobile, or a skeleton's joints placed otherwise."""
 
+FEW_METRES: Final = 0.15
+"""Metres by which a length may be off that a wider tolerance is worth trying for."""
+
+MOST_OF_THEM: Final = 0.95
+"""Share of the postures that fail by a check which a tolerance that is proposed lets pass."""
+
 MANY_METRES: Final = 3.0
 """Metres: what misses a length by so much is in another unit."""
 
@@ -32,48 +38,55 @@ def why_most_fail(columns: VerdictColumns, told: Mapping[str, Any]) -> str:
     told : mapping
         What decided them, as the report says it.
     """
-    total = int(np.count_nonzero(columns.verdict == INVALID_VERDICT))
-    if not total or not len(columns.place):
+    if not np.any(columns.verdict == INVALID_VERDICT) or not len(columns.place):
         return ""
     most = int(np.bincount(columns.place).argmax())
     mine, place = columns.place == most, columns.places[most]
-    count, by = len(np.unique(columns.posture[mine])), -float(np.median(columns.margin[mine]))
-    whose = "all" if count == total else f"{count} of the {total}"
+    count, beyond = len(np.unique(columns.posture[mine])), -columns.margin[mine]
     check = place.check.replace("_", "-")
     return (
-        f"{whose} that are invalid fail by {place.where} ({check}), by {_amount(by, place.unit)} in the median: "
-        f"{_remedy(place, by, told)}"
+        f"{count} of {len(columns)} postures fail by {place.where} ({check}), by "
+        f"{_amount(float(np.median(beyond)), place.unit)} in the median: "
+        f"{_remedy(place, float(np.quantile(beyond, MOST_OF_THEM)), told)}"
     )
 
 
 def _remedy(place: ReportPlace, by: float, told: Mapping[str, Any]) -> str:
+    """Say what to try, where most of the postures that fail do so by no more than this."""
     ours = told.get("urdf") in (None, "stick_figure", "as recovered")
     if place.check == "joint_range":
         if ours and told.get("ranges") not in (None, DEFAULT_RANGES):
             return f"try --ranges {DEFAULT_RANGES}, which real people pass"
         if by <= FEW_DEGREES:
             return f"try --angle-tolerance {math.ceil(by)}, or wider limits by --ranges FILE"
-        return "are its axes or its left and right others than supposed? Else give --ranges FILE"
+        return "are its axes, or left and right, as supposed? Else give wider limits by --ranges FILE"
     if place.check in ("rigid_parts", "reach"):
         if by > MANY_METRES:
-            return "is the file in another unit? Its lengths are no person's in metres"
+            return "its lengths are no person's in metres: give its --unit"
         if told.get("lengths_from") == "model":
             return "try --lengths median, the person's own"
-        if by <= 0.2:
-            return (
-                f"try --rigid-tolerance {math.ceil(100 * by) + 3}cm; or joints are swapped or broken in these"
-            )
-        return "joints are swapped, broken, or of several people in one recording"
+        if by > FEW_METRES:
+            return "joints are swapped, broken, or of several people in one recording"
+        used = "torso_tolerance" if "-pelvis" in place.where else "rigid_tolerance"
+        return f"try --rigid-tolerance {math.ceil(_centimetres(told.get(used, '3cm')) + 100 * by)}cm"
     if place.check == "collision":
-        return f"try --contact-margin -{math.ceil(100 * by)}cm: bodies are capsules, and flesh gives"
+        margin = math.floor(_centimetres(told.get("contact_margin", "0cm")) - 100 * by)
+        return f"try --contact-margin {margin}cm: bodies are capsules, and flesh gives"
     if place.check in ("walking", "balance"):
         return f"leave {place.check} out of --checks where it is not asked for"
-    return "its threshold is one of --profile"
+    return "leave such frames out (--keep, --keep-spans), or give your own threshold (--profile FILE)"
+
+
+def _centimetres(said: Any) -> float:
+    """Return the larger of what was allowed."""
+    return max(float(str(one).removesuffix("cm")) for one in (said if isinstance(said, list) else [said]))
 
 
 def _amount(by: float, unit: str) -> str:
     if unit == "m":
         return f"{100 * by:.2g} cm" if by < 1 else f"{by:.3g} m"
+    if unit == "1":
+        return f"{by:.2g} times its bound" if by >= 1 else f"{by:.1%}"
     return f"{by:.2g} {'degrees' if unit == 'deg' else unit}"
 
 
