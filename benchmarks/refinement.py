@@ -44,7 +44,7 @@ from posekit.settings import MEASURED_TOLERANCE, RIGID_TOLERANCE, Tolerance
 from posekit.skeleton import HEAD_POINTS, JOINTS, PARENTS, TREE_SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, mocap_scenes, random_views, read_capture
 from posekit.tree import Check, InterpretationTree
-from posekit.validation.validate import recovered_with
+from posekit.validation import recovered_with
 from posekit.validators import PHYSICAL_CHECKS, Validator, load_ranges, make_checks
 from posekit.views.builtin import view_of
 

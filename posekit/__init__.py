@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from posekit.settings import RecoverSettings as RecoverSettings
     from posekit.settings import Tolerance as Tolerance
     from posekit.settings import ValidateSettings as ValidateSettings
+    from posekit.validation import validate as validate
     from posekit.validators import Validator as Validator
     from posekit.views.builtin import builtin_view as builtin_view
     from posekit.views.opening import open_views as open_views
@@ -63,6 +64,7 @@ _HOMES = {
     "posekit.remedy": ("repair",),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),
+    "posekit.validation": ("validate",),
     "posekit.validators": ("Validator",),
 }
 _HOME = {name: home for home, names in _HOMES.items() for name in names}

@@ -1,7 +1,7 @@
 """Verdicts on configurations against the bare calls behind them, on several robots.
 
 Bare is one call of Pinocchio's pool and one vectorised comparison with the limits, of as many threads. The last
-number is a whole file's judging (`posekit.validation.validate`), with the pairs and depths of what fails.
+number is a whole file's judging (`posekit.validation.validate_postures`), with the pairs and depths of what fails.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from benchmarks.comparison.measure import Chart, Section, Sizes, least, microsec
 from posekit.body.pool import make_pool, n_threads
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.robots import load_robot
-from posekit.validation import validate
+from posekit.validation import validate_postures
 from posekit.validators import Validator
 
 ROBOT_NAMES = ("stick_figure", "human", "simple_humanoid")
@@ -46,7 +46,7 @@ def section(sizes: Sizes) -> Section:
                 {
                     "bare": bare,
                     "verdicts": lambda v=validator, q=q: v.check(q=q).valid,  # type: ignore[misc]
-                    "file": lambda v=validator, g=given: validate(v, g, detail="verdicts"),  # type: ignore[misc]
+                    "file": lambda v=validator, g=given: validate_postures(v, g, detail="verdicts"),  # type: ignore[misc]
                 },
                 2 * sizes.repeats,
             )

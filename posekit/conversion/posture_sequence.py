@@ -27,7 +27,7 @@ from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
 from posekit.robots.stretching import shoulders_are_behind
 from posekit.skeleton import JOINTS, POINTS
-from posekit.validation.validate import recovered_with
+from posekit.validation import recovered_with
 
 EVEN_STEP_SHARE: Final = 0.25
 """Share of a step by which the time of a picture may be off its place."""

@@ -24,7 +24,7 @@ from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 from posekit.safe_io.writing import write_lines
 from posekit.synthesis import random_views
-from posekit.validation.validate import validate
+from posekit.validation.judging import validate_postures
 from posekit.validators import PHYSICAL_CHECKS, Validator
 from posekit.viewer.illustrate import illustrate
 from posekit.views.builtin import builtin_view, view_of
@@ -73,7 +73,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     )
     table = ["# posekit demo", "", *table_lines(head, rows)]
     given = read_postures(folder / "seq1.result.json")
-    report = validate(Validator(ranges="urdf", strict=True), given)
+    report = validate_postures(Validator(ranges="urdf", strict=True), given)
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
     table += [

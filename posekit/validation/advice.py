@@ -10,7 +10,7 @@ import numpy as np
 
 from posekit.formats.own import ValidationReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
-from posekit.settings import DEFAULT_RANGES, ValidateSettings
+from posekit.settings import DEFAULT_RANGES, EXACT_TOLERANCE
 
 FEW_DEGREES: Final = 15.0
 """Degrees within which somebody may well be more mobile, or a skeleton's joints placed otherwise."""
@@ -90,14 +90,16 @@ def _amount(by: float, unit: str) -> str:
     return f"{by:.2g} {'degrees' if unit == 'deg' else unit}"
 
 
-def said_of(report: ValidationReport, settings: ValidateSettings) -> list[str]:
+def said_of(report: ValidationReport) -> list[str]:
     """Say what the postures of a report were allowed, and why most of those that fail do."""
     told = report.settings
-    lines = []
+    lines, angle = [], told.get("angle_tolerance")
     if "noise" in told or "people" in told:
         lines.append(_allowed(told))
-    elif settings.angle_tolerance is not None or settings.contact_margin < 0:
-        lines.append(f"judged with {settings.angle:g} degrees of tolerance")
+    elif isinstance(angle, float) and (
+        angle != EXACT_TOLERANCE.angle or str(told.get("contact_margin")).startswith("-")
+    ):
+        lines.append(f"judged with {angle:g} degrees of tolerance")
     if told.get("why"):
         lines.append(str(told["why"]))
     return lines

@@ -110,6 +110,7 @@ class ReportBuilder:
         self._said: Counter[str] = Counter()
         self._told: dict[str, Any] = {}
         self.count = 0
+        self.own = False
 
     def add(
         self,
@@ -118,6 +119,7 @@ class ReportBuilder:
         *,
         file: str = "",
         sequence: NDArray[np.intp] | None = None,
+        own: bool = False,
     ) -> None:
         """Judge a file.
 
@@ -131,6 +133,8 @@ class ReportBuilder:
             What reports call it.
         sequence : int array (N,), optional
             Which sequence in time each posture belongs to: see `Validator.check`.
+        own : bool
+            Whether it is judged by a body of its own, as results are.
 
         Raises
         ------
@@ -145,6 +149,7 @@ class ReportBuilder:
         except BaseException:
             self._places, self._checks = known, checks
             raise
+        self.own |= own
 
     def _add(self, validator: Validator, given: _Given, file: str, sequence: NDArray[np.intp] | None) -> None:
         applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
@@ -320,6 +325,43 @@ class ReportBuilder:
             for (file, frames), part in zip(self._frames, self._parts, strict=True)
         ]
         return (joined_frames(parts), True) if parts else (None, False)
+
+
+def validate_postures(
+    validator: Validator,
+    postures: Postures | HeldPostures | NamedConfigurations,
+    *,
+    settings: Mapping[str, Any] | None = None,
+    every: bool = False,
+    sequence: NDArray[np.intp] | None = None,
+    distances: bool | None = None,
+    detail: Detail = "findings",
+    file: str = "",
+) -> ValidationReport:
+    """Judge the postures of one file.
+
+    Parameters
+    ----------
+    validator : Validator
+        What judges, with its settings.
+    postures : Postures, HeldPostures or NamedConfigurations
+        What is judged; frames in time by the checks over time, too.
+    settings : dict, optional
+        What else is to be written of what decided the verdicts: the settings of the validator are.
+    every, distances, detail
+        As `WantedDetail` has them.
+    sequence : int array (N,), optional
+        Which sequence in time each posture belongs to: see `Validator.check`.
+    file : str
+        What reports call the file that they are of.
+
+    Returns
+    -------
+    posekit.formats.own.ValidationReport
+    """
+    built = ReportBuilder(WantedDetail(detail=detail, every=every, distances=distances))
+    built.add(validator, postures, file=file, sequence=sequence)
+    return built.report(settings)
 
 
 def _unordered(file: str, count: int) -> ReportFrames:

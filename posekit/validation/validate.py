@@ -1,143 +1,122 @@
-"""The postures of one file judged, and what a result was recovered with."""
+"""`posekit.validate`: whatever holds postures, judged."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any, Final, NamedTuple
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body import Figure, load_figure
-from posekit.formats.held_postures import HeldPostures
+from posekit.body import Figure
+from posekit.errors import InputError
+from posekit.formats.held_postures import HeldPostures, postures_of_result
 from posekit.formats.own import NamedConfigurations, Postures, Result, ValidationReport
-from posekit.recovery.judged import tolerances_of
-from posekit.safe_io.refusal import refusal
-from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
-from posekit.validation.judging import Detail, ReportBuilder, WantedDetail
-from posekit.validators import Validator
-from posekit.validators.ranges import NAMED_TABLES
-from posekit.validators.walking import THRESHOLDS_BY_WALKERS
+from posekit.geometry import Array
+from posekit.robots import Robot
+from posekit.settings import ValidateSettings
+from posekit.skeleton import HEAD_POINTS, JOINTS
+from posekit.validation.files import AskedValidation, validate_files
+from posekit.validation.judging import ReportBuilder
+from posekit.validation.reading import ReadPostures, StatedMotion, files_of
 
-SHORTEST_LIMB_METRES: Final = 0.2
-"""Metres: by it what positions are off becomes what angles are off."""
+Given = HeldPostures | Postures | NamedConfigurations | Result | Array
 
 
 def validate(
-    validator: Validator,
-    postures: Postures | HeldPostures | NamedConfigurations,
+    given: Given | str | Path | Sequence[str | Path],
+    settings: ValidateSettings | None = None,
     *,
-    settings: Mapping[str, Any] | None = None,
-    every: bool = False,
-    sequence: NDArray[np.intp] | None = None,
-    distances: bool | None = None,
-    detail: Detail = "findings",
-    file: str = "",
+    urdf: str | Path | Figure | Robot = "",
+    unit: str = "",
+    up: str = "",
+    rate: float | None = None,
+    body_model: str | Path | None = None,
+    **changes: Any,
 ) -> ValidationReport:
-    """Judge the postures of one file.
+    """Judge whatever holds postures: files, folders, patterns, or what was read or computed.
 
     Parameters
     ----------
-    validator : Validator
-        What judges, with its settings.
-    postures : Postures, HeldPostures or NamedConfigurations
-        What is judged; frames in time by the checks over time, too.
-    settings : dict, optional
-        What else is to be written of what decided the verdicts: the settings of the validator are.
-    every, distances, detail
-        As `WantedDetail` has them.
-    sequence : int array (N,), optional
-        Which sequence in time each posture belongs to: see `Validator.check`.
-    file : str
-        What reports call the file that they are of.
+    given : path, sequence of path, array, HeldPostures, Postures, NamedConfigurations or Result
+        Files, folders of them and patterns, as ``clips/*.bvh``; joints (T, 14, 3), or (T, 19, 3) with the head's
+        points, metres, NaN where unknown; or what was read. Motion, that is one posture a frame, is judged by the
+        checks over time, too.
+    settings : ValidateSettings, optional
+        What decides the verdicts; the usual, or what a result was recovered with, if not given.
+    urdf : str, path, Figure or Robot
+        By which body: what `posekit.Validator` takes.
+    unit : str
+        What files are in: ``m``, ``cm``, ``mm``, ``in``; else what they say, or what is recognised.
+    up : str
+        The axis that points up, as ``+y``; else what files say, or what is recognised.
+    rate : float, optional
+        Frames a second; else what files say. An array is motion where it is given.
+    body_model : path, optional
+        NPZ of the body model whose angles files have, as AMASS's.
+    **changes
+        Single settings that are other than those, by the names of the fields of `posekit.ValidateSettings`.
 
     Returns
     -------
-    posekit.formats.own.ValidationReport
-    """
-    built = ReportBuilder(WantedDetail(detail=detail, every=every, distances=distances))
-    built.add(validator, postures, file=file, sequence=sequence)
-    return built.report(settings)
-
-
-class RecoveredWith(NamedTuple):
-    """Whose postures a result holds, and settings that judge them by what they were recovered with.
-
-    Of several kinds of frames, by what allowed most; and no more strictly than is usual.
-    """
-
-    figure: Figure
-    settings: ValidateSettings
-
-
-def recovered_with(result: Result) -> RecoveredWith:
-    """Return what a result was recovered with, by its settings.
-
-    Where they are mute, it is taken as the built-in figure's, exact, and by the paper.
+    ValidationReport
+        Verdicts and what is behind them; `refused` has a line for each of several files that is broken.
 
     Raises
     ------
     InputError
-        Where the settings say what is no tolerance, margin or name.
+        Where a single file is broken or none of several can be judged, or what is asked is impossible.
+
+    Examples
+    --------
+    >>> import numpy as np, posekit
+    >>> standing = np.repeat(posekit.load_figure().neutral_points[None, :14], 20, axis=0)
+    >>> posekit.validate(standing, rate=30, up="+z").summary
+    {'valid': 20, 'invalid': 0, 'undecided': 0}
     """
-    figure, settings = load_figure(), result.settings
-    lengths = settings.get("lengths")
-    if isinstance(lengths, dict) and settings.get("figure") != figure.hash:
-        behind = _number(settings, "shoulder_offset", 0.0) < 0
-        figure = figure.scaled({str(name): float(length) for name, length in lengths.items()}, behind=behind)
-    # Results of earlier versions, which are mute of it, did not ask for the side.
-    if settings.get("shoulders", "undecided" if isinstance(lengths, dict) else "") == "undecided":
-        figure = replace(figure, side_known=False)
-    return RecoveredWith(figure, _judged(settings, result.decimals))
+    model = None if body_model is None else Path(body_model)
+    stated = StatedMotion(unit=unit, up=up, rate=rate, body_model=model)
+    asked = AskedValidation(urdf=urdf, settings=settings, changes=changes, stated=stated)
+    if isinstance(given, str | Path):
+        return validate_files(files_of([Path(given)]), asked)
+    if isinstance(given, list | tuple) and given and all(isinstance(one, str | Path) for one in given):
+        return validate_files(files_of([Path(one) for one in given]), asked)
+    read = _read(given, stated)
+    built = ReportBuilder()
+    built.add(asked.validator(read), read.postures, own=read.result is not None)
+    return built.report({"urdf": asked.told if urdf or not built.own else "as recovered"})
 
 
-def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettings:
-    """Return what frames were judged with, and by how much what a file says of them is off."""
-    judged = settings.get("judged")
-    kinds = {kind for kind in judged if isinstance(kind, str)} if isinstance(judged, list) else set()
-    asked = _number(settings, "contact_margin", 0.0)
-    rigid, angles, margins = [RIGID_TOLERANCE], [EXACT_TOLERANCE.angle], [asked]
-    for kind, said in tolerances_of(settings).items():
-        if kind in kinds:
-            within = "tolerance." if kind == "given" else f"{kind}."
-            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
-            angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
-            margins.append(_number(said, "contact", asked, within=within))
-    if decimals is not None:  # what was rounded may be off by that
-        step = math.sqrt(3) * 10.0**-decimals
-        rigid, margins = [max(rigid) + step], [min(margins) - step]
-        angles = [max(angles) + math.degrees(2 * step / SHORTEST_LIMB_METRES)]
-    walkers, ranges = settings.get("walkers", "paper"), settings.get("ranges")
-    if not (isinstance(walkers, str) and walkers in THRESHOLDS_BY_WALKERS):
-        raise refusal(
-            "result",
-            "settings.walkers",
-            repr(walkers)[:40],
-            " or ".join(THRESHOLDS_BY_WALKERS),
-            "correct what made the result",
-        )
-    return ValidateSettings(
-        rigid_tolerance=max(rigid),
-        angle_tolerance=max(angles),
-        contact_margin=min(margins),
-        noise=0.0,
-        lengths="model",
-        walkers=walkers,
-        **({"ranges": ranges} if ranges in ("urdf", *NAMED_TABLES) else {}),
-    )
+def _read(given: Any, stated: StatedMotion) -> ReadPostures:
+    """Lay out what was read or computed."""
+    if isinstance(given, NamedConfigurations):
+        return ReadPostures(given)
+    if isinstance(given, Result):
+        return ReadPostures(stated.applied(postures_of_result(given)), given)
+    if isinstance(given, HeldPostures):
+        return ReadPostures(stated.applied(given))
+    postures = given if isinstance(given, Postures) else _postures(given)
+    count = len(postures.joints)
+    if not count:
+        raise InputError("postures: there is none; nothing can be judged; expected at least one")
+    none: NDArray[np.intp] = np.zeros(count, dtype=np.intp)
+    held = HeldPostures(postures=postures, frame=none, clip=none, time=np.full(count, np.nan))
+    return ReadPostures(stated.applied(held))
 
 
-def _number(settings: Mapping[str, Any], name: str, default: float, *, within: str = "") -> float:
-    """Return a number of a result's settings, or refuse what is none."""
-    value = settings.get(name, default)
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise refusal(
-            "result",
-            f"settings.{within}{name}",
-            repr(value)[:40],
-            "a finite number",
-            "correct what made the result",
-        )
-    return float(value)
+def _postures(given: Any) -> Postures:
+    """Make postures of an array."""
+    expected = f"(T, {len(JOINTS)}, 3), or (T, {len(JOINTS) + len(HEAD_POINTS)}, 3) with the head, metres"
+    try:
+        points = np.asarray(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"postures: no array of numbers, and no path; expected {expected}") from error
+    if (
+        points.ndim != 3
+        or points.shape[1] not in (len(JOINTS), len(JOINTS) + len(HEAD_POINTS))
+        or points.shape[2] != 3
+    ):
+        raise InputError(f"postures: the shape is {points.shape}; expected {expected}")
+    head = points[:, len(JOINTS) :]
+    return Postures(joints=points[:, : len(JOINTS)], head=head if head.size else None)

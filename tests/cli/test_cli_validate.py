@@ -18,7 +18,7 @@ from posekit.formats.own.postures_q import NamedConfigurations, read_configurati
 from posekit.robots import load_robot
 from posekit.robots.find import find
 from posekit.skeleton import JOINTS
-from posekit.validation import validate as pipeline_validate
+from posekit.validation import validate_postures
 from posekit.validators import Validator
 
 FIGURE = load_figure()
@@ -290,9 +290,9 @@ def test_the_lengths_are_those_of_the_whole_file(monkeypatch: pytest.MonkeyPatch
     files = importlib.import_module("posekit.formats.own")
     module = importlib.import_module("posekit.validation.judging")
     joints = np.concatenate([STANDING * scale for scale in (0.99, 1.0, 1.0, 1.01)])
-    whole = pipeline_validate(Validator(HUMAN), files.Postures(joints=joints))
+    whole = validate_postures(Validator(HUMAN), files.Postures(joints=joints))
     monkeypatch.setattr(module, "POSTURES_AT_ONCE", 1)
-    parts = pipeline_validate(Validator(HUMAN), files.Postures(joints=joints))
+    parts = validate_postures(Validator(HUMAN), files.Postures(joints=joints))
     assert whole.settings == parts.settings
     for a, b in zip(whole.postures, parts.postures, strict=True):
         assert a.verdict == b.verdict

@@ -17,7 +17,7 @@ from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.inspection.results import result_lines
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import MAX_DETAILED, result_of
-from posekit.validation.validate import recovered_with
+from posekit.validation import recovered_with
 from posekit.validators import Validator
 
 EARLIER = Path(__file__).parent / "earlier"

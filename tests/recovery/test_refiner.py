@@ -27,7 +27,7 @@ from posekit.recovery.result import result_of
 from posekit.settings import MEASURED_TOLERANCE
 from posekit.skeleton import JOINT, SEGMENTS, segment_name
 from posekit.synthesis import SyntheticScene, random_views
-from posekit.validation.validate import recovered_with
+from posekit.validation import recovered_with
 from posekit.validators import Validator
 from posekit.views.builtin import forget_camera, view_of
 

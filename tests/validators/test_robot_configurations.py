@@ -13,7 +13,7 @@ import pytest
 from posekit.formats.own import write_report
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.robots import Robot, load_robot
-from posekit.validation import validate
+from posekit.validation import validate_postures
 from posekit.validators import Validator
 from posekit.validators.robot import Deferred
 
@@ -147,7 +147,7 @@ def test_contacts_are_all_pairs_one_by_one_and_the_nearest_of_the_rest(name: str
 def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
     given = NamedConfigurations(q=some_q("human"))
     reports = {
-        detail: validate(validator("human"), given, detail=detail)
+        detail: validate_postures(validator("human"), given, detail=detail)
         for detail in ("findings", "margins", "verdicts")
     }
     whole = reports["findings"]
@@ -168,9 +168,9 @@ def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
 def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     given = NamedConfigurations(q=some_q("human"))
     module = importlib.import_module("posekit.validation.judging")
-    whole = validate(validator("human"), given, detail="verdicts").columns
+    whole = validate_postures(validator("human"), given, detail="verdicts").columns
     monkeypatch.setattr(module, "POSTURES_AT_ONCE", 17)
-    parts = validate(validator("human"), given, detail="verdicts").columns
+    parts = validate_postures(validator("human"), given, detail="verdicts").columns
     assert whole is not None
     assert parts is not None
     assert whole.places == parts.places or set(whole.places) == set(parts.places)
@@ -185,8 +185,8 @@ def test_an_order_of_ones_own_is_brought_into_the_robots() -> None:
     q, robot = some_q("human")[:40], load_robot("human")
     names = robot.configuration_names
     turned = NamedConfigurations(q=q[:, ::-1], names=names[::-1])
-    plain = validate(validator("human"), NamedConfigurations(q=q, names=names), detail="verdicts")
-    assert validate(validator("human"), turned, detail="verdicts").verdicts == plain.verdicts
+    plain = validate_postures(validator("human"), NamedConfigurations(q=q, names=names), detail="verdicts")
+    assert validate_postures(validator("human"), turned, detail="verdicts").verdicts == plain.verdicts
 
 
 def test_a_robot_without_limits_is_inside_them() -> None:
@@ -195,7 +195,7 @@ def test_a_robot_without_limits_is_inside_them() -> None:
     q = pin.neutral(robot.model)[None]
     assert judge.check(q=q).verdicts == ["valid"]
     assert judge.check(q=q).judgements[0].where == ()
-    report = validate(judge, NamedConfigurations(q=q))
+    report = validate_postures(judge, NamedConfigurations(q=q))
     assert [posture.verdict for posture in report.postures] == ["valid"]
 
 

@@ -137,6 +137,8 @@ class ValidationReport:
         The verdicts on clips, of frames in time.
     stills : sequence of sequences of Still
         Of each clip, frames that can be drawn; not in the JSON file.
+    refused : sequence of str
+        Of several files those that could not be judged, each with why in a line.
     """
 
     settings: Mapping[str, Any]
@@ -148,6 +150,7 @@ class ValidationReport:
     frames: ReportFrames | None = field(default=None, compare=False, repr=False)
     clips: Sequence[ClipVerdict] | None = None
     stills: Sequence[Sequence[Still]] = field(default=(), compare=False, repr=False)
+    refused: Sequence[str] = ()
 
     def __len__(self) -> int:
         """Count the postures that were judged."""
@@ -282,6 +285,7 @@ def read_report(path: str | Path) -> ValidationReport:
         postures=tuple(_posture(posture) for posture in file.postures),
         checks=None if file.checks is None else {name: _count(check) for name, check in file.checks.items()},
         listed=file.listed,
+        refused=tuple(file.refused),
         verdicts=file.verdicts,
         clips=None if file.clips is None else tuple(clip_of_document(clip) for clip in file.clips),
     )
@@ -371,6 +375,8 @@ def _head(report: ValidationReport) -> dict[str, Any]:
         head["listed"] = report.listed
     if report.verdicts is not None:
         head["verdicts"] = report.verdicts
+    if report.refused:
+        head["refused"] = list(report.refused)
     if report.clips is not None:
         head["clips"] = [clip_document(clip) for clip in report.clips]
     return head

@@ -141,6 +141,9 @@ class ReportFile(FileModel):
     verdicts: Annotated[str, Field(pattern="^[viu]*$")] | None = Field(
         default=None, description="One letter for every posture of the file, where not all are listed."
     )
+    refused: list[str] = Field(
+        default=[], description="Of several files those that could not be judged, each with why."
+    )
     clips: list[ClipFields] | None = Field(
         default=None, description="Of frames in time: the verdict on every clip."
     )
