@@ -25,6 +25,9 @@ from posekit.safe_io.writing import make_folder
 MANIFEST_NAME: Final = "posekit-manifest.csv"
 
 
+ROUNDING_SECONDS: Final = 1e-6
+"""Seconds that the difference of two times may be off."""
+
 _NONE: Final = np.zeros(0, dtype=np.intp)
 
 
@@ -158,7 +161,7 @@ def _chosen(
         first, last = (int(np.flatnonzero(frames.frame[rows] == frame)[0]) for frame in clip.good)
         part = rows[first : last + 1]
         seconds = float(frames.time[part[-1]] - frames.time[part[0]])
-        if not seconds < spans:  # also where no times are known
+        if not seconds < spans - ROUNDING_SECONDS:  # also where no times are known
             return part, why
         why = f"longest good span {seconds:.3g} s, below {spans:g} s; {why}"
     return rows[:0], why

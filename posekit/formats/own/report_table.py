@@ -136,7 +136,7 @@ def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> 
     lines = clip_table(clips)[:1]
     for clip in bad[:most]:
         name, verdict, share, *_, worst, good = map(str, _of_clip(clip))
-        lines.append(_cell(f"  {name}: {verdict}, {share} not valid; {worst}; longest good span {good}"))
+        lines.append(_printable(f"  {name}: {verdict}, {share} not valid; {worst}; longest good span {good}"))
     return [*lines, f"  and {len(bad) - most} more"] if len(bad) > most else lines
 
 
@@ -212,5 +212,9 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 
 def _cell(text: str) -> str:
     """Keep a name from a file inside its cell."""
-    printable = "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
-    return printable.replace("|", "\\|")
+    return _printable(text).replace("|", "\\|")
+
+
+def _printable(text: str) -> str:
+    """Spell out what would steer a terminal or end a line."""
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
