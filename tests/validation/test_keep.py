@@ -66,7 +66,8 @@ def test_files_keep_their_names_below_the_folder_that_holds_them_all(tmp_path, t
     assert found["a/walk.npz"] == before["a/walk.npz"]
     with np.load(tmp_path / "out/b/walk.npz") as part:
         np.testing.assert_array_equal(part["q"][:, 0], 3.0 * np.arange(2, 8))
-    rows = list(csv.DictReader((tmp_path / "out" / MANIFEST_NAME).open(encoding="utf-8", newline="")))
+    with (tmp_path / "out" / MANIFEST_NAME).open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
     assert [(row["written"], row["first"], row["last"]) for row in rows] == [
         ("a/walk.npz", "0", "9"),
         ("b/walk.npz", "2", "7"),
