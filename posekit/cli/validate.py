@@ -100,8 +100,7 @@ def validate(
     allowed = parse_fail_over(fail_over)
     asked = asked_of(body, stated, judged)
     files = files_of(given, output)
-    for one in (output, page, timeline):
-        distinct(*files, one)
+    distinct(*files, output, page, timeline)
     with progress("judging", len(files)) as done:
         wanted = WantedDetail(detail=outputs.detail, every=every, distances=distances)
         report = validate_files(files, asked, wanted=wanted, progress=done)
