@@ -240,7 +240,7 @@ class Validator:
     @property
     def kinematics(self) -> Kinematics | None:
         """The joints of a robot, by its joint map; None of the stick figure, and of a robot that has none."""
-        return self._robot.models.own.kinematics if self.robot is not None else None
+        return self._robot.models.known_kinematics if self.robot is not None else None
 
     def _check_configurations(self, q: ArrayLike) -> Report:
         if self._figure is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,8 +15,10 @@ from posekit.formats.held_postures import held_configurations, mapped_positions
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.geometry import Array
 from posekit.robots.configuration_space import ConfigurationSpace
-from posekit.skeleton import POINTS
+from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics
+from posekit.skeleton import FEET_POINTS, POINTS, SIDES
 from posekit.validators import Validator
+from posekit.validators.robot.feet import find_soles
 
 
 def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPostures:
@@ -39,7 +42,57 @@ def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPos
     kinematics = validator.kinematics
     if kinematics is None:
         return held_configurations(configurations, names, _nowhere)
-    return held_configurations(configurations, names, partial(mapped_positions, kinematics))
+    held = held_configurations(configurations, names, partial(mapped_positions, kinematics))
+    feet = soles(kinematics, validator.robot.geometry)
+    return held if feet is None else replace(held, feet=feet.positions(held.q))
+
+
+def soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> Kinematics | None:
+    """Return what places toes and heels, in the order of `FEET_POINTS`: the middles of a sole's two ends.
+
+    Parameters
+    ----------
+    kinematics : Kinematics
+        The robot's points by its joint map.
+    geometry : pinocchio.GeometryModel or None
+        Its bodies; soles of a person's size are made up where there are none.
+
+    Returns
+    -------
+    Kinematics or None
+        None where the robot has not both feet.
+    """
+    model, data = kinematics.model, kinematics.model.createData()
+    pin.forwardKinematics(model, data, kinematics.neutral)
+    ankles = {
+        side: kinematics.names.index(f"{side}_ankle") for side in SIDES if f"{side}_ankle" in kinematics.names
+    }
+    if len(ankles) < len(SIDES):
+        return None
+    at = kinematics.positions(kinematics.neutral[None])[0]
+    hips = {
+        side: at[kinematics.names.index(f"{side}_hip")] for side in SIDES if f"{side}_hip" in kinematics.names
+    }
+    if len(hips) < len(SIDES):
+        return None
+    forward = np.cross(hips["left"] - hips["right"], hips["left"] - at[ankles["left"]])
+    corners = find_soles(kinematics, geometry)
+    places = np.array([data.oMi[one.joint].act(np.asarray(one.place)) for one in corners]).reshape(-1, 3)
+    ends: dict[str, list[BodySite]] = {point: [] for point in FEET_POINTS}
+    for side, ankle in ankles.items():
+        apart = {one: np.linalg.norm(places - at[place], axis=1) for one, place in ankles.items()}
+        mine = np.flatnonzero(apart[side] == np.min(list(apart.values()), axis=0))
+        if len(mine) < 2:
+            return None
+        along = places[mine] @ forward
+        for k, reach in zip(mine, along, strict=True):
+            x, y, z = (float(value) for value in corners[k].place)
+            site = BodySite(frame=model.names[corners[k].joint], offset=(x, y, z))
+            ends[f"{side}_{'toe' if reach > along.mean() else 'heel'}"].append(site)
+    if not all(ends.values()):
+        return None
+    points = tuple(BodyPoint(name=name, sites=tuple(sites)) for name, sites in ends.items())
+    return Kinematics(model=model, points=points)
 
 
 def moves_of(

@@ -125,7 +125,7 @@ class Models:
         subject = Subject(model=self.robot.model, lower=lower, upper=upper, geometry=self._geometry)
         needed = "balance" in self.settings.check_names
         return JudgedModel(
-            subject=subject, kinematics=self._mapped if needed else None, settings=self.settings
+            subject=subject, kinematics=self.known_kinematics if needed else None, settings=self.settings
         )
 
     def with_lengths(self, lengths: Mapping[str, float], behind: bool | None) -> JudgedModel:
@@ -191,8 +191,8 @@ class Models:
         return {}
 
     @cached_property
-    def _mapped(self) -> Kinematics | None:
-        """Points for balance; a robot that no joint map fits has none, and then no feet."""
+    def known_kinematics(self) -> Kinematics | None:
+        """The robot's points; None where no joint map fits it, and then it has no feet."""
         try:
             return self.kinematics
         except InputError:

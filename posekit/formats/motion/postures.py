@@ -146,7 +146,8 @@ def layout_of(names: Sequence[str], source: str = "motion") -> SkeletonMap:
 
 
 def _sources(one: SkeletonMap, there: set[str]) -> dict[str, frozenset[str]]:
-    found = {name: frozenset(plain(part) for part in parts) for name, parts in one.landmarks.items()}
+    placed = {**one.landmarks, **one.feet}
+    found = {name: frozenset(plain(part) for part in parts) for name, parts in placed.items()}
     return {name: parts for name, parts in found.items() if parts <= there}
 
 
