@@ -64,13 +64,15 @@ def about(file: Path) -> Iterator[None]:
 
 def distinct(*paths: Path | None) -> None:
     """Refuse to write over what is read, or two outputs over each other."""
-    named = [path for path in paths if path is not None]
-    places = [path.resolve() for path in named]
-    for k, place in enumerate(places):
-        if place in places[:k]:
+    places: set[Path] = set()
+    for path in paths:
+        if path is None:
+            continue
+        if path.resolve() in places:
             raise InputError(
-                f"{named[k]}: would be written over another file of this command; choose another name"
+                f"{path}: would be written over another file of this command; choose another name"
             )
+        places.add(path.resolve())
 
 
 def split(text: str) -> tuple[str, ...]:
