@@ -85,6 +85,12 @@ def validate(
             "Keep the longest good span of other clips too, where it takes as long.",
         ),
     ] = None,
+    repair: Annotated[
+        Path | None,
+        option(
+            "--repair", "FILE|DIR", "The nearest that passes, as a file, or in a folder one of each clip."
+        ),
+    ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")
     ] = False,
@@ -108,6 +114,11 @@ def validate(
     _tell(report)
     for line in written:
         typer.echo(line)
+    if repair is not None:
+        from posekit.conversion.repaired_file import repair_files
+
+        for line in repair_files(files, asked, repair):
+            typer.echo(line)
     if report.refused:
         raise typer.Exit(BAD_INPUT)
     if allowed.exceeded(report):

@@ -18,7 +18,7 @@ from posekit.remedy.lengths import with_lengths
 from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.validators import Judgement, Validator
 from posekit.validators.motion import MotionClip, judge_motion
-from posekit.validators.motion.clip import FEET_POINTS
+from posekit.skeleton import FEET_POINTS
 
 Bools = NDArray[np.bool_]
 

@@ -1,0 +1,267 @@
+"""What a file holds, repaired and written: as motion in its own format, as postures, as configurations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.body import Figure, load_figure
+from posekit.body.measured import figure_of, measured_person
+from posekit.conversion.motion_output import TABLE_FORMATS, MotionOutput, by_suffix, write_moving
+from posekit.conversion.posture_sequence import ASSUMED_RATE, PostureSequence
+from posekit.errors import InputError, PosekitError
+from posekit.formats import own as files
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.motion import Motion, write_motion
+from posekit.formats.own import Postures
+from posekit.formats.own.postures_q import NamedConfigurations, write_configurations
+from posekit.geometry import Array
+from posekit.remedy import Repaired, repair, repair_configurations
+from posekit.safe_io import refusal
+from posekit.safe_io.writing import check_target, make_folder
+from posekit.skeleton import POINTS
+from posekit.validation.files import AskedValidation
+from posekit.validation.over_time import clip_of
+from posekit.validation.reading import read_postures_of
+from posekit.validators import Validator
+
+MOST_TOLD: Final = 10
+"""Clips of which it is said what was changed in them; of more how many there are."""
+
+FOLDER_FORMAT: Final = ".npz"
+"""What clips of a folder are written as where their own format cannot be written."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairedClip:
+    """One clip of a file, repaired.
+
+    Parameters
+    ----------
+    name : str
+        Of the clip; that of the file where it has none.
+    held : HeldPostures
+        Its frames with the repaired joints.
+    repaired : Repaired
+        The record.
+    """
+
+    name: str
+    held: HeldPostures
+    repaired: Repaired
+
+
+def check_repair_target(target: Path, clips: int) -> None:
+    """Refuse a name before the work is done: of several clips a folder, or a format that carries several.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written.
+    """
+    if not target.suffix:
+        return
+    check_target(target)
+    several = (*(f".{one}" for one in TABLE_FORMATS), ".json")
+    if clips > 1 and target.suffix.lower() not in several:
+        raise refusal(
+            target,
+            "--repair",
+            f"a file, of {clips} clips",
+            f"a folder, or {', '.join(several)}",
+            "name it so",
+        )
+
+
+def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) -> Iterator[str]:
+    """Repair what files hold, each with the validator that judges it; those that are broken are passed over.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files.
+    asked : AskedValidation
+        By what they are judged.
+    target : Path
+        A file; or, without suffix, a folder: of several files, and of several clips.
+
+    Raises
+    ------
+    InputError
+        Where several files are to go to one, or it cannot be written.
+    """
+    if len(paths) > 1 and target.suffix:
+        got = f"a file, of {len(paths)} files"
+        raise refusal(target, "--repair", got, "a folder", "give a name without suffix")
+    for path in paths:
+        try:
+            read = read_postures_of(path, asked.stated)
+        except PosekitError:
+            if len(paths) == 1:
+                raise
+            continue
+        into = target if len(paths) == 1 else target / path.stem
+        yield from repair_file(read.postures, asked.validator(read), into, path)
+
+
+def repair_file(
+    given: HeldPostures | NamedConfigurations, validator: Validator, target: Path, source: Path
+) -> Iterator[str]:
+    """Repair what a file holds and write it, and say what was changed and what was not, a line each.
+
+    Parameters
+    ----------
+    given : HeldPostures or NamedConfigurations
+        What the file holds.
+    validator : Validator
+        What must pass.
+    target : Path
+        A file, or without suffix a folder with a file a clip.
+    source : Path
+        The file that was read: its format is kept in a folder where it can be written.
+
+    Raises
+    ------
+    InputError
+        Where a robot is given postures, or the target cannot be written.
+    """
+    if isinstance(given, NamedConfigurations):
+        done = repair_configurations(given.in_order_of(validator.configuration_names), validator)
+        q = given.q if done.q is None else done.q
+        target = target if target.suffix else target / f"{source.stem}{FOLDER_FORMAT}"
+        make_folder(target.parent)
+        write_configurations(target, q, validator.configuration_names)
+        yield f"repaired: {target}: {done.told()}"
+        return
+    if validator.robot is not None:
+        raise InputError(
+            "--repair: postures are repaired as the stick figure's; expected configurations of the robot; leave out "
+            "--urdf"
+        )
+    clips = list(repaired_clips(given, validator, source))
+    check_repair_target(target, len(clips))
+    for path, some in _targets(target, source, clips):
+        _write(path, some)
+    changed = [clip for clip in clips if clip.repaired.spans or clip.repaired.left]
+    for clip in changed[:MOST_TOLD]:
+        yield f"repaired: {clip.name}: {clip.repaired.told()}"
+    more = len(changed) - MOST_TOLD
+    also = f"; {more} more changed" if more > 0 else ""
+    yield f"written: {target}, {len(changed)} of {len(clips)} clips changed{also}"
+
+
+def repaired_clips(given: HeldPostures, validator: Validator, source: Path) -> Iterator[RepairedClip]:
+    """Repair each clip of a file; postures that are not in time, each by itself.
+
+    Parameters
+    ----------
+    given : HeldPostures
+        What the file holds.
+    validator : Validator
+        What must pass.
+    source : Path
+        The file: it names what has no name.
+    """
+    if not given.in_time:
+        done = repair(given.postures.joints, validator, head=given.postures.head)
+        yield RepairedClip(name=source.name, held=_with(given, np.arange(len(given)), done), repaired=done)
+        return
+    for index in np.unique(given.clip).tolist():
+        rows = np.flatnonzero(given.clip == index)
+        done = repair(clip_of(given, rows, validator), validator)
+        name = (given.clips[index] if index < len(given.clips) else "") or source.name
+        yield RepairedClip(name=name, held=_with(given, rows, done), repaired=done)
+
+
+def _with(given: HeldPostures, rows: NDArray[np.intp], done: Repaired) -> HeldPostures:
+    return HeldPostures(
+        postures=Postures(joints=done.joints, head=done.head),
+        frame=given.frame[rows],
+        clip=np.zeros(len(rows), dtype=np.intp),
+        time=given.time[rows] if done.time is None else done.time,
+        up=given.up,
+        unit=given.unit,
+    )
+
+
+def _targets(
+    target: Path, source: Path, clips: list[RepairedClip]
+) -> Iterator[tuple[Path, list[RepairedClip]]]:
+    """Name the files: one of all clips, or in a folder one of each."""
+    if target.suffix:
+        yield target, clips
+        return
+    try:
+        by_suffix(source)
+        suffix = source.suffix
+    except InputError:
+        suffix = FOLDER_FORMAT
+    make_folder(target)
+    for k, clip in enumerate(clips):
+        stem = "".join(one if one.isalnum() or one in "-_." else "_" for one in clip.name)
+        name = Path(stem).stem if clip.name == source.name else stem
+        unique = name if [other.name for other in clips].count(clip.name) == 1 else f"{name}_{k}"
+        yield target / f"{unique}{suffix}", [clip]
+
+
+def _write(path: Path, clips: list[RepairedClip]) -> None:
+    joints = np.concatenate([clip.held.postures.joints for clip in clips])
+    heads = [clip.held.postures.head for clip in clips]
+    head = (
+        None
+        if any(one is None for one in heads)
+        else np.concatenate([one for one in heads if one is not None])
+    )
+    in_time = all(clip.held.in_time for clip in clips)
+    if path.suffix.lower() == ".json" or not in_time:
+        files.write_postures(path, Postures(joints=joints, head=head))
+        return
+    to = by_suffix(path)
+    unknown = np.full((len(joints), len(POINTS) - joints.shape[1], 3), np.nan)
+    points = np.concatenate([joints, unknown if head is None else head], axis=1)
+    time = np.concatenate([_times(clip.held) for clip in clips])
+    if len(clips) > 1 or to in TABLE_FORMATS:
+        known = np.flatnonzero(np.isfinite(points[..., 0]).any(axis=0))
+        steps = np.diff(_times(clips[0].held))
+        motion = Motion(
+            names=tuple(POINTS[k] for k in known),
+            points=points[:, known],
+            time=time,
+            rate=float(1 / np.median(steps)) if len(steps) else ASSUMED_RATE,
+            up=clips[0].held.up,
+            source=str(path),
+            clip=np.repeat(np.arange(len(clips)), [len(clip.held) for clip in clips]),
+            clips=tuple(clip.name for clip in clips),
+        )
+        write_motion(path, motion, to)
+        return
+    whole = np.isfinite(points[:, :14]).all(axis=(1, 2))
+    write_moving(
+        MotionOutput(path=path, to=to),
+        PostureSequence(
+            points=points,
+            time=time,
+            frame=np.arange(len(points)),
+            survivor=np.zeros(len(points), dtype=np.intp),
+            up=clips[0].held.up or "+z",
+            figure=load_figure() if not whole.any() else _figure(points[:, :14]),
+            values={},
+        ),
+    )
+
+
+def _figure(joints: Array) -> Figure:
+    person = measured_person(joints)
+    return figure_of(load_figure(), person.lengths, person.behind)
+
+
+def _times(held: HeldPostures) -> Array:
+    """Return the times of frames; even ones where there are none."""
+    if np.isfinite(held.time).all() and (np.diff(held.time) > 0).all():
+        return held.time
+    return np.arange(len(held)) / ASSUMED_RATE
