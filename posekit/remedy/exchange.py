@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.remedy.record import runs
-from posekit.skeleton import POINTS, other_side
-from posekit.skeleton import FEET_POINTS
+from posekit.skeleton import FEET_POINTS, POINTS, other_side
 
 CLIP_MARKS: Final = (*POINTS, *FEET_POINTS)
 """All points of a clip: joints, head, feet."""

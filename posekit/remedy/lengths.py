@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.remedy.record import runs
-from posekit.skeleton import LIMB_JOINTS, POINTS, SEGMENT_NAMES, segment_name
-from posekit.skeleton import FEET_POINTS
+from posekit.skeleton import FEET_POINTS, LIMB_JOINTS, POINTS, SEGMENT_NAMES, segment_name
 
 RAMP_FRAMES: Final = 6
 """Frames before and after a span over which a length may have drifted there."""

@@ -15,10 +15,9 @@ from posekit.remedy.between import interpolated, smoothed
 from posekit.remedy.exchange import CLIP_MARKS, exchanged
 from posekit.remedy.ground import grounded, held_feet
 from posekit.remedy.lengths import with_lengths
-from posekit.skeleton import JOINT, JOINTS, POINTS, SEGMENT_NAMES
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.validators import Judgement, Validator
 from posekit.validators.motion import MotionClip, judge_motion
-from posekit.skeleton import FEET_POINTS
 
 Bools = NDArray[np.bool_]
 
