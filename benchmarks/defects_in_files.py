@@ -21,7 +21,8 @@ from posekit.validators.motion import MotionClip
 FOUND_IN_FILES: Final = ("joint-range", "unit", "up")
 """Names of what checks over time do not judge, but the reader of a file, or the checks of its postures."""
 
-SAID_OF_UNIT, SAID_OF_UP = "unit: got the file's own word", "though bodies stand along"
+SAID_OF_UNIT: Final = ("unit: got the file's own word",)
+SAID_OF_UP: Final = ("by the file's own word, though bodies stand along", "up: got")
 """What is said where a file's own word is not that of its points."""
 
 
@@ -36,9 +37,9 @@ def rejected_in_file(clip: MotionClip) -> dict[str, NDArray[np.bool_]]:
         _write(path, clip)
         said = _said("validate", str(path), "-o", str(report))
         frames = {}
-        if SAID_OF_UNIT in said:
+        if any(words in said for words in SAID_OF_UNIT):
             frames["unit"] = every
-        if SAID_OF_UP in said:
+        if any(words in said for words in SAID_OF_UP):
             frames["up"] = every
         if report.exists():
             frames.update(_postures(report, len(clip)))

@@ -79,5 +79,5 @@ def _smooth(lengths: Array) -> Array:
     last = np.maximum.accumulate(np.where(np.isfinite(lengths), slots, 0), axis=0)
     held = np.take_along_axis(lengths, last, axis=0)
     padded = np.pad(held, ((half, half), (0, 0)), mode="edge")
-    smooth = np.median(sliding_window_view(padded, DRIFT_FRAMES, axis=0), axis=-1)
+    smooth = np.partition(sliding_window_view(padded, DRIFT_FRAMES, axis=0), half, axis=-1)[..., half]
     return np.where(np.isfinite(lengths), smooth, np.nan)

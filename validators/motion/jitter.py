@@ -14,6 +14,9 @@ from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.trembling import trembling_frames
 
+NOISE_FACTOR: Final = 3.0
+"""Times the standard deviation of measuring that is allowed for: a length has the noise of two ends."""
+
 SLOWEST_RATE: Final = 25.0
 """Frames a second: at fewer, fast motion is not smooth from frame to frame."""
 
@@ -48,7 +51,7 @@ class Jitter(MotionCheck):
     def judge(self, clip: MotionClip) -> Findings:
         """Measure the standard deviation of what trembles, over fifteen frames; see `MotionCheck`."""
         found = explained(clip)
-        value, bound = found.trembling, self.deviation + 2.0 * clip.noise
+        value, bound = found.trembling, self.deviation + NOISE_FACTOR * clip.noise
         hot = np.nan_to_num(value) > bound
         if hot.any():
             exact = trembling_frames(found.joints, hot)
@@ -58,5 +61,5 @@ class Jitter(MotionCheck):
             value=found.timeline.of_frames(value),
             lower=np.array(-np.inf),
             upper=np.array(self.deviation),
-            tolerance=2.0 * clip.noise,
+            tolerance=NOISE_FACTOR * clip.noise,
         )

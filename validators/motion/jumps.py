@@ -91,8 +91,10 @@ def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
 def _middle(values: Array) -> Array:
     """Return the median over joints of (S, 14, ...): of those that are known."""
     known = np.isfinite(values)
-    if known.all() or not known.any():
-        return np.asarray(np.median(values, axis=1))
+    if known.all():
+        half = values.shape[1] // 2
+        ordered = np.partition(values, (half - 1, half), axis=1)
+        return np.asarray((ordered[:, half - 1] + ordered[:, half]) / 2.0)
     ordered = np.sort(values, axis=1)  # what is not known comes last
     number = known.sum(axis=1, keepdims=True)
     low, high = (

@@ -26,7 +26,7 @@ LEAST_METRES: Final = 0.005
 LEAST_JOINTS: Final = 3
 """That move: one or two that turn back tremble."""
 
-TURNS_APART: Final = 10
+TURNS_APART: Final = 6
 """Frames between two turns back that are one stretch."""
 
 AROUND_FRAMES: Final = 4
@@ -63,7 +63,11 @@ def displaced(joints: Array) -> NDArray[np.intp]:
         rows = rows[np.isfinite(joints[rows]).all(axis=(1, 2))]
         if len(rows) >= LEAST_FRAMES + 2:
             order = _shortest(joints[rows].reshape(len(rows), -1))
-            places[rows[order]] = rows - rows[order]
+            found = np.zeros(count, dtype=np.intp)
+            found[rows[order]] = rows - rows[order]
+            # Frames around it that go on evenly are in their places, though there may be a shorter way through them.
+            near = slice(max(first - 2, 0), last + 3)
+            places[near] = found[near]
     return places
 
 

@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.skeleton import JOINTS, SEGMENTS
 from posekit.validators.motion.timeline import centred, filtered, norm
 
 TREMBLING_FRAMES: Final = 15
@@ -18,8 +19,8 @@ TREMBLING_FRAMES: Final = 15
 CURVED_SHARE: Final = 0.3
 """Of the second difference, over three frames each way, that fast motion at few frames leaves in the sixth."""
 
-MEDIAN_OF_THREE: Final = 1.5382
-"""Median length of a vector of three normal coordinates of unit deviation."""
+MEDIAN_OF_THREE, MEDIAN_OF_ONE = 1.5382, 0.6745
+"""Median length of a vector of three normal coordinates of unit deviation, and of one."""
 
 NEAR_FRAMES: Final = 4
 """Between two stretches that are one."""
@@ -33,10 +34,22 @@ OUTSIDE_FRAMES: Final = 40
 LEAST_SHARE, FEW_FRAMES_SHARE = 0.1, 0.3
 """Of the trembling inside that there is outside at least; and where a few frames are all that says so."""
 
+OUTSIDE_QUANTILE: Final = 0.85
+"""Of what trembles outside a stretch: beside it motion may be fast."""
+
+MOST_SHARE, LEAST_INSIDE = 0.6, 0.002
+"""Of the trembling inside that there is outside at most, and metres that are trembling at least."""
+
 MOST_EVIDENCE: Final = 6.0
 """Of one joint in one frame that it trembles, or not: natural logarithm of a ratio of likelihoods."""
 
-_SIXTH: Final = np.array([(-1.0) ** k * comb(6, k) for k in range(7)])
+SIXTH_ORDER: Final = 6
+"""Of the differences that are taken for what is not smooth."""
+
+_SEGMENTS_OF: Final = tuple(
+    [k for k, segment in enumerate(SEGMENTS) if joint in segment] for joint in range(len(JOINTS))
+)
+_SIXTH: Final = np.array([(-1.0) ** k * comb(6, k) for k in range(7)]) / np.sqrt(comb(12, 6))
 _FOURTH: Final = np.array([(-1.0) ** k * comb(4, k) for k in range(5)]) / np.sqrt(comb(8, 4))
 _CURVATURE: Final = np.array([1.0, 0, 0, -2.0, 0, 0, 1.0]) / 9.0
 
@@ -48,15 +61,33 @@ def trembling_of(joints: Array) -> Array:
     -----
     The sixth difference of noise of deviation s has the deviation s sqrt(924) in each coordinate. Its median length
     over 15 frames is that of noise which lasts, not of one jump; what the curvature of fast motion leaves in it
-    is taken off.
+    is taken off. Lengths of segments are judged likewise, whose sixth differences no motion enters: a joint trembles
+    where the lengths of all its segments do.
     """
-    rough = norm(filtered(joints, _SIXTH)) / (np.sqrt(comb(12, 6)) * MEDIAN_OF_THREE)
-    rough = np.maximum(rough - CURVED_SHARE * norm(filtered(joints, _CURVATURE)), 0.0)
-    half = TREMBLING_FRAMES // 2
-    padded = np.pad(np.nan_to_num(rough), ((half, half), (0, 0)))
-    if not len(rough):
+    if len(joints) <= SIXTH_ORDER:
         return np.full(joints.shape[:2], np.nan)
-    return centred(np.median(sliding_window_view(padded, TREMBLING_FRAMES, axis=0), axis=-1), len(joints), 3)
+    rough = norm(filtered(joints, _SIXTH)) / MEDIAN_OF_THREE
+    rough = np.maximum(rough - CURVED_SHARE * norm(filtered(joints, _CURVATURE)), 0.0)
+    stretched = np.abs(filtered(_lengths(joints), _SIXTH)) / MEDIAN_OF_ONE
+    found = _windows(np.concatenate([rough, stretched], axis=1))
+    bodily, of_lengths = found[:, : joints.shape[1]], found[:, joints.shape[1] :]
+    by_length = np.stack([of_lengths[:, of_joint].min(axis=1) for of_joint in _SEGMENTS_OF], axis=1)
+    return centred(np.maximum(bodily, by_length), len(joints), SIXTH_ORDER // 2)
+
+
+def _windows(rough: Array) -> Array:
+    """Return medians over windows of (N, K), of every third frame and said of its neighbours; unknown is still."""
+    half = TREMBLING_FRAMES // 2
+    padded = np.pad(np.nan_to_num(rough), ((half, half + 2), (0, 0)))
+    windows = sliding_window_view(padded, TREMBLING_FRAMES, axis=0)[1::3]
+    medians = np.partition(windows, half, axis=-1)[..., half]
+    return np.repeat(medians, 3, axis=0)[: len(rough)]
+
+
+def _lengths(joints: Array) -> Array:
+    """Return the lengths of all segments (S, 17)."""
+    starts, ends = zip(*SEGMENTS, strict=True)
+    return norm(joints[:, ends] - joints[:, starts])
 
 
 def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -69,36 +100,47 @@ def trembling_frames(joints: Array, hot: NDArray[np.bool_]) -> NDArray[np.bool_]
     together.
     """
     rough = centred(norm(filtered(joints, _FOURTH)), len(joints), 2)
+    stretched = centred(np.abs(filtered(_lengths(joints), _FOURTH)), len(joints), 2)
     exact = np.zeros(hot.shape, dtype=np.bool_)
     at = np.flatnonzero(hot.any(axis=1))
     for part in np.split(at, np.flatnonzero(np.diff(at) > NEAR_FRAMES) + 1):
         first, last = int(part[0]), int(part[-1])
         which = np.flatnonzero(hot[first : last + 1].any(axis=0))
-        start, end = _edges(rough[:, which], first, last)
+        segments = sorted({k for joint in which.tolist() for k in _SEGMENTS_OF[joint]})
+        low, high = max(first - EDGE_FRAMES, 0), min(last + EDGE_FRAMES, len(rough) - 1)
+        evidence = _evidence(rough[:, which], first, last, 3) + _evidence(
+            stretched[:, segments], first, last, 1
+        )
+        start, end = _edges(evidence[low : high + 1], low, (first + last) // 2)
         exact[start : end + 1, which] = True
     return exact
 
 
-def _edges(rough: Array, first: int, last: int) -> tuple[int, int]:
-    """Return the first and the last frame that tremble, near those of a window's."""
-    low, high = max(first - EDGE_FRAMES, 0), min(last + EDGE_FRAMES, len(rough) - 1)
+def _evidence(rough: Array, first: int, last: int, numbers: int) -> Array:
+    """Return what says that each frame trembles (S,), of lengths (S, K) of vectors of so many numbers."""
     beyond = np.r_[max(first - OUTSIDE_FRAMES, 0) : max(first - 2, 0), last + 3 : last + OUTSIDE_FRAMES]
     outside = rough[beyond[beyond < len(rough)]]
+    median = MEDIAN_OF_THREE if numbers > 1 else MEDIAN_OF_ONE
     share = LEAST_SHARE if len(outside) >= TREMBLING_FRAMES else FEW_FRAMES_SHARE
-    inside = _spread(rough[first : last + 1])
-    outside_spread = np.clip(_spread(outside) if len(outside) else 0.0, share * inside, 0.6 * inside)
-    ratio = 3.0 * np.log(outside_spread / inside) + rough[low : high + 1] ** 2 / 2.0 * (
-        outside_spread**-2.0 - inside**-2.0
-    )
-    evidence = np.clip(np.nan_to_num(ratio), -MOST_EVIDENCE, MOST_EVIDENCE).sum(axis=1)
+    inside = _quantile(rough[first : last + 1], 0.5) / median
+    spread = np.clip(_quantile(outside, OUTSIDE_QUANTILE) / median, share * inside, MOST_SHARE * inside)
+    ratio = numbers * np.log(spread / inside) + rough**2 / 2.0 * (spread**-2.0 - inside**-2.0)
+    bounded = np.clip(np.nan_to_num(ratio), -MOST_EVIDENCE, MOST_EVIDENCE)
+    # A segment that does not tremble inside says nothing of where that is.
+    return np.asarray(np.where(inside > LEAST_INSIDE, bounded, 0.0).sum(axis=1))
+
+
+def _edges(evidence: Array, low: int, middle: int) -> tuple[int, int]:
+    """Return the first and the last frame that tremble, of what says so from frame `low` on, around a middle."""
     total = np.concatenate([[0.0], np.cumsum(evidence)])
-    middle = (first + last) // 2 - low
     # Two frames beyond the noise a fourth difference has a part of it: less than is evidence, the nearer one more.
-    start = low + int(total[: middle + 1].argmin()) + 1
-    end = low + middle + int(total[middle:].argmax()) - 2
+    start = low + int(total[: middle - low + 1].argmin()) + 1
+    end = middle + int(total[middle - low :].argmax()) - 2
     return min(start, end), max(start, end)
 
 
-def _spread(rough: Array) -> Array:
-    """Return the deviation of a coordinate (K,) from lengths (N, K); little where nothing is known."""
-    return np.maximum(np.median(np.nan_to_num(rough), axis=0) / MEDIAN_OF_THREE, 1e-9)
+def _quantile(rough: Array, share: float) -> Array:
+    """Return a quantile (K,) of lengths (N, K): little where nothing is known."""
+    if not len(rough):
+        return np.zeros(rough.shape[1])
+    return np.maximum(np.quantile(np.nan_to_num(rough), share, axis=0), 1e-9)
