@@ -34,9 +34,9 @@ class Answer:
         What it is made of; none where nothing was recovered.
     rows : int array (K,)
         The representatives: bodies that differ by 5 cm in some joint, so few that with what is within 5 cm of them they
-        hold 95 % of the probability. Rows of the frame's bodies, the likeliest first.
+        hold 95 % of the probability, or all that is listed. Rows of the frame's bodies, the likeliest first.
     probability : array (K,)
-        Of each representative and what it stands for; 0.95 or more together.
+        Of each representative and what it stands for; 0.95 or more together, or less where more is not listed.
     depth : DepthOrder
         Which end of each segment is nearer, and how sure that is.
     written : JointRegions, optional
@@ -72,9 +72,13 @@ class Answer:
         """The probability that the likeliest posture is right, to 5 cm in every joint; NaN where there is none."""
         return float(self.probability[0]) if len(self) else np.nan
 
+    def __repr__(self) -> str:
+        """Say how sure it is, and of how many postures."""
+        return f"Answer(sure={self.sure:.3g}, representatives={len(self)}, bodies={len(self.bodies)})"
+
     @cached_property
     def regions(self) -> JointRegions:
-        """Where each joint is with 95 %, whichever of the postures it is."""
+        """Where each joint is with 95 %, whichever of the listed postures it is."""
         return joint_regions(self.bodies) if self.written is None else self.written
 
 
@@ -99,14 +103,18 @@ def _answers(frames: Sequence[ListedBodies]) -> list[Answer]:
         np.concatenate([getattr(one, name) for one in frames])
         for name in ("joints", "probability", "depth_variance")
     )
-    depths = depth_orders(joints[..., 2], variance, frame, p, len(frames))
-    stands = cover(joints, frame, p, within=DISTINCT_METRES, hold=REPRESENTED_PROBABILITY)
+    unlisted = np.array([one.unlisted for one in frames])
+    depths = depth_orders(joints[..., 2], variance, frame, p, unlisted)
+    hold = np.minimum(REPRESENTED_PROBABILITY / np.maximum(1.0 - unlisted, REPRESENTED_PROBABILITY), 1.0)
+    stands = cover(joints, frame, p, within=DISTINCT_METRES, hold=hold[: 1 + int(frame.max(initial=-1))])
     held = held_by(stands, p)
     starts = np.cumsum([0, *counts])
     found = []
-    for one, depth, (start, end) in zip(frames, depths, pairwise(starts.tolist()), strict=True):
-        rows = most_held(held[start:end], REPRESENTED_PROBABILITY)
-        found.append(Answer(bodies=one, rows=rows, probability=held[start + rows], depth=depth))
+    each = zip(frames, depths, pairwise(starts.tolist()), hold.tolist(), strict=True)
+    for one, depth, (start, end), enough in each:
+        rows = most_held(held[start:end], enough)
+        probability = held[start + rows] * (1.0 - one.unlisted)
+        found.append(Answer(bodies=one, rows=rows, probability=probability, depth=depth))
     return found
 
 

@@ -11,7 +11,7 @@ from posekit.geometry import Array
 
 
 def cover(
-    points: Array, group: NDArray[np.intp], weight: Array, *, within: float, hold: float
+    points: Array, group: NDArray[np.intp], weight: Array, *, within: float, hold: Array | float
 ) -> NDArray[np.intp]:
     """Let the likeliest of each group stand for all that are near it, then the likeliest of the others, and so on.
 
@@ -27,7 +27,7 @@ def cover(
         Probabilities; over a group they sum to one.
     within : float
         Metres: as far apart may a point of two be of which one stands for the other.
-    hold : float
+    hold : array (G,) or float
         A group is done when so much of its probability is covered.
 
     Returns

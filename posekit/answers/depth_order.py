@@ -40,16 +40,19 @@ _erf = np.frompyfunc(math.erf, 1, 1)
 class DepthOrder:
     """Probabilities that the end of each of the 11 segments of `ANSWER_SEGMENTS` is nearer than its start, or farther.
 
-    What is missing to one is the probability that it is neither, by 5 cm of depth.
+    What is missing to one is the probability that it is neither, by 5 cm of depth, or that no listed body is right.
 
     Parameters
     ----------
     near, far : array (11,)
         Probabilities; NaN where an end is not known.
+    unlisted : float
+        The probability that no listed body is right.
     """
 
     near: Array
     far: Array
+    unlisted: float = 0.0
 
     def __post_init__(self) -> None:
         for values in (self.near, self.far):
@@ -58,11 +61,11 @@ class DepthOrder:
     @property
     def level(self) -> Array:
         """The probability that neither end is nearer by 5 cm (11,)."""
-        return np.maximum(1.0 - self.near - self.far, 0.0)
+        return np.maximum(1.0 - self.unlisted - self.near - self.far, 0.0)
 
 
 def depth_orders(
-    depth: Array, variance: Array, frame: NDArray[np.intp], probability: Array, frames: int
+    depth: Array, variance: Array, frame: NDArray[np.intp], probability: Array, unlisted: Array
 ) -> list[DepthOrder]:
     r"""Find the probabilities of near and far of every frame.
 
@@ -80,9 +83,10 @@ def depth_orders(
         The frame of each body.
     probability : array (N,)
         Of each body in its frame.
-    frames : int
-        How many there are.
+    unlisted : array (F,)
+        The probability that it is none of these, by frame.
     """
+    frames = len(unlisted)
     start, end = np.array(ANSWER_SEGMENTS).T
     gap = depth[:, end] - depth[:, start]
     own = np.abs(variance[:, end] - variance[:, start])
@@ -98,7 +102,11 @@ def depth_orders(
             into[:, column] = np.bincount(frame, probability * beyond[:, column], minlength=frames)
     empty = np.bincount(frame, minlength=frames) == 0
     found[:, empty] = np.nan
-    return [DepthOrder(near=near, far=far) for near, far in found.transpose(1, 0, 2)]
+    found *= 1.0 - unlisted[:, None]
+    return [
+        DepthOrder(near=near, far=far, unlisted=rest)
+        for (near, far), rest in zip(found.transpose(1, 0, 2), unlisted.tolist(), strict=True)
+    ]
 
 
 LEAST_DEVIATION_METRES: Final = 1e-3

@@ -44,6 +44,11 @@ class ListedFrame(Protocol):
         """Joints that were not seen, by survivor."""
         ...
 
+    @property
+    def unlisted_probability(self) -> float:
+        """What the bodies hold at most that are not listed."""
+        ...
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ListedBodies:
@@ -54,20 +59,23 @@ class ListedBodies:
     joints : array (N, 14, 3)
         Camera frame, metres; NaN where a joint is not known.
     probability : array (N,)
-        They sum to one.
+        Of each, if it is one of these: they sum to one.
     uncertainty : array (N, 14, 3, 3) or float
         The covariance of every joint, square metres, NaN where it is not known; or the metres that all joints are off
         in each direction.
+    unlisted : float
+        The probability that it is none of these.
 
     Raises
     ------
     InputError
-        Where there are not as many probabilities, or covariances, as bodies.
+        Where there are not as many probabilities, or covariances, as bodies, or what is unlisted is no probability.
     """
 
     joints: Array
     probability: Array
     uncertainty: Array | float = 0.0
+    unlisted: float = 0.0
 
     def __post_init__(self) -> None:
         joints = np.asarray(self.joints, dtype=np.float64)
@@ -80,6 +88,8 @@ class ListedBodies:
                 raise InputError(f"{name} has shape {values.shape}; expected {shape}, one a body")
             values.flags.writeable = False
             object.__setattr__(self, name, values)
+        if not 0.0 <= self.unlisted <= 1.0:
+            raise InputError(f"unlisted is {self.unlisted:g}; expected a probability, 0 to 1")
 
     def __len__(self) -> int:
         """Count the bodies."""
@@ -96,7 +106,12 @@ class ListedBodies:
             uncertainty = np.tile(np.eye(3) * deviation**2, (len(frame.joints), 14, 1, 1))
             for row, joints in enumerate(frame.inferred):
                 uncertainty[row, [JOINT[name] for name in joints]] = np.nan
-        return ListedBodies(joints=frame.joints, probability=probability, uncertainty=uncertainty)
+        return ListedBodies(
+            joints=frame.joints,
+            probability=probability,
+            uncertainty=uncertainty,
+            unlisted=frame.unlisted_probability,
+        )
 
     @property
     def covariance(self) -> Array:

@@ -39,6 +39,11 @@ class PathAnswer:
         """Count the representatives."""
         return len(self.rows)
 
+    def __repr__(self) -> str:
+        """Say how sure the first is, of how many paths and frames."""
+        each = ", ".join(f"{p:.3g}" for p in self.probability.tolist())
+        return f"PathAnswer(probability=[{each}], frames={len(self.frames)})"
+
 
 def path_answer(following: Following) -> PathAnswer:
     """Say of the paths of a sequence what `posekit.answers.answers_of` says of the bodies of a frame.

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from posekit.answers.answer import Answer
+from posekit.answers.answer import REPRESENTED_PROBABILITY, Answer
 from posekit.answers.depth_order import ANSWER_SEGMENTS, LEVEL_METRES
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
@@ -22,6 +22,9 @@ LIMB_NAMES: Final = {"shoulder": "upper arm", "elbow": "forearm", "hip": "thigh"
 """What a segment is called that begins at a joint."""
 
 NOTHING_ELSE: Final = "nothing that differs by 5 cm holds more than 5 %"
+
+OF_LISTED: Final = " of what is listed"
+"""Added where much is not."""
 
 
 def answer_lines(answers: Sequence[Answer]) -> list[str]:
@@ -41,9 +44,10 @@ def answer_lines(answers: Sequence[Answer]) -> list[str]:
             f"likeliest: {percent(sure[0])} sure, to 5 cm in every joint; {limbs}",
             f"what else it can be: {_others(answers[0])}",
         ]
-    others = NOTHING_ELSE
+    others = _nothing_else([answers[k] for k in found])
     if max(count) > 1:
-        others = f"{np.median(count):g} distinct postures hold 95 % in the median frame, {max(count)} in frame {most}"
+        held = _held([answers[k] for k in found])
+        others = f"{np.median(count):g} distinct postures hold {held} in the median frame, {max(count)} in frame {most}"
     return [
         f"likeliest: {percent(float(np.median(sure)))} sure in the median frame, to 5 cm in every joint; least sure is "
         f"frame {least}, {percent(min(sure))}: {limbs}",
@@ -66,20 +70,38 @@ def _limbs(answer: Answer) -> str:
     order = np.argsort(-np.nan_to_num(opposite), kind="stable").tolist()
     doubtful = [k for k in order if opposite[k] >= DOUBT_PROBABILITY]
     if not doubtful:
-        return "which way its limbs point that are over 5 cm deep is over 95 % sure"
+        whole = answer.bodies.unlisted <= DOUBT_PROBABILITY
+        return (
+            f"which way its limbs point that are over 5 cm deep is over 95 % sure{'' if whole else OF_LISTED}"
+        )
     which = [(k, bool(gap[k] < 0)) for k in doubtful[:MAX_TOLD]]
     more = f", and {len(doubtful) - MAX_TOLD} more in doubt" if len(doubtful) > MAX_TOLD else ""
     return _directions(which, [float((near if ahead else far)[k]) for k, ahead in which]) + more
 
 
+def _held(answers: Sequence[Answer]) -> str:
+    """Say what representatives hold: 95 %, or in the median frame what is listed."""
+    listed = 1.0 - float(np.median([answer.bodies.unlisted for answer in answers]))
+    return percent(min(REPRESENTED_PROBABILITY, listed))
+
+
+def _nothing_else(answers: Sequence[Answer]) -> str:
+    """Say that there is nothing else, or that it is not listed."""
+    unlisted = max(answer.bodies.unlisted for answer in answers)
+    if unlisted <= DOUBT_PROBABILITY:
+        return NOTHING_ELSE
+    where = "" if len(answers) == 1 else " of a frame"
+    return f"what is not listed, which may hold {percent(unlisted)}{where}"
+
+
 def _others(answer: Answer) -> str:
     """Say how many distinct postures hold 95 %, and what is different in the second."""
     if len(answer) == 1:
-        return NOTHING_ELSE
+        return _nothing_else([answer])
     each = [percent(p) for p in answer.probability[:MAX_TOLD].tolist()]
     more = ", …" if len(answer) > MAX_TOLD else ""
     return (
-        f"{len(answer)} distinct postures hold 95 % ({', '.join(each)}{more}); in the second "
+        f"{len(answer)} distinct postures hold {_held([answer])} ({', '.join(each)}{more}); in the second "
         f"{difference(answer.joints[0], answer.joints[1])}"
     )
 

@@ -39,7 +39,7 @@ def written_answer(frame: ResultFrame, deviation: float) -> Answer:
         bodies=bodies,
         rows=frame.answer.representatives,
         probability=frame.answer.probability,
-        depth=DepthOrder(near=frame.answer.near, far=frame.answer.far),
+        depth=DepthOrder(near=frame.answer.near, far=frame.answer.far, unlisted=frame.unlisted_probability),
         written=_regions(frame.answer) if len(frame.answer.region_mean) else None,
     )
 

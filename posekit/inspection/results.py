@@ -38,7 +38,7 @@ def result_lines(result: Result) -> list[str]:
     families = [frame.family.how for frame in frames if frame.family is not None]
     if families:
         lines.append(f"scale by {tally(map(cut_long, families))}")
-    inferred = [frame.inferred for frame in frames if frame.inferred]
+    inferred = [frame.inferred for frame in frames if frame.inferred and any(frame.inferred)]
     if inferred:
         names = {name for one in inferred for posture in one for name in posture}
         lines.append(
@@ -92,7 +92,7 @@ def _refined(result: Result) -> str:
 
 def _ranked(result: Result) -> str:
     likeliest = [
-        float(frame.probability.max())
+        float(frame.probability.max()) * (1.0 - frame.unlisted_probability)
         for frame in result.frames
         if frame.probability is not None and len(frame.probability)
     ]

@@ -179,3 +179,30 @@ def test_representatives_are_those_of_the_plain_way(rng):
     expected = sorted(held, key=lambda row: -held[row])[: len(found)]
     assert found.rows.tolist() == expected
     np.testing.assert_allclose(found.probability, [held[row] for row in expected])
+
+
+@pytest.mark.parametrize("unlisted", [0.0, 0.01, 0.4, 1.0])
+def test_no_probability_says_more_than_what_is_listed_holds(rng, unlisted):
+    joints, probability, covariance = bodies(rng, 40)
+    whole = answer(joints, probability, covariance)
+    given = {"joints": joints, "probability": probability, "uncertainty": covariance, "unlisted": unlisted}
+    empty = ListedBodies(joints=joints[:0], probability=probability[:0])
+    found, nothing = answers_of([ListedBodies(**given), empty])
+    listed = 1.0 - unlisted
+    assert not len(nothing)
+    assert found.sure == pytest.approx(listed * whole.sure)
+    assert found.probability.sum() >= min(REPRESENTED_PROBABILITY, listed) - 1e-9
+    assert found.probability.sum() <= listed + 1e-9
+    np.testing.assert_allclose(found.depth.near, listed * whole.depth.near)
+    np.testing.assert_allclose(found.depth.far, listed * whole.depth.far)
+    np.testing.assert_allclose(found.depth.level, listed * whole.depth.level, atol=1e-12)
+
+
+@pytest.mark.parametrize("unlisted", [-0.1, 1.5, np.nan])
+def test_what_is_unlisted_is_a_probability(unlisted):
+    with pytest.raises(InputError, match="unlisted"):
+        ListedBodies(joints=np.zeros((1, 14, 3)), probability=np.ones(1), unlisted=unlisted)
+
+
+def test_an_answer_is_written_in_a_line(rng):
+    assert len(repr(answer(*bodies(rng, 40)))) < 100

@@ -52,6 +52,19 @@ def test_of_frames_the_least_sure_is_named_counted_from_0():
     assert second.endswith("1 distinct postures hold 95 % in the median frame, 2 in frame 2")
 
 
+def test_what_is_not_listed_counts_against_what_is_said():
+    (sure,) = answers_of(
+        [ListedBodies(joints=ONE.bodies.joints, probability=np.ones(1), uncertainty=0.005, unlisted=0.4)]
+    )
+    first, second = answer_lines([sure])
+    assert first.startswith("likeliest: 60 % sure")
+    assert first.endswith("over 95 % sure of what is listed")
+    assert second == "what else it can be: what is not listed, which may hold 40 %"
+    assert answer_lines([sure, ONE])[1].endswith("what is not listed, which may hold 40 % of a frame")
+    bodies = ListedBodies(joints=TWO.bodies.joints, probability=np.array([0.8, 0.2]), unlisted=0.4)
+    assert "2 distinct postures hold 60 % (48 %, 12 %)" in answer_lines(answers_of([bodies]))[1]
+
+
 @pytest.mark.parametrize("answers", [[], [NONE], [NONE, NONE]])
 def test_of_nothing_nothing_is_told(answers):
     assert answer_lines(answers) == []

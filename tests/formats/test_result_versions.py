@@ -11,7 +11,7 @@ import pytest
 import posekit
 from posekit.answers import Answer
 from posekit.errors import InputError
-from posekit.formats.own import PostureSet, Result, View, read_postures, read_result, write_result
+from posekit.formats.own import Inferred, PostureSet, Result, View, read_postures, read_result, write_result
 from posekit.formats.own.column import columns_in
 from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.inspection.results import result_lines
@@ -194,3 +194,14 @@ def test_a_set_in_an_npz_that_is_damaged_is_refused(tmp_path, exact):
 def test_columns_of_sets_and_answers_say_what_they_mean():
     for table in (PostureSet, FrameAnswer):
         assert all(column.meaning.endswith(".") for column in columns_in(table).values())
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_frames_in_which_nothing_was_inferred_are_not_counted_as_inferred(tmp_path, noisy, suffix):
+    result = result_of(noisy)
+    first, second = result.frames
+    wrist = Inferred(kind="region", lower=np.zeros(3), upper=np.ones(3), radius=1.0)
+    nothing = replace(second, inferred=[{} for _ in range(len(second))])
+    one = replace(first, inferred=[{"right_wrist": wrist}, *({} for _ in range(len(first) - 1))])
+    back = read_back(tmp_path, replace(result, frames=[one, nothing]), suffix)
+    assert "joints not seen, and inferred in 1 frame: right_wrist" in result_lines(back)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import meshcat.geometry as mg
 import numpy as np
@@ -414,3 +415,27 @@ def test_completed_joints_have_no_box(taylor: Result) -> None:
     assert not any("/regions/" in path for path in nodes)
     assert nodes["/meshcat/posture-0/joints/pelvis"].object["material"]["opacity"] < 0.5  # type: ignore[index]
     assert "/meshcat/camera/points/pelvis" not in nodes
+
+
+def test_postures_without_configuration_or_with_few_digits_are_drawn_whole(
+    walk: View, walked: Result, subject: DrawnSubject
+) -> None:
+    frame = walked.frames[0]
+    q = np.round(
+        frame.q, 4
+    )  # as files are written where noise is known; of the second posture they have none
+    q[1] = np.nan
+    shown = subject_of(replace(walked, frames=[replace(frame, q=q), *walked.frames[1:]]), walk).frames[0]
+    assert shown.q is not None
+    np.testing.assert_allclose(np.linalg.norm(shown.q[:, 3:7], axis=1), 1, rtol=0, atol=1e-12)
+    wanted = subject.frames[0].points
+    np.testing.assert_allclose(
+        np.delete(shown.points, 1, axis=0), np.delete(wanted, 1, axis=0), rtol=0, atol=1e-3
+    )
+    np.testing.assert_allclose(shown.points[1, : len(JOINTS)], wanted[1, : len(JOINTS)], rtol=0, atol=0)
+    assert np.isfinite(shown.points).all()
+    scene, world = Scene(), upright_world(subject.points())
+    for row in (0, 1):
+        posture = DrawnPosture(points=shown.points[row], q=shown.q[row])
+        add_posture(scene, f"drawn-{row}", posture, figure=subject.figure, world=world)
+        assert f"/meshcat/drawn-{row}/bodies/head" in scene.nodes

@@ -18,8 +18,8 @@ from posekit.skeleton import JOINTS
 from posekit.viewer.scene.image_sight import ImageSight
 from posekit.viewer.scene.sight_of_view import check_camera, scale_of, sight_of, view_sight
 
-UNIT_QUATERNION_TOLERANCE = 1e-6
-"""How far a quaternion's length may be off for forward kinematics to be asked."""
+MAX_ROUNDING_ERROR = 1e-2
+"""How far a quaternion's length may be off in a file of few digits; of one that is off by more q is calculated."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,13 +177,25 @@ def _of_held(given: HeldPostures) -> list[Shown]:
     ]
 
 
+def _configurations(frame: ResultFrame, figure: Figure, points: Array) -> Array:
+    """Return q of a frame's postures (N, nq), with quaternions of unit length, calculated where the file has none.
+
+    Where noise is known a file has q of the likeliest alone, with few digits.
+    """
+    q = np.array(frame.q, dtype=np.float64)
+    norms = np.linalg.norm(q[:, 3:7], axis=1)
+    rounded = np.abs(norms - 1) < MAX_ROUNDING_ERROR
+    q[rounded, 3:7] /= norms[rounded, None]
+    if not rounded.all():
+        q[~rounded] = figure.inverse_kinematics(points[~rounded])
+    return q
+
+
 def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int) -> Shown:
     points = with_head(np.asarray(frame.joints)).copy()
-    q = frame.q if frame.q.shape[1] == figure.model.nq else None
+    q = _configurations(frame, figure, points) if frame.q.shape[1] == figure.model.nq else None
     if q is not None and len(q):
         placed = np.asarray(np.isfinite(q[:, :7]).all(axis=1))
-        norms = np.linalg.norm(np.where(placed[:, None], q[:, 3:7], 0.0), axis=1)
-        placed = np.asarray(placed & (np.abs(norms - 1) < UNIT_QUATERNION_TOLERANCE))
         if placed.any():
             # A result has no head points; they hang on the torso alone, by the neck's angles in q.
             head = figure.forward_kinematics(np.where(np.isnan(q[placed]), 0.0, q[placed]))[:, len(JOINTS) :]
