@@ -60,19 +60,24 @@ class ValidateOutput:
         """Refuse names that cannot be written before the work is done."""
         from posekit.formats.own.npz import suffix
         from posekit.formats.own.report import REPORT_SUFFIXES
+        from posekit.safe_io import extra
         from posekit.safe_io.writing import check_target
 
         if self.report is not None:
-            suffix(self.report, *REPORT_SUFFIXES, PAGE_SUFFIX)
+            if suffix(self.report, *REPORT_SUFFIXES, PAGE_SUFFIX) == ".parquet":
+                extra("pyarrow", "parquet", "writing Parquet")
             check_target(self.report)
         if self.page is not None:
             suffix(self.page, PAGE_SUFFIX)
             check_target(self.page)
-        if self.timeline is not None and self.timeline.suffix:
-            from posekit.viewer.plots.plot_file import PLOT_FORMATS
+        if self.timeline is not None:
+            from posekit.viewer.plots.plot_file import PLOT_FORMATS, drawing
 
-            suffix(self.timeline, *PLOT_FORMATS)
-            check_target(self.timeline)
+            with drawing():  # matplotlib is there
+                pass
+            if self.timeline.suffix:
+                suffix(self.timeline, *PLOT_FORMATS)
+                check_target(self.timeline)
         if self.keep is not None:
             from posekit.validation.keep import check_keep_folder
 

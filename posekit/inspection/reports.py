@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.formats.own.report import ValidationReport, columns_of
-from posekit.formats.own.report_table import summary_table
+from posekit.formats.own.report_table import clip_lines, summary_table
 from posekit.inspection.telling import cut_long, settings_line
 from posekit.safe_io import refusal
 
@@ -16,8 +16,9 @@ MAX_COUNT_BELIEVED: Final = 2**53
 
 def report_lines(report: ValidationReport) -> list[str]:
     """Describe verdicts, what checks reject, and settings."""
+    clips = clip_lines(report.clips) if report.clips else []
     if report.checks is None or report.listed is None:
-        return [*summary_table(columns_of(report)), settings_line(report.settings)]
+        return [*summary_table(columns_of(report)), *clips, settings_line(report.settings)]
     counts = ", ".join(f"{count} {verdict}" for verdict, count in report.summary.items())
     return [
         f"{len(report)} postures: {counts}; listed are {report.listed}",
@@ -25,6 +26,7 @@ def report_lines(report: ValidationReport) -> list[str]:
             f"{check}: {one.rejected} rejected, {one.undecided} undecided"
             for check, one in report.checks.items()
         ),
+        *clips,
         settings_line(report.settings),
     ]
 

@@ -22,7 +22,7 @@ from posekit.validation.over_time import clip_of, frames_of
 from posekit.validation.people import PeopleTold, Recording, recordings_of
 from posekit.validation.robot_motion import placed
 from posekit.validation.spans import clip_verdicts
-from posekit.validation.stills import stills_of
+from posekit.validation.stills import MOST_DRAWN_CLIPS, stills_of, worst_stills
 from posekit.validation.validate_columns import columns_of, in_order
 from posekit.validation.validate_listing import list_postures
 from posekit.validators import Judgement, Validator
@@ -40,9 +40,6 @@ CONFIGURATIONS_FACTOR: Final = 4
 
 MAX_LISTED: Final = 10_000
 """Postures that a report lists one by one: all where there are no more, else the first that are not valid."""
-
-MAX_STILLS: Final = 2_000
-"""Clips of which frames are kept that can be drawn."""
 
 MAX_SAID: Final = 100
 """Sentences of what was recognised that a report has."""
@@ -103,6 +100,7 @@ class ReportBuilder:
         self._frames: list[tuple[str, ReportFrames | None]] = []
         self._clips: list[ClipVerdict] = []
         self._stills: list[Sequence[Still]] = []
+        self._drawn = 0
         self._listed: list[tuple[int, PostureReport]] = []
         self._all_listed = True
         self._people = PeopleTold()
@@ -247,10 +245,14 @@ class ReportBuilder:
             clips: tuple[ClipVerdict, ...] = clip_verdicts(columns, _unordered(file, len(columns)), of=1)
         else:
             clips = clip_verdicts(columns, frames, of=max(self._wanted.files, len(frames.clips)))
-        if held is not None and frames is not None and frames.in_time and len(self._clips) < MAX_STILLS:
-            self._stills += stills_of(clips, held)
-        self._stills += [()] * (len(self._clips) + len(clips) - len(self._stills))
+        drawn = held is not None and frames is not None and frames.in_time
+        stills = stills_of(clips, held) if held is not None and drawn else ((),) * len(clips)
+        self._stills += stills
         self._clips += clips
+        self._drawn += sum(map(bool, stills))
+        if self._drawn > 2 * MOST_DRAWN_CLIPS:
+            self._stills = worst_stills(self._clips, self._stills)
+            self._drawn = MOST_DRAWN_CLIPS
         self._parts.append(columns)
         self._frames.append((file, frames))
 

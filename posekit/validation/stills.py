@@ -17,6 +17,9 @@ from posekit.validation.over_time import frames_of
 MOST_STILLS: Final = 8
 """Frames of a clip that are kept: the worst of its worst spans."""
 
+MOST_DRAWN_CLIPS: Final = 500
+"""Clips of which frames are kept, the worst."""
+
 UP_OF_CAMERAS: Final = "-y"
 """What is taken for up where nothing says it: a camera's frame."""
 
@@ -49,6 +52,25 @@ def stills_of(clips: Sequence[ClipVerdict], held: HeldPostures) -> tuple[tuple[S
             tuple(_still(points, rows, one, frame, R_up) for one, frame in zip(at, wanted, strict=True))
         )
     return tuple(stills)
+
+
+def worst_stills(
+    clips: Sequence[ClipVerdict], stills: Sequence[Sequence[Still]], most: int = MOST_DRAWN_CLIPS
+) -> list[Sequence[Still]]:
+    """Forget the frames of those clips that are not among the worst.
+
+    Parameters
+    ----------
+    clips : sequence of ClipVerdict
+        The verdicts so far.
+    stills : sequence of sequences of Still
+        Of each clip, what is kept.
+    most : int
+        Of how many clips to keep them.
+    """
+    drawn = (k for k, some in enumerate(stills) if some)
+    kept = set(sorted(drawn, key=lambda k: clips[k].rank())[:most])
+    return [some if k in kept else () for k, some in enumerate(stills)]
 
 
 def _still(points: Array, rows: NDArray[np.intp], at: int, frame: int, R_up: Array) -> Still:

@@ -106,6 +106,10 @@ class ClipVerdict:
         """The share of frames that are not valid."""
         return (self.invalid + self.undecided) / max(self.frames, 1)
 
+    def rank(self) -> tuple[bool, float]:
+        """Return by what clips are sorted, the worst first: what is rejected, by its share of frames not valid."""
+        return self.verdict != "invalid", -self.rejected_share
+
 
 class Still(NamedTuple):
     """A frame of a clip as it can be drawn: metres, z up, around its own middle.

@@ -142,8 +142,7 @@ def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> 
 
 def worst_first(clips: Sequence[ClipVerdict]) -> list[ClipVerdict]:
     """Return the clips that are not valid: invalid ones first, by their share of frames that are not valid."""
-    bad = [clip for clip in clips if clip.verdict != "valid"]
-    return sorted(bad, key=lambda clip: (clip.verdict == "undecided", -clip.rejected_share))
+    return sorted((clip for clip in clips if clip.verdict != "valid"), key=ClipVerdict.rank)
 
 
 def _of_clip(clip: ClipVerdict) -> tuple[object, ...]:
