@@ -14,6 +14,7 @@ from posekit.validators.motion.joint_velocity import JointVelocity
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.penetration import Penetration
 from posekit.validators.motion.repeated import Repeated
+from posekit.validators.motion.root_jerk import RootJerk
 from posekit.validators.motion.speed import JointSpeed
 from posekit.validators.motion.swap import Swap
 from posekit.validators.motion.teleport import Teleport
@@ -30,6 +31,7 @@ MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
         JointSpeed,
         JointAcceleration,
         JointJerk,
+        RootJerk,
         Jitter,
         Drift,
         JointVelocity,
