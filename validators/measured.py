@@ -25,6 +25,8 @@ from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, seg
 from posekit.tree import Check, Loosening
 
 SPINE_SEGMENT: Final = (JOINT["neck"], JOINT["pelvis"])
+USUAL_LENGTH: Final = 0.2
+"""Metres: of the shortest segment by which directions are told."""
 NECK_TO_HEAD: Final = ("", 0.2)
 """Where a check reads no segment, the length of one, metres: from neck to nose."""
 
@@ -78,6 +80,23 @@ class Allowance:
         if self.settings.strict or self.settings.angle_tolerance is not None:
             return self.settings.angle
         return math.hypot(MEASURED_TOLERANCE.angle, math.degrees(self.off(segment) / length))
+
+    def of_robot(self, settings: ValidateSettings, *, made_up: bool) -> ValidateSettings:
+        """Return a robot's settings with what noise asks for: its limits are its own, and known.
+
+        Bodies may penetrate by what noise puts them off where they are made up; meshes have no depth.
+        """
+        off = self.off()
+        shortest = min(self.person.lengths.values(), default=USUAL_LENGTH) if self.person else USUAL_LENGTH
+        angle = math.degrees(off / max(shortest, USUAL_LENGTH))
+        changes: dict[str, float] = {}
+        if settings.rigid_tolerance is None:
+            changes["rigid_tolerance"] = math.hypot(settings.rigid, off)
+        if settings.angle_tolerance is None:
+            changes["angle_tolerance"] = math.hypot(settings.angle, angle)
+        if made_up:
+            changes["contact_margin"] = settings.contact_margin - off
+        return settings.changed(**changes)
 
     def applied(self, checks: Iterable[Check], figure: Figure) -> list[Check]:
         """Return the checks of a figure, each that judges directions with the tolerance that its own segments ask."""

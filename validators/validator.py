@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -33,6 +34,9 @@ from posekit.validators.robot.settings import robot_settings
 from posekit.validators.robot.subject import Subject
 from posekit.validators.suite import judge
 from posekit.validators.walking import thresholds_of
+
+NO_NOISE_METRES = 1e-6
+"""Metres that noise may change a distance by: less is rounding, and a robot is judged as without."""
 
 MAX_METRES = 1e9
 """Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
@@ -86,6 +90,7 @@ class Validator:
             self.checks, self.lengths = own.check_names, own.lengths
             self.settings = asked.changed(ranges=own.ranges)
             self._robot = RobotValidator(robot=subject, settings=own)
+            self._noisy_robot: RobotValidator | None = None
             _ = self._robot.models.limits
             return
         # A figure that somebody gives is the body that they mean; the built-in one stands for anybody.
@@ -185,7 +190,8 @@ class Validator:
             which = None if sequence is None else _sequence(sequence, len(joints))
             if person is not None and self.lengths == "median":
                 lengths, behind = person.lengths, person.behind
-            return _report(self._robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
+            robot = self._robot_for(person or measured_person(joints))
+            return _report(robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
         figure, suite = self.figure_and_suite(joints, lengths=lengths, behind=behind, person=person)
         configurations, distance = figure.configurations(points)
         return Report(
@@ -275,13 +281,30 @@ class Validator:
     def told_of(self, person: MeasuredPerson) -> dict[str, Any]:
         """Say by what a person's postures are judged, as reports do: whose body, and what is allowed in it."""
         if self._figure is None:
-            return {}
+            settings = self._robot_for(person).settings
+            noise = self.settings.noise if self.settings.noise is not None else round(person.noise, 6)
+            return {
+                "noise": noise if math.isfinite(noise) else None,
+                "angle_tolerance": round(settings.angle, 4),
+                "rigid_tolerance": f"{100 * settings.rigid:.3g}cm",
+                "contact_margin": f"{100 * settings.contact_margin:.3g}cm",
+            }
         figure = self._judging(person)[0]
         return {
             **Allowance(settings=self.settings, person=person).told(figure),
             "shoulders": figure.shoulder_side,
             "moved_lengths": dict(figure.moved_lengths),
         }
+
+    def _robot_for(self, person: MeasuredPerson) -> RobotValidator:
+        """Return what judges a robot's postures, with what the measuring noise of a person allows; the last is kept."""
+        allowed = Allowance(settings=self.settings, person=person)
+        if self.settings.strict or allowed.off() < NO_NOISE_METRES:
+            return self._robot
+        settings = allowed.of_robot(self._robot.settings, made_up=self._robot.models.bodies == "capsules")
+        if self._noisy_robot is None or self._noisy_robot.settings != settings:
+            self._noisy_robot = replace(self._robot, settings=settings)
+        return self._noisy_robot
 
     def _judging(self, person: MeasuredPerson) -> tuple[Figure, list[Check]]:
         """Return figure and checks for a person; the last are kept, for a recording that is judged in parts."""

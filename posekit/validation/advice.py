@@ -122,7 +122,8 @@ def _allowed(told: Mapping[str, Any]) -> str:
     else:
         known = f"{1000 * noise:.2g} mm of noise"
     if "torso_tolerance" not in told:
-        return f"judged by {lengths}, {known}"
+        allowed = f"{told.get('angle_tolerance', 0):.3g} degrees, {told.get('rigid_tolerance', '')}"
+        return f"judged by {lengths}, {known}: {allowed}"
     low, high = told["angle_tolerance"]
     angles = _span(low, high)
     bones = " to ".join(dict.fromkeys(told["rigid_tolerance"]))

@@ -125,3 +125,11 @@ def test_lengths_that_a_robot_cannot_have_are_findings_of_its_frames() -> None:
     joints[:, JOINT["left_wrist"]] = joints[:, JOINT["left_elbow"]]
     assert Validator("human").check(joints).verdicts == ["invalid"] * 5
     assert Validator("human").check(np.zeros((2, 14, 3))).verdicts == ["invalid"] * 2
+
+
+def test_a_robot_is_fitted_with_what_noise_allows_and_strictly_without() -> None:
+    joints = standing(8, 0.004)
+    usual, strict = (Validator("human", noise=0.004, strict=value).check(joints) for value in (False, True))
+    assert usual.valid.sum() > strict.valid.sum()
+    assert usual.valid.sum() >= 5
+    assert Validator("human").check(standing(12)).valid.all()
