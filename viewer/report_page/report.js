@@ -16,8 +16,8 @@ const spanName = span => span.where ? `${span.check}/${span.where}` : span.check
 const spanFrames = span => span.last > span.first ? `frames ${span.first} to ${span.last}` : `frame ${span.first}`;
 const withUnit = (value, unit) => value === null ? "not known" : `${value} ${unit}`;
 
-function showChecks(data, total) {
-  const head = make("tr", {}, make("th", {}, "check"), make("th", { class: "number" }, "frames"), make("th", {}));
+function showChecks(data, total, what) {
+  const head = make("tr", {}, make("th", {}, "check"), make("th", { class: "number" }, what), make("th", { class: "bars" }));
   if (data.clip_counts) head.append(make("th", { class: "number" }, "clips"));
   head.append(make("th", { class: "number" }, "undecided"), make("th", {}, "most often"));
   document.getElementById("checks-head").append(head);
@@ -30,7 +30,7 @@ function showChecks(data, total) {
       make("td", { class: "bars" }, bar));
     if (data.clip_counts) row.append(make("td", { class: "number" }, String(check.clips)));
     row.append(make("td", { class: "number" }, String(check.undecided)),
-      make("td", { class: "soft" }, check.places.map(([where, count]) => `${where} ${count}`).join(", ")));
+      make("td", { class: "most" }, check.places.map(([where, count]) => `${where} ${count}`).join(", ")));
     document.getElementById("checks").append(row);
   }
 }
@@ -141,7 +141,7 @@ function showReport(data) {
   if (data.clip_counts) lead = `${Object.values(data.clip_counts).reduce((a, b) => a + b, 0)} clips: ${said(data.clip_counts)}. ${lead}`;
   document.getElementById("lead").textContent = lead;
   if (data.settings.why) document.getElementById("lead").after(make("p", {}, data.settings.why));
-  showChecks(data, total);
+  showChecks(data, total, what);
   if (data.clip_counts) showClips(data);
   if (data.rows.length) {
     document.getElementById("postures-section").hidden = false;
