@@ -15,7 +15,7 @@ from posekit.formats.motion import Motion, postures_of, read_motion
 from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
 from posekit.formats.motion.body_size import BodyUnit, body_unit, stature_of
 from posekit.formats.motion.detected import read_detected
-from posekit.formats.motion.ground_up import find_up
+from posekit.formats.motion.ground_up import FoundUp, find_up
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.people_in_motion import people_apart
 from posekit.formats.own import Postures
@@ -112,8 +112,11 @@ def held_motion(
     if size.metres != 1.0:
         said.append(f"lengths are taken as {size.name}: so the body is {size.stature:.2f} m tall")
     said += _odd_clips(joints, motion)
-    way = find_up(joints, motion.clip, motion.up, motion.source, told="up" in motion.told or up is not None)
-    said += [way.said] if way.said and up is None else []
+    if up is None:
+        way = find_up(joints, motion.clip, motion.up, motion.source, told="up" in motion.told)
+    else:
+        way = FoundUp(up)
+    said += [way.said] if way.said else []
     in_world = _in_world(joints)
     if not in_world:
         said.append("each frame has its own origin, the middle of the hips: nothing is known of the ground")
@@ -125,7 +128,7 @@ def held_motion(
         frame=np.arange(len(motion)),
         clip=motion.clip.copy(),
         time=time,
-        up=up or way.up,
+        up=way.up,
         clips=motion.clips,
         unit=size.name,
         in_world=in_world,

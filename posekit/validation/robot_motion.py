@@ -79,7 +79,7 @@ def soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> Kinemat
     corners = find_soles(kinematics, geometry)
     places = np.array([data.oMi[one.joint].act(np.asarray(one.place)) for one in corners]).reshape(-1, 3)
     ends: dict[str, list[BodySite]] = {point: [] for point in FEET_POINTS}
-    for side, ankle in ankles.items():
+    for side in SIDES:
         apart = {one: np.linalg.norm(places - at[place], axis=1) for one, place in ankles.items()}
         mine = np.flatnonzero(apart[side] == np.min(list(apart.values()), axis=0))
         if len(mine) < 2:

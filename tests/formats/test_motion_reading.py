@@ -40,7 +40,8 @@ def test_a_name_that_belies_the_content_is_ambiguous(tmp_path):
     write_motion(tmp_path / "a.trc", motion())
     (tmp_path / "a.trc").rename(tmp_path / "a.csv")
     with pytest.raises(
-        InputError, match=r"a file that is csv or caliscope or trc; expected one of them; say which with --format"
+        InputError,
+        match=r"a file that is csv or caliscope or trc; expected one of them; say which with --format",
     ):
         read_motion(tmp_path / "a.csv")
     assert read_motion(tmp_path / "a.csv", "trc").names == ("a", "b", "c")

@@ -21,6 +21,8 @@ LIMB_SHARES: Final = {
 Movement*, fig. 4.1."""
 SMALLEST_METRES, TALLEST_METRES = 0.4, 2.5
 """Statures by which another unit is recognised: of a toddler or a small robot of a person's form, and of a giant."""
+USUAL_METRES: Final = (1.2, 2.2)
+"""Statures of nearly all who are recorded: a body of 67 is one of inches, and no toddler in centimetres."""
 LEAST_METRES, MOST_METRES = 0.2, 5.0
 """Statures that are taken for metres: anything that is nearer to a body in metres than in another unit."""
 
@@ -79,9 +81,11 @@ def body_unit(joints: Array, source: str, *, told: bool) -> BodyUnit:
         return BodyUnit("m", 1.0, size)
     if LEAST_METRES <= size <= MOST_METRES:
         return BodyUnit("m", 1.0, size)
-    fitting = [
-        name for name, metres in METRES_IN_UNIT.items() if SMALLEST_METRES <= size * metres <= TALLEST_METRES
-    ]
+    usual, fitting = (
+        [name for name, metres in METRES_IN_UNIT.items() if low <= size * metres <= high]
+        for low, high in (USUAL_METRES, (SMALLEST_METRES, TALLEST_METRES))
+    )
+    fitting = usual if len(usual) == 1 else fitting
     if len(fitting) == 1 and not told:
         metres = METRES_IN_UNIT[fitting[0]]
         return BodyUnit(fitting[0], metres, size * metres)
