@@ -16,7 +16,7 @@ UP = np.array([0.0, 0.0, 1.0])
 
 def standing(count: int, *, rate: float = 30.0, ground: float | None = 0.0) -> MotionClip:
     joints = np.repeat(load_figure().neutral_points[None, :14], count, axis=0)
-    joints = joints - joints[:, :, 2:].min() * UP
+    joints = joints - (joints[:, :, 2:].min() - 0.066) * UP  # an ankle is so high over the sole
     return MotionClip(joints=joints, time=np.arange(count) / rate, rate=rate, up=UP, ground=ground)
 
 

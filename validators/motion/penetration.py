@@ -1,4 +1,4 @@
-"""How deep joints are below the ground."""
+"""How deep bodies are below the ground."""
 
 from __future__ import annotations
 
@@ -8,17 +8,23 @@ import numpy as np
 
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.ground import ground_of, ground_unknown
 from posekit.validators.motion.motion_check import MotionCheck
 
 
 @dataclass(frozen=True, kw_only=True)
 class Penetration(MotionCheck):
-    """Whether the lowest point of the body is below the ground.
+    """Whether the lowest sole or joint is below the ground; see `posekit.validators.motion.ground`.
+
+    Where the ground is given, a clip whose lowest level is below it is so in all its frames. Where it is not, it may be
+    lower where nothing rests.
 
     Parameters
     ----------
     depth : float
         Metres that it may be below.
+    unlevel : float
+        Metres by which a ground that is not given may be lower than where something rests.
     """
 
     name = "penetration"
@@ -26,7 +32,8 @@ class Penetration(MotionCheck):
     meaning = "the body is below the ground"
     needs = ("up",)
 
-    depth: float = 0.03
+    depth: float = 0.02
+    unlevel: float = 0.1
 
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the body's lowest point; see `MotionCheck`."""
@@ -34,12 +41,14 @@ class Penetration(MotionCheck):
         return ("lowest",)
 
     def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where the ground is not given; see `MotionCheck`."""
-        return super().not_asked(clip) or (
-            "" if clip.ground is not None else "the ground is not known (--ground)"
-        )
+        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
+        return super().not_asked(clip) or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
-        """Measure how high the lowest joint is over the ground; see `MotionCheck`."""
-        lowest = np.fmin.reduce(clip.height, axis=1)[:, None] - (clip.ground or 0.0)
-        return Findings(value=lowest, lower=np.array(-self.depth), upper=np.array(np.inf))
+        """Measure how high the lowest point is over the ground; see `MotionCheck`."""
+        ground = ground_of(clip)
+        lower = ground.lowest + (self.unlevel if clip.ground is None else 0.0)
+        over = ground.offset + ground.lifted + np.minimum(lower, 0.0)
+        return Findings(
+            value=over[:, None], lower=np.array(-self.depth - 2 * clip.noise), upper=np.array(np.inf)
+        )

@@ -7,6 +7,7 @@ from typing import Final
 
 from posekit.validators.motion.acceleration import JointAcceleration
 from posekit.validators.motion.drift import Drift
+from posekit.validators.motion.floating import Floating
 from posekit.validators.motion.frozen import Frozen
 from posekit.validators.motion.jerk import JointJerk
 from posekit.validators.motion.jitter import Jitter
@@ -15,7 +16,9 @@ from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.penetration import Penetration
 from posekit.validators.motion.repeated import Repeated
 from posekit.validators.motion.root_jerk import RootJerk
+from posekit.validators.motion.sliding import Sliding
 from posekit.validators.motion.speed import JointSpeed
+from posekit.validators.motion.support import Support
 from posekit.validators.motion.swap import Swap
 from posekit.validators.motion.teleport import Teleport
 from posekit.validators.motion.timing import Timing
@@ -36,6 +39,9 @@ MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
         Drift,
         JointVelocity,
         Penetration,
+        Floating,
+        Support,
+        Sliding,
     )
 }
 """In the order in which they are reported."""

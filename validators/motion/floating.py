@@ -1,0 +1,78 @@
+r"""How high bodies are above the ground that nothing holds there.
+
+What is in the air falls: its centre of mass has the acceleration :math:`-g`, so a flight of t seconds rises by
+:math:`g t^2 / 8` and no more. A body that is above all levels of the ground, nothing of which rests, and whose centre
+of mass falls by less than half of that, hovers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.tree import Findings
+from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.ground import ground_of, ground_unknown, in_air, stretches
+from posekit.validators.motion.motion_check import MotionCheck
+
+GRAVITY: float = 9.81
+"""Metres a second squared."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Floating(MotionCheck):
+    """Whether a body is above the ground without a jump; see `posekit.validators.motion.ground`.
+
+    Where the ground is given, a clip whose lowest level is above it is so in all its frames.
+
+    Parameters
+    ----------
+    height : float
+        Metres that it may be above.
+    shortest : float
+        Seconds below which a flight is not judged: its fall cannot be told from the motion of limbs.
+    fall : float
+        The share of gravity by which the centre of mass of a body in the air must fall.
+    """
+
+    name = "floating"
+    unit = "m"
+    meaning = "the body is above the ground, and nothing holds it there"
+    needs = ("up", "time")
+
+    height: float = 0.02
+    shortest: float = 0.25
+    fall: float = 0.5
+
+    def places(self, clip: MotionClip) -> tuple[str, ...]:
+        """Name the body's lowest point; see `MotionCheck`."""
+        del clip
+        return ("lowest",)
+
+    def not_asked(self, clip: MotionClip) -> str:
+        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
+        return super().not_asked(clip) or ground_unknown(clip)
+
+    def judge(self, clip: MotionClip) -> Findings:
+        """Measure how high the lowest point is over the ground; see `MotionCheck`."""
+        ground = ground_of(clip)
+        over = ground.offset + ground.lifted
+        for start, stop in stretches(in_air(ground)):
+            if (stop - start) * clip.step >= self.shortest and not self._falls(
+                ground.centre[start:stop], clip.step
+            ):
+                over[start:stop] += ground.lowest[start:stop] - ground.high
+        return Findings(
+            value=over[:, None], lower=np.array(-np.inf), upper=np.array(self.height + 2 * clip.noise)
+        )
+
+    def _falls(self, centre: Array, step: float) -> bool:
+        """Tell whether a centre of mass (N,) falls, by its parabola; where it is not known, it does."""
+        known: NDArray[np.bool_] = np.isfinite(centre)
+        if known.sum() < 4:
+            return True
+        curve = np.polyfit(np.arange(len(centre))[known] * step, centre[known], 2)[0]
+        return bool(2 * curve <= -self.fall * GRAVITY)

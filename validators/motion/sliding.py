@@ -1,0 +1,152 @@
+r"""How fast feet slide that stand.
+
+A foot that stands flat neither rises nor turns: its ankle and its toes have one velocity, which is 0. In recordings of
+people it is not: skin and markers move, feet roll, and what is taken for a joint lies above the sole; so the speed of
+the slowest point alone, by which skating is often told, calls every other step of a real walk sliding. What real feet
+do not do is to go on evenly: a foot slides whose points have for a time one velocity, from frame to frame the same, and
+along the ground.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from posekit.geometry import Array
+from posekit.skeleton import SIDES
+from posekit.tree import Findings
+from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.ground import ground_of, ground_unknown, soles, stretches
+from posekit.validators.motion.motion_check import MotionCheck
+from posekit.validators.motion.timeline import norm, timeline_of
+
+DOWN_METRES: Final = 0.04
+"""Above the highest level of the ground up to which a foot is down: a swinging foot's toes clear 1 to 6 cm, faster."""
+
+FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
+"""Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`."""
+
+USUAL_FRAMES: Final = 5
+"""Frames of which the median velocity is taken: a point that trembles does so from frame to frame."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sliding(MotionCheck):
+    """Whether a standing foot slides evenly.
+
+    Parameters
+    ----------
+    fastest : float
+        Metres a second that a standing foot may go.
+    lasting : float
+        Seconds for which it goes on.
+    uneven : float
+        Metres a second by which velocities of one slide differ at most, between points of the foot and over time.
+    rising : float
+        Metres a second that a foot on the ground goes up or down at most.
+    """
+
+    name = "sliding"
+    unit = "m/s"
+    meaning = "a foot slides that stands on the ground"
+    needs = ("up", "time")
+
+    fastest: float = 0.04
+    lasting: float = 0.4
+    uneven: float = 0.02
+    rising: float = 0.05
+
+    def places(self, clip: MotionClip) -> tuple[str, ...]:
+        """Name the feet; see `MotionCheck`."""
+        del clip
+        return tuple(f"{side}_foot" for side in SIDES)
+
+    def not_asked(self, clip: MotionClip) -> str:
+        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
+        return super().not_asked(clip) or ground_unknown(clip)
+
+    def judge(self, clip: MotionClip) -> Findings:
+        """Measure how fast each foot slides; see `MotionCheck`."""
+        line, ground = timeline_of(clip), ground_of(clip)
+        feet, over = soles(clip)
+        up = np.zeros(3) if clip.up is None else clip.up
+        base = (ground.low + ground.high + ground.lifted)[:, None]
+        down = line.spread((feet @ up - over < base + DOWN_METRES).astype(np.float64)) > 0
+        spread = line.spread(feet)
+        slides = [self._slides(clip, spread[:, foot], down[:, foot], up) for foot in FOOT_POINTS]
+        value = np.zeros((len(spread), len(SIDES)))
+        count = self._frames(clip)
+        for start, stop in stretches(np.any(slides, axis=0)):
+            sliding = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
+            points = spread[:, [point for k in sliding for point in FOOT_POINTS[k]]]
+            centre = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))].mean(axis=1)
+            centre = centre - (centre @ up)[:, None] * up
+            along = centre[stop - 1] - centre[start]
+            speed = float(norm(along)) / ((stop - 1 - start) * clip.step)
+            way = centre @ along / norm(along)
+            first, last = (
+                _bend(way, start, stop, count),
+                _bend(way[::-1], len(way) - stop, len(way) - start, count),
+            )
+            value[first + 1 : len(way) - last, sliding] = speed
+        return Findings(value=line.of_frames(value), lower=np.array(-np.inf), upper=np.array(self.fastest))
+
+    def _frames(self, clip: MotionClip) -> int:
+        return max(3, round(self.lasting / clip.step))
+
+    def _slides(
+        self, clip: MotionClip, points: Array, down: NDArray[np.bool_], up: Array
+    ) -> NDArray[np.bool_]:
+        """Say in which slots (S,) a foot (S, 3, 3) slides."""
+        count, known = self._frames(clip), np.isfinite(points).all(axis=(0, 2))
+        none = np.zeros(len(points), dtype=np.bool_)
+        if not known.any():
+            return none
+        ways = np.diff(points[:, known], axis=0) / clip.step
+        if len(ways) < max(count, USUAL_FRAMES):
+            return none
+        velocity = _usual(ways)
+        noise = 3 * np.sqrt(2) * clip.noise / clip.step
+        level = velocity - (velocity @ up)[..., None] * up
+        mean = level.mean(axis=1)
+        flat = (np.abs(velocity @ up).max(axis=1) < self.rising + noise) & (
+            norm(level - mean[:, None]).max(axis=1) < self.uneven + noise
+        )
+        flat &= down[1:, known].any(axis=1)
+        windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
+        even = windows.mean(axis=-1)
+        steady = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1) < self.uneven + noise
+        steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
+        steady &= norm(even) > self.fastest
+        slides = np.zeros(len(points), dtype=np.bool_)
+        for window in np.flatnonzero(steady):
+            slides[window : window + count + 1] = True
+        return slides
+
+
+def _bend(way: Array, start: int, stop: int, most: int) -> int:
+    """Find where an even slide (S,) starts, at most so many slots off: two lines that meet there fit best."""
+    first, last = max(start - most, 0), min(start + most, stop - 1)
+    time = np.arange(first, last + 1, dtype=np.float64)
+    piece, best, least = way[first : last + 1], start, np.inf
+    known = np.isfinite(piece)
+    for bend in range(first, last - 1):
+        lines = np.stack(
+            [np.ones(len(time)), np.minimum(time - bend, 0), np.maximum(time - bend, 0)], axis=1
+        )[known]
+        left = piece[known] - lines @ np.linalg.lstsq(lines, piece[known], rcond=None)[0]
+        if left @ left < least:
+            best, least = bend, float(left @ left)
+    return best
+
+
+def _usual(velocity: Array) -> Array:
+    """Return the median of each component over `USUAL_FRAMES` frames: edges stay, single frames do not count."""
+    room = USUAL_FRAMES // 2
+    padded = np.pad(velocity, ((room, room), (0, 0), (0, 0)), mode="reflect")
+    return np.asarray(
+        np.median(np.stack([padded[k : k + len(velocity)] for k in range(USUAL_FRAMES)]), axis=0)
+    )

@@ -1,0 +1,46 @@
+"""How long nothing holds a body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from posekit.tree import Findings
+from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.ground import ground_of, ground_unknown, in_air, stretches
+from posekit.validators.motion.motion_check import MotionCheck
+
+
+@dataclass(frozen=True, kw_only=True)
+class Support(MotionCheck):
+    """Whether a body is in the air for longer than a jump lasts; see `posekit.validators.motion.ground`.
+
+    Parameters
+    ----------
+    longest : float
+        Seconds.
+    """
+
+    name = "support"
+    unit = "s"
+    meaning = "nothing holds the body for longer than a jump lasts"
+    needs = ("up", "time")
+
+    longest: float = 1.0
+
+    def places(self, clip: MotionClip) -> tuple[str, ...]:
+        """Name the body; see `MotionCheck`."""
+        del clip
+        return ("body",)
+
+    def not_asked(self, clip: MotionClip) -> str:
+        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
+        return super().not_asked(clip) or ground_unknown(clip)
+
+    def judge(self, clip: MotionClip) -> Findings:
+        """Measure how long each flight lasts; see `MotionCheck`."""
+        lasts = np.zeros((len(clip), 1))
+        for start, stop in stretches(in_air(ground_of(clip))):
+            lasts[start:stop] = (stop - start) * clip.step
+        return Findings(value=lasts, lower=np.array(-np.inf), upper=np.array(self.longest))
