@@ -368,10 +368,28 @@ def _points(name: str, given: ArrayLike | None, count: int, postures: int | None
         raise InputError(f"{name}: not an array of numbers; expected {expected}, metres") from error
     if points.ndim != 3 or points.shape[1:] != (count, 3) or postures not in (None, len(points)):
         raise InputError(f"{name}: the shape is {points.shape}; expected {expected}, metres")
-    far = np.abs(points) > MAX_METRES
-    if far.any():
+    refuse_far(points, name)
+    return points
+
+
+def refuse_far(points: Array | None, name: str = "postures") -> None:
+    """Refuse coordinates where no body is; NaN is unknown.
+
+    Parameters
+    ----------
+    points : array, optional
+        Metres.
+    name : str
+        What to call them.
+
+    Raises
+    ------
+    InputError
+        Where a coordinate is infinite or absurd.
+    """
+    far = np.zeros(0, dtype=np.bool_) if points is None else np.abs(points) > MAX_METRES
+    if points is not None and far.any():
         raise InputError(
             f"{name}: a coordinate is {points[far][0]:g} m; expected finite ones within {MAX_METRES:g} m, "
             "NaN where unknown"
         )
-    return points

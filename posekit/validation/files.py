@@ -138,7 +138,7 @@ def validate_files(
             refused.append(error.line)
         if progress is not None:
             progress(1)
-    if not built.count:
+    if built.empty:
         raise InputError(f"none of {len(paths)} files can be judged, the first because of {refused[0]}")
     name = asked.told if asked.urdf or not built.own else "as recovered"
     return replace(built.report({"urdf": name}), refused=tuple(refused))

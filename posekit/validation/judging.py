@@ -18,9 +18,15 @@ from posekit.formats.own.report_clips import ClipVerdict, Still
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_frames import ClipName, ReportFrames, joined_frames
 from posekit.validation.advice import why_most_fail
+from posekit.validation.batches import (
+    POSTURES_AT_ONCE,
+    FileJob,
+    judged_parts,
+    postures_given,
+    recordings_given,
+)
 from posekit.validation.over_time import clip_of, frames_of
-from posekit.validation.people import PeopleTold, Recording, recordings_of
-from posekit.validation.robot_motion import placed
+from posekit.validation.people import PeopleTold
 from posekit.validation.spans import clip_verdicts
 from posekit.validation.stills import MOST_DRAWN_CLIPS, stills_of, worst_stills
 from posekit.validation.validate_columns import columns_of, in_order
@@ -31,12 +37,7 @@ from posekit.validators.motion import judge_motion
 from posekit.validators.motion.registry import MOTION_CHECKS
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
-
-POSTURES_AT_ONCE: Final = 4096
-"""Postures that are judged at once."""
-
-CONFIGURATIONS_FACTOR: Final = 4
-"""Times as many configurations, which need no search: the fewer calls, the less time is lost between threads."""
+from posekit.validators.validator import refuse_far
 
 MAX_LISTED: Final = 10_000
 """Postures that a report lists one by one: all where there are no more, else the first that are not valid."""
@@ -71,16 +72,12 @@ class WantedDetail:
     files: int = 1
 
 
-class _Given(NamedTuple):
-    """What is judged: postures, or configurations in the validator's order; and as motion, where they are frames."""
+class _FileVerdicts(NamedTuple):
+    """What is found in a file: columns part by part, which postures they are of, and those that are listed."""
 
-    joints: NDArray[np.float64] | None
-    head: NDArray[np.float64] | None
-    q: NDArray[np.float64] | None
-    held: HeldPostures | None
-
-    def __len__(self) -> int:
-        return len(self.q) if self.q is not None else len(self.joints) if self.joints is not None else 0
+    parts: list[VerdictColumns]
+    order: list[NDArray[np.intp]]
+    listed: list[tuple[int, PostureReport]]
 
 
 class ReportBuilder:
@@ -107,6 +104,7 @@ class ReportBuilder:
         self._not_asked: dict[str, Counter[str]] = {}
         self._said: Counter[str] = Counter()
         self._told: dict[str, Any] = {}
+        self._waiting: list[FileJob] = []
         self.count = 0
         self.own = False
 
@@ -139,89 +137,103 @@ class ReportBuilder:
         InputError
             Where the validator cannot judge it; nothing is then kept of it.
         """
-        given = _given(validator, postures)
-        known = dict(self._places)
-        checks = list(self._checks)
-        try:
-            self._add(validator, given, file, sequence)
-        except BaseException:
-            self._places, self._checks = known, checks
-            raise
+        given = postures_given(validator, postures)
+        job = FileJob(validator=validator, given=given, file=file, sequence=sequence)
+        job.recordings = recordings_given(validator, given)
+        if given.held is not None and given.held.in_time:
+            self._ask_over_time(job)
         self.own |= own
+        if not job.groups:  # its configurations may be none of the robot's
+            self._judge_waiting()
+            self._judge([job])
+            return
+        refuse_far(given.joints)
+        self._waiting.append(job)
+        if sum(len(one.given) for one in self._waiting) >= POSTURES_AT_ONCE:
+            self._judge_waiting()
 
-    def _add(self, validator: Validator, given: _Given, file: str, sequence: NDArray[np.intp] | None) -> None:
-        applied = [name for name in validator.checks if given.q is None or name not in OF_POSITIONS]
-        self._register(applied)
-        if self._all_listed and self.count + len(given) > MAX_LISTED:
+    @property
+    def empty(self) -> bool:
+        """Whether nothing was given yet."""
+        return not self.count and not self._waiting
+
+    def _judge_waiting(self) -> None:
+        """Judge the files that wait for others of their people."""
+        waiting, self._waiting = self._waiting, []
+        if waiting:
+            self._judge(waiting)
+
+    def _judge(self, jobs: Sequence[FileJob]) -> None:
+        """Judge files together, and keep their verdicts one after the other."""
+        for job in jobs:
+            q = job.given.q is not None
+            self._register([name for name in job.validator.checks if not q or name not in OF_POSITIONS])
+        for job in jobs:
+            self._register([one.check for judgements in job.over_time for one in judgements])
+        if self._all_listed and self.count + sum(len(job.given) for job in jobs) > MAX_LISTED:
             self._all_listed = False
-            self._listed = [one for one in self._listed if one[1].verdict != "valid"][:MAX_LISTED]
-        frames = None if given.held is None else frames_of(given.held, file)
-        over_time = given.held is not None and given.held.in_time and bool(validator.profile.checks)
-        parts: list[VerdictColumns] = []
-        order: list[NDArray[np.intp]] = []
-        listed: list[tuple[int, PostureReport]] = []
-        room = math.inf if self._all_listed else MAX_LISTED - len(self._listed)
-        people, not_asked = PeopleTold(), Counter[tuple[str, str]]()
-        if given.joints is None:
-            recordings = [Recording(np.arange(len(given)), None)]
-        else:  # scaling a robot takes a second: it has the lengths of the whole file
-            clip = None if given.held is None or validator.robot is not None else given.held.clip
-            recordings = recordings_of(given.joints, clip)
-        for rows, person in recordings:
-            judgements: Sequence[Judgement] = ()
-            if over_time and given.held is not None:
-                judgements = self._over_time(validator, given.held, rows, not_asked)
-            for part, of_postures in _batches(validator, given, sequence, Recording(rows, person)):
-                verdicts = of_postures.joined([one.of(part) for one in judgements])
-                at = rows[part]
-                columns, shown = self._judged(verdicts, room - len(listed))
-                listed += [(int(at[k]), one) for k, one in shown]
-                parts.append(columns)
-                order.append(at)
-            if person is not None:
-                people.add(validator, person)
-        columns = in_order(joined(parts, list(self._places), self._checks), order)
-        self._keep(columns, frames, file, given.held)
-        self._listed += sorted(
-            ((self.count + row, self._placed(one, row, frames)) for row, one in listed),
-            key=lambda one: one[0],
-        )
+            self._listed = [one for one in self._listed if one[1].verdict != "valid"]
+        found = {id(job): _FileVerdicts([], [], []) for job in jobs}
+        for judged in judged_parts(jobs):
+            mine = found[id(judged.job)]
+            over_time = judged.job.over_time
+            judgements = over_time[judged.recording] if over_time else ()
+            verdicts = judged.verdicts.joined([one.of(judged.part) for one in judgements])
+            columns, shown = self._judged(verdicts, MAX_LISTED - len(self._listed) - len(mine.listed))
+            mine.listed.extend((int(judged.rows[k]), one) for k, one in shown)
+            mine.parts.append(columns)
+            mine.order.append(judged.rows)
+        for job in jobs:
+            self._keep(job, found[id(job)])
+
+    def _keep(self, job: FileJob, found: _FileVerdicts) -> None:
+        """Keep a file's verdicts."""
+        columns = in_order(joined(found.parts, list(self._places), self._checks), found.order)
+        held = job.given.held
+        frames = None if held is None else frames_of(held, job.file)
+        self._keep_clips(columns, frames, job.file, held)
+        listed = sorted(found.listed, key=lambda one: one[0])[: max(MAX_LISTED - len(self._listed), 0)]
+        self._listed += [(self.count + row, self._placed(one, row, frames)) for row, one in listed]
         self.count += len(columns)
-        self._people.join(people)
-        for (name, reason), count in not_asked.items():
-            self._not_asked.setdefault(name, Counter())[reason] += count
-        self._said.update(() if given.held is None else given.held.said)
+        for (_, person), told in zip(job.recordings, job.told, strict=True):
+            if person is not None and told is not None:
+                self._people.add(person if job.validator.lengths == "median" else None, told)
+        for name, reason in job.not_asked:
+            self._not_asked.setdefault(name, Counter())[reason] += 1
+        self._said.update(() if held is None else held.said)
         self._told = self._told or {
-            **validator.describe(),
+            **job.validator.describe(),
             "checks": [],
-            **validator.settings.told(),
-            **_lengths_told(validator, given),
+            **job.validator.settings.told(),
+            **_lengths_told(job),
         }
 
     def _register(self, checks: Sequence[str]) -> None:
         """Know the names of checks, in the order in which they come."""
-        self._checks += [name for one in checks if (name := one.replace("-", "_")) not in self._checks]
+        self._checks += [
+            name for one in dict.fromkeys(checks) if (name := one.replace("-", "_")) not in self._checks
+        ]
 
-    def _over_time(
-        self,
-        validator: Validator,
-        held: HeldPostures,
-        rows: NDArray[np.intp],
-        not_asked: Counter[tuple[str, str]],
-    ) -> Sequence[Judgement]:
-        """Ask the checks over time about the clips of a recording; a row each of its postures."""
-        found: list[tuple[NDArray[np.intp], Judgement]] = []
-        clip = held.clip[rows]
-        for which in np.unique(clip).tolist():
-            at = np.flatnonzero(clip == which)
-            verdict = judge_motion(validator.profile.checks, clip_of(held, rows[at], validator))
-            found += [(at, one) for one in verdict.judgements]
-            not_asked.update(verdict.not_asked.items())
-        self._register([one.check for _, one in found])
-        return [_spread(one, at, len(rows)) for at, one in found]
+    def _ask_over_time(self, job: FileJob) -> None:
+        """Ask the checks over time about the clips of a file."""
+        held = job.given.held
+        if held is None:
+            return
+        not_asked: list[tuple[str, str]] = []
+        over_time: list[Sequence[Judgement]] = []
+        for rows, _ in job.recordings:
+            found: list[tuple[NDArray[np.intp], Judgement]] = []
+            clip = held.clip[rows]
+            for which in np.unique(clip).tolist():
+                at = np.flatnonzero(clip == which)
+                verdict = judge_motion(job.validator.profile.checks, clip_of(held, rows[at], job.validator))
+                found += [(at, one) for one in verdict.judgements]
+                not_asked += list(verdict.not_asked.items())
+            over_time.append([_spread(one, at, len(rows)) for at, one in found])
+        job.over_time, job.not_asked = over_time, not_asked
 
     def _judged(
-        self, verdicts: Verdicts, room: float
+        self, verdicts: Verdicts, room: int
     ) -> tuple[VerdictColumns, list[tuple[int, PostureReport]]]:
         """Put a batch in columns, and list those of its postures that are to be listed."""
         wanted = self._wanted
@@ -229,15 +241,15 @@ class ReportBuilder:
         columns = columns_of(
             verdicts, contacts, self._places, self._checks, margins=wanted.detail != "verdicts"
         )
-        if wanted.detail != "findings" or not room:
+        if wanted.detail != "findings" or room <= 0:
             return columns, []
-        rows = np.arange(len(columns)) if self._all_listed else np.flatnonzero(columns.verdict)[: int(room)]
+        rows = np.arange(len(columns)) if self._all_listed else np.flatnonzero(columns.verdict)[:room]
         made = list_postures(
             verdicts, contacts, columns, list(self._places), rows, every=wanted.every, first=None
         )
         return columns, list(zip(rows.tolist(), made, strict=True))
 
-    def _keep(
+    def _keep_clips(
         self, columns: VerdictColumns, frames: ReportFrames | None, file: str, held: HeldPostures | None
     ) -> None:
         """Keep a file's columns, and the verdicts on its clips."""
@@ -276,6 +288,7 @@ class ReportBuilder:
         settings : mapping, optional
             What else is to be written of what decided the verdicts.
         """
+        self._judge_waiting()
         checks = self._checks
         last = {name.replace("-", "_"): k for k, name in enumerate(MOTION_CHECKS)}
         shown = sorted(checks, key=lambda name: last.get(name, -1))
@@ -377,45 +390,6 @@ def _unordered(file: str, count: int) -> ReportFrames:
     )
 
 
-def _given(validator: Validator, postures: Postures | HeldPostures | NamedConfigurations) -> _Given:
-    """Lay out what is to be judged."""
-    if isinstance(postures, NamedConfigurations):
-        if not len(postures.time):
-            return _Given(joints=None, head=None, q=_ordered(validator, postures), held=None)
-        postures = placed(validator, postures)
-    if isinstance(postures, HeldPostures):
-        own = postures.postures
-        if postures.q.shape[1] == len(validator.configuration_names):
-            return _Given(joints=None, head=None, q=postures.q, held=postures)
-        return _Given(joints=own.joints, head=own.head, q=None, held=postures)
-    return _Given(joints=postures.joints, head=postures.head, q=None, held=None)
-
-
-def _batches(
-    validator: Validator, given: _Given, sequence: NDArray[np.intp] | None, recording: Recording
-) -> Iterator[tuple[slice, Verdicts]]:
-    """Judge a recording batch by batch: which of its rows, and the verdicts; lengths and noise are those of all."""
-    rows, person = recording
-    size = POSTURES_AT_ONCE * (CONFIGURATIONS_FACTOR if given.q is not None else 1)
-    for first in range(0, len(rows), size):
-        part = slice(first, min(first + size, len(rows)))
-        at = rows[part]
-        if given.q is not None:
-            yield part, validator.check(q=given.q[at])
-        elif given.joints is not None and person is not None:
-            head = None if given.head is None else given.head[at]
-            which = None if sequence is None else sequence[at]
-            yield part, validator.check(given.joints[at], head, sequence=which, person=person)
-
-
-def _ordered(validator: Validator, given: NamedConfigurations) -> NDArray[np.float64]:
-    """Return q in the validator's order; as it is where that is the file's."""
-    names = validator.configuration_names
-    if given.q.shape[1] == len(names) and given.names in (None, tuple(names)):
-        return given.q
-    return given.in_order_of(names)
-
-
 def _spread(judgement: Judgement, at: NDArray[np.intp], count: int) -> Judgement:
     """Lay what is said of some postures over all; of others nothing is said."""
     if len(at) == count:
@@ -430,11 +404,11 @@ def _spread(judgement: Judgement, at: NDArray[np.intp], count: int) -> Judgement
     return replace(judgement, violated=violated, **numbers)
 
 
-def _lengths_told(validator: Validator, given: _Given) -> dict[str, Any]:
+def _lengths_told(job: FileJob) -> dict[str, Any]:
     """Say what was given, and whose lengths the model had."""
-    if given.joints is None:
+    if job.given.joints is None:
         return {"given": "configurations"}
-    return {"given": "joint positions", "lengths_from": validator.lengths}
+    return {"given": "joint positions", "lengths_from": job.validator.lengths}
 
 
 def _contacts(verdicts: Verdicts, distances: bool | None, *, every: bool) -> Contacts | None:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.measured import MeasuredPerson, measured_person
-from posekit.validators import Validator
 
 MAX_TOLD_PEOPLE: Final = 1000
 """Recordings of which a report says by what they were judged, one by one."""
+
+
+DECIMALS_OF_METRES: Final = 5
 
 
 class Recording(NamedTuple):
@@ -32,10 +35,21 @@ def recordings_of(joints: NDArray[np.float64], clip: NDArray[np.intp] | None) ->
         Which recording each posture is of; one of all if not given.
     """
     if clip is None or not len(clip):
-        return [Recording(np.arange(len(joints)), measured_person(joints))]
+        return [Recording(np.arange(len(joints)), _measured(joints))]
     order = np.argsort(clip, kind="stable")
     parts = np.split(order, np.flatnonzero(np.diff(clip[order])) + 1)
-    return [Recording(rows, measured_person(joints[rows])) for rows in parts]
+    return [Recording(rows, _measured(joints[rows])) for rows in parts]
+
+
+def _measured(joints: NDArray[np.float64]) -> MeasuredPerson:
+    """Measure a person to a hundredth of a millimetre, so that two clips of one skeleton have the same."""
+    found = measured_person(joints)
+    return replace(
+        found,
+        lengths={name: round(length, DECIMALS_OF_METRES) for name, length in found.lengths.items()},
+        noise=round(found.noise, DECIMALS_OF_METRES),
+        noise_by_limb={name: round(noise, DECIMALS_OF_METRES) for name, noise in found.noise_by_limb.items()},
+    )
 
 
 class PeopleTold:
@@ -48,32 +62,27 @@ class PeopleTold:
         self._least = np.inf
         self._most: dict[str, Any] | None = None
 
-    def add(self, validator: Validator, person: MeasuredPerson) -> None:
-        """Note one, right after the judging: a validator keeps the last person's figure."""
-        told = validator.told_of(person)
-        if not self.count and validator.lengths == "median":
-            self._lengths = {name: round(length, 6) for name, length in person.lengths.items()}
-        self._note([told], 1)
+    def add(self, person: MeasuredPerson | None, told: dict[str, Any]) -> None:
+        """Note one.
 
-    def join(self, others: PeopleTold) -> None:
-        """Note those of another file."""
-        if not self.count:
-            self._lengths = others._lengths
-        extremes = [] if others._most is None else [{"noise": others._least}, others._most]
-        self._note(others._each, others.count, extremes)
-
-    def _note(
-        self, told: list[dict[str, Any]], count: int, extremes: list[dict[str, Any]] | None = None
-    ) -> None:
-        self.count += count
-        self._each += told[: MAX_TOLD_PEOPLE - len(self._each)]
-        for one in told if extremes is None else extremes:
-            noise = one.get("noise")
-            if noise is None:
-                continue
-            self._least = min(self._least, noise)
-            if len(one) > 1 and (self._most is None or noise > self._most["noise"]):
-                self._most = one
+        Parameters
+        ----------
+        person : MeasuredPerson or None
+            Whose lengths were taken; None where the model has its own.
+        told : dict
+            By what they were judged: see `Validator.told_of`.
+        """
+        if not self.count and person is not None:
+            self._lengths = dict(person.lengths)
+        self.count += 1
+        if len(self._each) < MAX_TOLD_PEOPLE:
+            self._each.append(told)
+        noise = told.get("noise")
+        if noise is None:
+            return
+        self._least = min(self._least, noise)
+        if self._most is None or noise > self._most["noise"]:
+            self._most = told
 
     def told(self) -> dict[str, Any]:
         """Say it as reports do."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,9 +64,8 @@ class StatedMotion:
         if up and up not in UP_DIRECTIONS:
             raise InputError(f"--up: {cut(self.up)!r}; expected one of {', '.join(UP_DIRECTIONS)}")
         object.__setattr__(self, "up", up)
-        if self.rate is not None and not (
-            math.isfinite(self.rate) and POSSIBLE_RATES[0] <= self.rate <= POSSIBLE_RATES[1]
-        ):
+        low, high = POSSIBLE_RATES
+        if self.rate is not None and not low <= self.rate <= high:
             raise InputError(f"--rate: {self.rate:g}; expected frames a second, as 30")
 
     def applied(self, held: HeldPostures) -> HeldPostures:

@@ -264,7 +264,7 @@ def test_json_keeps_its_schema(run) -> None:
 
 def test_a_large_file_is_judged_in_batches_and_listed_in_part(run, monkeypatch: pytest.MonkeyPatch) -> None:
     """With small bounds: the same verdicts as at once, those not valid listed with their numbers, up to the cap."""
-    module = importlib.import_module("posekit.validation.judging")
+    module = importlib.import_module("posekit.validation.batches")
     rng = np.random.default_rng(1)
     q = np.repeat(pin.neutral(HUMAN.model)[None], 120, axis=0)
     q[:, 7:] = rng.uniform(HUMAN.lower[7:], HUMAN.upper[7:], (120, 36))
@@ -272,7 +272,7 @@ def test_a_large_file_is_judged_in_batches_and_listed_in_part(run, monkeypatch: 
     at_once = Validator(HUMAN, checks=("joint-range", "collision")).check(q=q)
     run("q.npz", "--urdf", "human", "-o", "whole.csv")
     monkeypatch.setattr(module, "POSTURES_AT_ONCE", 32)
-    monkeypatch.setattr(module, "MAX_LISTED", 20)
+    monkeypatch.setattr(importlib.import_module("posekit.validation.judging"), "MAX_LISTED", 20)
     outcome = run("q.npz", "--urdf", "human", "-o", "r.json")
     report = read_report("r.json")
     bad = np.flatnonzero(at_once.invalid)
@@ -288,7 +288,7 @@ def test_a_large_file_is_judged_in_batches_and_listed_in_part(run, monkeypatch: 
 
 def test_the_lengths_are_those_of_the_whole_file(monkeypatch: pytest.MonkeyPatch) -> None:
     files = importlib.import_module("posekit.formats.own")
-    module = importlib.import_module("posekit.validation.judging")
+    module = importlib.import_module("posekit.validation.batches")
     joints = np.concatenate([STANDING * scale for scale in (0.99, 1.0, 1.0, 1.01)])
     whole = validate_postures(Validator(HUMAN), files.Postures(joints=joints))
     monkeypatch.setattr(module, "POSTURES_AT_ONCE", 1)

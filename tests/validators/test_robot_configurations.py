@@ -167,7 +167,7 @@ def test_less_detail_says_the_same_of_what_is_not_valid(tmp_path: Path) -> None:
 
 def test_parts_of_a_file_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     given = NamedConfigurations(q=some_q("human"))
-    module = importlib.import_module("posekit.validation.judging")
+    module = importlib.import_module("posekit.validation.batches")
     whole = validate_postures(validator("human"), given, detail="verdicts").columns
     monkeypatch.setattr(module, "POSTURES_AT_ONCE", 17)
     parts = validate_postures(validator("human"), given, detail="verdicts").columns

@@ -97,6 +97,14 @@ class Report:
             worst = np.fmin(worst, np.fmin.reduce(judgement.margin * each, axis=1, initial=np.nan))
         return worst
 
+    def of(self, part: slice) -> Report:
+        """Return the verdicts on some of the postures, of a stick figure."""
+        return replace(
+            self,
+            judgements=[judgement.of(part) for judgement in self.judgements],
+            **{name: getattr(self, name)[part] for name in ("complete", "q", "fk_distance")},
+        )
+
     def joined(self, judgements: Sequence[Judgement]) -> Report:
         """Return the report with further judgements of the same postures, as those of checks over time."""
         own = self.judgements
