@@ -121,7 +121,14 @@ def read_postures_of(path: Path, stated: StatedMotion) -> ReadPostures:
     elif found.holds is Content.CONFIGURATIONS:
         held = configurations_of(path, found, stated.rate)
     else:
-        read = held_postures(path, found, unit=stated.unit or None, up=stated.up or None, rate=stated.rate)
+        read = held_postures(
+            path,
+            found,
+            unit=stated.unit or None,
+            up=stated.up or None,
+            rate=stated.rate,
+            body_model=stated.body_model,
+        )
         held = read if found.holds is Content.MOTION else stated.applied(read)
     if not len(held):
         raise InputError(f"{path}: it holds no posture; nothing can be judged; expected at least one")

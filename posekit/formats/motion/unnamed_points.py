@@ -77,7 +77,7 @@ def _is_alike(points: Array, layout: SkeletonMap) -> bool:
         right, left = (
             _apart(_of(points, layout, f"{s}_{start}"), _of(points, layout, f"{s}_{end}")) for s in _SIDES
         )
-        if not abs(right - left) <= SIDES_SHARE * max(right, left):
+        if not 0 < max(right, left) or not abs(right - left) <= SIDES_SHARE * max(right, left):
             return False
         lengths = np.linalg.norm(
             _of(points, layout, f"left_{end}") - _of(points, layout, f"left_{start}"), axis=-1
