@@ -72,7 +72,7 @@ class AskedValidation:
         if self.urdf not in ("", STICK_FIGURE_NAME) and self.settings is None:
             # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
             own_limits = "urdf" if base.ranges == "urdf" else DEFAULT_RANGES
-            base = base.changed(contact_margin=0.0, ranges=own_limits)
+            base = base.changed(contact_margin=0.0, ranges=own_limits, lengths=None)
         return Validator(figure, base.changed(**self.changes))
 
     @staticmethod

@@ -83,3 +83,11 @@ def test_ranges_of_the_figure_name_those_that_people_pass(run: Any) -> None:
     assert code == 1
     assert report["settings"]["why"].endswith("try --ranges anatomical, which real people pass")
     assert judged(run, joints)[2] == 0
+
+
+def test_a_result_is_judged_by_its_own_lengths_and_a_robot_by_those_that_it_shows(run: Any) -> None:
+    assert run("synth", "walker", "-o", "view.json").code == 0
+    assert run("recover", "view.json", "-o", "result.json").code == 0
+    for options, lengths in (((), "model"), (("--urdf", "human", "--checks", "rigid-parts"), "median")):
+        assert run("validate", "result.json", "-o", "r.json", *options).code == 0
+        assert json.loads(Path("r.json").read_text(encoding="utf-8"))["settings"]["lengths_from"] == lengths
