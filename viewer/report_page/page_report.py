@@ -28,6 +28,9 @@ MOST_NAMED_CLIPS: Final = 2000
 MOST_PAGE_SPANS: Final = 100
 """Spans of a clip that the page has, the worst first."""
 
+MOST_REFUSED: Final = 200
+"""Files that could not be judged."""
+
 MOST_SETTING_CHARACTERS: Final = 2000
 """Characters of a setting."""
 
@@ -62,6 +65,7 @@ def page_report(report: ValidationReport, *, title: str) -> dict[str, Any]:
         ],
         "named": [_named(clip) for clip in bad[MOST_DETAILED_CLIPS:][:MOST_NAMED_CLIPS]],
         "unnamed": max(len(bad) - MOST_DETAILED_CLIPS - MOST_NAMED_CLIPS, 0),
+        "refused": list(report.refused[:MOST_REFUSED]),
         "rows": [] if clips else _postures(columns),
         "settings": {name: str(value)[:MOST_SETTING_CHARACTERS] for name, value in report.settings.items()},
         "skeleton": {
@@ -147,7 +151,6 @@ def _millimetres(points: np.ndarray[Any, Any] | None) -> list[list[int] | None] 
 
 
 def _postures(columns: VerdictColumns) -> list[dict[str, Any]]:
-    bad = set(np.flatnonzero(columns.verdict)[:MOST_POSTURES].tolist())
     return [
         {
             "posture": row.posture,
@@ -159,6 +162,5 @@ def _postures(columns: VerdictColumns) -> list[dict[str, Any]]:
             ][:5]
             or row.undecided_by,
         }
-        for row in columns.rows()
-        if row.posture in bad
+        for row in columns.rows(np.flatnonzero(columns.verdict)[:MOST_POSTURES].tolist())
     ]

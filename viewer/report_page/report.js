@@ -143,6 +143,8 @@ function showReport(data) {
   if (data.settings.why) document.getElementById("lead").after(make("p", {}, data.settings.why));
   showChecks(data, total, what);
   if (data.clip_counts) showClips(data);
+  document.getElementById("refused-section").hidden = !data.refused.length;
+  for (const line of data.refused) document.getElementById("refused").append(make("li", {}, line));
   if (data.rows.length) {
     document.getElementById("postures-section").hidden = false;
     for (const row of data.rows)

@@ -267,7 +267,9 @@ def write_report(path: str | Path, report: ValidationReport) -> None:
     elif kind == ".csv":
         write_lines(path, csv_lines(columns, report.frames))
     else:
-        write_lines(path, markdown_lines(columns, report.settings, report.frames, report.clips))
+        write_lines(
+            path, markdown_lines(columns, report.settings, report.frames, report.clips, report.refused)
+        )
 
 
 def read_report(path: str | Path) -> ValidationReport:
@@ -287,7 +289,7 @@ def read_report(path: str | Path) -> ValidationReport:
         listed=file.listed,
         refused=tuple(file.refused),
         verdicts=file.verdicts,
-        clips=None if file.clips is None else tuple(clip_of_document(clip) for clip in file.clips),
+        clips=tuple(clip_of_document(clip) for clip in file.clips) or None,
     )
 
 
@@ -377,7 +379,7 @@ def _head(report: ValidationReport) -> dict[str, Any]:
         head["verdicts"] = report.verdicts
     if report.refused:
         head["refused"] = list(report.refused)
-    if report.clips is not None:
+    if report.clips:
         head["clips"] = [clip_document(clip) for clip in report.clips]
     return head
 

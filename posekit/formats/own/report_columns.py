@@ -133,22 +133,22 @@ class VerdictColumns:
         letters = np.array([verdict[0] for verdict in VERDICT_NAMES])
         return "".join(letters[self.verdict].tolist())
 
-    def rows(self) -> Iterator[VerdictRow]:
-        """Go through the postures."""
+    def rows(self, some: Sequence[int] | None = None) -> Iterator[VerdictRow]:
+        """Go through the postures, or through some of them."""
         starts = np.searchsorted(self.posture, np.arange(len(self) + 1)).tolist()
         verdicts, distances = self.verdict.tolist(), self.fk_distance.tolist()
         places, where = self.worst_place.tolist(), self.place.tolist()
         least = np.stack([self.worst_value, self.worst_bound, self.worst_margin], axis=1).tolist()
         outside = np.stack([self.value, self.bound, self.margin], axis=1).tolist()
         silent = (self.silent != 0).tolist()
-        for k, verdict in enumerate(verdicts):
-            some = range(starts[k], starts[k + 1])
+        for k in range(len(self)) if some is None else some:
+            found = range(starts[k], starts[k + 1])
             yield VerdictRow(
                 posture=k,
-                verdict=VERDICT_NAMES[verdict],
+                verdict=VERDICT_NAMES[verdicts[k]],
                 fk_distance=distances[k],
                 worst=None if places[k] < 0 else PlaceValue(self.places[places[k]], *least[k]),
-                violations=[PlaceValue(self.places[where[i]], *outside[i]) for i in some],
+                violations=[PlaceValue(self.places[where[i]], *outside[i]) for i in found],
                 undecided_by=self.silent_checks(k) if silent[k] else [],
             )
 

@@ -144,7 +144,7 @@ class ReportFile(FileModel):
     refused: list[str] = Field(
         default=[], description="Of several files those that could not be judged, each with why."
     )
-    clips: list[ClipFields] | None = Field(
-        default=None, description="Of frames in time: the verdict on every clip."
+    clips: Annotated[list[ClipFields], FailFast()] = Field(
+        default=[], description="Of frames in time: the verdict on every clip."
     )
     postures: Annotated[list[PostureFields], FailFast()]

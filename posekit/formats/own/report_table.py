@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -26,17 +26,22 @@ MAX_SHOWN_CLIPS: Final = 100
 MAX_TERMINAL_CLIPS: Final = 5
 """Clips that are not valid, on the terminal."""
 
+MARKUP_LETTERS: Final = "&<>|\\`[]*"
+"""Letters that Markdown may take for more than themselves, also in the middle of a word."""
+
 MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
 
 
-def summary_table(columns: VerdictColumns) -> list[str]:
+def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[str]:
     """Count the verdicts, and for each check what it rejects, where most, and the worst posture (from 0).
 
     Parameters
     ----------
     columns : VerdictColumns
         The verdicts, one a posture.
+    markdown : bool
+        Whether names are escaped for Markdown, or for a terminal.
     """
     counts = ", ".join(f"{count} {verdict}" for verdict, count in columns.summary.items())
     lines = [f"{len(columns)} postures: {counts}", ""]
@@ -52,7 +57,7 @@ def summary_table(columns: VerdictColumns) -> list[str]:
         )
         for check, count in columns.by_check().items()
     ]
-    return lines + _table(head, rows)
+    return lines + _table(head, rows, _no_markup if markdown else _cell)
 
 
 def markdown_lines(
@@ -60,6 +65,7 @@ def markdown_lines(
     settings: Mapping[str, Any],
     frames: ReportFrames | None = None,
     clips: Sequence[ClipVerdict] | None = None,
+    refused: Sequence[str] = (),
 ) -> list[str]:
     """Write a report as Markdown: summary, clips with the worst first, settings, the first postures not valid.
 
@@ -73,19 +79,23 @@ def markdown_lines(
         Which frame each posture is.
     clips : sequence of ClipVerdict, optional
         The verdicts on clips.
+    refused : sequence of str
+        Files that could not be judged.
     """
-    lines = ["# Validation", "", *summary_table(columns)]
+    lines = ["# Validation", "", *summary_table(columns, markdown=True)]
+    if refused:
+        lines += ["", "## Files that could not be judged", ""]
+        lines += [f"- {_no_markup(line)}" for line in refused[:MAX_SHOWN_CLIPS]]
     if clips:
         lines += ["", "## Clips", "", *clip_table(clips)]
     lines += ["", "## Settings", ""]
-    lines += [f"- {_cell(name)}: {_cell(_shown(value))}" for name, value in settings.items()]
+    lines += [f"- {_no_markup(name)}: {_no_markup(_shown(value))}" for name, value in settings.items()]
     lines += ["", "## Postures that are not valid", ""]
     bad = np.flatnonzero(columns.verdict)
     if not len(bad):
         return [*lines, "None."]
     if len(bad) > MAX_SHOWN_POSTURES:
         lines += [f"The first {MAX_SHOWN_POSTURES} of {len(bad)}.", ""]
-    wanted = set(bad[:MAX_SHOWN_POSTURES].tolist())
     rows = [
         (
             row.posture,
@@ -94,15 +104,14 @@ def markdown_lines(
             "" if row.worst is None else _at(row.worst),
             "; ".join(map(_at, row.violations)) or f"undecided: {', '.join(row.undecided_by)}",
         )
-        for row in columns.rows()
-        if row.posture in wanted
+        for row in columns.rows(bad[:MAX_SHOWN_POSTURES].tolist())
     ]
     where = () if frames is None else ("clip", "frame", "time, s")
-    return lines + _table(("posture", *where, "verdict", "least margin", "why"), rows)
+    return lines + _table(("posture", *where, "verdict", "least margin", "why"), rows, _no_markup)
 
 
 def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> list[str]:
-    """List clips, the worst first, with the span behind each that is farthest beyond its bound.
+    """List clips in Markdown, the worst first, with the span behind each that is farthest beyond its bound.
 
     Parameters
     ----------
@@ -119,7 +128,7 @@ def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> lis
     if len(bad) > most:
         lines += [f"The worst {most} of {len(bad)} that are not valid.", ""]
     head = ("clip", "verdict", "not valid", "first", "worst", "longest good span")
-    return lines + _table(head, [_of_clip(clip) for clip in bad[:most]])
+    return lines + _table(head, [_of_clip(clip) for clip in bad[:most]], _no_markup)
 
 
 def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> list[str]:
@@ -199,8 +208,8 @@ def _shown(value: object) -> str:
     return text if len(text) <= MAX_SETTING_CHARACTERS else f"{text[: MAX_SETTING_CHARACTERS - 1]}…"
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    cells = [[_cell(str(cell)) for cell in row] for row in rows]
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]], escaped: Callable[[str], str]) -> list[str]:
+    cells = [[escaped(str(cell)) for cell in row] for row in rows]
     widths = [max(len(row[k]) for row in [list(head), *cells]) for k in range(len(head))]
 
     def line(row: Sequence[str]) -> str:
@@ -212,6 +221,11 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 def _cell(text: str) -> str:
     """Keep a name from a file inside its cell."""
     return _printable(text).replace("|", "\\|")
+
+
+def _no_markup(text: str) -> str:
+    """Keep a name from a file from being taken for Markdown or HTML."""
+    return "".join(f"&#{ord(letter)};" if letter in MARKUP_LETTERS else letter for letter in _printable(text))
 
 
 def _printable(text: str) -> str:
