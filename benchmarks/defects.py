@@ -414,6 +414,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             sizes=(1.0,),
             asked=1.0,
             put=swap("elbow", "wrist"),
+            share=0.6,
             frames=(5, 100),
         ),
         Defect(

@@ -89,7 +89,8 @@ def _explain(clip: MotionClip) -> Explained:
         joints = np.where(rearranged[:, None, None], np.nan, joints)
     kept = known & ~rearranged
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
-    exchanged[kept] = exchanged_pairs(joints[kept], clip.feet[order][kept], clip.head[order][kept])
+    follows = np.diff(timeline.slots[order][kept]) == 1
+    exchanged[kept] = exchanged_pairs(joints[kept], clip.feet[order][kept], clip.head[order][kept], follows)
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints)
     jumped = (jumps.joint > JUMP_METRES) | (jumps.body > JUMP_METRES)[:, None]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.skeleton import JOINT
+from posekit.skeleton import JOINT, N_TRUNK_JOINTS
 from posekit.validators.motion.timeline import norm
 
 SIDE_PAIRS: Final = ("shoulder", "elbow", "wrist", "hip", "knee", "ankle")
@@ -51,7 +51,9 @@ EXCHANGED_COST: Final = 0.03
 """Frames of evidence against a pair's being exchanged, a frame: labels are more often right than wrong."""
 
 
-def exchanged_pairs(joints: Array, feet: Array, head: Array) -> NDArray[np.bool_]:
+def exchanged_pairs(
+    joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_] | None = None
+) -> NDArray[np.bool_]:
     """Say which of `SIDE_PAIRS` have right and left exchanged (T, 6).
 
     Parameters
@@ -62,14 +64,20 @@ def exchanged_pairs(joints: Array, feet: Array, head: Array) -> NDArray[np.bool_
         Right and left toe, right and left heel.
     head : array (T, 5, 3)
         Nose, eyes and ears.
+    follows : bool array (T - 1,), optional
+        Whether each frame but the first is the next one in time; all are if not given.
     """
     count = len(joints)
     if not count:
         return np.zeros((0, 6), dtype=np.bool_)
     across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
     together, hips, shoulders = _evidence(joints, across, feet, head)
-    continuity = _continuity(across)
-    firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | ~known_before(across)]))
+    continuity = _continuity(joints, across)
+    gap = ~known_before(across)
+    if follows is not None:
+        gap |= ~follows
+    continuity[gap] = 0.0
+    firsts = np.flatnonzero(np.concatenate([[True], (continuity > 0).any(axis=1) | gap]))
     sums = [np.add.reduceat(one, firsts, axis=0) for one in (together, hips, shoulders)]
     lengths = np.diff(np.append(firsts, count))
     relations = [
@@ -164,11 +172,22 @@ def _unit(vectors: Array) -> Array:
     return np.asarray(vectors / np.maximum(norm(vectors), 1e-9)[..., None])
 
 
-def _continuity(across: Array) -> Array:
-    """Return what says that a pair turned over since the frame before (T - 1, 6), -1 to 1."""
-    dots = np.einsum("tki,tki->tk", across[1:], across[:-1])
-    sizes = norm(across[1:]) * norm(across[:-1])
-    return np.asarray(np.nan_to_num(-dots / np.maximum(sizes, APART_METRES**2)))
+def _continuity(joints: Array, across: Array) -> Array:
+    """Return what says that a pair turned over since the frame before (T - 1, 6), -1 to 1.
+
+    It is how much shorter the ways of both joints are when they change places, beside the way of the trunk.
+    """
+    moved = np.diff(joints[:, :N_TRUNK_JOINTS], axis=0)
+    known = np.isfinite(moved[..., 0])
+    number = np.maximum(known.sum(axis=1), 1)[:, None, None]
+    trunk = np.where(known[..., None], moved, 0.0).sum(axis=1, keepdims=True) / number
+    right, left = joints[1:, RIGHT_JOINTS] - trunk, joints[1:, LEFT_JOINTS] - trunk
+    right_before, left_before = joints[:-1, RIGHT_JOINTS], joints[:-1, LEFT_JOINTS]
+    straight = norm(right - right_before) + norm(left - left_before)
+    crossed = norm(right - left_before) + norm(left - right_before)
+    apart = norm(across)
+    sizes = 2.0 * np.fmax(np.fmax(apart[1:], apart[:-1]), APART_METRES)
+    return np.asarray(np.nan_to_num((straight - crossed) / sizes))
 
 
 def _least(energy: Array, turned: Array) -> NDArray[np.intp]:
