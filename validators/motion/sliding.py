@@ -29,6 +29,12 @@ DOWN_METRES: Final = 0.04
 FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
 """Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`."""
 
+EVEN_SHARE: Final = 0.3
+"""Of a fast slide's own speed, by which it may be uneven."""
+
+BEND_FRAMES: Final = 8
+"""How far the start of a slide may be from where it was first found."""
+
 USUAL_FRAMES: Final = 5
 """Frames of which the median velocity is taken: a point that trembles does so from frame to frame."""
 
@@ -82,16 +88,15 @@ class Sliding(MotionCheck):
         for start, stop in stretches(np.any(slides, axis=0)):
             sliding = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
             points = spread[:, [point for k in sliding for point in FOOT_POINTS[k]]]
-            centre = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))].mean(axis=1)
-            centre = centre - (centre @ up)[:, None] * up
-            along = centre[stop - 1] - centre[start]
+            points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]
+            along = (points[stop - 1] - points[start]).mean(axis=0)
+            along = along - (along @ up) * up
+            way = points @ along / norm(along)
             speed = float(norm(along)) / ((stop - 1 - start) * clip.step)
-            way = centre @ along / norm(along)
-            first, last = (
-                _bend(way, start, stop, count),
-                _bend(way[::-1], len(way) - stop, len(way) - start, count),
-            )
-            value[first + 1 : len(way) - last, sliding] = speed
+            rough = _roughly(np.diff(way.mean(axis=1)) - speed * clip.step / 2, start, stop - 1, count)
+            first = _bend(way, *rough, count)
+            last = len(way) - 1 - _bend(way[::-1], len(way) - 1 - rough[1], len(way) - 1 - rough[0], count)
+            value[first + 1 : last + 1, sliding] = speed
         return Findings(value=line.of_frames(value), lower=np.array(-np.inf), upper=np.array(self.fastest))
 
     def _frames(self, clip: MotionClip) -> int:
@@ -118,7 +123,8 @@ class Sliding(MotionCheck):
         flat &= down[1:, known].any(axis=1)
         windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
         even = windows.mean(axis=-1)
-        steady = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1) < self.uneven + noise
+        differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
+        steady = differs < np.maximum(self.uneven, EVEN_SHARE * norm(even)) + noise
         steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
         steady &= norm(even) > self.fastest
         slides = np.zeros(len(points), dtype=np.bool_)
@@ -127,19 +133,26 @@ class Sliding(MotionCheck):
         return slides
 
 
+def _roughly(gained: Array, start: int, stop: int, most: int) -> tuple[int, int]:
+    """Move the ends of a slide, by at most so many slots outward, to where what it gains (S - 1,) sums to most."""
+    middle = (start + stop) // 2
+    before = np.cumsum(gained[max(start - most, 0) : middle][::-1])
+    after = np.cumsum(gained[middle : stop + most])
+    return middle - int(np.nanargmax(before)) - 1, middle + int(np.nanargmax(after)) + 1
+
+
 def _bend(way: Array, start: int, stop: int, most: int) -> int:
-    """Find where an even slide (S,) starts, at most so many slots off: two lines that meet there fit best."""
-    first, last = max(start - most, 0), min(start + most, stop - 1)
+    """Find where an even slide of points (S, P) starts: where two lines meet that fit each point's way best."""
+    first, last = max(start - most, 0), min(start + most, stop)
     time = np.arange(first, last + 1, dtype=np.float64)
-    piece, best, least = way[first : last + 1], start, np.inf
-    known = np.isfinite(piece)
-    for bend in range(first, last - 1):
-        lines = np.stack(
-            [np.ones(len(time)), np.minimum(time - bend, 0), np.maximum(time - bend, 0)], axis=1
-        )[known]
-        left = piece[known] - lines @ np.linalg.lstsq(lines, piece[known], rcond=None)[0]
-        if left @ left < least:
-            best, least = bend, float(left @ left)
+    piece = way[first : last + 1]
+    piece, time = piece[np.isfinite(piece).all(axis=1)], time[np.isfinite(piece).all(axis=1)]
+    best, least = start, np.inf
+    for bend in range(max(first + 2, start - BEND_FRAMES), min(last - 2, start + BEND_FRAMES) + 1):
+        lines = np.stack([np.ones(len(time)), time - bend, np.maximum(time - bend, 0)], axis=1)
+        left = piece - lines @ np.linalg.lstsq(lines, piece, rcond=None)[0]
+        if np.vdot(left, left) < least:
+            best, least = bend, float(np.vdot(left, left))
     return best
 
 
