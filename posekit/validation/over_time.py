@@ -51,7 +51,8 @@ def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
     if len(held) > 1 and not held.frame.any():
         return None
     used, clip = np.unique(held.clip, return_inverse=True)
-    named = len(held.clips) > int(used.max(initial=0))
+    # A reader that finds no names counts; of one clip alone that says nothing.
+    named = len(held.clips) > int(used.max(initial=0)) and held.clips != ("0",)
     frames = ReportFrames(
         clips=[
             ClipName(file, held.clips[k] if named else str(k) if len(used) > 1 else "") for k in used.tolist()
