@@ -27,16 +27,17 @@ from numpy.typing import NDArray
 
 from benchmarks.clip_lengths import scene_of
 from benchmarks.people import people
-from posekit import Validator, recover
+from posekit import Validator, recover, validate
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import Postures
 from posekit.formats.own.report import columns_of
+from posekit.formats.own.report_columns import VerdictColumns
 from posekit.geometry import Array
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS, PARENTS
 from posekit.synthesis import Capture, SyntheticScene
-from posekit.validation import recovered_with, validate
+from posekit.validation import recovered_with
 from posekit.views.builtin import view_of
 
 BEYOND_DEGREES = (10.0, 30.0)
@@ -225,7 +226,7 @@ def main() -> None:
     ]
     sources += of_pictures(captures[0], given.frames, given.noise, given.seed)
     validator = Validator()
-    reports = [columns_of(validate(validator, one.held, detail="verdicts")) for one in sources]
+    reports = [columns_of(validate(one.held)) for one in sources]
     hinges = [
         f"{side} {hinge}, {d:g}°"
         for hinge in LIMB_PLACES
@@ -234,25 +235,13 @@ def main() -> None:
     ]
     rows = [[one.name, str(len(one.joints)), *beyond(one, validator)] for one in sources]
     print("\n".join(table_lines(["beyond by more than", "frames", *hinges], rows)), "\n")
-    checks = sorted({check for one in reports for check in one.checks}, key=list(reports[0].checks).index)
+    checks = list(dict.fromkeys(check for one in reports for check in one.checks))
     rows = [
-        [
-            one.name,
-            f"{found.summary['valid'] / len(found):.1%}",
-            "" if one.own is None else f"{one.own.mean():.1%}",
-            *(_share(found.by_check().get(check), len(found)) for check in checks),
-        ]
-        for one, found in zip(sources, reports, strict=True)
+        ["none: valid", *(f"{one.summary['valid'] / len(one):.1%}" for one in reports)],
+        ["none, by their result", *("" if one.own is None else f"{one.own.mean():.1%}" for one in sources)],
+        *([check.replace("_", " "), *(_share(one, check) for one in reports)] for check in checks),
     ]
-    print(
-        "\n".join(
-            table_lines(
-                ["rejected by", "valid", "by their result", *(check.replace("_", " ") for check in checks)],
-                rows,
-            )
-        ),
-        "\n",
-    )
+    print("\n".join(table_lines(["rejected by", *(one.name for one in sources)], rows)), "\n")
     rows = []
     for one, found in zip(sources[: len(captures)], reports, strict=False):
         for clip in np.unique(one.clip[found.verdict != 0]):
@@ -260,7 +249,7 @@ def main() -> None:
             bad = np.isin(found.posture, mine)
             names, counts = np.unique(found.place[bad], return_counts=True)
             said = [
-                f"{found.places[place].where} {count} (to {found.margin[bad & (found.place == place)].min():.2g} "
+                f"{found.places[place].name} {count} (to {found.margin[bad & (found.place == place)].min():.2g} "
                 f"{found.places[place].unit})"
                 for place, count in sorted(
                     zip(names.tolist(), counts.tolist(), strict=True), key=lambda p: -p[1]
@@ -276,9 +265,9 @@ def main() -> None:
     print("\n".join(table_lines(["clip", "frames not valid", "by, frames and worst margin"], rows)))
 
 
-def _share(count: object, total: int) -> str:
-    rejected = getattr(count, "rejected", None)
-    return "" if rejected is None else f"{rejected / total:.1%}"
+def _share(found: VerdictColumns, check: str) -> str:
+    count = found.by_check().get(check)
+    return "" if count is None else f"{count.rejected / len(found):.1%}"
 
 
 if __name__ == "__main__":
