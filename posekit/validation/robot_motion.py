@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -47,6 +47,7 @@ def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPos
     return held if feet is None else replace(held, feet=feet.positions(held.q))
 
 
+@lru_cache(maxsize=4)
 def soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> Kinematics | None:
     """Return what places toes and heels, in the order of `FEET_POINTS`: the middles of a sole's two ends.
 

@@ -50,8 +50,8 @@ def columns_of(
     for judgement in judgements:
         if not judgement.where:
             continue  # a robot without limits is inside them
-        says_nothing = np.isnan(judgement.worst) & ~judgement.violated.any(axis=1)
         if not judgement.over_time:
+            says_nothing = np.isnan(judgement.worst) & ~judgement.violated.any(axis=1)
             silent[asked[says_nothing]] |= np.int16(2 << checks.index(judgement.check))
         if judgement.by_pairs and contacts is not None:
             index = _indices(places, [ReportPlace(judgement.check, name, "m") for name in contacts.names])
@@ -77,9 +77,11 @@ def columns_of(
         at, columns = np.nonzero(judgement.violated[some])
         found.append(_judged_at(judgement, asked, index, some[at], columns))
         each = np.array([PER_DEGREE.get(unit, 1.0) for unit in judgement.unit])
-        scaled = np.where(np.isnan(judgement.margin), np.inf, judgement.margin / each)
+        every = np.arange(len(asked)) if margins else some
+        scaled = judgement.margin[every] / each
+        scaled[np.isnan(scaled)] = np.inf
         if len(scaled):
-            column, every = scaled.argmin(axis=1), np.arange(len(asked))
+            column = scaled.argmin(axis=1)
             worst.take(_judged_at(judgement, asked, index, every, column), each[column])
     outside = _Judged(*(np.concatenate(parts) for parts in zip(*found, strict=True))) if found else _NONE
     outside = outside.of(np.argsort(outside.posture, kind="stable"))
