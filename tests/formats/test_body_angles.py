@@ -154,7 +154,7 @@ def test_a_rate_that_is_none_is_no_time(tmp_path: Path, model: Path, rate: float
     [
         ({"poses": np.zeros((FRAMES, 63))}, "expected numbers .* K of 22 or more"),
         ({"poses": np.zeros((FRAMES, 70))}, "shape"),
-        ({"poses": np.full((FRAMES, 66), np.nan)}, r"poses\[0, 0\]: got a number that is not finite"),
+        ({"poses": np.full((FRAMES, 66), np.nan)}, r"poses\[0, 0\]: got nan; expected finite"),
         ({"poses": np.array([{}] * FRAMES, dtype=object)}, "pickles are not read"),
         ({"poses": np.zeros((0, 66)), "trans": np.zeros((0, 3))}, "one or more"),
         ({"trans": np.zeros((3, 3))}, "trans: got 3 frames"),

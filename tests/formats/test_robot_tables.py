@@ -176,7 +176,7 @@ def changed(layout: str, **arrays: Any) -> dict[str, Any]:
         (changed("gmr", root_pos=None), "root_pos: got nothing"),
         (changed("gmr", root_trans=q()[:, :3]), "two of one thing"),
         (changed("gmr", dof_pos=q()[:, 9:]), "34 variables; expected 36"),
-        (changed("gmr", dof_pos=np.full((FRAMES, 29), np.inf)), "an infinite number"),
+        (changed("gmr", dof_pos=np.full((FRAMES, 29), np.inf)), "joints: got inf; expected finite numbers"),
         (changed("gmr", dof_pos=np.array([{}] * FRAMES, dtype=object)), "pickles are not read"),
         (changed("gmr", dof_names=np.array(["a"] * 29)), "joint names: got"),
         (changed("gmr", dof_names=np.array([f"j{k}" for k in range(29)])), 'got "j0"; expected a variable'),

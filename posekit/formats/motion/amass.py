@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.motion.array_names import RATE_NAMES, holds_body_angles
 from posekit.formats.motion.body_model import BODY_JOINTS, BODY_PARENTS, BodyModel, read_body_model
+from posekit.formats.motion.body_size import FARTHEST
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array
@@ -152,9 +153,12 @@ def _rate(arrays: Arrays) -> float:
 
 
 def _finite(path: str | Path, name: str, values: NDArray[Any]) -> Array:
-    if not np.isfinite(values).all():
-        where = ", ".join(str(int(k)) for k in np.argwhere(~np.isfinite(values))[0])
-        raise refusal(path, f"{name}[{where}]", "a number that is not finite", "finite numbers", "correct it")
+    sane = np.abs(values) < FARTHEST
+    if not sane.all():
+        place = tuple(int(k) for k in np.argwhere(~sane)[0])
+        got = f"{values[place]:g}"
+        where = ", ".join(map(str, place))
+        raise refusal(path, f"{name}[{where}]", got, f"finite numbers below {FARTHEST:g}", "correct it")
     return values.astype(np.float64)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
+from posekit.formats.motion.body_size import FARTHEST
 from posekit.geometry import Array
 from posekit.safe_io import open_npz, refusal
 from posekit.safe_io.npz_file import Archive
@@ -77,8 +78,6 @@ def read_body_model(path: str | Path) -> BodyModel:
     with open_npz(path, limit=MAX_BYTES) as archive:
         _check_tree(archive)
         joints, directions = _joints(archive)
-    if not (np.isfinite(joints).all() and np.isfinite(directions).all()):
-        raise refusal(path, "J", "a number that is not finite", "finite numbers", "save it again")
     return BodyModel(joints=joints[:BODY_JOINTS], directions=directions[:BODY_JOINTS], source=str(path))
 
 
@@ -114,9 +113,9 @@ def _joints(archive: Archive) -> tuple[Array, Array]:
 def _check_tree(archive: Archive) -> None:
     """Refuse joints that hang on one another in another way than those of SMPL."""
     if "kintree_table" in archive.names:
-        parents: NDArray[np.int64] = archive.array("kintree_table", "iuf", (2, None))[0].astype(np.int64)
+        parents: NDArray[np.int64] = archive.array("kintree_table", "iu", (2, None))[0].astype(np.int64)
     elif "parents" in archive.names:
-        parents = archive.array("parents", "iuf", (None,)).astype(np.int64)
+        parents = archive.array("parents", "iu", (None,)).astype(np.int64)
     else:
         raise archive.lacks("kintree_table")
     if len(parents) < BODY_JOINTS or tuple(parents[1:BODY_JOINTS]) != BODY_PARENTS[1:]:
@@ -127,6 +126,9 @@ def _check_tree(archive: Archive) -> None:
 
 def _numbers(archive: Archive, name: str, shape: tuple[int | None, ...]) -> Array:
     values: Array = archive.array(name, "iuf", shape).astype(np.float64)
+    if not (np.abs(values) < FARTHEST).all():
+        got = "a number that is not finite, or beyond all bodies"
+        raise refusal(archive.path, name, got, f"numbers below {FARTHEST:g}", "save it again")
     if name in ("J", "J_regressor") and len(values) < BODY_JOINTS:
         raise refusal(
             archive.path, name, f"{len(values)} joints", f"{BODY_JOINTS} or more", "give a whole body"

@@ -93,7 +93,10 @@ def _stacked(columns: Mapping[str, Array], names: Sequence[str]) -> Array:
 
 def _cells(line: str) -> list[str]:
     delimiter = max(",;\t", key=line.count)
-    found = next(csv.reader(io.StringIO(line), delimiter=delimiter), [])
+    try:
+        found = next(csv.reader(io.StringIO(line, newline=""), delimiter=delimiter), [])
+    except csv.Error:  # a row that is none: its cells are not counted on
+        found = line.split(delimiter)
     return [cell.strip() for cell in found]
 
 

@@ -28,6 +28,7 @@ from posekit.formats.motion.array_names import (
     ROOT_TURNS_IN_ORDER,
     holds_robot,
 )
+from posekit.formats.motion.body_size import FARTHEST
 from posekit.formats.motion.configuration_format import ConfigurationFormat
 from posekit.formats.motion.root_turn import QUATERNION_ORDERS, root_turn
 from posekit.formats.own.postures_q import ROOT_NAMES, NamedConfigurations
@@ -95,9 +96,15 @@ def configurations_of_columns(columns: RobotColumns, source: str) -> NamedConfig
     InputError
         Where a number is infinite, or a quaternion is none.
     """
-    for name, values in (("root", columns.place), ("joints", columns.joints), ("time", columns.time)):
-        if np.isinf(values).any():
-            raise refusal(source, name, "an infinite number", "finite numbers", "correct it")
+    for name, values in (
+        ("root", columns.place),
+        (columns.turn_name, columns.turn),
+        ("joints", columns.joints),
+        ("time", columns.time),
+    ):
+        if (np.abs(values) > FARTHEST).any():
+            got = f"{float(values[np.abs(values) > FARTHEST][0]):g}"
+            raise refusal(source, name, got, f"finite numbers below {FARTHEST:g}", "correct it")
     turn = root_turn(columns.turn, columns.order, source, columns.turn_name)
     said = [*columns.said, turn.said]
     if not columns.names:
