@@ -22,6 +22,9 @@ LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2],
 DRIFT_FRAMES: Final = 5
 """Whose median length is judged: one frame's is no drift."""
 
+NOISE_FACTOR: Final = 4.0
+"""Standard deviations of measuring, or of trembling, by which a length may be off."""
+
 SHAKEN_METRES: Final = 0.0025
 """A joint that trembles by more makes lengths tremble: `jitter` names that."""
 
@@ -61,7 +64,7 @@ class Drift(MotionCheck):
             upper=np.array(self.share),
             # A length has the noise of its two ends, the median of five frames about half of it.
             tolerance=found.timeline.of_frames(
-                3.0 * np.fmax(shaken, clip.noise) / np.where(usual > 0, usual, 1.0)
+                NOISE_FACTOR * np.fmax(shaken, clip.noise) / np.where(usual > 0, usual, 1.0)
             ),
         )
 

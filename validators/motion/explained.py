@@ -48,6 +48,8 @@ class Explained:
         Of slots.
     joints : array (S, 14, 3)
         What is left.
+    noise : float
+        Of the clip.
     """
 
     timeline: Timeline
@@ -56,11 +58,12 @@ class Explained:
     exchanged: NDArray[np.bool_]
     jumps: Jumps
     joints: Array
+    noise: float
 
     @cached_property
     def trembling(self) -> Array:
         """How much joints tremble in slots (S, 14), metres."""
-        return trembling_of(self.joints)
+        return trembling_of(self.joints, self.noise)
 
 
 _KNOWN: Final[WeakKeyDictionary[MotionClip, Explained]] = WeakKeyDictionary()
@@ -90,7 +93,9 @@ def _explain(clip: MotionClip) -> Explained:
     kept = known & ~rearranged
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
     follows = np.diff(timeline.slots[order][kept]) == 1
-    exchanged[kept] = exchanged_pairs(joints[kept], clip.feet[order][kept], clip.head[order][kept], follows)
+    exchanged[kept] = exchanged_pairs(
+        joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, clip.noise
+    )
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints)
     jumped = (jumps.joint > JUMP_METRES) | (jumps.body > JUMP_METRES)[:, None]
@@ -101,4 +106,5 @@ def _explain(clip: MotionClip) -> Explained:
         exchanged=exchanged[back],
         jumps=jumps,
         joints=np.where(jumped[..., None], np.nan, joints) if jumped.any() else joints,
+        noise=clip.noise,
     )

@@ -14,8 +14,8 @@ from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.trembling import trembling_frames
 
-NOISE_FACTOR: Final = 3.0
-"""Times the standard deviation of measuring that is allowed for: a length has the noise of two ends."""
+NOISE_FACTOR: Final = 2.0
+"""Times the standard deviation of measuring that is allowed for."""
 
 SLOWEST_RATE: Final = 25.0
 """Frames a second: at fewer, fast motion is not smooth from frame to frame."""

@@ -16,8 +16,8 @@ from posekit.validators.motion.motion_check import MotionCheck
 class Penetration(MotionCheck):
     """Whether the lowest sole or joint is below the ground; see `posekit.validators.motion.ground`.
 
-    Where the ground is given, a clip whose lowest level is below it is so in all its frames. Where it is not, it may be
-    lower where nothing rests.
+    Where the ground is given, a clip whose lowest level is below it is so in all its frames. Where it is not, it may
+    be lower where nothing rests.
 
     Parameters
     ----------

@@ -38,6 +38,9 @@ TORN_METRES: Final = 0.02
 BEND_METRES: Final = 0.03
 """A knee or a toe so far before the line of its leg is full evidence of which way the hips face."""
 
+NOISE_FACTOR: Final = 5.0
+"""Standard deviations of measuring that are full evidence."""
+
 APART_METRES: Final = 0.1
 """Two joints so far apart are full evidence of which is which in the next frame; nearer ones may change places."""
 
@@ -52,7 +55,7 @@ EXCHANGED_COST: Final = 0.03
 
 
 def exchanged_pairs(
-    joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_] | None = None
+    joints: Array, feet: Array, head: Array, follows: NDArray[np.bool_] | None = None, noise: float = 0.0
 ) -> NDArray[np.bool_]:
     """Say which of `SIDE_PAIRS` have right and left exchanged (T, 6).
 
@@ -66,12 +69,14 @@ def exchanged_pairs(
         Nose, eyes and ears.
     follows : bool array (T - 1,), optional
         Whether each frame but the first is the next one in time; all are if not given.
+    noise : float
+        Standard deviation of measuring, metres: what is not more than some of it is no full evidence.
     """
     count = len(joints)
     if not count:
         return np.zeros((0, 6), dtype=np.bool_)
     across = joints[:, RIGHT_JOINTS] - joints[:, LEFT_JOINTS]
-    together, hips, shoulders = _evidence(joints, across, feet, head)
+    together, hips, shoulders = _evidence(joints, across, feet, head, NOISE_FACTOR * noise)
     continuity = _continuity(joints, across)
     gap = ~known_before(across)
     if follows is not None:
@@ -109,7 +114,9 @@ def known_before(across: Array) -> NDArray[np.bool_]:
     return np.asarray((known[1:] & known[:-1]).any(axis=1))
 
 
-def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[Array, Array, Array]:
+def _evidence(
+    joints: Array, across: Array, feet: Array, head: Array, unsure: float
+) -> tuple[Array, Array, Array]:
     """Return, in -1 to 1 a frame, what says that pairs go as labelled: relations (T, 5), hips (T,), shoulders (T,)."""
     together = np.zeros((len(joints), 5))
     for k, (first, second) in enumerate(_LIMB_LINKS):
@@ -120,9 +127,9 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[A
                 ((RIGHT_JOINTS, LEFT_JOINTS), (LEFT_JOINTS, RIGHT_JOINTS)),
             )
         )
-        length = _length(straight, crossed)
+        length = _length(straight, crossed, TORN_METRES + unsure / 2.0)
         off, off_crossed = (np.abs(one - length).sum(axis=1) for one in (straight, crossed))
-        together[:, k] = _sure((off - off_crossed) / (LENGTH_SHARE * np.fmax(length, 1e-9)))
+        together[:, k] = _sure((off - off_crossed) / np.fmax(LENGTH_SHARE * length, unsure + 1e-9))
     trunk = joints[:, JOINT["neck"]] - joints[:, JOINT["pelvis"]]
     across_shoulders, across_hips = across[:, 0], across[:, 3]
     sizes = np.maximum(norm(across_shoulders) * norm(across_hips), 1e-9)
@@ -134,14 +141,14 @@ def _evidence(joints: Array, across: Array, feet: Array, head: Array) -> tuple[A
         # Beyond a right angle between thigh and trunk the thigh itself points forward, as the knee does.
         bends.append(np.einsum("ti,ti->t", knee - (hip + ankle) / 2.0, forward))
     toes = np.einsum("tki,ti->tk", feet[:, :2] - joints[:, [RIGHT_JOINTS[5], LEFT_JOINTS[5]]], forward)
-    hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * BEND_METRES))
-    hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * BEND_METRES))
+    hips = _sure(np.stack(bends, axis=1).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
+    hips = hips + _sure(np.where(np.isnan(toes), 0.0, toes).sum(axis=1) / (2 * max(BEND_METRES, unsure)))
     facing = _unit(np.cross(trunk, across_shoulders))
     nose = np.einsum("ti,ti->t", head[:, 0] - (head[:, 3] + head[:, 4]) / 2.0, facing)
-    return together, hips, _sure(nose / BEND_METRES)
+    return together, hips, _sure(nose / max(BEND_METRES, unsure))
 
 
-def _length(straight: Array, crossed: Array) -> float:
+def _length(straight: Array, crossed: Array, torn: float) -> float:
     """Return a segment's length: the median as labelled or, where that spreads, what most lengths are together at.
 
     The right length is half of all lengths, as labelled and crossed, whatever share of a clip is exchanged: the
@@ -149,7 +156,7 @@ def _length(straight: Array, crossed: Array) -> float:
     1012-1016).
     """
     middle = _median(straight)
-    if not _median(np.abs(straight - middle)) > TORN_METRES:
+    if not _median(np.abs(straight - middle)) > torn:
         return middle
     every = np.sort(np.concatenate([straight, crossed], axis=None))
     every = every[np.isfinite(every)]

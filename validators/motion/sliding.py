@@ -3,8 +3,8 @@ r"""How fast feet slide that stand.
 A foot that stands flat neither rises nor turns: its ankle and its toes have one velocity, which is 0. In recordings of
 people it is not: skin and markers move, feet roll, and what is taken for a joint lies above the sole; so the speed of
 the slowest point alone, by which skating is often told, calls every other step of a real walk sliding. What real feet
-do not do is to go on evenly: a foot slides whose points have for a time one velocity, from frame to frame the same, and
-along the ground.
+do not do is to go on evenly: a foot slides whose points have for a time one velocity, from frame to frame the same,
+and along the ground.
 """
 
 from __future__ import annotations

@@ -19,6 +19,12 @@ TREMBLING_FRAMES: Final = 15
 CURVED_SHARE: Final = 0.3
 """Of the second difference, over three frames each way, that fast motion at few frames leaves in the sixth."""
 
+LENGTHS_NOISE: Final = 2.0
+"""Standard deviations of measuring that are taken off what a length trembles: one number varies more than three."""
+
+BOTH_ENDS: Final = 0.8
+"""Of the trembling of a length that is said to be a joint's: its other end may tremble, too."""
+
 MEDIAN_OF_THREE, MEDIAN_OF_ONE = 1.5382, 0.6745
 """Median length of a vector of three normal coordinates of unit deviation, and of one."""
 
@@ -54,7 +60,7 @@ _FOURTH: Final = np.array([(-1.0) ** k * comb(4, k) for k in range(5)]) / np.sqr
 _CURVATURE: Final = np.array([1.0, 0, 0, -2.0, 0, 0, 1.0]) / 9.0
 
 
-def trembling_of(joints: Array) -> Array:
+def trembling_of(joints: Array, noise: float = 0.0) -> Array:
     """Return the standard deviation of a coordinate's trembling (S, 14), metres, of joints in even time (S, 14, 3).
 
     Notes
@@ -62,7 +68,7 @@ def trembling_of(joints: Array) -> Array:
     The sixth difference of noise of deviation s has the deviation s sqrt(924) in each coordinate. Its median length
     over 15 frames is that of noise which lasts, not of one jump; what the curvature of fast motion leaves in it
     is taken off. Lengths of segments are judged likewise, whose sixth differences no motion enters: a joint trembles
-    where the lengths of all its segments do.
+    where the lengths of all its segments do, by more than the noise of measuring asks for.
     """
     if len(joints) <= SIXTH_ORDER:
         return np.full(joints.shape[:2], np.nan)
@@ -72,7 +78,9 @@ def trembling_of(joints: Array) -> Array:
     found = _windows(np.concatenate([rough, stretched], axis=1))
     bodily, of_lengths = found[:, : joints.shape[1]], found[:, joints.shape[1] :]
     by_length = np.stack([of_lengths[:, of_joint].min(axis=1) for of_joint in _SEGMENTS_OF], axis=1)
-    return centred(np.maximum(bodily, by_length), len(joints), SIXTH_ORDER // 2)
+    return centred(
+        np.maximum(bodily, BOTH_ENDS * by_length - LENGTHS_NOISE * noise), len(joints), SIXTH_ORDER // 2
+    )
 
 
 def _windows(rough: Array) -> Array:
