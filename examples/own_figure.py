@@ -20,5 +20,5 @@ joints[0, 8] += [0.0, 0.0, 0.4]  # tear the right wrist away
 report = posekit.Validator(figure).check(joints[:1])
 worst = report.judgements[0]
 print(
-    f"{report.verdicts[0]}: {worst.where[worst.margin[0].argmin()]} is {-worst.worst[0]:.2f} m beyond the tolerance"
+    f"{report.verdicts[0]}: {worst.where[np.nanargmin(worst.margin[0])]} is {-worst.worst[0]:.2f} m beyond the tolerance"
 )
