@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,6 +19,8 @@ FLAT_METRES: Final = 0.15
 STEEP_METRES: Final = 0.6
 """How much it must go along another axis for that axis not to be up: more than from a crouch to the tips of the
 toes."""
+CLEAR_RATIO: Final = 2.0
+"""How many times as much it must go along every other axis."""
 SPREAD_PERCENTS: Final = (5, 95)
 
 
@@ -56,19 +59,30 @@ def find_up(joints: Array, clip: NDArray[np.intp], up: str, source: str, *, told
     if stands and stands == up:
         return FoundUp(up)
     flat = {name: ground_spread(joints, clip, name) for name in UP_DIRECTIONS}
-    if not stands:
-        level = [name for name, spread in flat.items() if spread < FLAT_METRES]
-        others = [spread for name, spread in flat.items() if level and name[1] != level[0][1]]
-        if not up and len(level) == 1 and min(others, default=0.0) > STEEP_METRES:
-            return FoundUp(level[0], f"{level[0]} is up by the ground: the lowest joint stays level along it")
-        return FoundUp(up)
     if not told:
-        return FoundUp(stands, f"{stands} is up by how bodies stand")
+        by_ground = _level(flat)
+        if stands and not (flat[stands] > STEEP_METRES and min(flat.values()) < FLAT_METRES):
+            return FoundUp(stands, f"{stands} is up by how bodies stand")
+        if by_ground:
+            return FoundUp(
+                by_ground, f"{by_ground} is up by the ground: the lowest joint stays level along it"
+            )
+        return FoundUp(
+            up, "" if up else "which way is up is not known: nobody stands, and nothing is level (--up)"
+        )
+    if not stands:
+        return FoundUp(up)
     if flat[up] > STEEP_METRES and flat[stands] < FLAT_METRES:
         got = f"{up}, by the file's own word, along which the lowest joint goes {flat[up]:.1f} m"
         expected = f"an axis along which feet stay level: {stands}, along which bodies stand"
         raise refusal(source, "up", got, expected, f"state it: --up {up} or --up {stands}")
     return FoundUp(up, f"{up} is up by the file's own word, though bodies stand along {stands} (--up)")
+
+
+def _level(flat: Mapping[str, float]) -> str:
+    """Return the axis along which the lowest joint stays level, and clearly more so than along the others."""
+    best, second = sorted(flat, key=lambda name: flat[name])[:2]
+    return best if flat[best] < FLAT_METRES and CLEAR_RATIO * flat[best] < flat[second] else ""
 
 
 def ground_spread(joints: Array, clip: NDArray[np.intp], up: str) -> float:
