@@ -52,6 +52,7 @@ def _filter(times: Array, degree: int, jumped: NDArray[np.bool_]) -> _Filter:
 
 
 _ONE_FRAME: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
+_NEAR_END: Final = {at: _filter(np.arange(7.0) - at, 3, np.arange(7) == at) for at in (1, 2)}
 _FROM_NOW_ON: Final = _filter(np.arange(-2.5, 3.0), 2, np.arange(6) > 2)
 _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
@@ -78,7 +79,17 @@ def jumps_of(joints: Array) -> Jumps:
         third = norm(filtered(joints, _THIRD_DIFFERENCE))
         joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
         joint[-1] = third[-1] - END_MISFITS * third[-3:-1].max(axis=0)
+        for at, by in _NEAR_END.items():
+            for frame, window in ((at, joints[:7]), (-1 - at, joints[:-8:-1])):
+                joint[frame] = _near_end(window, by)
     return Jumps(joint=joint, body=np.fmax(alone, moved))
+
+
+def _near_end(window: Array, by: _Filter) -> Array:
+    """Return the jumps (14,) of one of seven frames (7, 14, 3): the farther it is from their middle, the less sure."""
+    misfit = np.sqrt((norm(np.tensordot(by.misfit, window, axes=1)) ** 2).sum(axis=0))
+    unsure = np.sqrt((by.jump**2).sum() / (_ONE_FRAME.jump**2).sum())
+    return np.asarray(norm(np.tensordot(by.jump, window, axes=1)) - JOINT_MISFITS * unsure * misfit)
 
 
 def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
