@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from posekit.live import TrackedPosture as TrackedPosture
     from posekit.live import Tracker as Tracker
     from posekit.recovery import recover as recover
+    from posekit.recovery.answered import result_answers as result_answers
     from posekit.recovery.recovery import Recovery as Recovery
     from posekit.recovery.result import result_of as result_of
     from posekit.recovery.sequences import follow as follow
@@ -61,6 +62,7 @@ _HOMES = {
     "posekit.formats.opening": ("open",),
     "posekit.live": ("TrackedPosture", "Tracker"),
     "posekit.recovery": ("Recovery", "follow", "recover", "result_of"),
+    "posekit.recovery.answered": ("result_answers",),
     "posekit.remedy": ("repair",),
     "posekit.settings": ("RecoverSettings", "Tolerance", "ValidateSettings"),
     "posekit.views": ("Source", "builtin_view", "open_views"),

@@ -11,6 +11,7 @@ from posekit.answers.answer import DISTINCT_METRES, REPRESENTED_PROBABILITY, Ans
 from posekit.answers.cover import cover, held_by, most_held
 from posekit.answers.listed_bodies import ListedBodies
 from posekit.following.following import Following
+from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,22 +46,41 @@ class PathAnswer:
         return f"PathAnswer(probability=[{each}], frames={len(self.frames)})"
 
 
+def distinct_paths(joints: Array, share: Array) -> tuple[NDArray[np.intp], Array]:
+    """Choose few of the paths (K, T, 14, 3), metres, that stand for all; K at most.
+
+    Parameters
+    ----------
+    joints : array (K, T, 14, 3)
+        Of the paths, metres; NaN where a joint is not known.
+    share : array (K,)
+        Their probabilities: 1 together.
+
+    Returns
+    -------
+    tuple of int array (D,) and array (D,)
+        The rows of paths that differ by 5 cm in some joint of some frame and hold 95 % of the probability, the
+        likeliest first, and what each holds with those that it stands for.
+    """
+    one = np.zeros(len(joints), dtype=np.intp)
+    points = joints.reshape(len(joints), -1, 3)
+    held = held_by(cover(points, one, share, within=DISTINCT_METRES, hold=REPRESENTED_PROBABILITY), share)
+    rows = most_held(held, REPRESENTED_PROBABILITY)
+    return rows, held[rows]
+
+
 def path_answer(following: Following) -> PathAnswer:
     """Say of the paths of a sequence what `posekit.answers.answers_of` says of the bodies of a frame.
 
     Joints that a path bridges are not known there: their regions and near and far are not either.
     """
-    paths, frames = following.joints.shape[:2]
+    frames = following.joints.shape[1]
     share = np.asarray(following.share, dtype=np.float64)
-    one = np.zeros(paths, dtype=np.intp)
-    points = following.joints.reshape(paths, -1, 3)
-    stands = cover(points, one, share, within=DISTINCT_METRES, hold=REPRESENTED_PROBABILITY)
-    held = held_by(stands, share)
-    rows = most_held(held, REPRESENTED_PROBABILITY)
+    rows, probability = distinct_paths(following.joints, share)
     variance = np.where(np.isfinite(following.deviation), following.deviation, np.nan) ** 2
     return PathAnswer(
         rows=rows,
-        probability=held[rows],
+        probability=probability,
         frames=tuple(
             answers_of(
                 [

@@ -23,6 +23,9 @@ LIMB_NAMES: Final = {"shoulder": "upper arm", "elbow": "forearm", "hip": "thigh"
 
 NOTHING_ELSE: Final = "nothing that differs by 5 cm holds more than 5 %"
 
+EVEN_ODDS: Final = 1.1
+"""Odds up to which one is about as likely as the other."""
+
 OF_LISTED: Final = " of what is listed"
 """Added where much is not."""
 
@@ -46,13 +49,30 @@ def answer_lines(answers: Sequence[Answer]) -> list[str]:
         ]
     others = _nothing_else([answers[k] for k in found])
     if max(count) > 1:
-        held = _held([answers[k] for k in found])
-        others = f"{np.median(count):g} distinct postures hold {held} in the median frame, {max(count)} in frame {most}"
+        held, middle = _held([answers[k] for k in found]), float(np.median(count))
+        some = "1 distinct posture holds" if middle == 1 else f"{middle:g} distinct postures hold"
+        others = f"{some} {held} in the median frame, {max(count)} in frame {most}"
     return [
         f"likeliest: {percent(float(np.median(sure)))} sure in the median frame, to 5 cm in every joint; least sure is "
         f"frame {least}, {percent(min(sure))}: {limbs}",
         f"what else it can be: {others}",
     ]
+
+
+def path_words(probability: Sequence[float]) -> str:
+    """Say how likely the distinct paths are, of which each has its probability: the first comes first."""
+    each = ", ".join(percent(p) for p in probability[:MAX_TOLD])
+    if len(probability) == 1:
+        return "no other that is 5 cm elsewhere holds 5 %"
+    more = ", …" if len(probability) > MAX_TOLD else ""
+    odds = probability[0] / probability[1]
+    said = "the first is " + (f"{odds:.2g} times" if odds >= EVEN_ODDS else "about") + " as likely as"
+    return f"{said} the next that is 5 cm elsewhere; {len(probability)} of them hold 95 % ({each}{more})"
+
+
+def plural(count: int, thing: str) -> str:
+    """Count things: ``1 frame``, ``2 frames``."""
+    return f"{count:,} {thing}{'' if count == 1 else 's'}"
 
 
 def percent(probability: float) -> str:

@@ -52,7 +52,7 @@ def convert(
             "--posture",
             "WHICH",
             "Of a result: first (the likeliest), path (through all frames, if they were followed), a number "
-            "from 1, or all (csv, npz, parquet, glb).",
+            "from 0, or all (csv, npz, parquet, glb).",
         ),
     ] = "first",
     view: Annotated[

@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 
 RENDER_EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
-    "posekit render postures.json --view walk.json -o first.png --frame 1 --posture 1 --supersample 3",
+    "posekit render postures.json --view walk.json -o first.png --frame 0 --posture 0 --supersample 3",
     "posekit render postures.json -o all.png --layout superposed --background grey",
     "posekit render postures.json -o walk.gif --posture likeliest --fps 5",
     "posekit render walk.bvh -o walk.html",
-    "posekit render postures.json -o turn.gif --frame 2 --posture 1 --turntable 36 --size 640x480",
+    "posekit render postures.json -o turn.gif --frame 1 --posture 0 --turntable 36 --size 640x480",
     "posekit render explained.json --view walk.json -o rejected.png --rejected",
 )
 
@@ -59,11 +59,11 @@ def render(
         option("--view", "VIEW", "What the result was recovered from: shows its camera and image."),
     ] = None,
     frame: Annotated[
-        str, option("--frame", "K|A-B", "From 1. Default: the first with a posture; all where it moves.")
+        str, option("--frame", "K|A-B", "From 0. Default: the first with a posture; all where it moves.")
     ] = "",
     posture: Annotated[
         str,
-        option("--posture", "LIST", "From 1, as 1,5; all; likeliest; or groups, the first of each group."),
+        option("--posture", "LIST", "From 0, as 0,4; all; likeliest; or groups, the first of each group."),
     ] = "all",
     rejected: Annotated[
         bool,
@@ -211,7 +211,7 @@ def _shown(
 
 
 def _chosen(shown: Shown, text: str, frame: int) -> Shown:
-    """Choose postures of a frame by a list of numbers from 1, ``all``, ``likeliest`` or ``groups``."""
+    """Choose postures of a frame by a list of numbers from 0, ``all``, ``likeliest`` or ``groups``."""
     if text == "all" or len(shown) == 0:
         return shown
     if text == "likeliest":
@@ -225,10 +225,10 @@ def _chosen(shown: Shown, text: str, frame: int) -> Shown:
             raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
         groups = shown.groups.tolist()
         return shown.chosen([groups.index(group) for group in sorted(set(groups))])
-    rows = [_number(word, len(shown), f"--posture: frame {frame + 1}: {word!r}") for word in split(text)]
+    rows = [_number(word, len(shown), f"--posture: frame {frame}: {word!r}") for word in split(text)]
     if not rows:
         raise InputError(
-            f"--posture: {text!r}; expected numbers from 1 with commas, all, likeliest or groups"
+            f"--posture: {text!r}; expected numbers from 0 with commas, all, likeliest or groups"
         )
     return shown.chosen(rows)
 
@@ -240,15 +240,15 @@ def _frames(text: str, count: int) -> list[int] | None:
     start = _number(first, count, f"--frame: {text!r}")
     end = _number(last, count, f"--frame: {text!r}") if dash else start
     if end < start:
-        raise InputError(f"--frame: {text!r}; expected the first frame before the last, as 1-5")
+        raise InputError(f"--frame: {text!r}; expected the first frame before the last, as 0-4")
     return list(range(start, end + 1))
 
 
 def _number(word: str, count: int, what: str) -> int:
-    """Read a number from 1 to `count`; return it from 0."""
-    if not (word.isdecimal() and len(word) < 10 and 1 <= int(word) <= count):
-        raise InputError(f"{what}; expected a number from 1 to {count}")
-    return int(word) - 1
+    """Read the number of one of `count`, from 0."""
+    if not (word.isdecimal() and len(word) < 10 and int(word) < count):
+        raise InputError(f"{what}; expected a number from 0 to {count - 1}")
+    return int(word)
 
 
 def _size(text: str) -> tuple[int, int]:

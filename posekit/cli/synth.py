@@ -182,4 +182,4 @@ def _write(
     if noise > 0 and scene.lee_chen_f is None:
         view = replace(view, deviation=noise)
     files.write_view(output, views.forget_camera(view) if uncalibrated else view)
-    typer.echo(f"written: {output} ({len(scene)} frames)")
+    typer.echo(f"written: {output} ({len(scene)} frame{'s' * (len(scene) != 1)})")

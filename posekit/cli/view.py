@@ -19,7 +19,7 @@ LAST_PORT = 65535
 VIEW_EXAMPLES = examples(
     "posekit view postures.json --view walk.json",
     "posekit view trial.trc",
-    "posekit view walk.json --frames 1-20 --no-open --port 8000",
+    "posekit view walk.json --frames 0-19 --no-open --port 8000",
 )
 
 
@@ -34,7 +34,7 @@ def view(
     seen: Annotated[
         Path | None, option("--view", "VIEW", "What the result was recovered from: shows the image too.")
     ] = None,
-    frames: Annotated[str, option("--frames", "A-B", "Only these frames, from 1, as 1-100 or 7.")] = "",
+    frames: Annotated[str, option("--frames", "A-B", "Only these frames, from 0, as 0-99 or 7.")] = "",
     port: Annotated[
         int, typer.Option("--port", min=0, max=LAST_PORT, help="0: any free one.", show_default=False)
     ] = 0,
@@ -61,18 +61,18 @@ def view(
 
 
 def _frames(text: str) -> range | None:
-    """Read ``A-B`` or ``A``, counted from 1."""
+    """Read ``A-B`` or ``A``, counted from 0."""
     if not text:
         return None
     first, dash, last = text.partition("-")
     last = last if dash else first
     # Nine digits are more than any file's frames, and no work to read.
     digits = all(number.isdecimal() and len(number) < 10 for number in (first, last))
-    if not digits or not 0 < int(first) <= int(last):
+    if not digits or int(first) > int(last):
         raise InputError(
-            f"--frames: {text!r}; expected numbers from 1, the first not after the last, as 1-100"
+            f"--frames: {text!r}; expected numbers from 0, the first not after the last, as 0-99"
         )
-    return range(int(first) - 1, int(last))
+    return range(int(first), int(last) + 1)
 
 
 def _has_screen() -> bool:

@@ -68,7 +68,7 @@ class Conversion:
     source : Source
         How a detector's file is to be read.
     posture : str
-        Of a result: ``first``, a number from 1, or ``all``.
+        Of a result: ``first``, a number from 0, or ``all``.
     view : View, optional
         What a result was recovered from.
     up : str
@@ -189,7 +189,7 @@ def _key_points(job: Conversion) -> list[str]:
     for each in people:
         path = of_person(job.output, each, alone=len(people) == 1)
         files.write_view(path, each.view)
-        says.append(f"{path}: {len(each.view)} frames")
+        says.append(f"{path}: {len(each.view)} frame{'s' * (len(each.view) != 1)}")
     return says
 
 

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.body import Figure
 from posekit.conversion.posture_sequence import PostureSequence
 from posekit.errors import InputError
 from posekit.formats import own as files
@@ -23,10 +24,12 @@ from posekit.formats.motion import (
     write_motion,
     write_survivors,
 )
+from posekit.formats.motion.bvh_tree import filled, nearest_known
 from posekit.formats.motion.glb import MAX_BODIES, write_postures_glb
 from posekit.formats.motion.urdf_folder import write_urdf_folder
 from posekit.formats.own import Postures
 from posekit.formats.skeleton_maps import load_skeleton_map
+from posekit.geometry import Array
 from posekit.safe_io import refusal
 
 CUSTOMARY_UP: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
@@ -124,7 +127,10 @@ def write_points(output: MotionOutput, motion: Motion, skeleton: str = "") -> li
     write_motion(output.path, turned, output.to)
     axis = f"{turned.up} up" if turned.up else "which way is up is not known, and axes stay as they are"
     clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
-    return [*says, f"{len(motion)} frames{clips} of {len(motion.names)} points, {axis}"]
+    return [
+        *says,
+        f"{len(motion)} frame{'s' * (len(motion) != 1)}{clips} of {len(motion.names)} points, {axis}",
+    ]
 
 
 def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = False) -> list[str]:
@@ -141,22 +147,36 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
         return _write_postures(output, found)
     if found.gaps and output.to in EVENLY_TIMED:
         raise InputError(
-            f"{output.path}: {found.gaps} frames have no posture, and {output.to} has one in every frame; expected "
-            "a format with times; choose trc, csv, npz, parquet, mot, glb or urdf"
+            f"{output.path}: {found.gaps} of the frames have no posture, and {output.to} has one in every frame; "
+            "expected a format with times; choose trc, csv, npz, parquet, mot, glb or urdf"
         )
     if carries_points(output.to):
         return write_points(output, found.motion(str(output.path)))
     # In BVH and GLB the writers turn z to y.
     up = "+z" if output.to in ALWAYS_Y_UP else output.up_of(found.up)
     q, off = found.configurations(up)
+    q, says = _without_gaps(output, found.figure, q)
     if output.to == "urdf":
         write_urdf_folder(output.path, found.figure, q, found.time, up=up)
     else:
         write_configurations(output.path, found.figure, q, found.time, output.to)
     return [
-        f"{len(q)} frames of joint angles, {output.up_of(up)} up; the figure's joints are within {off * 100:.2g} cm of "
-        "the postures'"
+        *says,
+        f"{len(q)} frame{'s' * (len(q) != 1)} of joint angles, {output.up_of(up)} up; the figure's joints are "
+        f"within {off * 100:.2g} cm of the postures'",
     ]
+
+
+def _without_gaps(output: MotionOutput, figure: Figure, q: Array) -> tuple[Array, list[str]]:
+    """Hold what is not known of q (T, nq) where the format marks nothing as missing, and say in how many frames."""
+    lacking = np.isnan(q).any(axis=1)
+    placed = np.flatnonzero(np.isfinite(q[:, :7]).all(axis=1))
+    if output.to not in ALWAYS_Y_UP or not lacking.any() or not len(placed):
+        return q, []
+    q = q.copy()
+    q[:, :7] = q[placed[nearest_known(placed, len(q))], :7]
+    said = f"what is not known in {lacking.sum()} of {len(q)} frames is held as in the nearest frame that knows it"
+    return filled(output.path, figure, q, "hold"), [said]
 
 
 def _write_postures(output: MotionOutput, found: PostureSequence) -> list[str]:
@@ -197,4 +217,4 @@ def _write_bodies(output: MotionOutput, found: PostureSequence) -> list[str]:
         else f"the {len(first)} survivors"
     )
     whose = " whose lengths fit best" if len(kept) < len(first) else ""
-    return [f"{some}{whose}, of frame {int(found.frame[0]) + 1}, the first that has any; +y up"]
+    return [f"{some}{whose}, of frame {int(found.frame[0])}, the first that has any; +y up"]

@@ -183,7 +183,7 @@ def read_sequence(
     what : Recognised
         What the file is.
     posture : str
-        Of a result: ``first``, the number of a survivor from 1, ``path``, or ``all``.
+        Of a result: ``first``, the number of a survivor from 0, ``path``, or ``all``.
     view : View, optional
         What a result was recovered from: its camera's place in the world turns and moves the postures there.
     skeleton : str
@@ -342,12 +342,12 @@ def _guessed(joints: Array, source: str) -> str:
 
 
 def _number(posture: str, count: int, frame: int) -> int:
-    if not posture.isdigit() or not 1 <= int(posture) <= count:
+    if not posture.isdecimal() or int(posture) >= count:
         raise InputError(
-            f"--posture: {posture!r}; expected first, path, all, or a number from 1 to {count}, "
-            f"as frame {frame + 1} has"
+            f"--posture: {posture!r}; expected first, path, all, or a number from 0 to {count - 1}, "
+            f"as frame {frame} has"
         )
-    return int(posture) - 1
+    return int(posture)
 
 
 def _in_world(points: Array, view: View) -> Array:

@@ -145,5 +145,5 @@ def check_order(before: float, after: float, number: int) -> None:
     if not after - before > 1e-6:
         raise InputError(
             f"frame {number} is at {after:g} s, the one before at {before:g} s; expected ascending times, "
-            "more than a microsecond apart"
+            "more than a microsecond apart; leave out a picture that is given twice"
         )

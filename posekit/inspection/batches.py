@@ -12,13 +12,14 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.answers.wording import plural
 from posekit.batch.reading import FRAME_COLUMNS, shard_paths
 from posekit.batch.run_folder import ASKED_FILE, MANIFEST_FILE, MANIFEST_SCHEMA, RunFolder
 from posekit.batch.shard import METADATA_KEY, SHARDS_FOLDER
 from posekit.errors import InputError
 from posekit.formats.given_file import first_bytes
 from posekit.formats.motion.parquet import opened
-from posekit.inspection.telling import cut_long, histogram_line, judged_line, plural, reason_lines
+from posekit.inspection.telling import cut_long, histogram_line, judged_line, reason_lines
 from posekit.safe_io import cut, extra, read_json, refusal
 
 MAX_FAILURES_NAMED: Final = 3

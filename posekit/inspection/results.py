@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from posekit.answers.wording import answer_lines
+from posekit.answers.paths import distinct_paths
+from posekit.answers.wording import answer_lines, path_words, plural
 from posekit.formats.own import Result
 from posekit.formats.own.paths import FollowedPaths
 from posekit.inspection.telling import (
     counts_line,
     cut_long,
     judged_line,
-    plural,
     reason_lines,
     settings_line,
     tally,
@@ -69,7 +68,7 @@ def _sets(result: Result) -> list[str]:
     trunks, limbs = (
         int(np.median([len(getattr(one, name)) for one in sets])) for name in ("trunks", "limb_kind")
     )
-    made = f"sets of {trunks} trunks with {limbs} limbs (median)"
+    made = f"sets of {plural(trunks, 'trunk')} with {plural(limbs, 'limb')} (median)"
     unlisted = sum(frame.unlisted for frame in result.frames)
     share = max(frame.unlisted_probability for frame in result.frames)
     told = f"{unlisted} at most are not listed, with at most {share:.2g} of a frame's probability"
@@ -106,9 +105,11 @@ def _ranked(result: Result) -> str:
 
 def _paths(paths: FollowedPaths) -> str:
     count, frames = paths.survivor.shape
-    lead = f"{paths.lead:.3g} cheaper than the next" if math.isfinite(paths.lead) else "without another"
+    lead = ""
+    if count > 1:
+        lead = f"{path_words(distinct_paths(paths.joints, paths.share)[1].tolist())}; "
     certain = "certain to be" if paths.exact else "not certain to be"
     return (
-        f"{count} path{'s' if count > 1 else ''}: the first {lead} that is different, {certain} the cheapest, "
+        f"{plural(count, 'path')}: {lead}the first is {certain} the likeliest, "
         f"{int((paths.survivor[0] < 0).sum())} of {frames} frames bridged"
     )

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from posekit.answers.wording import plural
 from posekit.batch import digests
 from posekit.safe_io import cut
 
@@ -17,11 +18,6 @@ OF_FRAMES: Final = ("judged", "unrecovered", "noisy", "refined")
 
 MAX_REASONS_NAMED: Final = 3
 """Reasons that are named."""
-
-
-def plural(count: int, thing: str) -> str:
-    """Count things: ``1 frame``, ``2 frames``."""
-    return f"{count:,} {thing}{'' if count == 1 else 's'}"
 
 
 def counts_line(counts: ArrayLike) -> str:

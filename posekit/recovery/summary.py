@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from posekit.answers import path_answer
-from posekit.answers.wording import answer_lines, percent
+from posekit.answers.paths import distinct_paths
+from posekit.answers.wording import answer_lines, path_words, percent, plural
 from posekit.recovery.recovery import FrameRecovery, Recovery
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ def summary_lines(recovery: Recovery) -> list[str]:
 def _count_line(recovery: Recovery) -> str:
     """Say how many postures there are, and in how many frames."""
     counts = [len(frame) for frame in recovery.frames]
-    total = f"{sum(counts)} posture{'s' if sum(counts) != 1 else ''}"
+    total = plural(sum(counts), "posture")
     if len(counts) == 1:
         return f"{total} in 1 frame{_unlisted(recovery)}"
     middle = f"median {np.median(counts):g}, most {max(counts)}"
@@ -97,29 +97,13 @@ def _frame_line(k: int, frame: FrameRecovery) -> str:
 
 def following_line(following: Following) -> str:
     """Describe the paths through a recovery in a line."""
-    lead = following.lead
     bridged = int(following.bridged[0].sum())
     guessed = int((following.confidence[0] < SURE_CONFIDENCE).sum())
-    sure = (
-        f"{lead:.3g} cheaper than the next that is different"
-        if np.isfinite(lead)
-        else "without another that differs by 5 cm"
-        if np.isinf(lead)
-        else "how sure is not asked (--follow 2)"
-    )
-    count = f"{len(following)} likeliest path{'s' if len(following) > 1 else ''}"
+    sure = "how sure is not asked (--follow 2)"
+    if not np.isnan(following.lead):
+        _, probability = distinct_paths(following.joints, following.share)
+        sure = path_words(probability.tolist())
     return (
-        f"{count}{_distinct(following)}; the first {sure}, {bridged} of {len(following.time)} frames bridged, "
-        f"{guessed} a guess, {len(following.switches())} changes between near and far"
+        f"{plural(len(following), 'likeliest path')}: {sure}; {bridged} of {len(following.time)} frames "
+        f"bridged, {guessed} a guess, {plural(len(following.switches()), 'change')} between near and far"
     )
-
-
-def _distinct(following: Following) -> str:
-    """Say how many of the paths are distinct, and how probable each of those is."""
-    if len(following) == 1:
-        return ""
-    found = path_answer(following)
-    each = ", ".join(percent(p) for p in found.probability[:MAX_SHOWN].tolist())
-    if len(found) == 1:
-        return f", of which one holds {each}"
-    return f", of which {len(found)} that differ by 5 cm hold 95 % ({each}{', …' if len(found) > MAX_SHOWN else ''})"

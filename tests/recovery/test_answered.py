@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,3 +75,15 @@ def test_hidden_joints_have_no_regions():
     for answer in found:
         assert np.isnan(answer.regions.level[12:]).all()
         assert np.isfinite(answer.regions.level[:12]).all()
+
+
+def test_what_is_shown_of_an_answer_is_what_a_run_says(
+    command: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    pages = Path(__file__).parents[2] / "README.md", Path(__file__).parents[2] / "docs" / "answers.md"
+    shown = [page.read_text(encoding="utf-8").partition("```\n$ ")[2].partition("```")[0] for page in pages]
+    assert shown[0] == shown[1]
+    synth, recover, *said = shown[0].splitlines()
+    assert command(*synth.removeprefix("posekit ").split()).code == 0
+    assert command(*recover.removeprefix("$ posekit ").split()).out.splitlines()[: len(said)] == said

@@ -158,8 +158,14 @@ def test_the_command_line_finds_the_scale_of_the_lengths(
 
 def test_the_line_on_paths_says_how_sure() -> None:
     recovery = recover(builtin_view("seq1"))
-    assert "cheaper than the next" in following_line(follow(recovery, k=2))
+    assert "as likely as the next that is 5 cm elsewhere" in following_line(follow(recovery, k=2))
     assert "--follow 2" in following_line(follow(recovery, k=1))
+
+
+def test_paths_that_are_the_same_to_5_cm_are_told_as_one() -> None:
+    following = follow(recover(builtin_view("seq1")), k=2)
+    twice = replace(following, joints=following.joints[[0, 0]] + np.array([0.0, 0.012])[:, None, None, None])
+    assert "no other that is 5 cm elsewhere" in following_line(twice)
 
 
 # --- frames without a posture ---------------------------------------------------------------------------

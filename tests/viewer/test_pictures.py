@@ -161,14 +161,14 @@ def test_render_draws_chosen_postures(
 ) -> None:
     result, view = walk_files
     picture = tmp_path / "a.png"
-    words = (result, "--view", view, "-o", picture, "--frame", 2, "--posture", "1,3", "--size", "320x200")
+    words = (result, "--view", view, "-o", picture, "--frame", 1, "--posture", "0,2", "--size", "320x200")
     assert render(monkeypatch, *words) == 0
     assert capsys.readouterr().out == f"written: {picture}\n"
     with Image.open(picture) as drawn:
         assert drawn.size == (320, 200)
     film = tmp_path / "a.gif"
     small = ("--size", "160x120", "--supersample", 1)
-    assert render(monkeypatch, result, "-o", film, "--frame", "2-4", "--posture", 1, *small) == 0
+    assert render(monkeypatch, result, "-o", film, "--frame", "1-3", "--posture", 0, *small) == 0
     assert capsys.readouterr().out == f"written: {film} (3 pictures)\n"
     assert render(monkeypatch, result, "-o", film, "--posture", "likeliest", *small) == 0
     assert render(monkeypatch, result, "-o", picture, "--rejected", *small) == 0
@@ -186,7 +186,7 @@ def test_render_draws_what_is_known_of_postures(
     small = ("--size", "160x120", "--supersample", 1)
     assert render(monkeypatch, tmp_path / "p.json", "-o", tmp_path / "a.png", *small) == 0
     capsys.readouterr()
-    text = refused(monkeypatch, capsys, tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", 2, *small)
+    text = refused(monkeypatch, capsys, tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", 1, *small)
     assert "all are NaN" in text
     assert not (tmp_path / "b.png").exists()
     words = (tmp_path / "p.json", "-o", tmp_path / "b.png", "--posture", "likeliest")
@@ -217,10 +217,10 @@ def test_render_refuses(
     posekit.write_postures(empty, np.empty((0, 14, 3)))
     for words, expected in (
         ((result, "-o", tmp_path / "a.bmp"), "the format is .bmp"),
-        ((result, "-o", picture, "--frame", "9"), "--frame: '9'; expected a number from 1 to 5"),
+        ((result, "-o", picture, "--frame", "9"), "--frame: '9'; expected a number from 0 to 4"),
         ((result, "-o", picture, "--frame", "3-2"), "the first frame before the last"),
-        ((result, "-o", picture, "--posture", "0"), "expected a number from 1 to"),
-        ((result, "-o", picture, "--posture", ","), "expected numbers from 1 with commas"),
+        ((result, "-o", picture, "--posture", "99999"), "expected a number from 0 to"),
+        ((result, "-o", picture, "--posture", ","), "expected numbers from 0 with commas"),
         ((result, "-o", picture, "--size", "1e9x2"), "--size: '1e9x2'"),
         ((result, "-o", picture, "--eye", "1,2"), "--eye: '1,2'; expected 3 numbers"),
         ((result, "-o", picture, "--fov", "0"), "field of view is 0 degrees"),
@@ -255,7 +255,7 @@ def test_render_draws_uncalibrated_results(
     for words in (
         (result, "--view", view, "--layout", "superposed"),
         (result, "--rejected"),
-        (several, "--posture", 3, "--through-view"),
+        (several, "--posture", 2, "--through-view"),
     ):
         assert render(monkeypatch, *words, "-o", out, *small) == 0
     assert render(monkeypatch, several, "--view", view, "-o", tmp_path / "page.html") == 0
@@ -263,4 +263,4 @@ def test_render_draws_uncalibrated_results(
     capsys.readouterr()
     error = refused(monkeypatch, capsys, several, "-o", tmp_path / "b.png", "--through-view", *small)
     assert "have 3 scales; expected one to look through the view's camera" in error
-    assert "--posture 1,2\n" in error
+    assert "--posture 0,1\n" in error

@@ -323,7 +323,7 @@ def test_survivors_of_several_scales_stand_in_one_place(scales: Result) -> None:
             index = JOINT[path.rpartition("/")[2]]
             wanted = world.place(shown.aligned_points[k, index])
             np.testing.assert_allclose(placement(scene, path)[:3, 3], wanted, rtol=0, atol=1e-8)
-    with pytest.raises(ViewerError, match=r"3 scales.*--posture 1,2"):
+    with pytest.raises(ViewerError, match=r"3 scales.*--posture 0,1"):
         check_one_scale(shown)
     check_one_scale(third)
 

@@ -102,7 +102,7 @@ def page_data(
         "settings": [] if result is None else _settings(result.settings),
         "frames": [
             {
-                "number": index + 1,
+                "number": index,
                 **(_time(subject.frames[index]) if isinstance(given, HeldPostures) else {}),
                 "points": _steps(world.place(body)),
                 **({} if result is None else _frame(result.frames[index])),

@@ -96,7 +96,7 @@ const page = (() => {
   function showTime() {
     const { number, time } = frame();
     const at = time === undefined ? "" : `, ${Number(time.toPrecision(4))} s`;
-    byId("frame-text").textContent = `frame ${number} of ${DATA.frames.at(-1).number}${at}`;
+    byId("frame-text").textContent = `frame ${number} of ${DATA.frames[0].number} to ${DATA.frames.at(-1).number}${at}`;
   }
 
   function columns() {
@@ -152,12 +152,12 @@ const page = (() => {
     );
     for (const index of sorted()) {
       const cells = columns().map((column) => {
-        if (column.key === "number") return element("td", index + 1);
+        if (column.key === "number") return element("td", index);
         if (column.key === "scale") return element("td", lift.scaleOf(here.family, index).toPrecision(4));
         if (column.key === "group") {
           const made = element("td"), chip = element("span", undefined, "chip");
           chip.style.background = css(groupColour(index));
-          made.append(chip, here.groups[index] + 1);
+          made.append(chip, here.groups[index]);
           return made;
         }
         if (column.key === "probability") return element("td", percent(here.probability[index]));

@@ -69,7 +69,7 @@ def plot_image(view: View, frames: Sequence[int] | None = None, *, result: Resul
                     *rings.T, linestyle="none", marker="o", markersize=5.5, markerfacecolor="none",
                     markeredgecolor=RIGHT_COLOUR, markeredgewidth=0.8, gid="reprojected",
                 )  # fmt: skip
-            panel.set_title(f"frame {frame + 1}, {view.time[frame]:.3g} s")
+            panel.set_title(f"frame {frame}, {view.time[frame]:.3g} s")
         figure.supxlabel(f"image x ({view.unit})" if metric else "image u (pixels)", fontsize=9)
         figure.supylabel(f"image y, down ({view.unit})" if metric else "image v, down (pixels)", fontsize=9)
         add_key(figure)

@@ -38,23 +38,23 @@ def rejected_of(result: Result, subject: DrawnSubject, frame: int) -> Shown:
     pruned = result.frames[frame].pruned
     if not pruned:
         raise ViewerError(
-            f"frame {frame + 1}: the result lists no pruned branch; recover it with --explain, and there must be some"
+            f"frame {frame}: the result lists no pruned branch; recover it with --explain, and there must be some"
         )
     shown = subject.frames[frame]
     if shown.sight is None or not len(shown):
         raise ViewerError(
-            f"frame {frame + 1}: to place its pruned branches the camera and a survivor are needed; give the view "
+            f"frame {frame}: to place its pruned branches the camera and a survivor are needed; give the view "
             "that it was recovered from (--view)"
         )
     recovered = result.frames[frame]
     if recovered.family is not None and len(recovered.family.chosen) > 1:
         raise ViewerError(
-            f"frame {frame + 1}: it was recovered at {len(recovered.family.chosen)} scales, and its pruned branches do "
+            f"frame {frame}: it was recovered at {len(recovered.family.chosen)} scales, and its pruned branches do "
             "not say at which; recover it at one, with --scale VALUE"
         )
     if tuple(recovered.levels["joint"]) != JOINTS:
         raise ViewerError(
-            f"frame {frame + 1}: its tree is not of the figure's joints, so its pruned branches cannot be placed; "
+            f"frame {frame}: its tree is not of the figure's joints, so its pruned branches cannot be placed; "
             "recover it with --proportions figure"
         )
     lengths = np.array([subject.figure.lengths[segment_name(segment)] for segment in TREE_SEGMENTS])

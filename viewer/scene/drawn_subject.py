@@ -222,7 +222,7 @@ def check_one_scale(shown: Shown) -> None:
     """
     if shown.scales is None or len(np.unique(shown.scales)) < 2:
         return
-    same = np.flatnonzero(shown.scales == shown.scales[0])[:9] + 1
+    same = np.flatnonzero(shown.scales == shown.scales[0])[:9]
     raise ViewerError(
         f"the postures at {shown.time:g} s have {len(np.unique(shown.scales))} scales; expected one to look through "
         f"the view's camera; choose some of one scale, as --posture {','.join(map(str, same.tolist()))}"

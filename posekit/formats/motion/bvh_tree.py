@@ -195,11 +195,11 @@ def filled(path: str | Path, figure: Figure, q: Array, unknown: str) -> Array:
     rest = np.clip(0.0, figure.limits.lower, figure.limits.upper)
     for k, neutral in zip(figure.angle_index, rest, strict=True):
         known = np.flatnonzero(~missing[:, k])
-        q[:, k] = q[known[_nearest(known, len(q))], k] if len(known) else neutral
+        q[:, k] = q[known[nearest_known(known, len(q))], k] if len(known) else neutral
     return q
 
 
-def _nearest(known: NDArray[np.intp], count: int) -> NDArray[np.intp]:
+def nearest_known(known: NDArray[np.intp], count: int) -> NDArray[np.intp]:
     """Return for each of the frames 0 … count - 1 which of the known frames (ascending) is nearest."""
     middles = (known[1:] + known[:-1]) / 2
     return np.searchsorted(middles, np.arange(count))

@@ -41,9 +41,9 @@ class FollowedPaths:
     scale : array (K, T)
         Pixels a metre of the survivors of an uncalibrated view; else NaN.
     lead : float
-        How much cheaper the first path is than the next that is different; NaN where there is none.
+        Logarithm of the odds of the first path against the next that is different; NaN where there is none.
     exact : bool
-        Whether the first path is certain to be the cheapest of all.
+        Whether the first path is certain to be the likeliest of all.
     apart : float
         Metres by which some joint is elsewhere in different paths.
     """

@@ -209,7 +209,9 @@ class ResultPath(FileModel):
 class ResultPaths(FileModel):
     """One person through all frames: the survivors that a body can have moved along."""
 
-    lead: Maybe = Field(description="How much cheaper the first path is than the next that is different.")
+    lead: Maybe = Field(
+        description="Logarithm of the odds of the first path against the next that is different."
+    )
     exact: bool = Field(description="Whether the first path is certain to be the cheapest.")
     apart: float = Field(description="By how much some joint is elsewhere in a different path, in `unit`.")
     paths: Annotated[list[ResultPath], Field(min_length=1, max_length=1000), FailFast()]
