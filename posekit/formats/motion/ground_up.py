@@ -59,24 +59,25 @@ def find_up(joints: Array, clip: NDArray[np.intp], up: str, source: str, *, told
     if stands and stands == up:
         return FoundUp(up)
     flat = {name: ground_spread(joints, clip, name) for name in UP_DIRECTIONS}
+    by_ground = _level(flat)
     if not told:
-        by_ground = _level(flat)
         if stands and not (flat[stands] > STEEP_METRES and min(flat.values()) < FLAT_METRES):
             return FoundUp(stands, f"{stands} is up by how bodies stand")
         if by_ground:
-            return FoundUp(
-                by_ground, f"{by_ground} is up by the ground: the lowest joint stays level along it"
-            )
+            said = f"{by_ground} is up by the ground: the lowest joint stays level along it"
+            return FoundUp(by_ground, said)
         return FoundUp(
-            up, "" if up else "which way is up is not known: nobody stands, and nothing is level (--up)"
+            up, "" if up else "which way is up is not known: nobody stands, nothing is level (--up)"
         )
-    if not stands:
+    other = stands or by_ground
+    if other in ("", up) or (flat[up] < FLAT_METRES and flat[other] > STEEP_METRES):
         return FoundUp(up)
-    if flat[up] > STEEP_METRES and flat[stands] < FLAT_METRES:
+    how = "bodies stand along" if stands else "the ground is level along"
+    if flat[up] > STEEP_METRES and flat[other] < FLAT_METRES:
         got = f"{up}, by the file's own word, along which the lowest joint goes {flat[up]:.1f} m"
-        expected = f"an axis along which feet stay level: {stands}, along which bodies stand"
-        raise refusal(source, "up", got, expected, f"state it: --up {up} or --up {stands}")
-    return FoundUp(up, f"{up} is up by the file's own word, though bodies stand along {stands} (--up)")
+        expected = f"an axis along which feet stay level, as {other}"
+        raise refusal(source, "up", got, expected, f"{how} {other}; state it: --up {up} or --up {other}")
+    return FoundUp(up, f"{up} is up by the file's own word, though {how} {other} (--up)")
 
 
 def _level(flat: Mapping[str, float]) -> str:
