@@ -16,6 +16,7 @@ from benchmarks.clean_clips import CleanClip, standing, up_of
 from posekit.geometry import Array
 from posekit.skeleton import HEAD_POINTS, JOINTS, LIMB_JOINTS, other_side
 from posekit.validators.motion import MotionClip
+from posekit.validators.motion.ground import ground_of
 
 Span = tuple[int, int]
 """First and last frame."""
@@ -138,6 +139,17 @@ def floating(clip: MotionClip, span: Span, size: float, rng: np.random.Generator
 def sinking(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
     """Sink the body by metres."""
     return floating(clip, span, -size, rng)
+
+
+def floating_clip(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
+    """Lift the body by metres over the ground that is given; sink it where they are negative."""
+    lifted = floating(clip, span, size, rng).clip
+    return Broken(clip=replace(lifted, ground=ground_of(clip).low), span=span)
+
+
+def sinking_clip(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
+    """Sink the body by metres into the ground that is given."""
+    return floating_clip(clip, span, -size, rng)
 
 
 def sliding(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
@@ -343,6 +355,24 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             asked=0.03,
             put=sinking,
             grounded=True,
+        ),
+        Defect(
+            name="floating, the whole clip, ground given",
+            checks=("floating", "support"),
+            unit="m",
+            sizes=(0.1, 0.05, 0.03, 0.02, 0.01),
+            asked=0.03,
+            put=floating_clip,
+            frames=_WHOLE,
+        ),
+        Defect(
+            name="sinking, the whole clip, ground given",
+            checks=("penetration",),
+            unit="m",
+            sizes=(0.1, 0.05, 0.03, 0.02, 0.01),
+            asked=0.03,
+            put=sinking_clip,
+            frames=_WHOLE,
         ),
         Defect(
             name="sliding",

@@ -32,7 +32,7 @@ class Penetration(MotionCheck):
     meaning = "the body is below the ground"
     needs = ("up",)
 
-    depth: float = 0.02
+    depth: float = 0.025
     unlevel: float = 0.1
 
     def places(self, clip: MotionClip) -> tuple[str, ...]:
