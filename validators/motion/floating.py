@@ -10,16 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from posekit.geometry import Array
 from posekit.tree import Findings
+from posekit.validators.motion.carried import FALL_SHARE, SHORTEST_FLIGHT, falls, stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, in_air, stretches
+from posekit.validators.motion.ground import ground_of, ground_unknown, in_air
 from posekit.validators.motion.motion_check import MotionCheck
-
-GRAVITY: float = 9.81
-"""Metres a second squared."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,8 +40,8 @@ class Floating(MotionCheck):
     needs = ("up", "time")
 
     height: float = 0.02
-    shortest: float = 0.25
-    fall: float = 0.5
+    shortest: float = SHORTEST_FLIGHT
+    fall: float = FALL_SHARE
 
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the body's lowest point; see `MotionCheck`."""
@@ -61,18 +57,9 @@ class Floating(MotionCheck):
         ground = ground_of(clip)
         over = ground.offset + ground.lifted
         for start, stop in stretches(in_air(ground)):
-            if (stop - start) * clip.step >= self.shortest and not self._falls(
-                ground.centre[start:stop], clip.step
-            ):
+            lasts = (stop - start) * clip.step
+            if lasts >= self.shortest and not falls(ground.centre[start:stop], clip.step, self.fall):
                 over[start:stop] += ground.lowest[start:stop] - ground.high
         return Findings(
             value=over[:, None], lower=np.array(-np.inf), upper=np.array(self.height + 2 * clip.noise)
         )
-
-    def _falls(self, centre: Array, step: float) -> bool:
-        """Tell whether a centre of mass (N,) falls, by its parabola; where it is not known, it does."""
-        known: NDArray[np.bool_] = np.isfinite(centre)
-        if known.sum() < 4:
-            return True
-        curve = np.polyfit(np.arange(len(centre))[known] * step, centre[known], 2)[0]
-        return bool(2 * curve <= -self.fall * GRAVITY)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES
+from posekit.validators.motion.carried import carried
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.lifted import lifted_by
 from posekit.validators.motion.timeline import norm, timeline_of
@@ -39,6 +40,9 @@ NEAR_METRES: Final = 0.30
 
 BY_CHANCE: Final = 3
 """Frames at rest below which nothing is known of the ground."""
+
+AIR_METRES: Final = 0.03
+"""Above the highest level of the ground by which a body that nothing holds is in the air."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,7 +134,8 @@ def _found(clip: MotionClip) -> Ground:
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
     slow = speeds(clip, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(clip)
-    resting = (near & slow).any(axis=1)
+    centre = up @ centre_of_mass(np.moveaxis(clip.joints, 0, -1))
+    resting = carried((near & slow).any(axis=1), lowest, centre, clip.step)
     held = lowest[resting & np.isfinite(lowest)]
     if len(held) < BY_CHANCE:
         held = lowest[np.isfinite(lowest)]
@@ -144,7 +149,7 @@ def _found(clip: MotionClip) -> Ground:
         lifted=lifted,
         lowest=lowest - low,
         resting=resting,
-        centre=up @ centre_of_mass(np.moveaxis(clip.joints, 0, -1)),
+        centre=centre,
     )
 
 
@@ -153,19 +158,9 @@ def _speed_noise(clip: MotionClip) -> float:
     return clip.noise / (np.sqrt(2) * clip.step) if clip.step > 0 else 0.0
 
 
-AIR_METRES: Final = 0.03
-"""Above the highest level of the ground by which a body that nothing holds is in the air."""
-
-
 def in_air(ground: Ground) -> NDArray[np.bool_]:
     """Say in which frames (T,) nothing rests, and the body is above all levels of the ground."""
     return np.asarray(~ground.resting & (ground.lowest > ground.high + AIR_METRES))
-
-
-def stretches(frames: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """List runs of frames, as slices have them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
 
 
 def ground_unknown(clip: MotionClip) -> str:

@@ -15,7 +15,7 @@ from posekit.tables.built_in import built_in_document
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.registry import MOTION_CHECKS
 
-BUILT_IN_PROFILES: Final = ("posekit",)
+BUILT_IN_PROFILES: Final = ("posekit", "phuma")
 """Profiles that come with the package."""
 
 

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Final
 
 from posekit.validators.motion.acceleration import JointAcceleration
+from posekit.validators.motion.balance_still import BalanceStill
+from posekit.validators.motion.curation import ContactShare, RootHeight, SupportDistance
 from posekit.validators.motion.drift import Drift
 from posekit.validators.motion.floating import Floating
 from posekit.validators.motion.frozen import Frozen
@@ -16,6 +18,7 @@ from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.penetration import Penetration
 from posekit.validators.motion.repeated import Repeated
 from posekit.validators.motion.root_jerk import RootJerk
+from posekit.validators.motion.skating import GmdSkating, PhysDiffSkate, WhamSliding
 from posekit.validators.motion.sliding import Sliding
 from posekit.validators.motion.speed import JointSpeed
 from posekit.validators.motion.support import Support
@@ -42,6 +45,13 @@ MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
         Floating,
         Support,
         Sliding,
+        BalanceStill,
+        GmdSkating,
+        WhamSliding,
+        PhysDiffSkate,
+        ContactShare,
+        RootHeight,
+        SupportDistance,
     )
 }
 """In the order in which they are reported."""

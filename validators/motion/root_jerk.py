@@ -75,7 +75,7 @@ class RootJerk(MotionCheck):
         if np.isfinite(root).any():
             smooth = low_pass(_filled(root), clip.step, self.cutoff)
             jerk = norm(np.diff(smooth, n=3, axis=0)) / clip.step**3
-            for part in _parts(len(root), clip.step):
+            for part in parts(len(root), clip.step):
                 mean = jerk[part.start : max(part.stop - 3, part.start + 1)].mean()
                 value[part] = np.fmax(value[part], mean)
         return Findings(value=timeline.of_frames(value), lower=np.array(-np.inf), upper=np.array(self.most))
@@ -104,7 +104,7 @@ def _filled(way: Array) -> Array:
     return np.stack([np.interp(slots, slots[known], column[known]) for column in way.T], axis=1)
 
 
-def _parts(count: int, step: float) -> Iterator[slice]:
+def parts(count: int, step: float) -> Iterator[slice]:
     """Go through the parts of so many slots."""
     size, overlap, least = (
         round(seconds / step) for seconds in (CHUNK_SECONDS, OVERLAP_SECONDS, LEAST_SECONDS)

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.skeleton import SIDES
 from posekit.tree import Findings
+from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, soles, stretches
+from posekit.validators.motion.ground import ground_of, ground_unknown, soles
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm, timeline_of
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from posekit.tree import Findings
+from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, in_air, stretches
+from posekit.validators.motion.ground import ground_of, ground_unknown, in_air
 from posekit.validators.motion.motion_check import MotionCheck
 
 
