@@ -90,6 +90,6 @@ class PeopleTold:
             lengths = {} if self._lengths is None else {"lengths": self._lengths}
             return {**lengths, **(self._each[0] if self._each else {})}
         if self._most is None:
-            return {"people": self._each} if any(self._each) else {}
+            return {**self._each[0], "moved_lengths": {}, "people": self._each}
         noise = [self._least, self._most["noise"]]
         return {**self._most, "moved_lengths": {}, "noise": noise, "people": self._each}

@@ -7,9 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+import posekit
 from posekit.body import load_figure
+from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures, write_postures
 from posekit.skeleton import JOINT
+from posekit.validation import said_of
 
 STANDING = load_figure().neutral_points[:14]
 
@@ -91,3 +94,18 @@ def test_a_result_is_judged_by_its_own_lengths_and_a_robot_by_those_that_it_show
     for options, lengths in (((), "model"), (("--urdf", "human", "--checks", "rigid-parts"), "median")):
         assert run("validate", "result.json", "-o", "r.json", *options).code == 0
         assert json.loads(Path("r.json").read_text(encoding="utf-8"))["settings"]["lengths_from"] == lengths
+
+
+def test_two_people_of_few_frames_are_judged_each_by_their_lengths() -> None:
+    joints = np.concatenate([standing(4), standing(4, 0.0, 0.7)])
+    held = HeldPostures(
+        postures=Postures(joints=joints),
+        frame=np.tile(np.arange(4), 2),
+        clip=np.repeat([0, 1], 4),
+        time=np.tile(np.arange(4) / 30, 2),
+    )
+    report = posekit.validate(held)
+    assert report.summary == {"valid": 8, "invalid": 0, "undecided": 0}
+    assert len(report.settings["people"]) == 2
+    (said,) = said_of(report)
+    assert "noise not known of so few frames: 2 degrees, 3cm in bones" in said
