@@ -80,8 +80,10 @@ def jumps_of(joints: Array) -> Jumps:
         joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
         joint[-1] = third[-1] - END_MISFITS * third[-3:-1].max(axis=0)
         for at, by in _NEAR_END.items():
-            for frame, window in ((at, joints[:7]), (-1 - at, joints[:-8:-1])):
-                joint[frame] = _near_end(window, by)
+            for end, frame, window in ((0, at, joints[:7]), (-1, -1 - at, joints[:-8:-1])):
+                jump = _near_end(window, by)
+                # A last frame that jumps is off from the curve of those next to it, not they.
+                joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
     return Jumps(joint=joint, body=np.fmax(alone, moved))
 
 
