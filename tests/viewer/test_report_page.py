@@ -99,6 +99,19 @@ def test_a_click_on_a_span_shows_its_frame_and_marks_the_joint(browser, tmp_path
     assert browser.requests() == [(tmp_path / "r.html").as_uri()]
 
 
+def test_all_spans_can_be_listed(browser, tmp_path):
+    clip = a_clip(count=30)
+    write_report_page(tmp_path / "r.html", ValidationReport(settings={}, postures=[], clips=[clip]))
+    browser.open(tmp_path / "r.html")
+    listed = "[...document.querySelectorAll('.spans button')].map(button => button.textContent)"
+    assert browser.evaluate(f"{listed}.length") == 13
+    browser.evaluate("document.querySelector('.spans button.soft').click()")
+    names = browser.evaluate(listed)
+    assert len(names) == len(clip.spans)
+    browser.evaluate("[...document.querySelectorAll('.spans button')].at(-2).click()")
+    assert browser.evaluate("document.querySelector('.frame dl').textContent.includes('295 to 297')")
+
+
 def test_clips_are_chosen_by_check(browser, tmp_path):
     write_report_page(tmp_path / "r.html", a_report(3))
     browser.open(tmp_path / "r.html")

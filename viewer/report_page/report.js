@@ -96,14 +96,22 @@ function showClip(clip, skeleton) {
   }
   card.append(timeline(clip, choose));
   const shown = 12;
-  clip.spans.slice(0, shown).forEach((span, k) => {
-    const worst = span.value === null ? "" : `: ${span.value} ${span.unit}`;
-    const button = make("button", { type: "button", "aria-pressed": "false" }, `${spanName(span)}, ${spanFrames(span)}${worst}`);
-    button.addEventListener("click", () => choose(k));
-    buttons.append(button);
-  });
-  const left = Math.max(clip.spans.length - shown, 0) + clip.more;
-  if (left) buttons.append(make("span", { class: "soft" }, `and ${left} more`));
+  function list(from, to) {
+    clip.spans.slice(from, to).forEach((span, k) => {
+      const worst = span.value === null ? "" : `: ${withUnit(span.value, span.unit)}`;
+      const button = make("button", { type: "button", "aria-pressed": "false" }, `${spanName(span)}, ${spanFrames(span)}${worst}`);
+      button.addEventListener("click", () => choose(from + k));
+      buttons.append(button);
+    });
+  }
+  list(0, shown);
+  const left = Math.max(clip.spans.length - shown, 0);
+  const unlisted = clip.more ? make("span", { class: "soft" }, `and ${clip.more} that are not listed`) : "";
+  if (left) {
+    const more = make("button", { type: "button", class: "soft" }, `${left} more`);
+    more.addEventListener("click", () => { more.remove(); list(shown); buttons.append(unlisted); });
+    buttons.append(more);
+  } else buttons.append(unlisted);
   card.append(buttons, box);
   return card;
 }
