@@ -127,7 +127,8 @@ class Sliding(MotionCheck):
         differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
         steady = differs < np.maximum(self.uneven, EVEN_SHARE * norm(even)) + noise
         steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
-        steady &= norm(even) > self.fastest
+        # Where noise lets feet differ by more than they slide, evenness is no evidence.
+        steady &= norm(even) > max(self.fastest, noise / EVEN_SHARE)
         slides = np.zeros(len(points), dtype=np.bool_)
         for window in np.flatnonzero(steady):
             slides[window : window + count + 1] = True
