@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from posekit.batch.shard import Finished as Finished
     from posekit.batch.shard import Shard as Shard
     from posekit.batch.shard import run_shard as run_shard
+    from posekit.batch.verdicts import VerdictTotals as VerdictTotals
+    from posekit.batch.verdicts import validate_archive as validate_archive
     from posekit.batch.view_table import write_view_table as write_view_table
 else:
     __getattr__ = on_demand(
@@ -41,6 +43,7 @@ else:
                 "Shard",
                 "run_shard",
             ),
+            "verdicts": ("VerdictTotals", "validate_archive"),
             "view_table": ("write_view_table",),
         },
     )

@@ -12,10 +12,12 @@ from posekit.cli.groups import with_groups
 from posekit.cli.main import BAD_INPUT
 from posekit.cli.options import distinct, examples, option, progress
 from posekit.cli.validate_options import BodyOptions, JudgedOptions, StatedOptions, asked_of
-from posekit.cli.validate_output import ValidateOutput, parse_fail_over
+from posekit.cli.validate_output import FailOver, ValidateOutput, parse_fail_over
+from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.formats.own import ValidationReport
+    from posekit.validation import AskedValidation
 
 SOME_INVALID: Final = 1
 MAX_REFUSED: Final = 20
@@ -44,7 +46,12 @@ def validate(
     ],
     output: Annotated[
         Path | None,
-        option("--output", "REPORT", "The report: .json, .md, .csv, .parquet, or .html.", short="-o"),
+        option(
+            "--output",
+            "REPORT",
+            "The report: .json, .md, .csv, .parquet, or .html; a folder for archives: tables, written as it goes on.",
+            short="-o",
+        ),
     ] = None,
     body: BodyOptions,
     stated: StatedOptions,
@@ -56,6 +63,10 @@ def validate(
             help="Whether JSON and CSV have the nearest pair of bodies in every posture of a robot (default: where "
             "none is a mesh).",
         ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        option("--jobs", "N", "Processes, where --output is a folder. Default: one a core."),
     ] = None,
     fail_over: Annotated[
         str,
@@ -101,6 +112,15 @@ def validate(
     """
     from posekit.validation import WantedDetail, files_of, validate_files
 
+    if output is not None and (output.is_dir() or not output.suffix):
+        outputs = ValidateOutput(page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
+        if outputs != ValidateOutput():
+            raise InputError(
+                f"-o {output}: a folder has verdicts alone; expected no --page, --timeline or --keep"
+            )
+        files = files_of(given, output)
+        _validate_archive(files, output, asked_of(body, stated, judged), jobs, parse_fail_over(fail_over))
+        return
     outputs = ValidateOutput(report=output, page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
     outputs.check()
     allowed = parse_fail_over(fail_over)
@@ -125,6 +145,30 @@ def validate(
         raise typer.Exit(SOME_INVALID)
 
 
+def _validate_archive(
+    files: Sequence[Path], output: Path, asked: AskedValidation, jobs: int | None, allowed: FailOver
+) -> None:
+    """Judge files into a folder, by several processes."""
+    from posekit.batch import validate_archive
+    from posekit.batch.run import Workers
+
+    with progress("judging", len(files)) as done:
+        totals = validate_archive(files, output, asked, Workers(jobs=jobs), progress=done)
+    for line in _bounded(totals.refused, MAX_REFUSED, "files that could not be judged"):
+        typer.echo(f"posekit: error: {line}", err=True)
+    for name, counts in (("frames", totals.frames), ("clips", totals.clips)):
+        told = ", ".join(f"{counts[verdict]:,} {verdict}" for verdict in ("valid", "invalid", "undecided"))
+        typer.echo(f"{counts.total():,} {name}: {told}")
+    for check, count in totals.rejected.most_common():
+        typer.echo(f"  {check}: {count:,} frames rejected")
+    typer.echo(f"written: {output}, {totals.parts} parts, {totals.skipped} of them from before")
+    if totals.refused:
+        raise typer.Exit(BAD_INPUT)
+    counts = totals.clips if allowed.clips else totals.frames
+    if counts.total() - counts["valid"] > allowed.number * (counts.total() if allowed.share else 1):
+        raise typer.Exit(SOME_INVALID)
+
+
 def _tell(report: ValidationReport) -> None:
     """Print what was recognised, what was found, what was allowed, and what was not asked."""
     from posekit.body.closing import closing_line
@@ -134,6 +178,10 @@ def _tell(report: ValidationReport) -> None:
 
     for line in _bounded(report.refused, MAX_REFUSED, "files that could not be judged"):
         typer.echo(f"posekit: error: {line}", err=True)
+    left_out = report.settings.get("left_out", ())
+    if left_out:
+        more = f" and {len(left_out) - 1} more" if len(left_out) > 1 else ""
+        typer.echo(f"posekit: warning: left out, as they hold no postures: {left_out[0]}{more}", err=True)
     changed = closing_line(report.settings.get("moved_lengths", {}))
     if changed:
         typer.echo(f"posekit: warning: {changed}", err=True)

@@ -9,8 +9,10 @@ from typing import Any
 
 from posekit.body import Figure
 from posekit.errors import InputError, PosekitError
-from posekit.formats.held_postures import HeldPostures
+from posekit.formats.format import Content
+from posekit.formats.held_postures import POSTURE_CONTENTS, HeldPostures
 from posekit.formats.own import ValidationReport
+from posekit.formats.recognising import recognise
 from posekit.geometry import Array
 from posekit.robots import Robot
 from posekit.settings import DEFAULT_RANGES, ValidateSettings
@@ -102,6 +104,7 @@ def validate_files(
     *,
     wanted: WantedDetail | None = None,
     progress: Callable[[int], None] | None = None,
+    strict: bool = True,
 ) -> ValidationReport:
     """Judge files, one after the other.
 
@@ -115,6 +118,8 @@ def validate_files(
         What is wanted of each posture.
     progress : callable, optional
         Told 1 after each file.
+    strict : bool
+        Whether it is an error where no file can be judged; else they are refused in a report of nothing.
 
     Returns
     -------
@@ -129,19 +134,34 @@ def validate_files(
     built = ReportBuilder(replace(wanted or WantedDetail(), files=len(paths)))
     validators = _Validators(asked)
     refused: list[str] = []
+    left_out: list[str] = []
     for path in paths:
         try:
-            _judge(built, validators, path, asked)
+            if len(paths) > 1 and (other := _other_content(path)):
+                left_out.append(f"{path} ({other})")
+            else:
+                _judge(built, validators, path, asked)
         except _Refused as error:
-            if len(paths) == 1:
+            if strict and len(paths) == 1:
                 raise InputError(error.line) from error
             refused.append(error.line)
         if progress is not None:
             progress(1)
-    if built.empty:
-        raise InputError(f"none of {len(paths)} files can be judged, the first because of {refused[0]}")
+    if strict and built.empty:
+        why = (*refused, *left_out)[0]
+        raise InputError(f"none of {len(paths)} files can be judged; the first: {why}")
     name = asked.told if asked.urdf or not built.own else "as recovered"
-    return replace(built.report({"urdf": name}), refused=tuple(refused))
+    others = {"left_out": left_out} if left_out else {}
+    return replace(built.report({"urdf": name, **others}), refused=tuple(refused))
+
+
+def _other_content(path: Path) -> str:
+    """Say what a file holds that is nothing to be judged, as a camera or a report; empty where it is to be read."""
+    try:
+        holds = recognise(path).holds
+    except PosekitError as error:
+        raise _Refused(path, error) from error
+    return "" if holds in (*POSTURE_CONTENTS, Content.KEY_POINTS) else holds.value
 
 
 class _Refused(Exception):
