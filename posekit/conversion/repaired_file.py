@@ -186,6 +186,7 @@ def _with(given: HeldPostures, rows: NDArray[np.intp], done: Repaired) -> HeldPo
         time=given.time[rows] if done.time is None else done.time,
         up=given.up,
         unit=given.unit,
+        feet=np.empty(0) if done.feet is None else done.feet,
     )
 
 

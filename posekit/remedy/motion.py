@@ -191,7 +191,7 @@ def _interpolate(clip: MotionClip, points: Array, found: Rejected, person: Measu
 def _whole(points: Array, bad: Bools) -> Array:
     out = points.copy()
     out[:, : len(POINTS)] = interpolated(points[:, : len(POINTS)], bad)
-    return _feet_along(points, out)
+    return feet_along(points, out)
 
 
 def _stepped_back(points: Array, bad: Bools) -> Array:
@@ -254,8 +254,8 @@ def _hold(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPers
     return [held_feet(points, FEET_OF_SIDES, bad, clip.up)]
 
 
-def _feet_along(before: Array, after: Array) -> Array:
-    """Move toes and heels as their ankles were moved."""
+def feet_along(before: Array, after: Array) -> Array:
+    """Move toes and heels (T, 23, 3) as their ankles were moved: `after` is changed and returned."""
     for k, name in enumerate(FEET_POINTS):
         ankle = JOINT[f"{name.split('_')[0]}_ankle"]
         after[:, len(POINTS) + k] += after[:, ankle] - before[:, ankle]

@@ -87,6 +87,8 @@ class Repaired:
         Metres; those that passed are as they were. None of a robot: N is then of `q`.
     head : array (N, 5, 3), optional
         The head's points, where they were given.
+    feet : array (N, 4, 3), optional
+        Toes and heels of a motion that has them (`posekit.skeleton.FEET_POINTS`): they go with their ankles.
     q : array (N, nq), optional
         Of a robot, its configurations.
     time : array (N,), optional
@@ -101,6 +103,7 @@ class Repaired:
 
     joints: Array
     head: Array | None = None
+    feet: Array | None = None
     q: Array | None = None
     time: Array | None = None
     spans: tuple[RepairedSpan, ...]
@@ -108,7 +111,7 @@ class Repaired:
     valid: NDArray[np.bool_]
 
     def __post_init__(self) -> None:
-        for array in (self.joints, self.head, self.q, self.valid):
+        for array in (self.joints, self.head, self.feet, self.q, self.valid):
             if array is not None:
                 array.flags.writeable = False
 

@@ -12,7 +12,7 @@ from posekit.body import with_head
 from posekit.body.measured import MeasuredPerson
 from posekit.errors import InputError
 from posekit.geometry import Array
-from posekit.remedy.motion import clip_points, clip_with, repair_over_time
+from posekit.remedy.motion import clip_points, clip_with, feet_along, repair_over_time
 from posekit.remedy.postures import joint_weights, nearest_valid
 from posekit.remedy.record import Repaired, left_of, spans_of
 from posekit.remedy.tied import tied_postures
@@ -101,9 +101,11 @@ def repair(
     way = np.nan_to_num(np.linalg.norm(legal.points - start[:, : len(POINTS)], axis=-1))[:, : len(JOINTS)]
     spans = [span for name, moved in (*steps, ("turned", way)) for span in spans_of(name, moved)]
     judgements, valid = list(legal.report.judgements), legal.report.valid.copy()
+    feet = None
     if clip is not None:
         out = start.copy()
         out[:, : len(POINTS)] = legal.points
+        feet = feet_along(start, out)[:, len(POINTS) :].copy()
         over_time = judge_motion(
             judge.profile.checks, clip_with(replace(clip, time=done.time), out)
         ).judgements
@@ -114,6 +116,7 @@ def repair(
     return Repaired(
         joints=legal.points[:, : len(JOINTS)].copy(),
         head=legal.points[:, len(JOINTS) :].copy() if has_head else None,
+        feet=feet if feet is not None and np.isfinite(feet).any() else None,
         time=time,
         spans=tuple(sorted(spans, key=lambda span: -span.most)),
         left=left_of(judgements),
