@@ -157,23 +157,40 @@ def slow_change(
     return float(np.sqrt(best))
 
 
+def repaired_postures(cases: Sequence[IllegalPosture], judge: Validator) -> tuple[Array, float]:
+    """Repair postures, those of a person at once: joints (N, 14, 3), and seconds of work."""
+    repaired, seconds = np.empty((len(cases), len(JOINTS), 3)), 0.0
+    for whose in {id(case.person): case.person for case in cases}.values():
+        its = [k for k, case in enumerate(cases) if case.person is whose]
+        began = time.process_time()
+        repaired[its] = repair(np.stack([cases[k].joints for k in its]), judge, person=whose).joints
+        seconds += time.process_time() - began
+    return repaired, seconds
+
+
+def freshly_valid(cases: Sequence[IllegalPosture], repaired: Array) -> NDArray[np.bool_]:
+    """Ask a validator that has not seen them (N,)."""
+    fresh = Validator()
+    return np.array(
+        [
+            fresh.check(one[None], person=case.person).valid[0]
+            for one, case in zip(repaired, cases, strict=True)
+        ]
+    )
+
+
 def posture_rows(
     cases: Sequence[IllegalPosture], judge: Validator, slow: int, starts: int, rng: np.random.Generator
 ) -> list[list[str]]:
     """Repair postures, and compare with the slow solver on the first of each kind."""
     rows = []
-    by_kind: dict[str, list[IllegalPosture]] = defaultdict(list)
-    for case in cases:
-        by_kind[case.kind].append(case)
-    for kind, mine in by_kind.items():
-        repaired, valid = np.empty((len(mine), len(JOINTS), 3)), np.zeros(len(mine), dtype=np.bool_)
-        fresh, seconds = Validator(), 0.0
-        for whose in {id(case.person): case.person for case in mine}.values():
-            its = [k for k, case in enumerate(mine) if case.person is whose]
-            began = time.process_time()
-            repaired[its] = repair(np.stack([mine[k].joints for k in its]), judge, person=whose).joints
-            seconds += time.process_time() - began
-            valid[its] = fresh.check(repaired[its], person=whose).valid
+    every, seconds = repaired_postures(cases, judge)
+    by_kind: dict[str, list[int]] = defaultdict(list)
+    for k, case in enumerate(cases):
+        by_kind[case.kind].append(k)
+    for kind, numbers in by_kind.items():
+        mine, repaired = [cases[k] for k in numbers], every[numbers]
+        valid = freshly_valid(mine, repaired)
         change = np.array(
             [np.linalg.norm(one - case.joints) for one, case in zip(repaired, mine, strict=True)]
         )
@@ -201,7 +218,7 @@ def posture_rows(
                 f"{change.mean() * 100:.2f}",
                 f"{known.mean() * 100:.2f}",
                 *told,
-                f"{seconds / len(mine) * 1000:.0f}",
+                f"{seconds / len(cases) * 1000:.0f}",
             ]
         )
     return rows

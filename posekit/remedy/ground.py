@@ -19,17 +19,16 @@ SMOOTH_SECONDS: Final = 0.3
 MOST_SHIFT_METRES: Final = 0.5
 """Metres: a body that is farther from the ground is not meant to stand on it, or up is another way."""
 
-STANDING_PERCENT: Final = 50
-"""Of the heights of frames that are right: where the lowest point usually is."""
 
-
-def grounded(points: Array, bad: Bools, up: Array, rate: float) -> Array:
-    """Shift spans of frames along up, so that their lowest points are where those of the other frames are.
+def grounded(points: Array, height: Array, bad: Bools, up: Array, rate: float) -> Array:
+    """Shift spans of frames along up by what they are above or below the ground, evenly over time.
 
     Parameters
     ----------
     points : array (T, P, 3)
         All points, metres.
+    height : array (T,)
+        Of the lowest over the ground, metres, negative below it.
     bad : bool array (T,)
         Frames that float or sink.
     up : array (3,)
@@ -38,13 +37,9 @@ def grounded(points: Array, bad: Bools, up: Array, rate: float) -> Array:
         Frames a second.
     """
     out = points.copy()
-    lowest = np.nanmin(points @ up, axis=1)
-    usual = np.percentile(lowest[~bad], STANDING_PERCENT) if (~bad).any() else None
     width = max(int(SMOOTH_SECONDS * rate) | 1, 1)
     for first, last in runs(bad):
-        level = usual if usual is not None else 0.0
-        needed = level - lowest[first : last + 1]
-        by = _over(np.mean, _over(np.median, needed, width), width)
+        by = -_over(np.mean, _over(np.median, height[first : last + 1], width), width)
         if np.abs(by).max() <= MOST_SHIFT_METRES:
             out[first : last + 1] += by[:, None, None] * up
     return out

@@ -27,6 +27,9 @@ MOTION_ROUNDS: Final = 3
 SMOOTHING_STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
 """Of smoothing, least first."""
 
+USUAL_RATE: Final = 30.0
+"""Frames a second of motion whose rate is not known."""
+
 FEET_OF_SIDES: Final = tuple(
     tuple(CLIP_MARKS.index(name) for name in (f"{side}_toe", f"{side}_ankle")) for side in ("right", "left")
 )
@@ -230,10 +233,18 @@ def _smooth(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPe
 
 def _shift(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
     del person
-    bad = found.frames("floating", "penetration", "support")
-    if bad is None or clip.up is None:
+    if clip.up is None:
         return []
-    return [grounded(points, bad, clip.up, clip.rate if np.isfinite(clip.rate) else 30.0)]
+    height = np.zeros(len(points))
+    for check in ("floating", "penetration"):
+        if check in found.judgements:
+            one = found.judgements[check]
+            height = np.where(one.violated[:, 0], one.value[:, 0], height)
+    if not height.any():
+        return []
+    return [
+        grounded(points, height, height != 0, clip.up, clip.rate if np.isfinite(clip.rate) else USUAL_RATE)
+    ]
 
 
 def _hold(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
