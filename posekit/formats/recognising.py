@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Final
 
 from posekit.errors import InputError
 from posekit.formats.format import Content, Format
@@ -13,6 +14,9 @@ from posekit.formats.own_files import OWN_FORMATS
 from posekit.formats.registry import FOLDER_SUFFIX, formats, names, with_suffix
 from posekit.safe_io import cut, nearest, refusal, shown
 from posekit.safe_io.regular_file import check_file, unreadable
+
+PICKLE_SUFFIXES: Final = (".pkl", ".pickle", ".p", ".pt", ".pth", ".joblib")
+"""The ends of names of Python's pickles, which are never opened."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +158,9 @@ def _nothing_known(given: GivenFile) -> InputError:
     if given.suffix == ".json":
         got = f"JSON of no known format, {shown(given.document)}"
         return refusal(given.path, "", got, known, "say which with --format")
+    if given.suffix in PICKLE_SUFFIXES:
+        remedy = "where you trust it, save its arrays: numpy.savez(path, **dictionary)"
+        return refusal(given.path, "", "a pickle, which can run any program", "an NPZ of its arrays", remedy)
     if given.suffix == ".npz" and not zipfile.is_zipfile(given.path):
         got, expected = "a damaged file: no NPZ", "arrays that NumPy saved"
         return refusal(given.path, "", got, expected, "check how it was written")

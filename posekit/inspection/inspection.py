@@ -43,7 +43,13 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
     if what.holds is Content.MOTION:
         if what.names and motion_format(what.names[0]).read is None:
             return [*lines, f"{motion_format(what.names[0]).title}: written, and not read by itself"]
-        motion = read_motion(path, what.names[0] if what.names else None, unit=unit or None)
+        named = what.names[0] if what.names else None
+        if named == "amass":
+            return [
+                *lines,
+                "angles of a body model; posekit validate --body-model FILE.npz places its joints",
+            ]
+        motion = read_motion(path, named, unit=unit or None, as_recorded=True)
         return lines + _motion(motion, source.skeleton)
     if what.holds is Content.CAMERAS:
         return lines + [_camera(camera) for camera in read_cameras(path).values()]
@@ -65,8 +71,8 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
         ]
     if what.holds is Content.CONFIGURATIONS:
         found = configurations_of(path, what)
-        named = f" of {_listed(found.names)}" if found.names else ""
-        return [*lines, f"{len(found)} configurations{named}"]
+        variables = f" of {_listed(found.names)}" if found.names else ""
+        return [*lines, f"{len(found)} configurations{variables}", *found.said]
     return lines
 
 
@@ -130,8 +136,10 @@ def _motion(motion: Motion, skeleton: str) -> list[str]:
     seconds = float(sum(spans))
     clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
     up = f"{motion.up} up" if motion.up else "which way is up is not said"
+    rate = f"{motion.rate:g} a second ({seconds:.2f} s)" if np.isfinite(seconds) else "no rate that is known"
     lines = [
-        f"{len(motion)} frames{clips} at {motion.rate:g} a second ({seconds:.2f} s), {len(motion.names)} points, {up}",
+        f"{len(motion)} frames{clips} at {rate}, {len(motion.names)} points, {up}",
+        *motion.said,
         f"points: {_listed(motion.names)}",
     ]
     try:
