@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import posekit
 from posekit.body import load_figure
@@ -41,7 +43,7 @@ def steps() -> MotionClip:
     return MotionClip(joints=joints, time=np.arange(FRAMES) / RATE, rate=RATE, up=UP)
 
 
-def rejected(clip: MotionClip) -> Array:
+def rejected(clip: MotionClip) -> NDArray[np.bool_]:
     """Return which frames a fresh validator rejects, by all its checks (T,)."""
     judge = Validator()
     bad = judge.check(clip.joints).invalid.copy()
@@ -108,7 +110,7 @@ def freeze(joints: Array) -> Array:
     ],
     ids=lambda one: getattr(one, "__name__", str(one)),
 )
-def test_defects_are_undone(put, remedy, near) -> None:
+def test_defects_are_undone(put: Callable[[Array], Array], remedy: str, near: float) -> None:
     """The clip passes again, is near what it was, and the record names the remedy."""
     clean = steps()
     spoiled = with_joints(clean, put(clean.joints.copy()))
