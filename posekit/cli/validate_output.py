@@ -59,7 +59,7 @@ class ValidateOutput:
     def check(self) -> None:
         """Refuse names that cannot be written before the work is done."""
         from posekit.formats.own.npz import suffix
-        from posekit.formats.own.report import REPORT_SUFFIXES
+        from posekit.formats.own.report_file import REPORT_SUFFIXES
         from posekit.safe_io import extra
         from posekit.safe_io.writing import check_target
 

@@ -155,7 +155,7 @@ OWN_FORMATS: Final = (
         Content.OBJECTS,
         "posekit.formats.own.object_result:read_object",
     ),
-    _own("report", "verdicts of checks", Content.REPORT, "posekit.formats.own.report:read_report"),
+    _own("report", "verdicts of checks", Content.REPORT, "posekit.formats.own.report_file:read_report"),
     _own("evaluation", "how good recovery is", Content.EVALUATION, "posekit.safe_io:read_json"),
     _own("nearer", "nearer ends of segments", Content.OTHER, "posekit.formats.own.nearer:read_nearer"),
     _own(

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.formats.own import JudgedCheck
-from posekit.formats.own.report import Finding, PostureReport, Worst, make_report
+from posekit.formats.own.report import Finding, PostureReport, Worst
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
+from posekit.formats.own.report_making import make_report
 from posekit.formats.own.report_schema import VERDICT_NAMES
 from posekit.tree import Findings
 from posekit.validation.validate_columns import lower_margin

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from posekit.formats.own.postures_q import read_configurations as read_configurations
     from posekit.formats.own.postures_q import write_configurations as write_configurations
     from posekit.formats.own.report import Finding as Finding
-    from posekit.formats.own.report import JudgedCheck as JudgedCheck
     from posekit.formats.own.report import PostureReport as PostureReport
     from posekit.formats.own.report import ValidationReport as ValidationReport
-    from posekit.formats.own.report import check_report_path as check_report_path
-    from posekit.formats.own.report import make_report as make_report
-    from posekit.formats.own.report import read_report as read_report
-    from posekit.formats.own.report import write_report as write_report
+    from posekit.formats.own.report_file import check_report_path as check_report_path
+    from posekit.formats.own.report_file import read_report as read_report
+    from posekit.formats.own.report_file import write_report as write_report
+    from posekit.formats.own.report_making import JudgedCheck as JudgedCheck
+    from posekit.formats.own.report_making import make_report as make_report
     from posekit.formats.own.result import Result as Result
     from posekit.formats.own.result import ResultFrame as ResultFrame
     from posekit.formats.own.result_file import check_result_path as check_result_path
@@ -86,16 +86,9 @@ else:
                 "read_configurations",
                 "write_configurations",
             ),
-            "report": (
-                "Finding",
-                "JudgedCheck",
-                "PostureReport",
-                "ValidationReport",
-                "check_report_path",
-                "make_report",
-                "read_report",
-                "write_report",
-            ),
+            "report": ("Finding", "PostureReport", "ValidationReport"),
+            "report_file": ("check_report_path", "read_report", "write_report"),
+            "report_making": ("JudgedCheck", "make_report"),
             "result": (
                 "Result",
                 "ResultFrame",

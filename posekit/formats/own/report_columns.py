@@ -32,6 +32,11 @@ def measured(value: float, unit: str, digits: int = 4) -> str:
     return number if unit == "1" else f"{number} {unit}"
 
 
+def known_number(value: float | None) -> float | None:
+    """Return a number as files have it: None for what is not known or not finite."""
+    return None if value is None or not math.isfinite(value) else float(value)
+
+
 class ReportPlace(NamedTuple):
     """Where a check judges, and the unit of its numbers."""
 
