@@ -101,6 +101,8 @@ def keep_clips(
     try:
         kept = Kept(clips=tuple(_written(beside, clips, frames, spans)))
         write_lines(beside / MANIFEST_NAME, map(csv_line, [KeptClip._fields, *kept.clips]))
+        if folder.exists():  # empty; not every system puts a folder in its place
+            folder.rmdir()
         beside.replace(folder)
     except OSError as error:
         reason = cut(error.strerror or str(error))

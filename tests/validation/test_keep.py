@@ -79,6 +79,7 @@ def test_files_keep_their_names_below_the_folder_that_holds_them_all(tmp_path, t
 
 
 def test_without_spans_only_what_passes_is_kept(tmp_path, three):
+    (tmp_path / "out").mkdir()
     keep_clips(tmp_path / "out", *three)
     assert set(files_of(tmp_path / "out")) == {"a/walk.npz", MANIFEST_NAME}
 
