@@ -70,17 +70,18 @@ class BalanceStill(MotionCheck):
         """Measure how far the centre of mass is beyond the feet; see `MotionCheck`."""
         feet, over = soles(clip)
         up = np.zeros(3) if clip.up is None else clip.up
-        height = feet @ up - over
-        bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
-        # What a foot reaches beyond its known points: all of it beyond an ankle, its end and its edges beyond a toe.
-        toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-        reach = (0.4 if toes else 0.75) * FOOT_SHARE * stature_of(clip)
-        centre = centre_of_mass(np.moveaxis(clip.joints, 0, -1)).T
-        value = beyond_support(centre, np.where(bears[..., None], feet, np.nan), up) - reach
-        value[~self._stands(clip)] = np.nan
-        return Findings(
-            value=value[:, None], lower=np.array(-np.inf), upper=np.array(self.beyond + 2 * clip.noise)
-        )
+        value = np.full((len(clip), 1), np.nan)
+        still = np.flatnonzero(self._stands(clip))
+        if len(still):
+            height = feet[still] @ up - over
+            bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
+            # What a foot reaches beyond its known points: all of it beyond an ankle, its end and edges beyond a toe.
+            toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
+            reach = (0.4 if toes else 0.75) * FOOT_SHARE * stature_of(clip)
+            centre = centre_of_mass(np.moveaxis(clip.joints[still], 0, -1)).T
+            bearing = np.where(bears[..., None], feet[still], np.nan)
+            value[still, 0] = beyond_support(centre, bearing, up) - reach
+        return Findings(value=value, lower=np.array(-np.inf), upper=np.array(self.beyond + 2 * clip.noise))
 
     def _stands(self, clip: MotionClip) -> NDArray[np.bool_]:
         """Say in which frames (T,) the body stands, and is still for long enough."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.geometry import Array
 
-DIRECTIONS: Final = 96
+HULL_DIRECTIONS: Final = 96
 """Of which edges of supports are taken: distances are short by 0.05 % at most."""
 
 
@@ -33,7 +33,7 @@ def beyond_support(points: Array, bearing: Array, up: Array) -> Array:
     """
     first = np.cross(up, np.eye(3)[np.abs(up).argmin()])
     first = first / np.linalg.norm(first)
-    angle = np.arange(DIRECTIONS) * (2 * np.pi / DIRECTIONS)
+    angle = np.arange(HULL_DIRECTIONS) * (2 * np.pi / HULL_DIRECTIONS)
     around = np.outer(np.cos(angle), first) + np.outer(np.sin(angle), np.cross(up, first))
     beyond = np.full(len(points), -np.inf)
     for direction in around:
