@@ -65,6 +65,7 @@ def page_report(report: ValidationReport, *, title: str) -> dict[str, Any]:
         ],
         "named": [_named(clip) for clip in bad[MOST_DETAILED_CLIPS:][:MOST_NAMED_CLIPS]],
         "unnamed": max(len(bad) - MOST_DETAILED_CLIPS - MOST_NAMED_CLIPS, 0),
+        "not_asked": _not_asked(report.settings),
         "refused": list(report.refused[:MOST_REFUSED]),
         "rows": [] if clips else _postures(columns),
         "settings": {name: str(value)[:MOST_SETTING_CHARACTERS] for name, value in report.settings.items()},
@@ -91,6 +92,16 @@ def _checks(columns: VerdictColumns, clips: Sequence[ClipVerdict]) -> list[dict[
         }
         for name, count in columns.by_check().items()
     ]
+
+
+def _not_asked(settings: Mapping[str, Any]) -> list[str]:
+    """Say for each reason which checks were not asked for it."""
+    reasons: dict[str, list[str]] = defaultdict(list)
+    given = settings.get("not_asked")
+    for check, why in given.items() if isinstance(given, dict) else ():
+        for reason in why if isinstance(why, dict) else ():
+            reasons[str(reason)].append(str(check))
+    return [f"{', '.join(checks)}: {reason}" for reason, checks in reasons.items()]
 
 
 def _clip(clip: ClipVerdict, stills: Sequence[Still]) -> dict[str, Any]:

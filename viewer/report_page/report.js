@@ -22,7 +22,12 @@ function showChecks(data, total, what) {
   head.append(make("th", { class: "number" }, "undecided"), make("th", {}, "most often"));
   document.getElementById("checks-head").append(head);
   const most = Math.max(1, ...data.checks.map(check => check.rejected));
-  for (const check of [...data.checks].sort((a, b) => b.rejected - a.rejected)) {
+  const says = data.checks.filter(check => check.rejected || check.undecided);
+  const content = data.checks.filter(check => !says.includes(check)).map(check => check.name);
+  const silent = document.getElementById("silent");
+  if (content.length) silent.append(make("p", {}, `Nothing is rejected by ${content.join(", ")}.`));
+  for (const line of data.not_asked) silent.append(make("p", {}, `Not asked: ${line}.`));
+  for (const check of says.sort((a, b) => b.rejected - a.rejected)) {
     const bar = make("span", { class: "bar" });
     bar.style.width = `${100 * check.rejected / most}%`;
     const row = make("tr", {}, make("td", {}, check.name),
