@@ -1,34 +1,44 @@
 """Validating configurations against the bare calls behind it, and postures through inverse kinematics.
 
-    python benchmarks/validate.py [--configurations 100000] [--postures 500]
+    python benchmarks/validate.py [--configurations 100000] [--postures 500] [--motion 100000] [--clips 1000]
 
 Bare is one call of Pinocchio's `computeCollisionsInParallel` and one vectorised comparison with the limits, on the same
 configurations, as many threads, in the same run; the ways take turns, and the least processor time of each counts:
 what else runs on a shared machine only adds. `verdicts` is `Validator.check(q=…)`, whose margins are made when they
 are looked at; these, the pairs that touch, and the nearest pair, are asked for on top. Ratios are of one run.
+
+`motion` is frames in time, clips of a thousand, judged by all checks of postures and over time into one report, given as
+configurations of a robot, or as joint positions of the stick figure; bare is the same as above on the same frames.
+`memory` is what Python holds after so many clips of positions, and after a tenth of them.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
 
+from posekit.body import load_figure
 from posekit.body.pool import make_pool, n_threads
+from posekit.formats.held import HeldPostures
+from posekit.formats.own import NamedConfigurations, Postures
 from posekit.robots import load_robot
 from posekit.robots.joint_map import postures_of
+from posekit.validation import ReportBuilder, WantedDetail
 from posekit.validators import Validator
 
 N_REPEATS = 7
+RATE, CLIP_FRAMES = 50.0, 1000
 
 
-def least(ways: dict[str, Callable[[], object]]) -> dict[str, float]:
+def least(ways: dict[str, Callable[[], object]], repeats: int = N_REPEATS) -> dict[str, float]:
     """Time each way in turn, and return the least of each, seconds."""
     seconds: dict[str, list[float]] = {name: [] for name in ways}
-    for _ in range(N_REPEATS):
+    for _ in range(repeats):
         for name, way in ways.items():
             start = time.process_time()
             way()
@@ -99,11 +109,95 @@ def postures(name: str, n: int) -> None:
     )
 
 
+def moving(lower: np.ndarray, upper: np.ndarray, n: int) -> np.ndarray:
+    """Return joint angles (n, len(lower)) that swing by a tenth of their ranges around zero, at 0.1 to 0.5 Hz."""
+    rng = np.random.default_rng(2)
+    phase = np.arange(n)[:, None] / RATE * 2 * np.pi * rng.uniform(0.1, 0.5, len(lower))
+    return np.clip(
+        0.1 * (upper - lower) * np.sin(phase + rng.uniform(0, 2 * np.pi, len(lower))), lower, upper
+    )
+
+
+def motion(name: str, bodies: str, n: int) -> None:
+    robot = load_robot(name)
+    stick = name == "stick_figure"
+    own = Validator(robot, bodies=bodies)
+    subject = own._robot.models.own.subject
+    model, geometry = subject.model, subject.geometry
+    lower, upper = robot.lower[7:], robot.upper[7:]
+    q = np.tile(pin.neutral(model), (n, 1))
+    q[:, 7:] = moving(lower, upper, n)
+    time_of = np.arange(n) / RATE
+    columns, pool = np.asfortranarray(q.T), make_pool(model, geometry)
+    validator = Validator(ground=-2.0) if stick else own
+    joints = load_figure().forward_kinematics(q)[:, :14] if stick else np.empty(0)
+
+    def bare() -> np.ndarray:
+        hit = np.asarray(pin.computeCollisionsInParallel(n_threads(), pool, columns, True)).astype(bool)
+        return hit | ((q[:, 7:] < lower) | (q[:, 7:] > upper)).any(axis=1)
+
+    def judged() -> int:
+        built = ReportBuilder(WantedDetail(detail="verdicts", files=n // CLIP_FRAMES))
+        for first in range(0, n, CLIP_FRAMES):
+            rows = slice(first, first + CLIP_FRAMES)
+            given = (
+                posture_clip(joints[rows]) if stick else NamedConfigurations(q=q[rows], time=time_of[rows])
+            )
+            built.add(validator, given, file=str(first))
+        return len(built.report())
+
+    judged()
+    seconds = least({"bare": bare, "motion": judged}, 2)
+    print(
+        f"{name:14} {n} frames of motion, {len(subject.pair_names)} pairs: bare {seconds['bare'] / n * 1e6:.2f} us "
+        f"each, with all checks {seconds['motion'] / n * 1e6:.1f} us, ratio {seconds['motion'] / seconds['bare']:.2f}"
+    )
+
+
+def posture_clip(joints: np.ndarray) -> HeldPostures:
+    frame = np.arange(len(joints))
+    held = HeldPostures(
+        postures=Postures(joints=joints), frame=frame, clip=0 * frame, time=frame / RATE, up="+z"
+    )
+    return held
+
+
+def memory(clips: int) -> None:
+    lower, upper = (
+        np.asarray(one) for one in (load_robot("stick_figure").lower, load_robot("stick_figure").upper)
+    )
+    figure = load_figure()
+    validator, frames = Validator(), 100
+    q = np.tile(pin.neutral(figure.model), (frames, 1))
+    q[:, 7:] = moving(lower[7:], upper[7:], frames)
+    joints = figure.forward_kinematics(q)[:, :14]
+    held = []
+    tracemalloc.start()
+    built = ReportBuilder(WantedDetail(detail="margins", files=clips))
+    for k in range(clips):
+        built.add(validator, posture_clip(joints * (1 + 1e-4 * (k % 100))), file=f"clips/walk{k}.npz")
+        if k + 1 in (clips // 10, clips):
+            held.append(tracemalloc.get_traced_memory())
+    tracemalloc.stop()
+    (few, few_peak), (many, many_peak) = held
+    each = (many - few) / (clips - clips // 10) / frames
+    print(
+        f"{clips} clips of {frames} frames: {few / 1e6:.1f} MB held after a tenth of them and {many / 1e6:.1f} MB after "
+        f"all, {each:.0f} bytes a frame; at most {few_peak / 1e6:.1f} and {many_peak / 1e6:.1f} MB on the way"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--configurations", type=int, default=100_000)
     parser.add_argument("--postures", type=int, default=500)
+    parser.add_argument("--motion", type=int, default=100_000)
+    parser.add_argument("--clips", type=int, default=1000)
     given = parser.parse_args()
+    memory(given.clips)
+    motion("g1", "urdf", given.motion // 10)
+    motion("human", "capsules", given.motion)
+    motion("stick_figure", "urdf", given.motion)
     configurations("stick_figure", "urdf", given.configurations)
     configurations("human", "capsules", given.configurations)
     configurations("talos", "urdf", given.configurations // 50)
