@@ -7,8 +7,8 @@ configurations, as many threads, in the same run; the ways take turns, and the l
 what else runs on a shared machine only adds. `verdicts` is `Validator.check(q=…)`, whose margins are made when they
 are looked at; these, the pairs that touch, and the nearest pair, are asked for on top. Ratios are of one run.
 
-`motion` is frames in time, clips of a thousand, judged by all checks of postures and over time into one report, given as
-configurations of a robot, or as joint positions of the stick figure; bare is the same as above on the same frames.
+`motion` is frames in time, clips of a thousand, judged by all checks of postures and over time into one report,
+given as configurations of a robot, or as joint positions of the stick figure; bare is the same as above on those frames.
 `memory` is what Python holds after so many clips of positions, and after a tenth of them.
 """
 
@@ -182,7 +182,7 @@ def memory(clips: int) -> None:
     (few, few_peak), (many, many_peak) = held
     each = (many - few) / (clips - clips // 10) / frames
     print(
-        f"{clips} clips of {frames} frames: {few / 1e6:.1f} MB held after a tenth of them and {many / 1e6:.1f} MB after "
+        f"{clips} clips of {frames} frames: {few / 1e6:.1f} MB held after a tenth and {many / 1e6:.1f} MB after "
         f"all, {each:.0f} bytes a frame; at most {few_peak / 1e6:.1f} and {many_peak / 1e6:.1f} MB on the way"
     )
 

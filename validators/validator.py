@@ -142,6 +142,7 @@ class Validator:
         lengths: Mapping[str, float] | None = None,
         behind: bool | None = None,
         person: MeasuredPerson | None = None,
+        configured: bool = True,
     ) -> Report:
         """Judge postures, given by their joints or as configurations.
 
@@ -168,6 +169,9 @@ class Validator:
             Likewise, whether the shoulders lie behind the line from neck to pelvis.
         person : MeasuredPerson, optional
             All of that, and the measuring noise, of whose recording the postures are a part.
+        configured : bool
+            Whether the configurations of a stick figure's postures are wanted, and how far these are off; verdicts do
+            not depend on them.
 
         Returns
         -------
@@ -193,7 +197,11 @@ class Validator:
             robot = self._robot_for(person or measured_person(joints))
             return _report(robot.judge_postures(points, sequence=which, lengths=lengths, behind=behind))
         figure, suite = self.figure_and_suite(joints, lengths=lengths, behind=behind, person=person)
-        configurations, distance = figure.configurations(points)
+        configurations, distance = (
+            figure.configurations(points)
+            if configured
+            else (np.full((len(points), figure.model.nq), np.nan), np.full(len(points), np.nan))
+        )
         return Report(
             judgements=judge(suite, points),
             complete=np.asarray(np.isfinite(joints).all(axis=(1, 2))),

@@ -134,13 +134,15 @@ def recordings_given(validator: Validator, given: PosturesGiven) -> list[Recordi
     return recordings_of(given.joints, clip)
 
 
-def judged_parts(jobs: Sequence[FileJob]) -> Iterator[JudgedPart]:
+def judged_parts(jobs: Sequence[FileJob], *, configured: bool = True) -> Iterator[JudgedPart]:
     """Judge files; the parts of each recording come in their order.
 
     Parameters
     ----------
     jobs : sequence of FileJob
         The files.
+    configured : bool
+        Whether the configurations of postures are wanted: see `Validator.check`.
     """
     groups: dict[tuple[Any, ...], list[tuple[FileJob, int]]] = {}
     for job in jobs:
@@ -151,10 +153,10 @@ def judged_parts(jobs: Sequence[FileJob]) -> Iterator[JudgedPart]:
             key = (id(job.validator), job.given.head is None, *who, *alone)
             groups.setdefault(key, []).append((job, k))
     for members in groups.values():
-        yield from _judged_together(members)
+        yield from _judged_together(members, configured)
 
 
-def _judged_together(members: Sequence[tuple[FileJob, int]]) -> Iterator[JudgedPart]:
+def _judged_together(members: Sequence[tuple[FileJob, int]], configured: bool) -> Iterator[JudgedPart]:
     """Judge recordings of one person in as few calls as may be."""
     validator, given = members[0][0].validator, members[0][0].given
     size = POSTURES_AT_ONCE * (CONFIGURATIONS_FACTOR if given.q is not None else 1)
@@ -169,10 +171,10 @@ def _judged_together(members: Sequence[tuple[FileJob, int]]) -> Iterator[JudgedP
             room -= part.stop - part.start
             first = part.stop
             if not room:
-                yield from _checked(validator, person, pieces)
+                yield from _checked(validator, person, pieces, configured)
                 pieces, room = [], size
     if pieces:
-        yield from _checked(validator, person, pieces)
+        yield from _checked(validator, person, pieces, configured)
     if person is not None:
         told = validator.told_of(person)
         for job, k in members:
@@ -180,7 +182,10 @@ def _judged_together(members: Sequence[tuple[FileJob, int]]) -> Iterator[JudgedP
 
 
 def _checked(
-    validator: Validator, person: MeasuredPerson | None, pieces: Sequence[tuple[FileJob, int, slice]]
+    validator: Validator,
+    person: MeasuredPerson | None,
+    pieces: Sequence[tuple[FileJob, int, slice]],
+    configured: bool,
 ) -> Iterator[JudgedPart]:
     """Judge parts of recordings in one call."""
     rows = [job.recordings[k].rows[part] for job, k, part in pieces]
@@ -191,7 +196,7 @@ def _checked(
         head = None if jobs[0].given.head is None else _taken([job.given.head for job in jobs], rows)
         which = None if jobs[0].sequence is None or jobs[0].groups else _taken([jobs[0].sequence], rows)
         joints = _taken([job.given.joints for job in jobs], rows)
-        found = validator.check(joints, head, sequence=which, person=person)
+        found = validator.check(joints, head, sequence=which, person=person, configured=configured)
     if len(pieces) == 1:
         yield JudgedPart(*pieces[0], found)
         return

@@ -174,7 +174,7 @@ class ReportBuilder:
             self._all_listed = False
             self._listed = [one for one in self._listed if one[1].verdict != "valid"]
         found = {id(job): _FileVerdicts([], [], []) for job in jobs}
-        for judged in judged_parts(jobs):
+        for judged in judged_parts(jobs, configured=self._wanted.detail != "verdicts"):
             mine = found[id(judged.job)]
             over_time = judged.job.over_time
             judgements = over_time[judged.recording] if over_time else ()
