@@ -8,7 +8,7 @@ what else runs on a shared machine only adds. `verdicts` is `Validator.check(q=â
 are looked at; these, the pairs that touch, and the nearest pair, are asked for on top. Ratios are of one run.
 
 `motion` is frames in time, clips of a thousand, judged by all checks of postures and over time into one report,
-given as configurations of a robot, or as joint positions of the stick figure; bare is the same as above on those frames.
+given as configurations of a robot, or as positions of the stick figure; bare is the same as above on those frames.
 `memory` is what Python holds after so many clips of positions, and after a tenth of them.
 """
 
