@@ -255,6 +255,10 @@ def test_caliscopes_points_of_the_body_are_read_and_others_left_out(tmp_path: Pa
     found = held(caliscope(tmp_path / "a.csv", rows))
     known = np.isfinite(found.postures.joints).all(axis=-1)
     assert not known[3, JOINTS.index("left_knee")] and known.sum() == FRAMES * len(JOINTS) - 1
+    seen = held(caliscope(tmp_path / "d.csv", [row for row in rows if row[0] != 9]), rate=10.0)
+    assert len(seen) == FRAMES and np.isnan(seen.postures.joints[4]).all() and seen.time[5] == 0.5
+    with pytest.raises(InputError, match="whole numbers, one a frame"):
+        held(caliscope(tmp_path / "e.csv", [*rows, (1e9, *rows[0][1:])]))
     with pytest.raises(InputError, match="a point twice in a frame"):
         held(caliscope(tmp_path / "b.csv", [*rows, rows[0]]))
     with pytest.raises(InputError, match="no point of the body"):

@@ -18,6 +18,8 @@ from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.safe_io import refusal
 
+MOST_GAPS: Final = 10
+"""Times as many frames as points that gaps may make."""
 TABLE_COLUMNS: Final = ("sync_index", "point_id", "x_coord", "y_coord", "z_coord")
 
 
@@ -46,7 +48,12 @@ def read_caliscope(path: str | Path, unit: str | None = None, *, as_recorded: bo
     body = values[(values[:, 1] >= 0) & (values[:, 1] < len(names)) & np.isfinite(values).all(axis=1)]
     if not len(body):
         raise refusal(path, "point_id", "no point of the body", f"some of 0 to {len(names) - 1}")
-    frames, row = np.unique(body[:, 0], return_inverse=True)
+    first, last = float(body[:, 0].min()), float(body[:, 0].max())
+    if (body[:, 0] % 1).any() or last - first > MOST_GAPS * len(body):
+        got = f"frames {first:g} to {last:g}"
+        raise refusal(path, "sync_index", got, "whole numbers, one a frame", "check how it was written")
+    frames = np.arange(first, last + 1)  # those in which nobody was seen, too: they take their time
+    row = (body[:, 0] - first).astype(np.intp)
     point = body[:, 1].astype(np.intp)
     if len(np.unique(row * len(names) + point)) != len(body):
         raise refusal(path, "point_id", "a point twice in a frame", "each once", "remove one of the two")
