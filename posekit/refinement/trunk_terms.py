@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.compiled import descent_kernels
+from posekit.compiled.compiling import compiled, is_installed
 from posekit.geometry import Array, cross, dot
 from posekit.geometry.batch_last import matrix_vector
 from posekit.refinement.figure_numbers import LEG_LIMBS, LIMB_STARTS, TRUNK_SEGMENTS
@@ -108,7 +110,7 @@ def trunk_chi2(problem: RefinementProblem, state: PostureState, offsets: Array) 
     if problem.anatomy.middle_pelvis:
         chi2 += (_spine_turn(state)[0] / SPINE_TURN_DEVIATION) ** 2
     if problem.shape_weight is not None:
-        stretch, _ = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape)
+        stretch, _ = shape_distances(problem.shape_weight, problem.anatomy.shape, state.shape, slopes=False)
         chi2 += np.einsum("kn,kn->n", stretch, stretch)
     return chi2, crossed
 
@@ -223,8 +225,20 @@ def shape_jacobian(state: PostureState) -> Array:
     return jacobian
 
 
-def shape_distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
-    """Return the residuals (9, N) of the trunk's distances and their derivative (9, 9, N) along the shape."""
+def shape_distances(weight: Array, own: Array, shape: Array, *, slopes: bool = True) -> tuple[Array, Array]:
+    """Return the residuals (9, N) of the trunk's distances and, unless not wanted, their derivative (9, 9, N)."""
+    if not is_installed():
+        return summed_distances(weight, own, shape)
+    J = np.empty((9 if slopes else 0, *shape.shape))
+    residual = np.empty_like(shape, order="C")
+    each = np.array(np.broadcast_to(weight.reshape(9, -1), shape.shape), order="C")
+    squared = ((_APART @ own) ** 2).sum(axis=1)
+    compiled(descent_kernels).distances(each, squared, _APART, np.array(shape, order="C"), residual, J)
+    return residual, J
+
+
+def summed_distances(weight: Array, own: Array, shape: Array) -> tuple[Array, Array]:
+    """Find the same by sums over all postures at once, derivatives always."""
     points, mine = np.einsum("jis,sn->jin", _PLACES, shape), _PLACES @ own
     residual, J = np.empty_like(shape), np.empty((9, *shape.shape))
     for row, (i, j) in enumerate(TRUNK_SEGMENTS):
@@ -247,3 +261,5 @@ def _places() -> NDArray[np.float64]:
 
 
 _PLACES = _places()
+_APART = np.array([_PLACES[j] - _PLACES[i] for i, j in TRUNK_SEGMENTS])
+"""How the shape places the end of each of the trunk's distances against its start (9, 3, 9)."""
