@@ -6,8 +6,8 @@ A file is anything that `benchmarks/people.py` reads. Postures of its clips are 
 shoulder 5 to 40 degrees beyond where it becomes so, a limb's segment 5 cm too long or too short, two bodies 3 cm in
 each other. They are repaired, and judged by a validator that has not seen them, each by the lengths of its clip. The
 slow solver is SciPy's SLSQP on some of them, the best of random starts, on the same problem (all lengths stay, but
-those that are wrong), and on the looser one that the checks alone state (lengths within their tolerance). With
-``--clips`` so many clips a kind have a defect of `benchmarks/defects.py` at the size that must be found.
+those that are wrong), or, of wrong lengths and with ``--loose`` of all, on what the checks alone state (lengths within
+their tolerance). With ``--clips`` so many clips a kind have a defect of `benchmarks/defects.py` at the size that must be found.
 """
 
 from __future__ import annotations
@@ -180,7 +180,7 @@ def freshly_valid(cases: Sequence[IllegalPosture], repaired: Array) -> NDArray[n
 
 
 def posture_rows(
-    cases: Sequence[IllegalPosture], judge: Validator, slow: int, starts: int, rng: np.random.Generator
+    cases: Sequence[IllegalPosture], judge: Validator, asked: argparse.Namespace, rng: np.random.Generator
 ) -> list[list[str]]:
     """Repair postures, and compare with the slow solver on the first of each kind."""
     rows = []
@@ -196,14 +196,14 @@ def posture_rows(
         )
         known = np.array([np.linalg.norm(case.legal - case.joints) for case in mine])
         ratios: list[list[tuple[float, float]]] = [[], []]
-        some = np.linspace(0, len(mine) - 1, slow // len(by_kind)).astype(int).tolist() if slow else []
+        some = np.linspace(0, len(mine) - 1, asked.slow // len(by_kind)).astype(int).tolist()
         for k in some:
             case = mine[k]
             _, suite = judge.figure_and_suite(case.joints[None], person=case.person)
             for which, free in enumerate((False, True)):
-                if kind == "length" and not free:
-                    continue  # lengths that stay have no solution
-                least = slow_change(case.joints, suite, rng, starts, free=free)
+                if free != (kind == "length") and not (free and asked.loose):
+                    continue  # lengths that are wrong and stay have no solution
+                least = slow_change(case.joints, suite, rng, asked.starts, free=free)
                 if np.isfinite(least) and valid[k]:
                     ratios[which].append((change[k], least))
         told = []
@@ -285,6 +285,7 @@ def main() -> None:
     parser.add_argument("--postures", type=int, default=1000)
     parser.add_argument("--slow", type=int, default=40)
     parser.add_argument("--starts", type=int, default=20)
+    parser.add_argument("--loose", action="store_true")
     parser.add_argument("--clips", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
@@ -294,7 +295,7 @@ def main() -> None:
         cases = illegal_postures(clips, asked.postures, rng)
         head = ["illegal by", "postures", "valid", "change, cm", "of the known, cm"]
         head += ["slow solver, same problem", "checks alone", "ms"]
-        print("\n".join(table_lines(head, posture_rows(cases, judge, asked.slow, asked.starts, rng))))
+        print("\n".join(table_lines(head, posture_rows(cases, judge, asked, rng))))
     if asked.clips:
         head = ["defect", "clips", "valid", "change, cm", "of the known, cm", "left to it, cm"]
         print("\n".join(table_lines(head, clip_rows(clips, judge, asked.clips, rng))))

@@ -55,7 +55,7 @@ def interpolated(points: Array, bad: Bools) -> Array:
     good = ~bad & np.isfinite(points[:, list(TORSO_AND_HIPS)]).all(axis=(1, 2))
     for first, last in runs(~good):
         before, after = first - 1, last + 1
-        if before < 0 or after >= len(points):
+        if before < 0 or after >= len(points) or not bad[first:after].any():
             continue
         there, back = (turn_between(points[a], points[b]) for a, b in ((before, after), (after, before)))
         share = (np.arange(first, after) - before)[:, None] / (after - before)
