@@ -7,7 +7,8 @@ shoulder 5 to 40 degrees beyond where it becomes so, a limb's segment 5 cm too l
 each other. They are repaired, and judged by a validator that has not seen them, each by the lengths of its clip. The
 slow solver is SciPy's SLSQP on some of them, the best of random starts, on the same problem (all lengths stay, but
 those that are wrong), or, of wrong lengths and with ``--loose`` of all, on what the checks alone state (lengths within
-their tolerance). With ``--clips`` so many clips a kind have a defect of `benchmarks/defects.py` at the size that must be found.
+their tolerance). With ``--clips`` so many clips a kind have a defect of `benchmarks/defects.py` at the size that must
+be found.
 """
 
 from __future__ import annotations

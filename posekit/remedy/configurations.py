@@ -19,12 +19,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from posekit.body.measured import MeasuredPerson
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.remedy.nearest import bounded_forces
 from posekit.remedy.record import Repaired, left_of, spans_of
+from posekit.remedy.repair import repair
 from posekit.robots.configuration_space import ConfigurationSpace
 from posekit.robots.unit_quaternions import check_configurations
+from posekit.skeleton import JOINTS
 from posekit.validators import Validator
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.near_pairs import NearPairs
@@ -88,12 +91,16 @@ def repair_configurations(q: ArrayLike, validator: Validator) -> Repaired:
     """
     subject, collision = validator.configured
     given = check_configurations(subject.model, q, "q")
-    before = validator.check(q=given)
+    bad = np.flatnonzero(validator.check(q=given).invalid)
     out = given.copy()
     nearest = NearestConfiguration(subject=subject, collision=collision)
-    for row in np.flatnonzero(before.invalid).tolist():
+    for row in bad.tolist():
         out[row] = nearest.of(given[row])
     report = validator.check(q=out)
+    left = np.flatnonzero(report.invalid)
+    if validator.robot is None and left.size:
+        out[left] = _as_postures(out[left], validator)
+        report = validator.check(q=out)
     moved = np.abs(nearest.space.difference(given, out))
     names = [
         str(subject.model.names[joint])
@@ -116,6 +123,17 @@ def repair_configurations(q: ArrayLike, validator: Validator) -> Repaired:
         left=left_of(report.judgements),
         valid=report.valid,
     )
+
+
+def _as_postures(q: Array, validator: Validator) -> Array:
+    """Repair configurations of a figure by their joints: its ranges may be more than limits of single angles."""
+    figure = validator.figure
+    points = figure.forward_kinematics(q)
+    person = MeasuredPerson(lengths=figure.lengths, behind=figure.shoulder_offset < 0, noise=0.0)
+    judge = Validator(figure, validator.settings.changed(strict=True))
+    done = repair(points[:, : len(JOINTS)], judge, head=points[:, len(JOINTS) :], person=person)
+    head = points[:, len(JOINTS) :] if done.head is None else done.head
+    return figure.configurations(np.concatenate([done.joints, head], axis=1)).q
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

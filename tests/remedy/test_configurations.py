@@ -88,3 +88,18 @@ def test_what_is_no_configuration_is_refused() -> None:
     """A width that is not the model's is named."""
     with pytest.raises(InputError, match="expected"):
         repair_configurations(np.zeros((1, 3)), PANDA)
+
+
+def test_configurations_of_the_figure_heed_what_no_limit_says() -> None:
+    """Anatomical ranges bound an arm by its elevation and turn, beside its three angles."""
+    judge = Validator()
+    subject = judge.configured[0]
+    q = np.tile(pin.neutral(subject.model), (6, 1))
+    low, high = subject.lower[subject.index], subject.upper[subject.index]
+    q[:, subject.index] = np.random.default_rng(5).uniform(low, high, (6, len(low)))
+    assert judge.check(q=q).invalid.sum() > 3
+    repaired = repair_configurations(q, judge)
+    assert repaired.q is not None
+    assert Validator().check(q=repaired.q).valid.all()
+    legal = judge.check(q=q).valid
+    np.testing.assert_array_equal(repaired.q[legal], q[legal])
