@@ -357,7 +357,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             grounded=True,
         ),
         Defect(
-            name="floating, the whole clip, ground given",
+            name="floating clip",
             checks=("floating", "support"),
             unit="m",
             sizes=(0.1, 0.05, 0.03, 0.02, 0.01),
@@ -366,7 +366,7 @@ DEFECTS: Final[Mapping[str, Defect]] = {
             frames=_WHOLE,
         ),
         Defect(
-            name="sinking, the whole clip, ground given",
+            name="sinking clip",
             checks=("penetration",),
             unit="m",
             sizes=(0.1, 0.05, 0.03, 0.02, 0.01),
