@@ -50,7 +50,7 @@ def _write(path: Path, clip: MotionClip) -> None:
     np.savez(
         path,
         joints=np.concatenate([clip.joints, clip.head, clip.feet[:, :2]], axis=1),
-        joint_names=np.array([*JOINTS, *HEAD_POINTS, "right_toe", "left_toe"]),
+        joint_names=np.array([_cmu_name(name) for name in (*JOINTS, *HEAD_POINTS, "right_toe", "left_toe")]),
         clip=np.zeros(len(clip), dtype=np.int64),
         clip_names=np.array(["clip"]),
         clip_action=np.array(["some"]),
@@ -58,6 +58,11 @@ def _write(path: Path, clip: MotionClip) -> None:
         unit="m",
         up="+y",
     )
+
+
+def _cmu_name(name: str) -> str:
+    """Name a joint as files of CMU's motion do: toes have a name there."""
+    return name.replace("right_", "r_").replace("left_", "l_")
 
 
 def _said(*arguments: str) -> str:
