@@ -55,9 +55,12 @@ def test_c3d_keeps_the_points_of_neighbouring_frames(tmp_path, rng):
 def test_a_long_table_is_cut_by_frames_and_not_by_lines(tmp_path, rng):
     motion = a_motion(rng)
     write_csv_motion(tmp_path / "m.csv", motion, long=True)
+    lines = (tmp_path / "m.csv").read_text().splitlines()
     np.testing.assert_array_equal(
         read_motion(cut_to(tmp_path, "m.csv"), unit="m").points, motion.points[ROWS]
     )
+    kept = (tmp_path / "out" / "m.csv").read_text().splitlines()
+    assert kept == [lines[0], *(lines[1 + 3 * row + k] for row in ROWS for k in range(3))]
 
 
 @pytest.mark.parametrize("name", ["m.bvh", "m.mot"])

@@ -7,6 +7,7 @@ posekit cannot write becomes an NPZ of its points.
 
 from __future__ import annotations
 
+import csv
 import re
 import zipfile
 from collections.abc import Callable, Mapping
@@ -28,6 +29,9 @@ CLIP_KEYS: Final = frozenset(
     ("betas", "clip_fps", "rate", "fps", "framerate", "mocap_framerate", "trans_offset")
 )
 """Numbers in an NPZ that are of a whole clip, however many there are."""
+
+FRAME_COLUMNS: Final = ("frame", "sync_index", "time")
+"""Columns that say which frame a row of a table is of, the first that there is."""
 
 FALLBACK_SUFFIX: Final = ".npz"
 
@@ -104,6 +108,8 @@ def _cut_text(source: Path, target: str | Path, rows: NDArray[np.intp], count: i
     lines = _filled(text[head.end() :])
     if len(lines) == count - 1 and source.suffix.lower() == ".csv":  # a table without names
         start, lines = "", _filled(text)
+    if len(lines) != count and source.suffix.lower() == ".csv":
+        lines = _frames_of_rows(start, lines)
     if len(lines) != count:
         return False
     if table.counts is not None:
@@ -120,6 +126,26 @@ def _cut_text(source: Path, target: str | Path, rows: NDArray[np.intp], count: i
 def _filled(text: str) -> list[str]:
     """Part text into its lines, but for empty ones."""
     return [line for line in text.split("\n") if line.strip()]
+
+
+def _frames_of_rows(head: str, lines: list[str]) -> list[str]:
+    """Join the rows of a frame, of a table with a row a frame and point: neighbours of one frame and clip."""
+    delimiter = max(",;\t", key=head.count)
+    names = [name.strip() for name in next(csv.reader([head], delimiter=delimiter), [])]
+    frame = next((name for name in FRAME_COLUMNS if name in names), None)
+    if frame is None:
+        return lines
+    keys = [names.index(name) for name in (frame, "clip") if name in names]
+    frames: list[str] = []
+    last: list[str] = []
+    for line, cells in zip(lines, csv.reader(lines, delimiter=delimiter), strict=False):
+        key = [cells[k] for k in keys if k < len(cells)]
+        if frames and key == last:
+            frames[-1] += f"\n{line}"
+        else:
+            frames.append(line)
+        last = key
+    return frames
 
 
 def _counted_trc(head: str, count: int) -> str:
