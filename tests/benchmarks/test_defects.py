@@ -23,7 +23,7 @@ BY_SIZE = (
     "drift of a length",
     "jitter",
 )
-WHOLE = ("another unit", "another up axis")
+WHOLE = [kind for kind, defect in DEFECTS.items() if not defect.frames[1]]
 
 
 def clean(count: int = 120) -> CleanClip:
