@@ -18,11 +18,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
 from posekit.body import Figure
-from posekit.body.measured import LIMB_NAMES, MeasuredPerson
+from posekit.body.measured import LIMB_NAMES, MeasuredPerson, hips_outward
 from posekit.body.torso_bending import bending_gives
 from posekit.settings import ALLOWED_DEVIATIONS, MEASURED_TOLERANCE, RigidTolerance, ValidateSettings
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, segment_name
 from posekit.tree import Check, Loosening
+from posekit.validators.ranges import Ranges
 
 SPINE_SEGMENT: Final = (JOINT["neck"], JOINT["pelvis"])
 USUAL_LENGTH: Final = 0.2
@@ -74,6 +75,12 @@ class Allowance:
         return RigidTolerance(
             shoulders=bone, sides=sides, hips=bone, own=tuple({**bones, SPINE_SEGMENT: sides}.items())
         )
+
+    def ranges(self, ranges: Ranges) -> Ranges:
+        """Return joint ranges that begin where the person's skeleton has its pelvis."""
+        if self.person is None or self.settings.strict or not math.isfinite(self.person.hips_forward):
+            return ranges
+        return ranges.with_hips(self.person.hips_forward, hips_outward(self.person.lengths))
 
     def angle(self, segment: str, length: float) -> float:
         """Return by how much the direction of a segment may be off, degrees, by its length, metres."""

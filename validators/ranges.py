@@ -57,6 +57,13 @@ class Ranges:
     def __hash__(self) -> int:
         return hash((self.name, self.kind, frozenset(self.limits.items())))
 
+    def with_hips(self, forward: float, outward: float) -> Ranges:
+        """Return the ranges of somebody whose hips are so many degrees forward and outward (`Anatomy.with_hips`)."""
+        if self.anatomy is None:
+            return self
+        anatomy = self.anatomy.with_hips(forward, outward)
+        return replace(self, limits=anatomy.limits(), anatomy=anatomy)
+
     def of(self, figure: Figure) -> Ranges:
         """Return the ranges of a figure: anatomical ones depend on where its pelvis is (`Anatomy.on_pelvis`)."""
         if self.anatomy is None:

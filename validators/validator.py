@@ -317,7 +317,8 @@ class Validator:
     def _judging(self, person: MeasuredPerson) -> tuple[Figure, list[Check]]:
         """Return figure and checks for a person; the last are kept, for a recording that is judged in parts."""
         allowed = Allowance(settings=self.settings, person=person)
-        key = tuple(person.lengths.items()), person.behind, tuple(map(allowed.off, ("", *LIMB_NAMES)))
+        noise = tuple(map(allowed.off, ("", *LIMB_NAMES)))
+        key = tuple(person.lengths.items()), person.behind, person.hips_forward, noise
         if self._person is None or self._person[0] != key:
             figure = self.figure
             if self.lengths == "median" and person.lengths:
@@ -335,7 +336,7 @@ class Validator:
             directions=True,
             rigid_tolerance=allowed.rigid(figure),
             contact_margin=allowed.contact_margin,
-            **self._options,
+            **{**self._options, "ranges": allowed.ranges(self._options["ranges"])},
         )
         return allowed.applied(made, figure)
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from posekit.body.anthropometry.postures import DEVIATION_OF_MAD
 from posekit.body.figure import Figure
+from posekit.body.loading import load_figure
 from posekit.errors import FigureError
 from posekit.geometry import Array, cross
 from posekit.robots.scaling import segment_lengths, shoulders_are_behind
@@ -68,12 +69,16 @@ class MeasuredPerson:
         Standard deviation of measured coordinates, metres; NaN of fewer than `LEAST_FRAMES` frames.
     noise_by_limb : mapping
         The same by each limb's segment alone, as far as it was seen.
+    hips_forward : float
+        Degrees by which the hips lie before the line from neck to pelvis, seen from the pelvis, in the median
+        frame; NaN of fewer than `LEAST_FRAMES` frames.
     """
 
     lengths: Mapping[str, float]
     behind: bool | None
     noise: float
     noise_by_limb: Mapping[str, float] = field(default_factory=dict)
+    hips_forward: float = math.nan
 
     def noise_of(self, segment: str) -> float:
         """Return the deviation of the coordinates of a segment's ends, metres: wrists and ankles are measured worse.
@@ -92,7 +97,41 @@ def measured_person(joints: Array) -> MeasuredPerson:
         behind=shoulders_are_behind(_unswapped(joints)),
         noise=usual_noise(by_limb),
         noise_by_limb=by_limb,
+        hips_forward=hips_forward(joints),
     )
+
+
+def hips_forward(joints: Array) -> float:
+    """Measure how far before the trunk's line the hips lie in the median frame (T, 14, 3), degrees at the pelvis."""
+    neck, pelvis, right, left = (
+        joints[:, JOINT[name]] for name in ("neck", "pelvis", "right_hip", "left_hip")
+    )
+    down, hips = pelvis - neck, (right + left) / 2 - pelvis
+    with np.errstate(invalid="ignore", divide="ignore"):
+        down = down / np.linalg.norm(down, axis=1, keepdims=True)
+        forward = cross(down, left - right)
+        before = np.einsum("ni,ni->n", hips, forward) / np.linalg.norm(forward, axis=1)
+    angles = np.arctan2(before, np.einsum("ni,ni->n", hips, down))
+    known = angles[np.isfinite(angles)]
+    return math.degrees(float(np.median(known))) if len(known) >= LEAST_FRAMES else math.nan
+
+
+def hips_outward(lengths: Mapping[str, float]) -> float:
+    """Return by how many degrees straight thighs lean inward because a skeleton's hips are wider apart than people's.
+
+    Hips that it has nearer together give a negative number. People's are taken as the built-in figure's, by the length
+    of the thigh.
+
+    Parameters
+    ----------
+    lengths : mapping
+        Metres, by segment name.
+    """
+    usual = load_figure().lengths
+    hips, thigh = "right_hip-left_hip", "right_hip-right_knee"
+    if not lengths.get(thigh, 0.0) > 0 or hips not in lengths:
+        return 0.0
+    return math.degrees(math.atan((lengths[hips] / lengths[thigh] - usual[hips] / usual[thigh]) / 2))
 
 
 def usual_noise(by_limb: Mapping[str, float]) -> float:

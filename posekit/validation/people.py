@@ -48,6 +48,7 @@ def _measured(joints: NDArray[np.float64]) -> MeasuredPerson:
         found,
         lengths={name: round(length, DECIMALS_OF_METRES) for name, length in found.lengths.items()},
         noise=round(found.noise, DECIMALS_OF_METRES),
+        hips_forward=round(found.hips_forward, 3),
         noise_by_limb={name: round(noise, DECIMALS_OF_METRES) for name, noise in found.noise_by_limb.items()},
     )
 

@@ -8,10 +8,13 @@ import pinocchio as pin
 import pytest
 
 from posekit.body import load_figure
+from posekit.body.measured import hips_outward, measured_person
+from posekit.geometry import Array
 from posekit.settings import ValidateSettings
 from posekit.skeleton import JOINT, JOINTS, urdf_joint_name
 from posekit.validators import Validator
 from posekit.validators.measured import Allowance
+from posekit.validators.ranges import load_ranges
 
 FIGURE = load_figure()
 STANDING = FIGURE.neutral_points[:14]
@@ -133,3 +136,43 @@ def test_a_robot_is_fitted_with_what_noise_allows_and_strictly_without() -> None
     assert usual.valid.sum() > strict.valid.sum()
     assert usual.valid.sum() >= 5
     assert Validator("human").check(standing(12)).valid.all()
+
+
+def _turned(joints: Array, degrees: float, moved: tuple[str, ...], axis: int = 1) -> Array:
+    """Turn some joints about the pelvis, in the sagittal plane of the figure."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.eye(3)
+    first, second = (k for k in range(3) if k != axis)
+    turn[[first, first, second, second], [first, second, first, second]] = c, s, -s, c
+    turned = joints.copy()
+    at = [JOINT[name] for name in moved]
+    turned[:, at] = (joints[:, at] - joints[:, [JOINT["pelvis"]]]) @ turn.T + joints[:, [JOINT["pelvis"]]]
+    return turned
+
+
+def test_a_skeleton_whose_pelvis_is_far_before_or_behind_its_hips_has_its_zero_there() -> None:
+    standing = np.tile(load_figure().neutral_points[:14], (40, 1, 1))
+    for degrees in (-30.0, 30.0):
+        hips = _turned(standing, degrees, ("right_hip", "left_hip"))
+        person = measured_person(hips)
+        assert abs(abs(person.hips_forward) - 30.0) < 1e-6
+        anatomy = load_ranges("anatomical").anatomy
+        assert anatomy is not None
+        own = anatomy.with_hips(person.hips_forward)
+        for side in ("lower", "upper"):
+            for angle in ("pelvis.flexion", "hip.flexion"):
+                sign = 1.0 if side == "upper" else -1.0
+                assert sign * own.motions[angle].end(side)[0] >= sign * anatomy.motions[angle].end(side)[0]
+
+
+def test_hips_that_are_wide_apart_let_thighs_lean_inward() -> None:
+    lengths = dict(load_figure().lengths)
+    assert hips_outward(lengths) == 0.0
+    wide = {**lengths, "right_hip-left_hip": 2 * lengths["right_hip-left_hip"]}
+    assert 5.0 < hips_outward(wide) < 25.0
+    anatomy = load_ranges("anatomical").anatomy
+    assert anatomy is not None
+    usual, own = (
+        one.motions["hip.abduction"].end("lower")[0] for one in (anatomy, anatomy.with_hips(13.5, 10.0))
+    )
+    assert own == usual - 10.0
