@@ -13,7 +13,7 @@ from posekit.formats.format import Content
 from posekit.formats.held import HeldPostures
 from posekit.formats.motion import Motion, postures_of, read_motion
 from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
-from posekit.formats.motion.body_size import FARTHEST, BodyUnit, body_unit, stature_of
+from posekit.formats.motion.body_size import FARTHEST_COORDINATE, BodyUnit, body_unit, stature_of
 from posekit.formats.motion.detected import read_detected
 from posekit.formats.motion.ground_up import FoundUp, find_up
 from posekit.formats.motion.motion_format import MotionFormat
@@ -139,11 +139,13 @@ def held_motion(
 
 def _within_reach(motion: Motion) -> Motion:
     """Refuse coordinates whose squares overflow."""
-    if len(motion) and np.nanmax(np.abs(motion.points), initial=0.0) > FARTHEST:
-        frame, point, axis = np.argwhere(np.abs(motion.points) > FARTHEST)[0]
+    if len(motion) and np.nanmax(np.abs(motion.points), initial=0.0) > FARTHEST_COORDINATE:
+        frame, point, axis = np.argwhere(np.abs(motion.points) > FARTHEST_COORDINATE)[0]
         got = f"a coordinate of {motion.points[frame, point, axis]:g} m"
         where = f"frame {frame}: {motion.names[point]}"
-        raise refusal(motion.source, where, got, f"at most {FARTHEST:g} m", "correct it, or leave it out")
+        raise refusal(
+            motion.source, where, got, f"at most {FARTHEST_COORDINATE:g} m", "correct it, or leave it out"
+        )
     return motion
 
 

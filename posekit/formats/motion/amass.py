@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from posekit.formats.motion.array_names import RATE_NAMES, holds_body_angles
 from posekit.formats.motion.body_model import BODY_JOINTS, BODY_PARENTS, BodyModel, read_body_model
-from posekit.formats.motion.body_size import FARTHEST
+from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.geometry import Array
@@ -153,12 +153,14 @@ def _rate(arrays: Arrays) -> float:
 
 
 def _finite(path: str | Path, name: str, values: NDArray[Any]) -> Array:
-    sane = np.abs(values) < FARTHEST
+    sane = np.abs(values) < FARTHEST_COORDINATE
     if not sane.all():
         place = tuple(int(k) for k in np.argwhere(~sane)[0])
         got = f"{values[place]:g}"
         where = ", ".join(map(str, place))
-        raise refusal(path, f"{name}[{where}]", got, f"finite numbers below {FARTHEST:g}", "correct it")
+        raise refusal(
+            path, f"{name}[{where}]", got, f"finite numbers below {FARTHEST_COORDINATE:g}", "correct it"
+        )
     return values.astype(np.float64)
 
 

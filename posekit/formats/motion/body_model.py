@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.motion.body_size import FARTHEST
+from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.safe_io import open_npz, refusal
 from posekit.safe_io.npz_file import Archive
@@ -126,9 +126,9 @@ def _check_tree(archive: Archive) -> None:
 
 def _numbers(archive: Archive, name: str, shape: tuple[int | None, ...]) -> Array:
     values: Array = archive.array(name, "iuf", shape).astype(np.float64)
-    if not (np.abs(values) < FARTHEST).all():
+    if not (np.abs(values) < FARTHEST_COORDINATE).all():
         got = "a number that is not finite, or beyond all bodies"
-        raise refusal(archive.path, name, got, f"numbers below {FARTHEST:g}", "save it again")
+        raise refusal(archive.path, name, got, f"numbers below {FARTHEST_COORDINATE:g}", "save it again")
     if name in ("J", "J_regressor") and len(values) < BODY_JOINTS:
         raise refusal(
             archive.path, name, f"{len(values)} joints", f"{BODY_JOINTS} or more", "give a whole body"

@@ -27,7 +27,7 @@ LEAST_METRES, MOST_METRES = 0.2, 5.0
 """Statures that are taken for metres: anything that is nearer to a body in metres than in another unit."""
 
 
-FARTHEST: Final = 1e9
+FARTHEST_COORDINATE: Final = 1e9
 """Beyond it no point of a body is in any unit, and squares overflow."""
 
 
@@ -53,7 +53,7 @@ def stature_of(joints: Array) -> float:
         In that unit; NaN where no limb is known in any frame.
     """
     found = []
-    joints = np.where(np.abs(joints) < FARTHEST, joints, np.nan)
+    joints = np.where(np.abs(joints) < FARTHEST_COORDINATE, joints, np.nan)
     for (start, end), share in LIMB_SHARES.items():
         for side in SIDES:
             way = joints[:, JOINT[f"{side}_{end}"]] - joints[:, JOINT[f"{side}_{start}"]]

@@ -28,7 +28,7 @@ from posekit.formats.motion.array_names import (
     ROOT_TURNS_IN_ORDER,
     holds_robot,
 )
-from posekit.formats.motion.body_size import FARTHEST
+from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.formats.motion.configuration_format import ConfigurationFormat
 from posekit.formats.motion.root_turn import QUATERNION_ORDERS, root_turn
 from posekit.formats.own.postures_q import ROOT_NAMES, NamedConfigurations
@@ -102,9 +102,9 @@ def configurations_of_columns(columns: RobotColumns, source: str) -> NamedConfig
         ("joints", columns.joints),
         ("time", columns.time),
     ):
-        if (np.abs(values) > FARTHEST).any():
-            got = f"{float(values[np.abs(values) > FARTHEST][0]):g}"
-            raise refusal(source, name, got, f"finite numbers below {FARTHEST:g}", "correct it")
+        if (np.abs(values) > FARTHEST_COORDINATE).any():
+            got = f"{float(values[np.abs(values) > FARTHEST_COORDINATE][0]):g}"
+            raise refusal(source, name, got, f"finite numbers below {FARTHEST_COORDINATE:g}", "correct it")
     turn = root_turn(columns.turn, columns.order, source, columns.turn_name)
     said = [*columns.said, turn.said]
     if not columns.names:

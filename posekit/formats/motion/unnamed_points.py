@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.formats.motion.amass import SMPL_NAMES
-from posekit.formats.motion.body_size import FARTHEST
+from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import refusal
@@ -48,11 +48,11 @@ def named_points(points: Array, source: str) -> NamedPoints:
         Where their number is none that is known, or the body in them does not hang together so.
     """
     count = points.shape[1]
-    beyond = np.abs(points) > FARTHEST
+    beyond = np.abs(points) > FARTHEST_COORDINATE
     if beyond.any():
         frame, point, axis = np.argwhere(beyond)[0]
         got = f"a coordinate of {points[frame, point, axis]:g}"
-        raise refusal(source, f"frame {frame}", got, f"at most {FARTHEST:g}", "correct it")
+        raise refusal(source, f"frame {frame}", got, f"at most {FARTHEST_COORDINATE:g}", "correct it")
     if count in SMPL_COUNTS and _is_smpl(points):
         said = "points are taken in the order of SMPL: so hips and shoulders are on both sides of the spine"
         return NamedPoints(SMPL_NAMES, points[:, : len(SMPL_NAMES)], said)
