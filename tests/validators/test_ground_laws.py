@@ -68,6 +68,16 @@ def test_a_body_that_stands_is_on_its_ground(toes: bool) -> None:
     assert not rejected(replace(clip, ground=0.0))
 
 
+def test_a_robots_toes_and_heels_are_its_soles() -> None:
+    clip = standing(30)
+    soles = clip.feet.copy()
+    soles[:, 2:] = soles[:, :2] - np.array([0.2, 0.0, 0.0])
+    soles[..., 2] = 0.0
+    robot = replace(clip, feet=soles, q=np.zeros((30, 1)), ground=0.0)
+    assert ground_of(robot).low == pytest.approx(0.0, abs=1e-9)
+    assert not rejected(robot)
+
+
 @pytest.mark.parametrize("count", [9, 15, 21])
 def test_a_jump_is_no_floating(count: int) -> None:
     assert not rejected(flight(standing(90), 30, count, falls=True))

@@ -35,6 +35,8 @@ LEG_SHARE: Final = 0.491
 REST_SPEED: Final = 0.25
 """Metres a second below which a point rests; a foot's parts move so slowly in stance, in no part of a swing."""
 
+HEELS_OF_SIDES: Final = (FEET_POINTS.index("right_heel"), FEET_POINTS.index("left_heel"))
+
 NEAR_METRES: Final = 0.30
 """What rests carries where it is not this much higher than the body's lowest point."""
 
@@ -101,7 +103,8 @@ def soles(clip: MotionClip) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
     ankles = clip.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]
     stature = stature_of(clip)
-    over = np.array([TOE_METRES] * len(FEET_POINTS) + [ANKLE_SHARE * (stature if stature > 0 else 1.7)] * 2)
+    toes = TOE_METRES if clip.q is None else 0.0  # a robot's are the ends of its soles
+    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * (stature if stature > 0 else 1.7)] * 2)
     return np.concatenate([clip.feet, ankles], axis=1), over
 
 
@@ -124,13 +127,12 @@ def _found(clip: MotionClip) -> Ground:
     legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them
     lifted = line.of_frames(lifted_by(line.spread(height), legs, clip.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
-    toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-    # The ankle of a foot whose toes are known is its heel: it is down when the toes are up.
-    sole = (
-        np.fmin.reduce(feet @ up - over, axis=1)
-        if toes
-        else np.fmin.reduce((feet @ up - over)[:, -2:], axis=1)
-    )
+    over_ground = feet @ up - over
+    for side in range(len(SIDES)):
+        # The ankle of a foot whose heel is not known is its heel: it is down when the toes are up.
+        if np.isfinite(over_ground[:, HEELS_OF_SIDES[side]]).any():
+            over_ground[:, len(FEET_POINTS) + side] = np.nan
+    sole = np.fmin.reduce(over_ground, axis=1)
     lowest = np.fmin(sole, np.fmin.reduce(height, axis=1)) - lifted
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
     slow = speeds(clip, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(clip)
