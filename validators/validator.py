@@ -88,6 +88,7 @@ class Validator:
         if isinstance(subject, Robot):
             own = robot_settings(asked)
             self.checks, self.lengths = own.check_names, own.lengths
+            self._check_asked()
             self.settings = asked.changed(ranges=own.ranges)
             self._robot = RobotValidator(robot=subject, settings=own)
             self._noisy_robot: RobotValidator | None = None
@@ -107,8 +108,7 @@ class Validator:
                 )
         self._chosen = chosen_checks(PHYSICAL_CHECKS if asked.checks is None else asked.checks)
         self.checks = tuple(one.name for one in self._chosen)
-        if not self.checks and not self.profile.checks:
-            raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
+        self._check_asked()
         self._options: dict[str, Any] = {
             "ranges": load_ranges(asked.ranges) if isinstance(asked.ranges, str) else asked.ranges,
             "angle_tolerance": asked.angle,
@@ -118,6 +118,11 @@ class Validator:
         }
         self._own_suite = self._make_suite(subject, Allowance(settings=asked.changed(strict=True)))
         self._person: tuple[tuple[Any, ...], Figure, list[Check]] | None = None
+
+    def _check_asked(self) -> None:
+        """Refuse to judge by nothing."""
+        if not self.checks and not self.profile.checks:
+            raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
 
     @property
     def figure(self) -> Figure:

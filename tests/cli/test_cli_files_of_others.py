@@ -54,6 +54,8 @@ def test_a_table_of_a_robot_is_judged_over_time(run: Callable[..., Any]) -> None
     checks = json.loads(Path("r.json").read_text(encoding="utf-8"))["checks"]
     assert checks["drift"]["rejected"] == 0
     assert "--rate" in run(*arguments).out
+    done = run("walk.csv", "--urdf", "g1", "--checks", "timing", "--rate", 50)
+    assert done.code == 0 and f"{FRAMES} valid" in done.out, done.err
 
 
 def test_angles_of_a_body_model_are_judged_with_the_model(run: Callable[..., Any]) -> None:

@@ -94,7 +94,8 @@ class RobotValidator:
         """
         checked = check_configurations(self.robot.model, q, source)
         checked.flags.writeable = False  # its margins may be asked for later
-        if not set(self.settings.check_names) - set(OF_POSITIONS):
+        asked = set(self.settings.check_names)
+        if asked and not asked - set(OF_POSITIONS):
             raise InputError(
                 f"--checks: {', '.join(self.settings.check_names)}: a configuration's lengths are the model's own, so "
                 "nothing would be judged; expected joint-range, collision or balance"
