@@ -65,7 +65,9 @@ def named(clip: MotionClip) -> dict[str, tuple[int, int]]:
     return {name: (int(rows[0]), int(rows[-1])) for name, rows in at.items() if len(rows)}
 
 
-def with_joints(clip: MotionClip, rows: slice | int, change: Callable[[Array], Array]) -> MotionClip:
+def with_joints(
+    clip: MotionClip, rows: slice | int | NDArray[np.intp], change: Callable[[Array], Array]
+) -> MotionClip:
     joints = clip.joints.copy()
     joints[rows] = change(joints[rows])
     return replace(clip, joints=joints)
@@ -174,6 +176,19 @@ def test_a_swap_of_a_hundred_frames_leaves_all_others_alone() -> None:
     clip = with_joints(walking(300), slice(100, 200), swapped)
     rejected = np.any([found.any(axis=1) for found in verdicts(clip).values()], axis=0)
     assert np.array_equal(np.flatnonzero(rejected), np.arange(100, 200))
+
+
+def test_labels_that_flicker_are_exchanged_and_in_no_wrong_order() -> None:
+    rows = np.flatnonzero(np.random.default_rng(0).random(len(WALK)) < 0.4)
+    found = verdicts(with_joints(WALK, rows, swapped))
+    assert np.array_equal(np.flatnonzero(found.pop("swap").all(axis=1)), rows)
+    assert not any(violated.any() for violated in found.values())
+
+
+def test_frames_that_come_twice_by_their_times_are_named() -> None:
+    twice = np.sort(np.append(np.arange(90), [40, 41]))
+    clip = replace(WALK, joints=WALK.joints[twice], time=WALK.time[twice], feet=np.empty(0), head=np.empty(0))
+    assert np.array_equal(np.flatnonzero(verdicts(clip)["timing"].any(axis=1)), [41, 43])
 
 
 def test_a_gap_is_no_jump() -> None:

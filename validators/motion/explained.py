@@ -23,7 +23,7 @@ from posekit.validators.motion.jumps import Jumps, jumps_of
 from posekit.validators.motion.order import displaced, stretches_of
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, timeline_of
-from posekit.validators.motion.trembling import trembling_of
+from posekit.validators.motion.trembling import trembling_of, usual_trembling
 
 JUMP_METRES: Final = 0.06
 """By so much a frame must jump to be left out of what is judged as motion; the bound of `teleport` is the
@@ -92,9 +92,10 @@ def _explain(clip: MotionClip) -> Explained:
         joints = np.where(rearranged[:, None, None], np.nan, joints)
     kept = known & ~rearranged
     exchanged = np.zeros((len(joints), 6), dtype=np.bool_)
+    noise = max(clip.noise, usual_trembling(joints[kept]))
     follows = np.diff(timeline.slots[order][kept]) == 1
     exchanged[kept] = exchanged_pairs(
-        joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, clip.noise
+        joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, noise
     )
     joints = timeline.spread(put_right(joints, exchanged)[back])
     jumps = jumps_of(joints)

@@ -8,7 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.skeleton import JOINT
+from posekit.validators.motion.sides import LEFT_JOINTS, RIGHT_JOINTS
 from posekit.validators.motion.timeline import norm
+
+MIDDLE_JOINTS: Final = (JOINT["neck"], JOINT["pelvis"])
+"""Joints that have no side."""
 
 LONGEST_STRETCH: Final = 600
 """Frames that are put into order at once; longer stretches are taken in parts."""
@@ -50,6 +55,7 @@ def displaced(joints: Array) -> NDArray[np.intp]:
     """
     count = len(joints)
     places = np.zeros(count, dtype=np.intp)
+    joints = _without_sides(joints)
     if count < LEAST_FRAMES + 2:
         return places
     steps = np.diff(joints, axis=0)
@@ -69,6 +75,19 @@ def displaced(joints: Array) -> NDArray[np.intp]:
             near = slice(max(first - 2, 0), last + 3)
             places[near] = found[near]
     return places
+
+
+def _without_sides(joints: Array) -> Array:
+    """Return what joints say whichever is the right one (T, 20, 3), metres: labels that flicker are no wrong order.
+
+    Neck, pelvis and the middles of pairs; and the vector d between a pair as its outer product with itself over its
+    length, which is that of -d.
+    """
+    right, left = joints[:, RIGHT_JOINTS], joints[:, LEFT_JOINTS]
+    across = (right - left) / 2.0
+    lengths = np.maximum(norm(across), 1e-9)[..., None]
+    squares, products = across**2 / lengths, across * np.roll(across, 1, axis=-1) / lengths
+    return np.concatenate([joints[:, MIDDLE_JOINTS], (right + left) / 2.0, squares, products], axis=1)
 
 
 def stretches_of(places: NDArray[np.intp]) -> NDArray[np.bool_]:

@@ -34,6 +34,9 @@ NEAR_FRAMES: Final = 4
 EDGE_FRAMES: Final = 20
 """By which the edges of a stretch are looked for, either way."""
 
+SAMPLED_FRAMES: Final = 2000
+"""That say how much joints usually tremble."""
+
 OUTSIDE_FRAMES: Final = 40
 """Before and after a stretch that say how much joints tremble outside it."""
 
@@ -81,6 +84,13 @@ def trembling_of(joints: Array, noise: float = 0.0) -> Array:
     return centred(
         np.maximum(bodily, BOTH_ENDS * by_length - LENGTHS_NOISE * noise), len(joints), SIXTH_ORDER // 2
     )
+
+
+def usual_trembling(joints: Array) -> float:
+    """Return the median trembling of joints (T, 14, 3) early in a clip, metres: no less than its noise."""
+    rough = norm(filtered(joints[:SAMPLED_FRAMES], _SIXTH)) / MEDIAN_OF_THREE
+    known = rough[np.isfinite(rough)]
+    return float(np.median(known)) if len(known) else 0.0
 
 
 def _windows(rough: Array) -> Array:
