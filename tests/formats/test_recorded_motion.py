@@ -208,3 +208,20 @@ def test_a_body_around_the_origin_in_every_frame_is_in_no_world(tmp_path: Path) 
     hips = points[:, [POINTS.index("right_hip"), POINTS.index("left_hip")]].mean(axis=1, keepdims=True)
     assert not held(written(tmp_path / "a.npz", points - hips)).in_world
     assert held(written(tmp_path / "b.npz")).in_world
+
+
+@pytest.mark.parametrize("apart", [True, False])
+def test_people_of_a_column_are_a_clip_each(tmp_path: Path, apart: bool) -> None:
+    head = ",".join(["time", "person", *(f"{name}_{axis}" for name in POINTS for axis in "xyz")])
+    rows = [(k, who) for who in "ab" for k in range(5)]
+    rows = rows if apart else sorted(rows)
+    lines = [
+        ",".join([f"{k / 30:.6f}", who, *map(repr, (walked()[k] + (who == "b")).reshape(-1).tolist())])
+        for k, who in rows
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([head, *lines]), encoding="utf-8")
+    found = held(tmp_path / "a.csv")
+    assert found.clips == ("person a", "person b") and found.in_time
+    np.testing.assert_allclose(found.postures.joints[found.clip == 1], walked()[:5, : len(JOINTS)] + 1.0)
+    with pytest.raises(InputError, match="ascend"):
+        read_motion(tmp_path / "a.csv")

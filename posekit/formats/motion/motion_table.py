@@ -19,6 +19,8 @@ from posekit.geometry import Array
 from posekit.safe_io import refusal, shown
 
 LONG_COLUMNS: Final = ("name", "x", "y", "z")
+PERSON_COLUMNS: Final = ("person", "person_id", "track_id", "subject")
+"""Who a row is of, where several people are in one table: each is a clip."""
 MAX_POINTS: Final = 10_000
 MAX_VALUES: Final = 100_000_000
 _COORDINATE: Final = re.compile(r"(.+)[_. ]([xyz])", re.IGNORECASE | re.DOTALL)
@@ -94,6 +96,9 @@ def motion_of(
     if count == 0:
         raise refusal(source, "", "no rows", "a row a frame", "check how it was written")
     columns = {"time": np.full(count, np.nan), **columns}
+    person = next((name for name in PERSON_COLUMNS if name in columns), "")
+    if as_recorded and person and "clip" not in columns:
+        columns["clip"] = np.array([f"person {who}" for who in columns[person].tolist()])
     names, points, rows = (
         _long(columns, source) if set(LONG_COLUMNS) <= set(columns) else _wide(columns, source)
     )
