@@ -100,6 +100,15 @@ def test_a_stretch_that_is_lifted_is_named_from_its_first_to_its_last_frame(
     assert rejected(moved(standing(90, toes=toes), by)) == {name: list(range(20, 55))}
 
 
+@pytest.mark.parametrize("height", [0.2, 0.5, -0.2, -0.5])
+def test_a_body_that_is_moved_up_or_down_smoothly_and_rests_there_is_named(height: float) -> None:
+    by = np.interp(np.arange(180), [40, 52, 110, 122], [0.0, height, height, 0.0])
+    name = "floating" if height > 0 else "penetration"
+    found = rejected(moved(standing(180), by[:, None] * UP))
+    assert set(range(60, 105)) <= set(found[name])
+    assert min(found[name]) >= 40 and max(found[name]) <= 122
+
+
 @pytest.mark.parametrize("height", [0.05, -0.05])
 def test_a_whole_clip_is_judged_by_the_ground_that_is_given(height: float) -> None:
     clip = moved(standing(60), np.full((60, 1), height) * UP)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from posekit.geometry import Array
 
-LEVEL_METRES: Final = 0.10
+LEVEL_METRES: Final = 0.05
 """Levels that differ by less are of one ground."""
 
 SHORTEST_FLIGHT: Final = 0.25

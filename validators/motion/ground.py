@@ -65,6 +65,8 @@ class Ground:
         The lowest sole, or joint, over `low`, without what `lifted` says.
     resting : bool array (T,)
         Whether something that can carry the body rests.
+    hanging : bool array (T,)
+        Whether what rests got there with no step and no jump.
     centre : array (T,)
         The centre of mass, along up.
     """
@@ -75,6 +77,7 @@ class Ground:
     lifted: Array
     lowest: Array
     resting: NDArray[np.bool_]
+    hanging: NDArray[np.bool_]
     centre: Array
 
 
@@ -137,7 +140,8 @@ def _found(clip: MotionClip) -> Ground:
     near = height - lifted[:, None] < lowest[:, None] + NEAR_METRES
     slow = speeds(clip, points - (lifted[:, None] * up)[:, None]) < REST_SPEED + 2 * _speed_noise(clip)
     centre = up @ centre_of_mass(np.moveaxis(clip.joints, 0, -1))
-    resting = carried((near & slow).any(axis=1), lowest, centre, clip.step)
+    still = (near & slow).any(axis=1)
+    resting = carried(still, lowest, centre, clip.step)
     held = lowest[resting & np.isfinite(lowest)]
     if len(held) < BY_CHANCE:
         held = lowest[np.isfinite(lowest)]
@@ -151,6 +155,7 @@ def _found(clip: MotionClip) -> Ground:
         lifted=lifted,
         lowest=lowest - low,
         resting=resting,
+        hanging=still & ~resting,
         centre=centre,
     )
 

@@ -19,6 +19,9 @@ from posekit.geometry import Array
 LEAST_STEP_METRES: Final = 0.012
 """Steps below are motion: clean recordings have steps of up to 0.7 cm where a foot is at rest, at 30 Hz."""
 
+SURE_STEP_METRES: Final = 0.15
+"""Steps above need no foot at rest: clean recordings have up to 13 cm, in a backflip at 16 frames a second."""
+
 SAME_SHARE: Final = 0.35
 """By so much of the larger of the two the step back may be another."""
 
@@ -57,7 +60,8 @@ def lifted_by(height: Array, feet: slice, noise: float = 0.0) -> Array:
     rests = np.zeros(len(height), dtype=np.bool_)
     rests[1:] = (beside < REST_METRES + 3 * noise).any(axis=1)
     start = -1
-    for frame in np.flatnonzero(rests & (np.abs(steps) >= max(LEAST_STEP_METRES, 4 * noise))):
+    large = np.abs(steps) >= SURE_STEP_METRES
+    for frame in np.flatnonzero(large | (rests & (np.abs(steps) >= max(LEAST_STEP_METRES, 4 * noise)))):
         size = steps[frame]
         if start >= 0 and size * steps[start] < 0:
             larger = max(abs(size), abs(steps[start]))

@@ -24,7 +24,7 @@ class Penetration(MotionCheck):
     depth : float
         Metres that it may be below.
     unlevel : float
-        Metres by which a ground that is not given may be lower than where something rests.
+        Metres by which a ground that is not given may be lower than where something rests; not where that hangs.
     """
 
     name = "penetration"
@@ -47,7 +47,8 @@ class Penetration(MotionCheck):
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how high the lowest point is over the ground; see `MotionCheck`."""
         ground = ground_of(clip)
-        lower = ground.lowest + (self.unlevel if clip.ground is None else 0.0)
+        unlevel = np.where(ground.hanging, 0.0, self.unlevel if clip.ground is None else 0.0)
+        lower = ground.lowest + unlevel
         over = ground.offset + ground.lifted + np.minimum(lower, 0.0)
         return Findings(
             value=over[:, None], lower=np.array(-self.depth - 2 * clip.noise), upper=np.array(np.inf)
