@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from benchmarks.studies.prior_fitting import DEFAULT_TEMPERATURE, fit_prior
 from posekit.body import Figure
 from posekit.body.uncertainty import MEASURED_LENGTHS
+from posekit.errors import InputError
 from posekit.formats.own import View
 from posekit.ranking import Depth, Prior, deviation_of_noise, deviation_of_tolerance
 from posekit.recovery import recover
@@ -104,7 +105,11 @@ def views_of(
             tolerance = BEFORE_REFINEMENT
         start = time.perf_counter()
         rooting = Rooting(deviation=noise) if placed else None
-        recovery = recover(view, checks=CHECK_NAMES, ranges=ranges, tolerance=tolerance, rooting=rooting)
+        try:
+            recovery = recover(view, checks=CHECK_NAMES, ranges=ranges, tolerance=tolerance, rooting=rooting)
+        except InputError as error:  # noise may show a segment longer than it is
+            print(f"clip {index} is left out: {error}")
+            continue
         seconds += time.perf_counter() - start
         placements = [frame.placement for frame in recovery.frames]
         pixel = scene.joints_cam[:, 0, 2] / float(scene.camera.K[0, 0])

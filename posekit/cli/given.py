@@ -37,6 +37,11 @@ def read_given(
     from posekit.formats.recognising import recognise
 
     found = recognise(path)
+    if seen is not None and (seen.is_dir() or recognise(seen).holds is Content.KEY_POINTS):
+        raise InputError(
+            f"--view: {seen} holds a detector's key points, which say no camera; expected a view; write it: "
+            f"posekit convert {seen} view.json, with the camera and the person that the result was recovered with"
+        )
     behind = files.read_view(seen) if seen is not None else None
     if found.holds is Content.VIEW:
         from posekit.recovery import recover, result_of

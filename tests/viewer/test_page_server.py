@@ -13,7 +13,9 @@ import pytest
 from posekit.cli import given as given_files
 from posekit.cli import view
 from posekit.errors import InputError, ViewerError
-from posekit.formats.own import Postures, Result, View, write_postures, write_view
+from posekit.formats.own import Postures, Result, View, write_postures, write_result, write_view
+from posekit.recovery import recover
+from posekit.recovery.result import result_of
 from posekit.viewer.page.server import PageServer
 from posekit.views.builtin import builtin_view
 
@@ -115,6 +117,13 @@ def test_the_kinds_of_files_are_told_apart(tmp_path):
     for name in ("postures.json", "view.json"):
         with pytest.raises(InputError, match="--view"):
             given_files.read_given(tmp_path / name, tmp_path / "view.json")
+
+
+def test_a_detectors_files_are_no_view_and_what_makes_one_of_them_is_said(tmp_path):
+    write_result(tmp_path / "result.npz", result_of(recover(builtin_view("seq1"))))
+    (tmp_path / "keypoints").mkdir()
+    with pytest.raises(InputError, match=r"posekit convert .*keypoints view\.json"):
+        given_files.read_given(tmp_path / "result.npz", tmp_path / "keypoints")
 
 
 @pytest.mark.parametrize("text", ["3-2", "a", "1-", "-1", "1-2-3", "²"])
