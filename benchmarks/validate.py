@@ -9,14 +9,14 @@ are looked at; these, the pairs that touch, and the nearest pair, are asked for 
 
 `motion` is frames in time, clips of a thousand, judged by all checks of postures and over time into one report,
 given as configurations of a robot, or as positions of the stick figure; bare is the same as above on those frames.
-`memory` is what Python holds after so many clips of positions, and after a tenth of them.
+`memory` is the most that the process took for so many clips of positions, and for the first tenth of them.
 """
 
 from __future__ import annotations
 
 import argparse
+import resource
 import time
-import tracemalloc
 from collections.abc import Callable
 
 import numpy as np
@@ -167,23 +167,18 @@ def memory(clips: int) -> None:
         np.asarray(one) for one in (load_robot("stick_figure").lower, load_robot("stick_figure").upper)
     )
     figure = load_figure()
-    validator, frames = Validator(), 100
+    validator, frames = Validator(), 50
     q = np.tile(pin.neutral(figure.model), (frames, 1))
     q[:, 7:] = moving(lower[7:], upper[7:], frames)
     joints = figure.forward_kinematics(q)[:, :14]
-    held = []
-    tracemalloc.start()
+    most = []
     built = ReportBuilder(WantedDetail(detail="margins", files=clips))
     for k in range(clips):
         built.add(validator, posture_clip(joints * (1 + 1e-4 * (k % 100))), file=f"clips/walk{k}.npz")
         if k + 1 in (clips // 10, clips):
-            held.append(tracemalloc.get_traced_memory())
-    tracemalloc.stop()
-    (few, few_peak), (many, many_peak) = held
-    each = (many - few) / (clips - clips // 10) / frames
+            most.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
     print(
-        f"{clips} clips of {frames} frames: {few / 1e6:.1f} MB held after a tenth and {many / 1e6:.1f} MB after "
-        f"all, {each:.0f} bytes a frame; at most {few_peak / 1e6:.1f} and {many_peak / 1e6:.1f} MB on the way"
+        f"{clips} clips of {frames} frames: at most {most[0]:.0f} MiB for the first tenth, {most[1]:.0f} MiB for all"
     )
 
 
