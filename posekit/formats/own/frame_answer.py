@@ -51,7 +51,7 @@ class FrameAnswer:
 
     representatives: NDArray[np.intp] = column(
         "Numbers of the postures that stand for all, from 0, the likeliest first: they hold 95 % of the probability "
-        "with what is within 5 cm of them.",
+        "with what is within 5 cm of them, or all that is listed.",
         kind="int",
     )
     probability: Array = column("Of each of these and what it stands for.", digits=4)
