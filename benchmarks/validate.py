@@ -113,9 +113,8 @@ def moving(lower: np.ndarray, upper: np.ndarray, n: int) -> np.ndarray:
     """Return joint angles (n, len(lower)) that swing by a tenth of their ranges around zero, at 0.1 to 0.5 Hz."""
     rng = np.random.default_rng(2)
     phase = np.arange(n)[:, None] / RATE * 2 * np.pi * rng.uniform(0.1, 0.5, len(lower))
-    return np.clip(
-        0.1 * (upper - lower) * np.sin(phase + rng.uniform(0, 2 * np.pi, len(lower))), lower, upper
-    )
+    swing = 0.1 * (upper - lower) * np.sin(phase + rng.uniform(0, 2 * np.pi, len(lower)))
+    return np.asarray(np.clip(swing, lower, upper))
 
 
 def motion(name: str, bodies: str, n: int) -> None:
