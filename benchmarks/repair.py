@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from benchmarks.clean_clips import CleanClip, clean_clips, up_of
+from benchmarks.clean_clips import CleanClip, clean_clips
 from benchmarks.defects import DEFECTS, draw
 from posekit.body import with_head
 from posekit.body.measured import MeasuredPerson, measured_person
@@ -237,7 +237,7 @@ def clip_rows(
             if case is None:
                 continue
             clean = next(one.clip for one in clips if one.name == case.source)
-            clip = with_ground(case.clip, clean)
+            clip = case.clip
             if not rejected(clip, judge).any():
                 continue
             found += 1
@@ -261,14 +261,6 @@ def clip_rows(
 def distance(some: Array, others: Array) -> float:
     """Return the root of the sum of squares over frames, joints and axes, metres."""
     return float(np.sqrt(np.nansum((some - others) ** 2)))
-
-
-def with_ground(clip: MotionClip, clean: MotionClip) -> MotionClip:
-    """Say of a clip where the ground of the clean one is."""
-    points = (
-        clean.joints if np.isnan(clean.feet).all() else np.concatenate([clean.joints, clean.feet], axis=1)
-    )
-    return replace(clip, ground=float(np.nanpercentile(np.nanmin(points @ up_of(clean), axis=1), 5)))
 
 
 def rejected(clip: MotionClip, judge: Validator) -> NDArray[np.bool_]:
