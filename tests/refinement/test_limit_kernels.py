@@ -25,7 +25,9 @@ def test_the_least_cosine_is_one() -> None:
     assert LEAST_COSINE == MIN_COSINE
 
 
-@pytest.mark.parametrize("possible", [list(LIMB_BRANCHES), list(LIMB_BRANCHES[:1]), list(LIMB_BRANCHES[1::2])])
+@pytest.mark.parametrize(
+    "possible", [list(LIMB_BRANCHES), list(LIMB_BRANCHES[:1]), list(LIMB_BRANCHES[1::2])]
+)
 def test_branches_are_those_that_numpy_finds(
     possible: list[tuple[int, float]], rng: np.random.Generator
 ) -> None:
