@@ -19,6 +19,5 @@ print(f"{report.valid.sum()} of {len(joints)} postures are valid")
 joints[0, 8] += [0.0, 0.0, 0.4]  # tear the right wrist away
 report = posekit.Validator(figure).check(joints[:1])
 worst = report.judgements[0]
-print(
-    f"{report.verdicts[0]}: {worst.where[np.nanargmin(worst.margin[0])]} is {-worst.worst[0]:.2f} m beyond the tolerance"
-)
+where = worst.where[np.nanargmin(worst.margin[0])]
+print(f"{report.verdicts[0]}: {where} is {-worst.worst[0]:.2f} m beyond the tolerance")

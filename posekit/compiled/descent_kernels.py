@@ -27,7 +27,7 @@ def eliminate_blocks(matrix: Array, right: Array) -> None:
     for j in range(k):
         for n in range(B):
             pivot = matrix[j, j, n]
-            if pivot < MIN_PIVOT:
+            if pivot < MIN_PIVOT:  # noqa: PLR1730 - what is no number stays so
                 pivot = MIN_PIVOT
             matrix[j, j, n] = math.sqrt(pivot)
         for i in range(j + 1, k):

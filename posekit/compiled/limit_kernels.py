@@ -93,7 +93,7 @@ def judge_balls(
         az = cosine * parent[2, 0, n] - sine * parent[2, 2, n]
         fx, fy, fz = child[0, 0, n], child[1, 0, n], child[2, 0, n]
         turned = (uy * az - uz * ay) * fx + (uz * ax - ux * az) * fy + (ux * ay - uy * ax) * fz
-        least = max(h, LEAST_COSINE) if h == h else h
+        least = h if math.isnan(h) else max(h, LEAST_COSINE)
         square = least * least
         for k in range(3):
             angle = math.atan2(sine, cosine)

@@ -46,8 +46,10 @@ def test_all_reports_say_the_same_of_every_frame(run):
         rows = list(csv.DictReader(file))
     parquet = pytest.importorskip("pyarrow.parquet").read_table("r.parquet").to_pylist()
     assert len(report.postures) == len(rows) == len(parquet) == len(CLIPS) * FRAMES
+    assert report.clips is not None
     for posture, row, cells in zip(report.postures, rows, parquet, strict=True):
         assert posture.verdict == row["verdict"] == cells["verdict"]
+        assert posture.clip is not None and posture.worst is not None
         name = report.clips[posture.clip].clip
         assert (cells["file"], cells["clip"]) == ("clips.npz", name)
         assert row["clip"] == (f"'{name}" if name.startswith("=") else name)
@@ -81,14 +83,15 @@ def test_markdown_has_no_markup_from_files(run):
 def test_a_jump_is_a_span_of_its_clip_alone(run):
     write_clips()
     run("clips.npz", *OPTIONS, "-o", "r.json")
-    walk, still, jumps = read_report("r.json").clips
+    walk, still, jumps = read_report("r.json").clips or ()
     assert (walk.verdict, walk.spans, walk.good, walk.rejected_share) == ("valid", (), (0, FRAMES - 1), 0.0)
     assert still.verdict == "valid"
     assert jumps.verdict == "invalid"
-    assert abs(jumps.first_frame - JUMP) <= 2
+    assert jumps.first_frame is not None and abs(jumps.first_frame - JUMP) <= 2
     assert {span.check for span in jumps.spans} == {"speed"}
     assert all(JUMP - 2 <= span.first <= span.last <= JUMP + 2 for span in jumps.spans)
-    assert jumps.spans[0].value > jumps.spans[0].bound
+    value, bound = jumps.spans[0].value, jumps.spans[0].bound
+    assert value is not None and bound is not None and value > bound
     assert jumps.seconds == pytest.approx((FRAMES - 1) / 30)
 
 

@@ -191,7 +191,7 @@ def test_lifted_predictions_are_points_in_space_with_names_and_without(tmp_path:
 
 
 def test_people_who_are_tracked_are_a_clip_each_and_others_refused(tmp_path: Path) -> None:
-    people = [
+    people: list[dict[str, Any]] = [
         {
             "frame_id": k,
             "instances": [lifted(points, track_id=7), lifted(points + np.array([0.0, 1.0, 0.0]), track_id=9)],
@@ -253,7 +253,7 @@ def test_caliscopes_points_of_the_body_are_read_and_others_left_out(tmp_path: Pa
     rows = [(5 + k, j, *mediapipe()[k, j]) for k in range(FRAMES) for j in range(33) if (k, j) != (3, 25)]
     rows += [(5, 100 + j, 9.0, 9.0, 9.0) for j in range(21)]
     found = held(caliscope(tmp_path / "a.csv", rows))
-    known = np.isfinite(found.postures.joints).all(axis=-1)
+    known = np.asarray(np.isfinite(found.postures.joints).all(axis=-1))
     assert not known[3, JOINTS.index("left_knee")] and known.sum() == FRAMES * len(JOINTS) - 1
     seen = held(caliscope(tmp_path / "d.csv", [row for row in rows if row[0] != 9]), rate=10.0)
     assert len(seen) == FRAMES and np.isnan(seen.postures.joints[4]).all() and seen.time[5] == 0.5

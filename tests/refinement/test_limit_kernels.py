@@ -46,9 +46,9 @@ def test_balls_are_judged_as_numpy_does(watched: bool, spread: float, rng: np.ra
     bounds = FigureNumbers.of(load_figure()).pelvis_bounds
     parent = Rotation.random(MANY, random_state=1).as_matrix()
     child = parent @ Rotation.from_rotvec(spread * rng.standard_normal((MANY, 3))).as_matrix()
-    given = [np.moveaxis(each, 0, -1) for each in (parent, child)]
+    mother, daughter = (np.moveaxis(each, 0, -1) for each in (parent, child))
     watch = rng.integers(-1, 2, (3, MANY)).astype(np.int8) if watched else None
-    expected, found = summed_ball(*given, bounds, watch), looped_ball(*given, bounds, watch)
+    expected, found = (each(mother, daughter, bounds, watch) for each in (summed_ball, looped_ball))
     np.testing.assert_allclose(found.residual, expected.residual, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(found.crossed, expected.crossed)
     assert (found.jacobian is None) == (expected.jacobian is None)

@@ -81,8 +81,10 @@ def test_what_is_cut_out_passes(motion, tmp_path, suffix):
     path = tmp_path / f"clips.{suffix}"
     write_motion(path, motion)
     judged = posekit.validate(path, up="+z")
+    assert judged.clips is not None and judged.frames is not None
     keep_clips(tmp_path / "kept", judged.clips, judged.frames, spans=0.3)
     again = posekit.validate(tmp_path / "kept" / path.name, up="+z")
+    assert again.clips is not None
     assert [clip.verdict for clip in again.clips] == ["valid"] * CLIPS
     assert [clip.frames for clip in again.clips] == [clip.good[1] - clip.good[0] + 1 for clip in judged.clips]
     assert [clip.clip for clip in again.clips] == ["first", "second", "third"]

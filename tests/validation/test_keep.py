@@ -9,6 +9,7 @@ import pytest
 from posekit.errors import InputError
 from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ClipName, ReportFrames
+from posekit.formats.own.report_schema import Verdict
 from posekit.validation.keep import MANIFEST_NAME, keep_clips, names_below
 
 FRAMES = 10
@@ -19,7 +20,7 @@ def a_file(path: Path) -> None:
     np.savez(path, q=np.arange(3.0 * FRAMES).reshape(FRAMES, 3), fps=np.array(10.0))
 
 
-def judged(*files: tuple[Path, str, tuple[int, ...]]) -> tuple[list[ClipVerdict], ReportFrames]:
+def judged(*files: tuple[Path, Verdict, tuple[int, ...]]) -> tuple[list[ClipVerdict], ReportFrames]:
     """Return verdicts on files of one clip: the path, the verdict, the longest good span."""
     count = len(files)
     clips = [

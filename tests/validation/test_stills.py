@@ -7,6 +7,7 @@ from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own import Postures
 from posekit.formats.own.report_clips import ClipVerdict, Span, Still
+from posekit.formats.own.report_schema import Verdict
 from posekit.validation.stills import MOST_STILLS, stills_of, worst_stills
 
 
@@ -23,7 +24,7 @@ def a_span(frame: int) -> Span:
     )
 
 
-def a_clip(*frames: int, bad: int = 1, verdict: str = "invalid") -> ClipVerdict:
+def a_clip(*frames: int, bad: int = 1, verdict: Verdict = "invalid") -> ClipVerdict:
     spans = [a_span(frame) for frame in frames]
     return ClipVerdict(file="a", clip="", verdict=verdict, frames=20, invalid=bad, undecided=0, spans=spans)
 
@@ -46,6 +47,7 @@ def test_frames_stand_upright_in_their_own_middle_and_keep_their_shape(rng, up):
     heights = joints[7] @ UP_DIRECTIONS[up]
     np.testing.assert_allclose(first.points[:, 2], heights - heights.mean(), atol=1e-6)
     np.testing.assert_allclose(first.points.mean(axis=0), 0, atol=1e-6)
+    assert first.before is not None
     for a, b in ((first.points, first.points), (first.points, first.before)):
         ours = np.linalg.norm(a[:, None] - b[None], axis=-1)
         other = joints[7] if b is a else joints[6]

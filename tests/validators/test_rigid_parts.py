@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -32,6 +33,13 @@ def postures(n: int, seed: int = 3) -> np.ndarray:
 
 
 EACH = RigidTolerance(shoulders=0.01, sides=0.04, hips=0.02)
+
+
+def _with(name: str, tolerance: float) -> RigidTolerance:
+    changed: dict[str, Any] = {name: tolerance}
+    return replace(EACH, **changed)
+
+
 OWN = dict(zip(NAMES, (0.01, 0.04, 0.04, 0.02), strict=True))
 
 
@@ -250,7 +258,7 @@ def test_a_looser_tolerance_of_one_distance_never_rejects_more(name: str, rng: n
     points = postures(200) + rng.normal(size=(200, 19, 3)) * 0.01
     rejected = []
     for tolerance in (0.0, 0.01, 0.03, 0.2):
-        findings = judge(points, tolerance=replace(EACH, **{name: tolerance}), mode="distances").values()
+        findings = judge(points, tolerance=_with(name, tolerance), mode="distances").values()
         rejected.append(np.any([f.violated[:, 0] for f in findings], axis=0))
     for strict, loose in pairwise(rejected):
         assert (strict | ~loose).all()
@@ -281,7 +289,7 @@ def test_a_segment_may_have_a_tolerance_of_its_own() -> None:
 @pytest.mark.parametrize("name", ["shoulders", "sides", "hips"])
 def test_a_tolerance_that_is_no_length_is_refused(name: str, value: float) -> None:
     with pytest.raises(InputError, match=rf"the rigid tolerance of {name} is {value!r} m; expected zero or"):
-        replace(EACH, **{name: value})
+        _with(name, value)
 
 
 def test_a_suite_takes_one_tolerance_or_one_each() -> None:

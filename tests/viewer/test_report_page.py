@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from posekit.formats.own.report import ValidationReport
 from posekit.formats.own.report_clips import ClipVerdict, Span, Still
@@ -25,7 +27,7 @@ def browser(request) -> Iterator[Browser]:
 
 
 def a_span(first: int, last: int, **changes) -> Span:
-    given = {
+    given: dict[str, Any] = {
         "check": "speed",
         "where": "right_wrist",
         "unit": "m/s",
@@ -139,7 +141,11 @@ def test_postures_alone_have_a_page_too(browser, tmp_path):
 
 def test_a_timeline_draws_each_span_where_it_is(tmp_path):
     figure = plot_timelines([a_clip(count=4)])
-    bars = {patch.get_gid(): patch for patch in figure.axes[0].patches if patch.get_gid()}
+    bars = {
+        gid: patch
+        for patch in figure.axes[0].patches
+        if (gid := patch.get_gid()) and isinstance(patch, Rectangle)
+    }
     assert {name for name in bars if name != "good"} == {
         *(f"speed/right_wrist:{5 + 10 * k}-{7 + 10 * k}" for k in range(4)),
         "collision:40-49",
