@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,42 +90,44 @@ def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:
 
     Where two checks judge the same place, the later one knows more joints, and holds where it is decided.
     """
-    judgements = []
-    for name in dict.fromkeys(check.name for check in checks):
-        columns: dict[str, tuple[str, Array, Array, Array, Array, NDArray[np.bool_]]] = {}
-        for check in checks:
-            if check.name != name:
-                continue
-            findings = check.judge(points[:, list(check.points)])
-            shape = findings.value.shape
-            lower, upper = np.broadcast_to(findings.lower, shape), np.broadcast_to(findings.upper, shape)
-            for k, where in enumerate(check.where):
-                new = (
-                    findings.value[:, k],
-                    lower[:, k],
-                    upper[:, k],
-                    findings.margin[:, k],
-                    findings.violated[:, k],
-                )
-                if where in columns:
-                    undecided = np.isnan(new[3])
-                    old = columns[where][1:]
-                    new = tuple(np.where(undecided, o, n) for o, n in zip(old, new, strict=True))  # type: ignore[assignment]
-                columns[where] = (check.unit, *new)
-        table = list(columns.values())
-        value, lower, upper, margin, violated = (
-            np.stack([column[i] for column in table], axis=1) for i in range(1, 6)
+    return [
+        _gathered(name, [check for check in checks if check.name == name], points)
+        for name in dict.fromkeys(check.name for check in checks)
+    ]
+
+
+def _gathered(name: str, checks: Sequence[Check], points: Array) -> Judgement:
+    """Ask the checks of one validator, each place of which has one column."""
+    units: dict[str, str] = {}
+    for check in checks:
+        units |= dict.fromkeys(check.where, check.unit)
+    column = {where: k for k, where in enumerate(units)}
+    # A column lies in one piece: it is written, and mostly read, as a whole.
+    value, lower, upper, margin = np.empty((4, len(units), len(points)))
+    violated = np.empty((len(units), len(points)), dtype=np.bool_)
+    written: set[str] = set()
+    for check in checks:
+        findings = check.judge(points[:, list(check.points)])
+        shape = findings.value.shape
+        new = (
+            findings.value,
+            np.broadcast_to(findings.lower, shape),
+            np.broadcast_to(findings.upper, shape),
+            findings.margin,
+            findings.violated,
         )
-        judgements.append(
-            Judgement(
-                check=name,
-                where=tuple(columns),
-                unit=tuple(column[0] for column in table),
-                value=value,
-                lower=lower,
-                upper=upper,
-                margin=margin,
-                violated=violated.astype(bool),
-            )
-        )
-    return judgements
+        for k, where in enumerate(check.where):
+            known: Any = ~np.isnan(new[3][:, k]) if where in written else True
+            for held, found in zip((value, lower, upper, margin, violated), new, strict=True):
+                np.copyto(held[column[where]], found[:, k], where=known)
+        written.update(check.where)
+    return Judgement(
+        check=name,
+        where=tuple(units),
+        unit=tuple(units.values()),
+        value=value.T,
+        lower=lower.T,
+        upper=upper.T,
+        margin=margin.T,
+        violated=violated.T,
+    )

@@ -14,6 +14,9 @@ from posekit.validators.motion.clip import MotionClip
 LONGEST_GAP: Final = 16
 """Slots that a gap is given at most: longer ones say nothing more."""
 
+CACHED_SLOTS: Final = 256
+"""Slots that are filtered at a time."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Timeline:
@@ -75,9 +78,12 @@ def filtered(points: Array, weights: Array) -> Array:
     """Sum `weights` (K,) over K neighbouring slots of (S, ...): (S - K + 1, ...)."""
     room = max(len(points) - len(weights) + 1, 0)
     total = np.zeros((room, *points.shape[1:]))
-    for k, weight in enumerate(weights):
-        if weight:
-            total += weight * points[k : k + room]
+    # So many slots at a time stay in the cache while all weights are gone through.
+    for start in range(0, room, CACHED_SLOTS):
+        part = total[start : start + CACHED_SLOTS]
+        for k, weight in enumerate(weights):
+            if weight:
+                part += weight * points[start + k : start + k + len(part)]
     return total
 
 
