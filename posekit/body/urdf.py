@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import deepcopy
+from functools import lru_cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -106,7 +108,7 @@ def rewrite(
     str
         URDF text.
     """
-    robot = parse(text, "stick figure")
+    robot = deepcopy(_parsed(text))
     torso, hips = torso_points(lengths, behind=behind), hips_points(lengths)
     origins = {
         "right_shoulder_flexion": torso[1],
@@ -147,12 +149,18 @@ def rewrite(
 
 def replace_limits(text: str, limits: Mapping[str, tuple[float, float]]) -> str:
     """Write the figure's URDF with other limits (radians) on some joints."""
-    robot = parse(text, "stick figure")
+    robot = deepcopy(_parsed(text))
     for name, (lower, upper) in limits.items():
         limit = _find(robot, f"joint[@name='{name}']/limit")
         limit.set("lower", repr(float(lower)))
         limit.set("upper", repr(float(upper)))
     return _text(robot)
+
+
+@lru_cache(maxsize=4)
+def _parsed(text: str) -> ElementTree.Element:
+    """Parse the URDF of a figure of which many others are made: whoever changes the tree changes a copy."""
+    return parse(text, "stick figure")
 
 
 def _text(robot: ElementTree.Element) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from posekit.formats.own.report import Finding, PostureReport, ValidationReport
 from posekit.formats.own.report_columns import known_number
 from posekit.formats.own.report_schema import VERDICT_NAMES
+from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal, shown
 from posekit.tree.check import Findings
 
@@ -111,17 +113,28 @@ def _list_findings(rows: list[list[Finding]], check: JudgedCheck, every: bool) -
         listed[np.arange(len(value)), worst] = True
     if check.over_time:
         listed &= ~undecided
-    for posture, place in np.argwhere(listed).tolist():
-        at = posture, place
+    postures, places = np.nonzero(listed)
+    verdicts = np.where(violated, "invalid", np.where(undecided, "undecided", "valid"))[listed]
+    numbers = (value, lower, upper, np.where(undecided, np.nan, margin))
+    columns = (_known_numbers(column[listed]) for column in numbers)
+    for posture, place, verdict, *found_numbers in zip(
+        postures.tolist(), places.tolist(), verdicts.tolist(), *columns, strict=True
+    ):
+        number, low, high, inside = found_numbers
         rows[posture].append(
             Finding(
                 check=check.check,
                 where=check.where[place],
-                value=known_number(value[at]),
-                lower=known_number(lower[at]),
-                upper=known_number(upper[at]),
-                margin=None if undecided[at] else known_number(margin[at]),
+                value=number,
+                lower=low,
+                upper=high,
+                margin=inside,
                 unit=check.unit,
-                verdict="invalid" if violated[at] else "undecided" if undecided[at] else "valid",
+                verdict=verdict,
             )
         )
+
+
+def _known_numbers(column: Array) -> list[float | None]:
+    """Return numbers (N,) as `known_number` does each."""
+    return [number if math.isfinite(number) else None for number in column.astype(np.float64).tolist()]
