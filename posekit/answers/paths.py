@@ -26,7 +26,7 @@ class PathAnswer:
     probability : array (K,)
         Of each representative and what it stands for; 0.95 or more together.
     frames : tuple of Answer (T,)
-        Of each frame, over all paths.
+        Of each frame, over all paths; what the frame does not list is left out of their probabilities.
     """
 
     rows: NDArray[np.intp]
@@ -76,6 +76,7 @@ def path_answer(following: Following) -> PathAnswer:
     """
     frames = following.joints.shape[1]
     share = np.asarray(following.share, dtype=np.float64)
+    unlisted = [0.0] * frames if following.unlisted is None else following.unlisted.tolist()
     rows, probability = distinct_paths(following.joints, share)
     variance = np.where(np.isfinite(following.deviation), following.deviation, np.nan) ** 2
     return PathAnswer(
@@ -88,6 +89,7 @@ def path_answer(following: Following) -> PathAnswer:
                         joints=following.joints[:, t],
                         probability=share,
                         uncertainty=variance[:, t, :, None, None] * np.eye(3),
+                        unlisted=unlisted[t],
                     )
                     for t in range(frames)
                 ]

@@ -50,6 +50,9 @@ class Following:
         Whether no path was left out that could be likelier than the likeliest single one.
     apart : float
         Metres by which some joint is elsewhere in another path.
+    unlisted : array (T,), optional
+        What the survivors of each frame hold at most that are not listed, and through which no path goes; nothing if
+        not given.
     """
 
     time: Array
@@ -65,6 +68,7 @@ class Following:
     scale: Array | None
     exact: bool
     apart: float = PATH_SEPARATION_METRES
+    unlisted: Array | None = None
 
     def __post_init__(self) -> None:
         for value in vars(self).values():

@@ -259,4 +259,5 @@ def _following(
         scale=scale,
         exact=paths.exact,
         apart=apart,
+        unlisted=np.array([frame.unlisted_probability for frame in frames]),
     )

@@ -13,7 +13,9 @@ from posekit.answers import Answer
 from posekit.errors import InputError
 from posekit.formats.own import Inferred, PostureSet, Result, View, read_postures, read_result, write_result
 from posekit.formats.own.column import columns_in
+from posekit.formats.own.digits import FEWEST_DECIMALS
 from posekit.formats.own.frame_answer import FrameAnswer
+from posekit.formats.own.units import UNIT_NAMES
 from posekit.inspection.results import result_lines
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import MAX_DETAILED, result_of
@@ -101,6 +103,17 @@ def test_json_and_npz_of_noisy_frames_agree_to_the_digits_that_they_have(tmp_pat
             np.testing.assert_allclose(
                 read.posture_set.limb_joints, frame.posture_set.limb_joints, atol=deviation / 10
             )
+
+
+def test_noisy_frames_in_millimetres_take_fewer_bytes_than_in_metres(tmp_path, noisy):
+    size = {}
+    for unit in UNIT_NAMES:
+        path = tmp_path / f"{unit}.json"
+        write_result(path, replace(result_of(noisy), unit=unit))
+        size[unit] = path.stat().st_size
+        for one, frame in zip(read_result(path).frames, noisy.frames, strict=True):
+            assert np.abs(one.joints - frame.joints).max() <= 10.0**-FEWEST_DECIMALS
+    assert size["mm"] < size["cm"] < size["m"]
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.own.digits import shortened
+from posekit.formats.own.digits import shortened, whole_as_integers
 from posekit.formats.own.family import Family
 from posekit.formats.own.frame_answer import ANSWER_PRECISION, FrameAnswer
 from posekit.formats.own.frame_tables import table_fields, table_of
@@ -129,7 +129,7 @@ def _frames(result: Result) -> Iterator[dict[str, Any]]:
             fields["root"] = shortened(root) if precision else root
         if frame.pruned is not None:
             fields["pruned"] = [dict(entry) for entry in frame.pruned]
-        yield fields
+        yield whole_as_integers(fields) if precision else fields
 
 
 def _length(value: Any, unit: Unit) -> Any:
