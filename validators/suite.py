@@ -90,24 +90,26 @@ def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:
 
     Where two checks judge the same place, the later one knows more joints, and holds where it is decided.
     """
+    # Each point in one piece: checks read a few of them, over all postures.
+    by_point = np.ascontiguousarray(np.moveaxis(points, 1, 0))
     return [
-        _gathered(name, [check for check in checks if check.name == name], points)
+        _gathered(name, [check for check in checks if check.name == name], by_point)
         for name in dict.fromkeys(check.name for check in checks)
     ]
 
 
-def _gathered(name: str, checks: Sequence[Check], points: Array) -> Judgement:
-    """Ask the checks of one validator, each place of which has one column."""
+def _gathered(name: str, checks: Sequence[Check], by_point: Array) -> Judgement:
+    """Ask the checks of one validator about points (19, N, 3); each of its places has one column."""
     units: dict[str, str] = {}
     for check in checks:
         units |= dict.fromkeys(check.where, check.unit)
     column = {where: k for k, where in enumerate(units)}
     # A column lies in one piece: it is written, and mostly read, as a whole.
-    value, lower, upper, margin = np.empty((4, len(units), len(points)))
-    violated = np.empty((len(units), len(points)), dtype=np.bool_)
+    value, lower, upper, margin = np.empty((4, len(units), by_point.shape[1]))
+    violated = np.empty((len(units), by_point.shape[1]), dtype=np.bool_)
     written: set[str] = set()
     for check in checks:
-        findings = check.judge(points[:, list(check.points)])
+        findings = check.judge(np.moveaxis(by_point[list(check.points)], 0, 1))
         shape = findings.value.shape
         new = (
             findings.value,
@@ -117,9 +119,9 @@ def _gathered(name: str, checks: Sequence[Check], points: Array) -> Judgement:
             findings.violated,
         )
         for k, where in enumerate(check.where):
-            known: Any = ~np.isnan(new[3][:, k]) if where in written else True
+            known: Any = ~np.isnan(new[3][:, k]) if where in written else slice(None)
             for held, found in zip((value, lower, upper, margin, violated), new, strict=True):
-                np.copyto(held[column[where]], found[:, k], where=known)
+                held[column[where], known] = found[known, k]
         written.update(check.where)
     return Judgement(
         check=name,
