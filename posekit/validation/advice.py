@@ -24,6 +24,12 @@ MOST_OF_THEM: Final = 0.95
 MANY_METRES: Final = 3.0
 """Metres: what misses a length by so much is in another unit."""
 
+CAUSING_CHECKS: Final = ("timing", "repeated", "swap", "teleport")
+"""Checks that name what others fail by, too."""
+
+ALMOST_AS_MANY: Final = 0.9
+"""Share of the most frequent violation's postures from which a cause is said instead."""
+
 INVALID_VERDICT: Final = 1
 """Of a verdict in `VerdictColumns.verdict`."""
 
@@ -40,9 +46,14 @@ def why_most_fail(columns: VerdictColumns, told: Mapping[str, Any]) -> str:
     """
     if not np.any(columns.verdict == INVALID_VERDICT) or not len(columns.place):
         return ""
-    most = int(np.bincount(columns.place).argmax())
+    often = np.bincount(columns.place, minlength=len(columns.places))
+    many = often >= ALMOST_AS_MANY * often.max()
+    causes = [k for k in np.flatnonzero(many).tolist() if columns.places[k].check in CAUSING_CHECKS]
+    most = int(causes[0] if causes else often.argmax())
     mine, place = columns.place == most, columns.places[most]
     count, beyond = len(np.unique(columns.posture[mine])), -columns.margin[mine]
+    if place.check == "swap":
+        return f"{count} of {len(columns)} postures have left and right exchanged: put them right by --repair FILE"
     check = place.check.replace("_", "-")
     return (
         f"{count} of {len(columns)} postures fail by {place.where} ({check}), by "
@@ -74,7 +85,10 @@ def _remedy(place: ReportPlace, by: float, told: Mapping[str, Any]) -> str:
         return f"try --contact-margin {margin}cm: bodies are capsules, and flesh gives"
     if place.check in ("walking", "balance"):
         return f"leave {place.check} out of --checks where it is not asked for"
-    return "leave such frames out (--keep, --keep-spans), or give your own threshold (--profile FILE)"
+    return (
+        "leave such frames out (--keep, --keep-spans), repair them (--repair FILE), or give your own threshold "
+        "(--profile FILE)"
+    )
 
 
 def _centimetres(said: Any) -> float:

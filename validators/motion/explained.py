@@ -20,7 +20,7 @@ from posekit.geometry import Array
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.duplicates import duplicates
 from posekit.validators.motion.jumps import Jumps, jumps_of
-from posekit.validators.motion.order import displaced, stretches_of
+from posekit.validators.motion.order import ORDERED_RATE, displaced, stretches_of
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, timeline_of
 from posekit.validators.motion.trembling import trembling_of, usual_trembling
@@ -86,7 +86,8 @@ def _explain(clip: MotionClip) -> Explained:
     joints = np.where((repeats > 0)[:, None, None], np.nan, joints) if repeats.any() else joints
     known = repeats == 0
     places = np.zeros(len(joints), dtype=np.intp)
-    places[known] = displaced(joints[known])
+    if not clip.rate < ORDERED_RATE:
+        places[known] = displaced(joints[known])
     rearranged = stretches_of(places)
     if places.any():
         joints = np.where(rearranged[:, None, None], np.nan, joints)

@@ -31,6 +31,9 @@ LEAST_METRES: Final = 0.005
 LEAST_JOINTS: Final = 3
 """That move: one or two that turn back tremble."""
 
+ORDERED_RATE: Final = 20.0
+"""Frames a second from which motion tells their order: at fewer, people turn back between two frames."""
+
 TURNS_APART: Final = 6
 """Frames between two turns back that are one stretch."""
 

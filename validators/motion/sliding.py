@@ -36,6 +36,13 @@ EVEN_SHARE: Final = 0.3
 BEND_FRAMES: Final = 8
 """How far the start of a slide may be from where it was first found."""
 
+VIDEO_RATE: Final = 29.0
+SLOW_FACTOR: Final = 2.0
+"""Times as long a slide lasts at fewer frames a second than that: medians over `USUAL_FRAMES` hide a foot's roll."""
+
+SLIDING_RATE: Final = 15.0
+"""Frames a second at which feet are seen to rest."""
+
 USUAL_FRAMES: Final = 5
 """Frames of which the median velocity is taken: a point that trembles does so from frame to frame."""
 
@@ -73,7 +80,8 @@ class Sliding(MotionCheck):
 
     def not_asked(self, clip: MotionClip) -> str:
         """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
+        few = f"it needs {SLIDING_RATE:g} frames a second" if clip.rate < SLIDING_RATE else ""
+        return super().not_asked(clip) or few or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how fast each foot slides; see `MotionCheck`."""
@@ -101,7 +109,8 @@ class Sliding(MotionCheck):
         return Findings(value=line.of_frames(value), lower=np.array(-np.inf), upper=np.array(self.fastest))
 
     def _frames(self, clip: MotionClip) -> int:
-        return max(3, round(self.lasting / clip.step))
+        lasting = self.lasting * (SLOW_FACTOR if clip.rate < VIDEO_RATE else 1.0)
+        return max(3, round(lasting / clip.step))
 
     def _slides(
         self, clip: MotionClip, points: Array, down: NDArray[np.bool_], up: Array

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -14,6 +15,10 @@ from posekit.validators.motion.motion_check import MotionCheck
 
 NOISE_FACTOR = 5.0
 """Standard deviations of measuring by which a frame may be off."""
+
+
+JUMPING_RATE: Final = 15.0
+"""Frames a second: at fewer, limbs that are thrown jump."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +46,11 @@ class Teleport(MotionCheck):
         """Name the joints and the body; see `MotionCheck`."""
         del clip
         return (*JOINTS, "body")
+
+    def not_asked(self, clip: MotionClip) -> str:
+        """Ask nothing of clips at few frames a second; see `MotionCheck`."""
+        few = f"it needs {JUMPING_RATE:g} frames a second" if clip.rate < JUMPING_RATE else ""
+        return super().not_asked(clip) or few
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure what neighbours on both sides do not explain; see `MotionCheck`."""
