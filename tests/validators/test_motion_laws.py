@@ -150,6 +150,11 @@ def test_a_mirror_image_is_rejected_on_the_other_side(name: str) -> None:
     }
 
 
+@pytest.mark.parametrize("rate", [8.0, 10.0, 12.0, 15.0, 20.0, 24.0, 25.0])
+def test_few_frames_a_second_of_the_same_motion_raise_no_alarm(rate: float) -> None:
+    assert named(walking(int(6 * rate), rate=rate)) == {}
+
+
 @pytest.mark.parametrize("rate", [60.0, 120.0, 240.0])
 def test_more_frames_a_second_of_the_same_motion_change_nothing(rate: float) -> None:
     assert named(walking(int(3 * rate), rate=rate)) == {}
