@@ -323,10 +323,13 @@ class Validator:
         """Return figure and checks for a person; the last are kept, for a recording that is judged in parts."""
         allowed = Allowance(settings=self.settings, person=person)
         noise = tuple(map(allowed.off, ("", *LIMB_NAMES)))
-        key = tuple(person.lengths.items()), person.behind, person.hips_forward, noise
+        body = tuple(person.lengths.items()), person.behind
+        key = body, str(person.hips_forward), noise
         if self._person is None or self._person[0] != key:
             figure = self.figure
-            if self.lengths == "median" and person.lengths:
+            if self._person is not None and self._person[0][0] == body:
+                figure = self._person[1]
+            elif self.lengths == "median" and person.lengths:
                 figure = figure_of(figure, person.lengths, person.behind)
             self._person = key, figure, self._make_suite(figure, allowed)
         return self._person[1:]

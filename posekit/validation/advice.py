@@ -15,6 +15,9 @@ from posekit.settings import DEFAULT_RANGES, EXACT_TOLERANCE
 FEW_DEGREES: Final = 15.0
 """Degrees within which somebody may well be more mobile, or a skeleton's joints placed otherwise."""
 
+FULL_TURN_DEGREES: Final = 360.0
+"""No joint is beyond its limit by so much whose angles are in radians."""
+
 FEW_METRES: Final = 0.15
 """Metres by which a length may be off that a wider tolerance is worth trying for."""
 
@@ -66,6 +69,8 @@ def _remedy(place: ReportPlace, by: float, told: Mapping[str, Any]) -> str:
     """Say what to try, where most of the postures that fail do so by no more than this."""
     ours = told.get("urdf") in (None, "stick_figure", "as recovered")
     if place.check == "joint_range":
+        if not ours and by > FULL_TURN_DEGREES:
+            return "its angles are in degrees, as it seems: give radians"
         if ours and told.get("ranges") not in (None, DEFAULT_RANGES):
             return f"try --ranges {DEFAULT_RANGES}, which real people pass"
         if by <= FEW_DEGREES:

@@ -214,7 +214,7 @@ def _taken(arrays: Sequence[NDArray[Any] | None], rows: Sequence[NDArray[np.intp
 def _key(person: MeasuredPerson) -> tuple[Any, ...]:
     """Return what is the same of two people who are judged alike."""
     limbs = tuple(person.noise_by_limb.items())
-    return tuple(person.lengths.items()), person.behind, str(person.noise), limbs
+    return tuple(person.lengths.items()), person.behind, str(person.hips_forward), str(person.noise), limbs
 
 
 def _ordered(validator: Validator, given: NamedConfigurations) -> NDArray[np.float64]:

@@ -42,13 +42,13 @@ def recordings_of(joints: NDArray[np.float64], clip: NDArray[np.intp] | None) ->
 
 
 def _measured(joints: NDArray[np.float64]) -> MeasuredPerson:
-    """Measure a person to a hundredth of a millimetre, so that two clips of one skeleton have the same."""
+    """Measure a person to a hundredth of a millimetre and a degree, so that clips of one skeleton have the same."""
     found = measured_person(joints)
     return replace(
         found,
         lengths={name: round(length, DECIMALS_OF_METRES) for name, length in found.lengths.items()},
         noise=round(found.noise, DECIMALS_OF_METRES),
-        hips_forward=round(found.hips_forward, 3),
+        hips_forward=float(np.round(found.hips_forward)),
         noise_by_limb={name: round(noise, DECIMALS_OF_METRES) for name, noise in found.noise_by_limb.items()},
     )
 

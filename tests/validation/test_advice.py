@@ -7,6 +7,8 @@ import pytest
 
 import posekit
 from posekit.body import load_figure
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.own import NamedConfigurations, Postures
 from posekit.skeleton import JOINT, JOINTS, other_side
 
 
@@ -28,3 +30,34 @@ def test_exchanged_sides_are_the_reason_and_not_what_they_cause(first: int) -> N
     report = posekit.validate(joints, rate=30.0, up="+z")
     assert "have left and right exchanged: put them right by --repair" in report.settings["why"]
     assert report.columns is not None and report.columns.summary["valid"] == 60
+
+
+def test_angles_in_degrees_are_told_by_their_size() -> None:
+    q = np.zeros((20, 29 + 7))
+    q[:, 2], q[:, 6], q[:, 7:] = 0.8, 1.0, 20.0
+    report = posekit.validate(NamedConfigurations(q=q), urdf="g1", checks=["joint-range"])
+    assert "its angles are in degrees" in report.settings["why"]
+
+
+def test_a_clip_is_judged_alike_alone_and_beside_others_of_the_same_skeleton() -> None:
+    upright, bent = bent_walk(40), bent_walk(40)
+    hips = [
+        JOINT[name]
+        for name in ("right_hip", "left_hip", "right_knee", "left_knee", "right_ankle", "left_ankle")
+    ]
+    c, s = np.cos(0.9), np.sin(0.9)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    pelvis = bent[:, [JOINT["pelvis"]]]
+    bent[:, hips] = (bent[:, hips] - pelvis) @ turn.T + pelvis
+    both = HeldPostures(
+        postures=Postures(joints=np.concatenate([upright, bent])),
+        frame=np.tile(np.arange(40), 2),
+        clip=np.repeat([0, 1], 40),
+        time=np.tile(np.arange(40) / 30.0, 2),
+        up="+z",
+    )
+    together = posekit.validate(both, checks=["joint-range"])
+    alone = [posekit.validate(one, rate=30.0, up="+z", checks=["joint-range"]) for one in (upright, bent)]
+    assert together.columns is not None
+    margins = [one.columns.worst_margin for one in alone if one.columns is not None]
+    assert np.array_equal(together.columns.worst_margin, np.concatenate(margins))
