@@ -114,9 +114,9 @@ def validate(
 
     if output is not None and (output.is_dir() or not output.suffix):
         outputs = ValidateOutput(page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
-        if outputs != ValidateOutput():
+        if outputs != ValidateOutput() or repair is not None:
             raise InputError(
-                f"-o {output}: a folder has verdicts alone; expected no --page, --timeline or --keep"
+                f"-o {output}: a folder has verdicts alone; expected no --page, --timeline, --keep or --repair"
             )
         files = files_of(given, output)
         _validate_archive(files, output, asked_of(body, stated, judged), jobs, parse_fail_over(fail_over))
@@ -126,7 +126,11 @@ def validate(
     allowed = parse_fail_over(fail_over)
     asked = asked_of(body, stated, judged)
     files = files_of(given, output)
-    distinct(*files, output, page, timeline)
+    distinct(*files, output, page, timeline, keep, repair)
+    if repair is not None:
+        from posekit.conversion.repaired_file import repair_targets
+
+        repair_targets(files, repair)
     with progress("judging", len(files)) as done:
         wanted = WantedDetail(detail=outputs.detail, every=every, distances=distances)
         report = validate_files(files, asked, wanted=wanted, progress=done)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,9 +24,10 @@ from posekit.formats.own.postures_q import NamedConfigurations, write_configurat
 from posekit.geometry import Array
 from posekit.remedy import Repaired, repair, repair_configurations
 from posekit.safe_io import refusal
-from posekit.safe_io.writing import check_target, make_folder
+from posekit.safe_io.writing import check_target, make_folder, safe_stem
 from posekit.skeleton import POINTS
 from posekit.validation.files import AskedValidation
+from posekit.validation.keep import names_below
 from posekit.validation.over_time import clip_of
 from posekit.validation.reading import read_postures_of
 from posekit.validators import Validator
@@ -78,6 +80,41 @@ def check_repair_target(target: Path, clips: int) -> None:
         )
 
 
+def repair_targets(paths: Sequence[Path], target: Path) -> list[Path]:
+    """Say where each file's repair goes: of one to the target, of several to folders below it, named like the files.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files.
+    target : Path
+        A file; or, without suffix, a folder: of several files, and of several clips.
+
+    Raises
+    ------
+    InputError
+        Where several files are to go to one, or a file to where one of them is.
+    """
+    if target.suffix:
+        if len(paths) > 1:
+            got = f"a file, of {len(paths)} files"
+            raise refusal(target, "--repair", got, "a folder", "give a name without suffix")
+        check_target(target)
+    if len(paths) == 1:
+        into = [target]
+    else:
+        below = names_below({str(path): path for path in paths})
+        names = [below[str(path)].with_suffix("") for path in paths]
+        # A name with a dot would be a file's.
+        apart = _told_apart([name.with_name(name.name.replace(".", "_")).as_posix() for name in names])
+        into = [target / name for name in apart]
+    given = {path.resolve() for path in paths} | {path.resolve().parent for path in paths}
+    for place in into:
+        if place.resolve() in given:
+            raise refusal(place, "--repair", "where a file is that is read", "another name", "choose one")
+    return into
+
+
 def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) -> Iterator[str]:
     """Repair what files hold, each with the validator that judges it; those that are broken are passed over.
 
@@ -88,24 +125,20 @@ def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) ->
     asked : AskedValidation
         By what they are judged.
     target : Path
-        A file; or, without suffix, a folder: of several files, and of several clips.
+        As `repair_targets` has it.
 
     Raises
     ------
     InputError
         Where several files are to go to one, or it cannot be written.
     """
-    if len(paths) > 1 and target.suffix:
-        got = f"a file, of {len(paths)} files"
-        raise refusal(target, "--repair", got, "a folder", "give a name without suffix")
-    for path in paths:
+    for path, into in zip(paths, repair_targets(paths, target), strict=True):
         try:
             read = read_postures_of(path, asked.stated)
         except PosekitError:
             if len(paths) == 1:
                 raise
             continue
-        into = target if len(paths) == 1 else target / path.stem
         yield from repair_file(read.postures, asked.validator(read), into, path)
 
 
@@ -203,11 +236,15 @@ def _targets(
     except InputError:
         suffix = FOLDER_FORMAT
     make_folder(target)
-    for k, clip in enumerate(clips):
-        stem = "".join(one if one.isalnum() or one in "-_." else "_" for one in clip.name)
-        name = Path(stem).stem if clip.name == source.name else stem
-        unique = name if [other.name for other in clips].count(clip.name) == 1 else f"{name}_{k}"
-        yield target / f"{unique}{suffix}", [clip]
+    stems = [safe_stem(source.stem if clip.name == source.name else clip.name) for clip in clips]
+    for stem, clip in zip(_told_apart(stems), clips, strict=True):
+        yield target / f"{stem}{suffix}", [clip]
+
+
+def _told_apart(names: Sequence[str]) -> list[str]:
+    """Append its number to each name that several have."""
+    count = Counter(names)
+    return [name if count[name] == 1 else f"{name}_{k}" for k, name in enumerate(names)]
 
 
 def _write(path: Path, clips: list[RepairedClip]) -> None:

@@ -9,11 +9,14 @@ import shutil
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, Final
 
 from posekit.errors import InputError
 from posekit.safe_io.json_file import MAX_BYTES
 from posekit.safe_io.refusal import cut, refusal
+
+MAX_STEM: Final = 80
+"""Letters of a file's name that is made of a clip's."""
 
 
 @contextmanager
@@ -118,6 +121,11 @@ def make_folder(path: str | Path) -> None:
         raise refusal(
             path, "", error.strerror or str(error), "a folder for results", "choose another name"
         ) from None
+
+
+def safe_stem(name: str) -> str:
+    """Make a file's name, without its suffix, of any text: letters that every system takes, and not too many."""
+    return "".join(letter if letter.isalnum() or letter in "-_." else "_" for letter in name)[:MAX_STEM]
 
 
 def too_large_to_read(path: str | Path) -> InputError:

@@ -89,6 +89,36 @@ def test_several_clips_are_refused_by_a_format_of_one(run: Callable[..., Any], t
     assert done.code == 2 and "folder" in done.err and not out.exists()
 
 
+def test_files_of_one_name_are_all_kept(repaired: Callable[..., str], tmp_path: Path) -> None:
+    """What is in different folders, or differs in the suffix, has a folder of its own."""
+    out, given = tmp_path / "out", []
+    for name in ("a/walk.npz", "b/walk.npz", "b/walk.csv"):
+        given.append(tmp_path / name)
+        given[-1].parent.mkdir(exist_ok=True)
+        write_motion(given[-1], motion(swaying(12, 30)), given[-1].suffix[1:])
+    repaired(*given, "--repair", out, "--up", "+z")
+    assert len([path for path in out.rglob("*") if path.is_file()]) == len(given)
+
+
+@pytest.mark.parametrize("target", ["given.npz", ".", "report.json"])
+def test_nothing_is_written_over(run: Callable[..., Any], tmp_path: Path, target: str) -> None:
+    """What is read, and the report, stay: the command refuses before it judges."""
+    given = tmp_path / "given.npz"
+    write_motion(given, motion(swaying(12, 30)), "npz")
+    before = given.read_bytes()
+    done = run("validate", given, "-o", tmp_path / "report.json", "--repair", tmp_path / target)
+    assert done.code == 2 and "another name" in done.err
+    assert given.read_bytes() == before and not (tmp_path / "report.json").exists()
+
+
+def test_a_folder_of_verdicts_takes_no_repair(run: Callable[..., Any], tmp_path: Path) -> None:
+    """An option that would do nothing is refused."""
+    given = tmp_path / "given.npz"
+    write_motion(given, motion(swaying(12, 30)), "npz")
+    done = run("validate", given, "-o", tmp_path / "verdicts", "--repair", tmp_path / "out")
+    assert done.code == 2 and "--repair" in done.err and not (tmp_path / "out").exists()
+
+
 def test_postures_are_repaired_as_postures(repaired: Callable[..., str], tmp_path: Path) -> None:
     """A file of single postures stays one."""
     given, out = tmp_path / "given.json", tmp_path / "out.json"

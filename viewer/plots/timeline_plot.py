@@ -11,7 +11,7 @@ from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ClipName
 from posekit.formats.own.report_table import worst_first
 from posekit.safe_io import one_line
-from posekit.safe_io.writing import make_folder
+from posekit.safe_io.writing import make_folder, safe_stem
 from posekit.viewer.plots.plot_file import FAINT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, drawing, save
 
 if TYPE_CHECKING:
@@ -158,6 +158,5 @@ def _legend(figure: Figure) -> None:
 
 
 def _file_name(clip: ClipVerdict) -> str:
-    """Make a file's name of a clip's: letters that every system takes."""
-    name = "_".join(filter(None, (Path(clip.file).stem, clip.clip))) or "clip"
-    return "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)[:80]
+    """Name a clip's picture."""
+    return safe_stem("_".join(filter(None, (Path(clip.file).stem, clip.clip))) or "clip")
