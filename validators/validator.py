@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from posekit.body import Figure, with_head
 from posekit.body.measured import LIMB_NAMES, MeasuredPerson, figure_of, measured_person
@@ -21,6 +21,7 @@ from posekit.robots.kinematics import Kinematics
 from posekit.settings import ValidateSettings
 from posekit.skeleton import HEAD_POINTS, JOINTS
 from posekit.tree import Check
+from posekit.validators.given_points import points_of, sequence_of
 from posekit.validators.measured import Allowance
 from posekit.validators.motion.profile import with_profile
 from posekit.validators.ranges import load_ranges
@@ -37,9 +38,6 @@ from posekit.validators.walking import thresholds_of
 
 NO_NOISE_METRES = 1e-6
 """Metres that noise may change a distance by: less is rounding, and a robot is judged as without."""
-
-MAX_METRES = 1e9
-"""Metres: no body is there, and well beyond it squares overflow, to findings that are undecided."""
 
 
 class Validator:
@@ -191,12 +189,12 @@ class Validator:
             raise InputError("give either postures or q; expected one of the two")
         if q is not None:
             return self._check_configurations(q)
-        joints = _points("postures", postures, len(JOINTS))
+        joints = points_of("postures", postures, len(JOINTS))
         points = with_head(joints)
         if head is not None:
-            points[:, len(JOINTS) :] = _points("head", head, len(HEAD_POINTS), len(joints))
+            points[:, len(JOINTS) :] = points_of("head", head, len(HEAD_POINTS), len(joints))
         if self._figure is None:
-            which = None if sequence is None else _sequence(sequence, len(joints))
+            which = None if sequence is None else sequence_of(sequence, len(joints))
             if person is not None and self.lengths == "median":
                 lengths, behind = person.lengths, person.behind
             robot = self._robot_for(person or measured_person(joints))
@@ -367,46 +365,3 @@ def _report(verdict: Verdict) -> Report:
 def _largest(residual: Array) -> Array:
     """Return the largest known distance (N,); NaN where none is known."""
     return np.asarray(np.fmax.reduce(residual, axis=1))
-
-
-def _sequence(given: ArrayLike, count: int) -> NDArray[np.intp]:
-    which = np.asarray(given)
-    if which.shape != (count,) or which.dtype.kind not in "iu":
-        raise InputError(f"sequence: {which.dtype} of shape {which.shape}; expected whole numbers ({count},)")
-    return which.astype(np.intp)
-
-
-def _points(name: str, given: ArrayLike | None, count: int, postures: int | None = None) -> Array:
-    """Make an array (N, count, 3) of what was given, or refuse it."""
-    expected = f"({'N' if postures is None else postures}, {count}, 3)"
-    try:
-        points = np.asarray(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: not an array of numbers; expected {expected}, metres") from error
-    if points.ndim != 3 or points.shape[1:] != (count, 3) or postures not in (None, len(points)):
-        raise InputError(f"{name}: the shape is {points.shape}; expected {expected}, metres")
-    refuse_far(points, name)
-    return points
-
-
-def refuse_far(points: Array | None, name: str = "postures") -> None:
-    """Refuse coordinates where no body is; NaN is unknown.
-
-    Parameters
-    ----------
-    points : array, optional
-        Metres.
-    name : str
-        What to call them.
-
-    Raises
-    ------
-    InputError
-        Where a coordinate is infinite or absurd.
-    """
-    far = np.zeros(0, dtype=np.bool_) if points is None else np.abs(points) > MAX_METRES
-    if points is not None and far.any():
-        raise InputError(
-            f"{name}: a coordinate is {points[far][0]:g} m; expected finite ones within {MAX_METRES:g} m, "
-            "NaN where unknown"
-        )

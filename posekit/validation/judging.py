@@ -25,19 +25,18 @@ from posekit.validation.batches import (
     postures_given,
     recordings_given,
 )
-from posekit.validation.over_time import clip_of, frames_of
+from posekit.validation.over_time import frames_of, judged_over_time
 from posekit.validation.people import PeopleTold
 from posekit.validation.spans import clip_verdicts
 from posekit.validation.stills import MOST_DRAWN_CLIPS, stills_of, worst_stills
 from posekit.validation.validate_columns import columns_of, in_order
 from posekit.validation.validate_listing import list_postures
-from posekit.validators import Judgement, Validator
 from posekit.validators import Report as Verdicts
-from posekit.validators.motion import judge_motion
+from posekit.validators import Validator
+from posekit.validators.given_points import refuse_far
 from posekit.validators.motion.registry import MOTION_CHECKS
 from posekit.validators.robot import Contacts
 from posekit.validators.robot.settings import OF_POSITIONS
-from posekit.validators.validator import refuse_far
 
 MAX_LISTED: Final = 10_000
 """Postures that a report lists one by one: all where there are no more, else the first that are not valid."""
@@ -141,7 +140,7 @@ class ReportBuilder:
         job = FileJob(validator=validator, given=given, file=file, sequence=sequence)
         job.recordings = recordings_given(validator, given)
         if given.held is not None and given.held.in_time:
-            self._ask_over_time(job)
+            job.over_time, job.not_asked = judged_over_time(given.held, job.recordings, validator)
         self.own |= own
         if not job.groups:  # its configurations may be none of the robot's
             self._judge_waiting()
@@ -213,24 +212,6 @@ class ReportBuilder:
         self._checks += [
             name for one in dict.fromkeys(checks) if (name := one.replace("-", "_")) not in self._checks
         ]
-
-    def _ask_over_time(self, job: FileJob) -> None:
-        """Ask the checks over time about the clips of a file."""
-        held = job.given.held
-        if held is None:
-            return
-        not_asked: list[tuple[str, str]] = []
-        over_time: list[Sequence[Judgement]] = []
-        for rows, _ in job.recordings:
-            found: list[tuple[NDArray[np.intp], Judgement]] = []
-            clip = held.clip[rows]
-            for which in np.unique(clip).tolist():
-                at = np.flatnonzero(clip == which)
-                verdict = judge_motion(job.validator.profile.checks, clip_of(held, rows[at], job.validator))
-                found += [(at, one) for one in verdict.judgements]
-                not_asked += list(verdict.not_asked.items())
-            over_time.append([_spread(one, at, len(rows)) for at, one in found])
-        job.over_time, job.not_asked = over_time, not_asked
 
     def _judged(
         self, verdicts: Verdicts, room: int
@@ -388,20 +369,6 @@ def _unordered(file: str, count: int) -> ReportFrames:
         time=np.full(count, np.nan),
         in_time=False,
     )
-
-
-def _spread(judgement: Judgement, at: NDArray[np.intp], count: int) -> Judgement:
-    """Lay what is said of some postures over all; of others nothing is said."""
-    if len(at) == count:
-        return judgement
-    numbers: dict[str, Any] = {
-        name: np.full((count, len(judgement.where)), np.nan) for name in ("value", "lower", "upper", "margin")
-    }
-    violated = np.zeros((count, len(judgement.where)), dtype=np.bool_)
-    for name, array in numbers.items():
-        array[at] = getattr(judgement, name)
-    violated[at] = judgement.violated
-    return replace(judgement, violated=violated, **numbers)
 
 
 def _lengths_told(job: FileJob) -> dict[str, Any]:

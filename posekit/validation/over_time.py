@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,9 +14,10 @@ from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.settings import ValidateSettings
+from posekit.validation.people import Recording
 from posekit.validation.robot_motion import moves_of
-from posekit.validators import Validator
-from posekit.validators.motion import MotionClip
+from posekit.validators import Judgement, Validator
+from posekit.validators.motion import MotionClip, judge_motion
 
 
 def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) -> MotionClip:
@@ -44,6 +49,54 @@ def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) ->
         noise=_noise_of(joints, settings),
         **moves,
     )
+
+
+def judged_over_time(
+    held: HeldPostures, recordings: Sequence[Recording], validator: Validator
+) -> tuple[list[list[Judgement]], list[tuple[str, str]]]:
+    """Ask the checks over time about the clips of a file.
+
+    Parameters
+    ----------
+    held : HeldPostures
+        What the file holds.
+    recordings : sequence of Recording
+        Which of its postures are whose.
+    validator : Validator
+        Whose profile asks.
+
+    Returns
+    -------
+    judgements : list of lists of Judgement
+        Of each recording, a row a posture of it.
+    not_asked : list of (str, str)
+        Of each clip, checks that do not apply and why.
+    """
+    judgements: list[list[Judgement]] = []
+    not_asked: list[tuple[str, str]] = []
+    for rows, _ in recordings:
+        clip, found = held.clip[rows], []
+        for which in np.unique(clip).tolist():
+            at = np.flatnonzero(clip == which)
+            verdict = judge_motion(validator.profile.checks, clip_of(held, rows[at], validator))
+            found += [_spread(one, at, len(rows)) for one in verdict.judgements]
+            not_asked += list(verdict.not_asked.items())
+        judgements.append(found)
+    return judgements, not_asked
+
+
+def _spread(judgement: Judgement, at: NDArray[np.intp], count: int) -> Judgement:
+    """Lay what is said of some postures over all; of others nothing is said."""
+    if len(at) == count:
+        return judgement
+    numbers: dict[str, Any] = {
+        name: np.full((count, len(judgement.where)), np.nan) for name in ("value", "lower", "upper", "margin")
+    }
+    violated = np.zeros((count, len(judgement.where)), dtype=np.bool_)
+    for name, array in numbers.items():
+        array[at] = getattr(judgement, name)
+    violated[at] = judgement.violated
+    return replace(judgement, violated=violated, **numbers)
 
 
 def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
