@@ -17,7 +17,6 @@ from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import (
     LEG_SHARE,
     ground_of,
-    ground_unknown,
     soles,
     speeds,
     stature_of,
@@ -51,7 +50,7 @@ class BalanceStill(MotionCheck):
     name = "balance-still"
     unit = "m"
     meaning = "the body stands still, and would fall over"
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     beyond: float = 0.05
     slower: float = 0.1
@@ -61,10 +60,6 @@ class BalanceStill(MotionCheck):
         """Name the centre of mass; see `MotionCheck`."""
         del clip
         return ("centre_of_mass",)
-
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how far the centre of mass is beyond the feet; see `MotionCheck`."""

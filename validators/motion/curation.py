@@ -16,7 +16,7 @@ from posekit.skeleton import FEET_POINTS, JOINT, SIDES
 from posekit.tree import Findings
 from posekit.validators.motion.base_of_support import beyond_support
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_unknown, soles
+from posekit.validators.motion.ground import soles
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.root_jerk import LEAST_SECONDS, parts
 from posekit.validators.motion.timeline import timeline_of
@@ -25,12 +25,12 @@ from posekit.validators.motion.timeline import timeline_of
 class _Curation(MotionCheck):
     """What the rules have in common."""
 
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing of short clips, or where nothing is known of the ground; see `MotionCheck`."""
+        """Ask nothing of short clips; see `MotionCheck`."""
         short = "" if len(clip) * clip.step >= LEAST_SECONDS else f"it needs {LEAST_SECONDS:g} s of motion"
-        return super().not_asked(clip) or short or ground_unknown(clip)
+        return super().not_asked(clip) or short
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,7 +14,7 @@ import numpy as np
 from posekit.tree import Findings
 from posekit.validators.motion.carried import FALL_SHARE, SHORTEST_FLIGHT, falls, stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, in_air
+from posekit.validators.motion.ground import ground_of, in_air
 from posekit.validators.motion.motion_check import MotionCheck
 
 
@@ -37,7 +37,7 @@ class Floating(MotionCheck):
     name = "floating"
     unit = "m"
     meaning = "the body is above the ground, and nothing holds it there"
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     height: float = 0.02
     shortest: float = SHORTEST_FLIGHT
@@ -47,10 +47,6 @@ class Floating(MotionCheck):
         """Name the body's lowest point; see `MotionCheck`."""
         del clip
         return ("lowest",)
-
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how high the lowest point is over the ground; see `MotionCheck`."""

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.ground import ground_unknown
 
 
 class MotionCheck:
@@ -23,7 +24,7 @@ class MotionCheck:
     meaning : str
         What it rejects, in one sentence.
     needs : tuple of str
-        What must be known of a clip: ``time``, ``up``; it is not asked where that is not known.
+        What must be known of a clip: ``time``, ``up``, ``ground``; it is not asked where that is not known.
     """
 
     name: ClassVar[str]
@@ -44,7 +45,9 @@ class MotionCheck:
             return "the frame rate is not known (--rate)"
         if "up" in self.needs and clip.up is None:
             return "which way is up is not known (--up)"
-        return "" if len(clip) else "there is no frame"
+        if not len(clip):
+            return "there is no frame"
+        return ground_unknown(clip) if "ground" in self.needs else ""
 
     def judge(self, clip: MotionClip) -> Findings:
         """Judge a clip.

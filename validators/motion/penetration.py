@@ -8,7 +8,7 @@ import numpy as np
 
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown
+from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.motion_check import MotionCheck
 
 
@@ -30,7 +30,7 @@ class Penetration(MotionCheck):
     name = "penetration"
     unit = "m"
     meaning = "the body is below the ground"
-    needs = ("up",)
+    needs = ("up", "ground")
 
     depth: float = 0.025
     unlevel: float = 0.1
@@ -39,10 +39,6 @@ class Penetration(MotionCheck):
         """Name the body's lowest point; see `MotionCheck`."""
         del clip
         return ("lowest",)
-
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how high the lowest point is over the ground; see `MotionCheck`."""

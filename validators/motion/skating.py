@@ -16,7 +16,7 @@ from posekit.geometry import Array
 from posekit.skeleton import SIDES
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, soles
+from posekit.validators.motion.ground import ground_of, soles
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm, timeline_of
 
@@ -28,16 +28,12 @@ class _Skating(MotionCheck):
     """What the three have in common: one value a foot, from the ways of its lowest point."""
 
     unit = "m"
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the feet; see `MotionCheck`."""
         del clip
         return tuple(f"{side}_foot" for side in SIDES)
-
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,7 +20,7 @@ from posekit.skeleton import SIDES
 from posekit.tree import Findings
 from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, soles
+from posekit.validators.motion.ground import ground_of, soles
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm, timeline_of
 
@@ -66,7 +66,7 @@ class Sliding(MotionCheck):
     name = "sliding"
     unit = "m/s"
     meaning = "a foot slides that stands on the ground"
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     fastest: float = 0.04
     lasting: float = 0.4
@@ -79,9 +79,9 @@ class Sliding(MotionCheck):
         return tuple(f"{side}_foot" for side in SIDES)
 
     def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
+        """Ask nothing of clips at few frames a second; see `MotionCheck`."""
         few = f"it needs {SLIDING_RATE:g} frames a second" if clip.rate < SLIDING_RATE else ""
-        return super().not_asked(clip) or few or ground_unknown(clip)
+        return super().not_asked(clip) or few
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how fast each foot slides; see `MotionCheck`."""

@@ -9,7 +9,7 @@ import numpy as np
 from posekit.tree import Findings
 from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, ground_unknown, in_air
+from posekit.validators.motion.ground import ground_of, in_air
 from posekit.validators.motion.motion_check import MotionCheck
 
 
@@ -26,7 +26,7 @@ class Support(MotionCheck):
     name = "support"
     unit = "s"
     meaning = "nothing holds the body for longer than a jump lasts"
-    needs = ("up", "time")
+    needs = ("up", "time", "ground")
 
     longest: float = 1.0
 
@@ -34,10 +34,6 @@ class Support(MotionCheck):
         """Name the body; see `MotionCheck`."""
         del clip
         return ("body",)
-
-    def not_asked(self, clip: MotionClip) -> str:
-        """Ask nothing where nothing is known of the ground; see `MotionCheck`."""
-        return super().not_asked(clip) or ground_unknown(clip)
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how long each flight lasts; see `MotionCheck`."""
