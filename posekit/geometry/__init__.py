@@ -10,6 +10,7 @@ from posekit.geometry.angles import other_branch as other_branch
 from posekit.geometry.angles import other_hinge as other_hinge
 from posekit.geometry.angles import turned_near as turned_near
 from posekit.geometry.arrays import Array as Array
+from posekit.geometry.arrays import runs as runs
 from posekit.geometry.quaternions import quaternion_conjugate as quaternion_conjugate
 from posekit.geometry.quaternions import quaternion_exp as quaternion_exp
 from posekit.geometry.quaternions import quaternion_from_rotation as quaternion_from_rotation

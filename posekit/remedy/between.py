@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array, best_rotation, rotation_between, unit, vector_from_rotation
+from posekit.geometry import Array, best_rotation, rotation_between, runs, unit, vector_from_rotation
 from posekit.remedy.pieces import (
     N_PIECES,
     N_UNKNOWNS,
@@ -17,7 +17,6 @@ from posekit.remedy.pieces import (
     moved,
     vectors_of,
 )
-from posekit.remedy.record import runs
 
 Bools = NDArray[np.bool_]
 
@@ -53,8 +52,8 @@ def interpolated(points: Array, bad: Bools) -> Array:
     """
     out = points.copy()
     good = ~bad & np.isfinite(points[:, list(TORSO_AND_HIPS)]).all(axis=(1, 2))
-    for first, last in runs(~good):
-        before, after = first - 1, last + 1
+    for first, after in runs(~good):
+        before = first - 1
         if before < 0 or after >= len(points) or not bad[first:after].any():
             continue
         there, back = (turn_between(points[a], points[b]) for a, b in ((before, after), (after, before)))

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.remedy.record import runs
+from posekit.geometry import Array, runs
 from posekit.skeleton import FEET_POINTS, POINTS, other_side
 
 CLIP_MARKS: Final = (*POINTS, *FEET_POINTS)
@@ -44,7 +43,8 @@ def exchanged(points: Array, bad: NDArray[np.bool_]) -> Array:
         Where labels are exchanged.
     """
     out = points.copy()
-    for first, last in runs(bad):
+    for first, stop in runs(bad):
+        last = stop - 1
         best = _jumps(out, first, last, np.arange(len(CLIP_MARKS)))
         chosen = None
         for parts, begin, end in product(

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.remedy.record import runs
+from posekit.geometry import Array, runs
 
 Bools = NDArray[np.bool_]
 
@@ -38,10 +37,10 @@ def grounded(points: Array, height: Array, bad: Bools, up: Array, rate: float) -
     """
     out = points.copy()
     width = max(int(SMOOTH_SECONDS * rate) | 1, 1)
-    for first, last in runs(bad):
-        by = -_over(np.mean, _over(np.median, height[first : last + 1], width), width)
+    for start, stop in runs(bad):
+        by = -_over(np.mean, _over(np.median, height[start:stop], width), width)
         if np.abs(by).max() <= MOST_SHIFT_METRES:
-            out[first : last + 1] += by[:, None, None] * up
+            out[start:stop] += by[:, None, None] * up
     return out
 
 

@@ -8,8 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
-from posekit.remedy.record import runs
+from posekit.geometry import Array, runs
 from posekit.skeleton import FEET_POINTS, LIMB_JOINTS, POINTS, SEGMENT_NAMES, segment_name
 
 RAMP_FRAMES: Final = 6
@@ -36,8 +35,8 @@ def with_lengths(points: Array, bad: NDArray[np.bool_], lengths: Mapping[str, fl
         for start, end in ((joints[0], joints[1]), (joints[1], joints[2])):
             name = segment_name((start, end))
             spans = np.zeros(len(points), dtype=np.bool_)
-            for first, last in runs(bad[:, SEGMENT_NAMES.index(name)]):
-                spans[max(first - RAMP_FRAMES, 0) : last + RAMP_FRAMES + 1] = True
+            for first, stop in runs(bad[:, SEGMENT_NAMES.index(name)]):
+                spans[max(first - RAMP_FRAMES, 0) : stop + RAMP_FRAMES] = True
             vector = out[:, end] - out[:, start]
             length = np.linalg.norm(vector, axis=-1)
             off = spans & (np.abs(length - lengths[name]) > SEEN_SHARE * lengths[name])

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.skeleton import JOINTS
 from posekit.validators.suite import Judgement
 
@@ -154,20 +154,13 @@ def spans_of(
             remedy=remedy,
             place=place,
             first=first,
-            last=last,
-            most=float(moved[first : last + 1, column].max()),
+            last=stop - 1,
+            most=float(moved[first:stop, column].max()),
             unit=unit,
         )
         for column, place in enumerate(places)
-        for first, last in runs(moved[:, column] > least)
+        for first, stop in runs(moved[:, column] > least)
     ]
-
-
-def runs(which: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
-    """Go through the runs of consecutive True of an array (N,): first and last index of each."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]).astype(np.int8)))
-    for first, end in edges.reshape(-1, 2).tolist():
-        yield first, end - 1
 
 
 def left_of(judgements: Sequence[Judgement]) -> tuple[UnrepairedFrame, ...]:

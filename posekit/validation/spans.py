@@ -13,7 +13,7 @@ from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import PER_DEGREE, VerdictColumns
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.validation.over_time import rate_of
 
 MERGED_SECONDS: Final = 0.1
@@ -111,12 +111,11 @@ def _verdict(
 
 def longest_run(good: NDArray[np.bool_]) -> tuple[int, int] | None:
     """Return first and last place of the longest run of True, the first of them; None where there is none."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    if not len(starts):
+    found = runs(good)
+    if not found:
         return None
-    longest = int(np.argmax(ends - starts))
-    return int(starts[longest]), int(ends[longest]) - 1
+    start, stop = max(found, key=lambda run: run[1] - run[0])
+    return start, stop - 1
 
 
 def _badness(span: Span) -> tuple[bool, float, int]:

@@ -1,5 +1,7 @@
 """Laws of vectors, quaternions, rotations and rigid fits, with SciPy's rotations as the oracle."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -30,6 +32,7 @@ from posekit.geometry import (
     rotation_between,
     rotation_from_quaternion,
     rotation_from_vector,
+    runs,
     shorter_quaternion,
     turned_near,
     unit,
@@ -231,3 +234,15 @@ def test_angles_are_turned_to_within_half_a_turn_of_a_middle(rng):
     assert (np.abs(found - middle) <= np.pi).all()
     near((found - angles) / (2 * np.pi), np.round((found - angles) / (2 * np.pi)), 1e-12)
     assert turned_near(np.array(540.0), 0.0, half_turn=180.0) == -180.0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_runs_are_all_that_is_true_and_do_not_touch(seed: int) -> None:
+    """Runs, laid down again, give the array they are of; between two of them something is false."""
+    which = np.random.default_rng(seed).random(seed * 7) < 0.5
+    found, again = runs(which), np.zeros(len(which), dtype=np.bool_)
+    for start, stop in found:
+        assert start < stop
+        again[start:stop] = True
+    assert (again == which).all()
+    assert all(stop < start for (_, stop), (start, _) in pairwise(found))

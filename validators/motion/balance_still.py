@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.geometry import runs
 from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES
 from posekit.tree import Findings
 from posekit.validators.motion.base_of_support import beyond_support
-from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import (
     LEG_SHARE,
@@ -82,7 +82,7 @@ class BalanceStill(MotionCheck):
         """Say in which frames (T,) the body stands, and is still for long enough."""
         noise = clip.noise / (np.sqrt(2) * clip.step)
         still = np.nan_to_num(speeds(clip, clip.joints), nan=0.0).max(axis=1) < self.slower + 4 * noise
-        for start, stop in stretches(still):
+        for start, stop in runs(still):
             still[start:stop] = (stop - start) * clip.step >= self.lasting
         hips = clip.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].mean(axis=1)
         ankles = np.fmin.reduce(clip.height[:, [JOINT[f"{side}_ankle"] for side in SIDES]], axis=1)

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 
 LEVEL_METRES: Final = 0.05
 """Levels that differ by less are of one ground."""
@@ -38,7 +38,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
     step : float
         Seconds from a frame to the next.
     """
-    rests = stretches(resting)
+    rests = runs(resting)
     if len(rests) < 2 or not step > 0:
         return resting
     group = np.zeros(len(rests), dtype=np.intp)
@@ -66,9 +66,3 @@ def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
         return True
     curve = np.polyfit(np.arange(len(centre))[known] * step, centre[known], 2)[0]
     return bool(2 * curve <= -share * GRAVITY_ACCELERATION)
-
-
-def stretches(frames: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """List runs of frames, as slices have them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], frames.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

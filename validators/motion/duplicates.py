@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.validators.motion.timeline import norm
 
 SAME_METRES: Final = 1e-6
@@ -44,8 +44,7 @@ def duplicates(joints: Array) -> NDArray[np.intp]:
     alike = (unknown[1:] == unknown[:-1]).all(axis=1) & ~unknown[1:].all(axis=1)
     fastest = np.nan_to_num(np.fmax.reduce(steps, axis=1))
     same = alike & (fastest < SAME_METRES)
-    edges = np.flatnonzero(np.diff(same, prepend=False, append=False))
-    for first, last in zip(edges[::2], edges[1::2], strict=True):
+    for first, last in runs(same):
         before, after = fastest[max(first - NEAR_FRAMES, 0) : first], fastest[last : last + NEAR_FRAMES]
         moving = [part.max() > MOVED_METRES for part in (before, after) if len(part)]
         if moving and all(moving):

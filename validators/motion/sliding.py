@@ -15,10 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.skeleton import SIDES
 from posekit.tree import Findings
-from posekit.validators.motion.carried import stretches
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import ground_of, soles
 from posekit.validators.motion.motion_check import MotionCheck
@@ -94,7 +93,7 @@ class Sliding(MotionCheck):
         slides = [self._slides(clip, spread[:, foot], down[:, foot], up) for foot in FOOT_POINTS]
         value = np.zeros((len(spread), len(SIDES)))
         count = self._frames(clip)
-        for start, stop in stretches(np.any(slides, axis=0)):
+        for start, stop in runs(np.any(slides, axis=0)):
             sliding = [k for k, slots in enumerate(slides) if slots[start:stop].any()]
             points = spread[:, [point for k in sliding for point in FOOT_POINTS[k]]]
             points = points[:, np.isfinite(points[start:stop]).all(axis=(0, 2))]

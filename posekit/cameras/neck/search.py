@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from posekit.cameras.neck.body import NeckRays
 from posekit.cameras.neck.closure import RigidClosure, Rows
 from posekit.cameras.neck.minima import MisfitSamples, minima_of
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 
 N_CELLS = 96
 """Cells of the grid over the angle whose cosine is the distance over its bound."""
@@ -217,11 +217,10 @@ def _intervals(
     edge = dict(zip(crossing.tolist(), good.tolist(), strict=True))
     found = []
     for k, mask in enumerate(within):
-        bounds = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
         pairs = []
-        for first, last in zip(np.flatnonzero(bounds == 1), np.flatnonzero(bounds == -1) - 1, strict=True):
-            low = edge.get(int(start[k] + first) - 1, float(nodes[k][first]))
-            high = edge.get(int(start[k] + last), float(nodes[k][last]))
+        for first, stop in runs(mask):
+            low = edge.get(int(start[k]) + first - 1, float(nodes[k][first]))
+            high = edge.get(int(start[k]) + stop - 1, float(nodes[k][stop - 1]))
             pairs.append((low, high))
         found.append(_joined(np.array(pairs).reshape(-1, 2)))
     return found

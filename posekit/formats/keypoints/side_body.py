@@ -81,9 +81,3 @@ def mean(values: Array) -> float:
     """Return the mean of what is known; NaN where nothing is."""
     known = values[~np.isnan(values)]
     return float(known.mean()) if len(known) else float("nan")
-
-
-def runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """List the runs of a mask (F,) as (start, end)."""
-    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
-    return [(int(start), int(end)) for start, end in edges.reshape(-1, 2)]

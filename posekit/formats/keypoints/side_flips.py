@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.formats.keypoints.side_body import ARM_JOINTS, LEG_JOINTS, pair, runs, size
-from posekit.geometry import Array
+from posekit.formats.keypoints.side_body import ARM_JOINTS, LEG_JOINTS, pair, size
+from posekit.geometry import Array, runs
 
 MIN_PICTURES_OF_JUMPS: Final = 5
 """Pictures of a sequence: with fewer, a jump is no jump."""
