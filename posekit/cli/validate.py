@@ -169,7 +169,7 @@ def _validate_archive(
     if totals.refused:
         raise typer.Exit(BAD_INPUT)
     counts = totals.clips if allowed.clips else totals.frames
-    if counts.total() - counts["valid"] > allowed.number * (counts.total() if allowed.share else 1):
+    if allowed.exceeded_by(counts.total() - counts["valid"], counts.total()):
         raise typer.Exit(SOME_INVALID)
 
 

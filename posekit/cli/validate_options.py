@@ -97,7 +97,6 @@ class StatedOptions:
             "--rate", "FPS", "Frames a second. Default: as the file says; without, speeds are not judged."
         ),
     ] = None
-
     body_model: Annotated[
         Path | None,
         option("--body-model", "FILE.npz", "Your SMPL, SMPL+H or SMPL-X, for files of angles as AMASS's."),
@@ -121,12 +120,17 @@ class JudgedOptions:
             "--checks",
             "LIST",
             "By commas. Stick figure: rigid-parts, joint-range, collision (these by default), walking; robots: reach, "
-            "rigid-parts, joint-range, collision (these by default), balance; and those over time of the profile.",
+            "rigid-parts, joint-range, collision (these by default), balance; and those over time, by default the "
+            "profile's.",
         ),
     ] = ""
     profile: Annotated[
         str,
-        option("--profile", "NAME|FILE", "Checks over time and their thresholds: posekit, or a TOML table."),
+        option(
+            "--profile",
+            "NAME|FILE",
+            "Checks over time and their thresholds: posekit, phuma, or a TOML table.",
+        ),
     ] = "posekit"
     ground: Annotated[
         str,

@@ -6,18 +6,17 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, Literal
+from typing import TYPE_CHECKING, Final
 
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.formats.own import ValidationReport
     from posekit.formats.own.report_clips import ClipVerdict
+    from posekit.validation.judging import Detail
 
 PAGE_SUFFIX: Final = ".html"
 CLIPS_WORD: Final = "clips"
-
-Detail = Literal["findings", "margins", "verdicts"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +45,7 @@ class ValidateOutput:
 
     @property
     def detail(self) -> Detail:
-        """What the report needs of every posture: see `posekit.validation.validate`."""
+        """What the report needs of every posture: see `posekit.validation.WantedDetail`."""
         suffix = "" if self.report is None else self.report.suffix.lower()
         return (
             "findings" if suffix == ".json" else "margins" if suffix in (".csv", ".parquet") else "verdicts"
@@ -141,9 +140,11 @@ class FailOver:
         """Whether a report has more than that."""
         if self.clips:
             verdicts = [clip.verdict for clip in clips_of_report(report, "--fail-over")]
-            bad, total = sum(verdict != "valid" for verdict in verdicts), len(verdicts)
-        else:
-            bad, total = len(report) - report.summary["valid"], len(report)
+            return self.exceeded_by(sum(verdict != "valid" for verdict in verdicts), len(verdicts))
+        return self.exceeded_by(len(report) - report.summary["valid"], len(report))
+
+    def exceeded_by(self, bad: int, total: int) -> bool:
+        """Whether so many that are not valid are more than that, of so many in all."""
         return bad > self.number * (total if self.share else 1)
 
 

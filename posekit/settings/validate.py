@@ -28,7 +28,8 @@ class ValidateSettings(JudgingSettings):
     checks : sequence of str, CheckSettings or check, optional
         Of a figure some of ``rigid-parts``, ``joint-range``, ``collision``, ``walking``, the first three unless told
         otherwise; of a robot some of ``reach``, ``rigid-parts``, ``joint-range``, ``collision``, ``balance``, the
-        first four.
+        first four. Of motion checks over time, too (docs, "Checks over time"), those of the profile unless told
+        otherwise.
     ranges : str or Ranges
         ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges. Of a robot its
         own limits unless the path of a table is given.
@@ -68,7 +69,7 @@ class ValidateSettings(JudgingSettings):
     up : array (3,)
         Against gravity, in the frame of the postures: for ``balance``. By default z.
     profile : str
-        Thresholds of checks over time: ``posekit`` (the default), or the path of a TOML table.
+        Checks over time and their thresholds: ``posekit`` (the default), ``phuma``, or the path of a TOML table.
     ground : float, optional
         Metres of the ground along the axis that points up; estimated from each clip where not given.
 
