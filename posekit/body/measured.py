@@ -37,7 +37,6 @@ LIMB_SEGMENTS: Final = tuple(SEGMENTS[SEGMENT_NAMES.index(name)] for name in LIM
 LEAST_FRAMES: Final = 10
 """Frames from which noise is estimated: of ten frames and eight limbs it is within a quarter of the true one."""
 
-
 BENT_METRES: Final = 0.04
 """Metres that both knees together are before the middles between hip and ankle in a frame that tells the side."""
 

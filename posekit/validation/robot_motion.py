@@ -127,8 +127,8 @@ def moves_of(
     for joint, name in enumerate(names, 1):
         for k in range(model.nvs[joint]):
             called[model.idx_vs[joint] + k] = name if model.nvs[joint] == 1 else f"{name}.{k}"
-    fastest = np.array(model.velocityLimit, dtype=np.float64)
-    return {"q": q, "velocity": velocity, "fastest": fastest, "velocity_names": tuple(called)}
+    limits = np.array(model.velocityLimit, dtype=np.float64)
+    return {"q": q, "velocity": velocity, "velocity_limits": limits, "velocity_names": tuple(called)}
 
 
 def _nowhere(q: Array) -> Array:

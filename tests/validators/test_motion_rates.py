@@ -55,7 +55,7 @@ def robot(velocity: Array, fastest: Array) -> MotionClip:
         time=np.arange(count) / 50.0,
         rate=50.0,
         velocity=velocity,
-        fastest=fastest,
+        velocity_limits=fastest,
         velocity_names=("root.0", "knee", "ankle"),
     )
 

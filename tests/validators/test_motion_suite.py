@@ -28,6 +28,12 @@ def test_every_check_of_a_profile_is_asked_or_says_why_not() -> None:
     assert all(len(judgement.value) == 8 for judgement in verdict.judgements)
 
 
+def test_a_check_alone_has_the_thresholds_of_the_usual_profile() -> None:
+    """A threshold stands in the profile and in the check: asked by name under another profile it is the same."""
+    checks = load_profile("posekit").checks
+    assert [vars(check) for check in checks] == [vars(type(check)()) for check in checks]
+
+
 def test_standing_still_breaks_no_check() -> None:
     verdict = judge_motion(load_profile("posekit").checks, standing(8))
     assert not any(judgement.violated.any() for judgement in verdict.judgements)

@@ -37,6 +37,11 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
         How high the lowest point and the centre of mass are, metres.
     step : float
         Seconds from a frame to the next.
+
+    Returns
+    -------
+    bool array (T,)
+        Those of `resting` that carry the body.
     """
     rests = runs(resting)
     if len(rests) < 2 or not step > 0:

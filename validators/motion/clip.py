@@ -35,11 +35,11 @@ class MotionClip:
     noise : float
         Standard deviation of measured coordinates, metres; 0 where none is supposed.
     q : array (T, nq), optional
-        Configurations, where the motion is a robot's.
-    fastest : array (nv,), optional
-        The robot's joint velocity limits, as its URDF has them.
+        Configurations, where the motion is a robot's; in Pinocchio's order.
+    velocity_limits : array (nv,), optional
+        Of the robot's joints, radians or metres a second, as its URDF has them.
     velocity : array (T, nv), optional
-        Its velocities, from neighbouring configurations on their manifold.
+        Its velocities, radians or metres a second, from neighbouring configurations on their manifold.
     velocity_names : tuple of str (nv,)
         A name for each of them.
     """
@@ -53,7 +53,7 @@ class MotionClip:
     ground: float | None = None
     noise: float = 0.0
     q: Array | None = None
-    fastest: Array | None = None
+    velocity_limits: Array | None = None
     velocity: Array | None = None
     velocity_names: tuple[str, ...] = ()
 

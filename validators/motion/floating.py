@@ -13,7 +13,7 @@ import numpy as np
 
 from posekit.geometry import runs
 from posekit.tree import Findings
-from posekit.validators.motion.carried import FALL_SHARE, SHORTEST_FLIGHT, falls
+from posekit.validators.motion.carried import FALL_SHARE, falls
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import ground_of, in_air
 from posekit.validators.motion.motion_check import MotionCheck
@@ -41,7 +41,7 @@ class Floating(MotionCheck):
     needs = ("up", "time", "ground")
 
     height: float = 0.02
-    shortest: float = SHORTEST_FLIGHT
+    shortest: float = 0.35
     fall: float = FALL_SHARE
 
     def places(self, clip: MotionClip) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.body.stature import SHANK_OF_STATURE, THIGH_OF_STATURE
 from posekit.geometry import Array
 from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES
@@ -29,8 +30,8 @@ TOE_METRES: Final = 0.02
 ANKLE_SHARE: Final = 0.039
 """Height of the ankle over the sole, of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1)."""
 
-LEG_SHARE: Final = 0.491
-"""Thigh and shank, of the stature (same figure: 0.245 + 0.246)."""
+LEG_SHARE: Final = THIGH_OF_STATURE + SHANK_OF_STATURE
+"""Thigh and shank, of the stature (same figure)."""
 
 REST_SPEED: Final = 0.25
 """Metres a second below which a point rests; a foot's parts move so slowly in stance, in no part of a swing."""

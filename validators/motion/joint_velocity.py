@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.motion_check import MotionCheck
+
+NO_LIMIT: Final = 1e6
+"""Radians or metres a second from which a URDF's number means that there is none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,21 +40,25 @@ class JointVelocity(MotionCheck):
     def not_asked(self, clip: MotionClip) -> str:
         """Ask nothing where there are no configurations of a robot with limits; see `MotionCheck`."""
         reason = super().not_asked(clip)
-        if not reason and (clip.velocity is None or clip.fastest is None):
+        if not reason and (clip.velocity is None or clip.velocity_limits is None):
             return "there are no configurations of a robot (--urdf)"
         return reason or ("" if len(_limited(clip)) else "the URDF has no velocity limits")
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure velocities as shares of their limits; see `MotionCheck`."""
-        velocity, fastest, limited = np.asarray(clip.velocity), np.asarray(clip.fastest), _limited(clip)
+        velocity, limits, limited = (
+            np.asarray(clip.velocity),
+            np.asarray(clip.velocity_limits),
+            _limited(clip),
+        )
         return Findings(
-            value=np.abs(velocity[:, limited]) / fastest[limited],
+            value=np.abs(velocity[:, limited]) / limits[limited],
             lower=np.array(-np.inf),
             upper=np.array(self.share),
         )
 
 
-def _limited(clip: MotionClip) -> np.ndarray:
+def _limited(clip: MotionClip) -> NDArray[np.intp]:
     """Return which velocities have a limit: the root has none, and 0 or no number in a URDF is none."""
-    fastest = np.empty(0) if clip.fastest is None else np.asarray(clip.fastest)
-    return np.flatnonzero(np.isfinite(fastest) & (fastest > 0) & (fastest < 1e6))
+    limits = np.empty(0) if clip.velocity_limits is None else clip.velocity_limits
+    return np.flatnonzero(np.isfinite(limits) & (limits > 0) & (limits < NO_LIMIT))

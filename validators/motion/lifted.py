@@ -28,7 +28,6 @@ SAME_SHARE: Final = 0.35
 SHORTEST_FRAMES: Final = 3
 """Shorter stretches are jumps of the body."""
 
-
 REST_METRES: Final = 0.01
 """A foot rests that goes less far up or down in the frame before a step, and in the one after it."""
 

@@ -13,9 +13,8 @@ from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
 
-NOISE_FACTOR = 5.0
+NOISE_FACTOR: Final = 5.0
 """Standard deviations of measuring by which a frame may be off."""
-
 
 JUMPING_RATE: Final = 15.0
 """Frames a second: at fewer, limbs that are thrown jump."""

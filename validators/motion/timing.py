@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
+
+TWICE_FRAMES: Final = 0.75
+"""Of a step, by which a stamp must be early to be that of the frame before: a quarter of one is a slot of its own."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +50,6 @@ class Timing(MotionCheck):
         place = np.where(by_time != 0, by_time, found.displaced).astype(np.float64)
         return Findings(
             value=np.column_stack([found.timeline.missing, place]),
-            lower=np.array([-0.75, -self.displaced]),
+            lower=np.array([-TWICE_FRAMES, -self.displaced]),
             upper=np.array([self.missing, self.displaced]),
         )
