@@ -14,13 +14,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.body.measured import MeasuredPerson
-from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.remedy.nearest import bounded_forces
 from posekit.remedy.record import Repaired, left_of, spans_of
@@ -205,14 +203,14 @@ class NearestConfiguration:
         return value, slope
 
     def _pairs(self, q: Array) -> Iterator[tuple[float, Array]]:
-        subject, bodies = self.subject, self._bodies
+        subject, bodies = self.subject, self._kept_apart.bodies
         model, data, placed = subject.model, subject.data, self._placed
         pin.computeJointJacobians(model, data, q)
         pin.updateGeometryPlacements(model, data, bodies, placed, q)
         for pair in self._near_pairs(q).tolist():
             ends = bodies.collisionPairs[pair]
             first, second = (bodies.geometryObjects[k].parentJoint for k in (ends.first, ends.second))
-            margin = float(self._margins[pair]) + KEPT_APART_METRES
+            margin = float(self._kept_apart.margins[pair]) + KEPT_APART_METRES
             for distance, normal, a, b in self._apart(pair):
                 if distance - margin < LOOKED_AT_METRES and np.isfinite(normal).all():
                     way = normal @ (self._moves(second, b) - self._moves(first, a))
@@ -220,10 +218,10 @@ class NearestConfiguration:
 
     def _apart(self, pair: int) -> Iterator[tuple[float, Array, Array, Array]]:
         """Yield distances of a pair with their normals, from the first body to the second, and points on both."""
-        bodies, placed = self._bodies, self._placed
+        bodies, placed = self._kept_apart.bodies, self._placed
         found = pin.computeDistance(bodies, placed, pair)
         distance = float(found.min_distance)
-        if distance > 0 or not self._with_mesh[pair]:
+        if distance > 0 or not self._kept_apart.with_mesh[pair]:
             yield distance, np.array(found.normal), found.getNearestPoint1(), found.getNearestPoint2()
             return
         pin.computeCollision(bodies, placed, pair)
@@ -243,32 +241,19 @@ class NearestConfiguration:
     def _near_pairs(self, q: Array) -> NDArray[np.intp]:
         return np.flatnonzero(self._balls.of(q[None])[0])
 
-    @property
-    def _bodies(self) -> pin.GeometryModel:
-        if self.subject.geometry is None:
-            raise InputError(
-                "the model was loaded without collision bodies; expected some for the check collision"
-            )
-        return self.subject.geometry
-
     @cached_property
-    def _margins(self) -> Array:
-        return np.zeros(0) if self.collision is None else self.collision.margins
+    def _kept_apart(self) -> SelfCollision:
+        """The pairs with their margins; read only where contact is asked about."""
+        return self.collision or SelfCollision(subject=self.subject)
 
     @cached_property
     def _balls(self) -> NearPairs:
-        return NearPairs(self.subject.model, self._bodies, self._margins + LOOKED_AT_METRES)
-
-    @cached_property
-    def _with_mesh(self) -> NDArray[np.bool_]:
-        """Which pairs have a mesh, which has no depth."""
-        meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in self._bodies.geometryObjects]
-        pairs = self._bodies.collisionPairs
-        return np.array([meshes[pair.first] or meshes[pair.second] for pair in pairs], dtype=np.bool_)
+        kept = self._kept_apart
+        return NearPairs(self.subject.model, kept.bodies, kept.margins + LOOKED_AT_METRES)
 
     @cached_property
     def _placed(self) -> pin.GeometryData:
-        placed = self._bodies.createData()
+        placed = self._kept_apart.bodies.createData()
         for request in placed.collisionRequests:
             request.num_max_contacts, request.enable_contact = MOST_CONTACTS, True
         return placed

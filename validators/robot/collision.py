@@ -46,7 +46,8 @@ class SelfCollision:
         _ = self.margins
 
     @property
-    def _bodies(self) -> pin.GeometryModel:
+    def bodies(self) -> pin.GeometryModel:
+        """The collision bodies, refused where the model has none."""
         if self.subject.geometry is None:
             raise InputError(
                 "the model was loaded without collision bodies; expected some for the check collision"
@@ -56,17 +57,17 @@ class SelfCollision:
     @cached_property
     def has_meshes(self) -> bool:
         """Whether some pair has a mesh: distances take a thousand times as long then."""
-        return bool(self._with_mesh.any())
+        return bool(self.with_mesh.any())
 
     @cached_property
-    def _with_mesh(self) -> NDArray[np.bool_]:
+    def with_mesh(self) -> NDArray[np.bool_]:
         """Which pairs have a mesh (P,)."""
         return np.asarray(self._meshes.any(axis=1))
 
     @cached_property
     def _meshes(self) -> NDArray[np.bool_]:
         """Which bodies of each pair are meshes (P, 2)."""
-        geometry = self._bodies
+        geometry = self.bodies
         meshes = [isinstance(body.geometry, coal.BVHModelBase) for body in geometry.geometryObjects]
         both = [(meshes[pair.first], meshes[pair.second]) for pair in geometry.collisionPairs]
         return np.array(both, dtype=np.bool_).reshape(-1, 2)
@@ -74,12 +75,12 @@ class SelfCollision:
     @cached_property
     def _near(self) -> NearPairs | None:
         """What spares asking pairs that are far apart, where asking is dear."""
-        return NearPairs(self.subject.model, self._bodies, self.margins) if self.has_meshes else None
+        return NearPairs(self.subject.model, self.bodies, self.margins) if self.has_meshes else None
 
     @cached_property
     def margins(self) -> Array:
         """The security margin of each pair (P,), metres: less than the contact margin by what is rounding noise."""
-        with_mesh = self._with_mesh
+        with_mesh = self.with_mesh
         if with_mesh.any() and self.contact_margin < 0:
             name = self.subject.pair_names[int(np.argmax(with_mesh))]
             raise InputError(
@@ -127,7 +128,7 @@ class SelfCollision:
         """List the pairs that collide in some configurations; with `nearest` the nearest pair of the others too."""
         return find_contacts(
             self.subject,
-            self._bodies,
+            self.bodies,
             q,
             rows,
             margins=self.margins,
@@ -138,7 +139,7 @@ class SelfCollision:
 
     @cached_property
     def _pool(self) -> pin.GeometryPool:
-        pool = make_pool(self.subject.model, self._bodies)
+        pool = make_pool(self.subject.model, self.bodies)
         for data in pool.getGeometryDatas():
             for request, margin in zip(data.collisionRequests, self.margins.tolist(), strict=True):
                 request.security_margin = margin
