@@ -228,15 +228,12 @@ def asked_of(body: BodyOptions, stated: StatedOptions, judged: JudgedOptions) ->
     InputError
         Where one of them is impossible.
     """
-    from posekit.formats.motion import UP_DIRECTIONS
     from posekit.validation import AskedValidation as Made
 
-    said = stated.stated
-    up = {"up": tuple(UP_DIRECTIONS[said.up].tolist())} if said.up else {}
-    changes = {**body.changes, **judged.changes, **up}
+    changes = {**body.changes, **judged.changes}
     return Made(
         urdf=body.urdf,
         changes={name: value for name, value in changes.items() if value is not None},
-        stated=said,
+        stated=stated.stated,
         sequence=body.sequence,
     )

@@ -11,6 +11,7 @@ from posekit.body import Figure
 from posekit.errors import InputError, PosekitError
 from posekit.formats.format import Content
 from posekit.formats.held_postures import POSTURE_CONTENTS, HeldPostures
+from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.own import ValidationReport
 from posekit.formats.recognising import recognise
 from posekit.geometry import Array
@@ -75,7 +76,8 @@ class AskedValidation:
             # What was allowed is the stick figure's: a robot's bodies are other ones, and meshes have no depth.
             own_limits = "urdf" if base.ranges == "urdf" else DEFAULT_RANGES
             base = base.changed(contact_margin=0.0, ranges=own_limits, lengths=None)
-        return Validator(figure, base.changed(**self.changes))
+        stated = {"up": UP_DIRECTIONS[self.stated.up]} if self.stated.up else {}
+        return Validator(figure, base.changed(**{**stated, **self.changes}))
 
     @staticmethod
     def _usual(up: Array | None) -> ValidateSettings:

@@ -13,9 +13,17 @@ from posekit.batch import validate_archive
 from posekit.batch.run import Workers
 from posekit.errors import InputError
 from posekit.formats.held import HeldPostures
-from posekit.formats.own import Postures, read_report
+from posekit.formats.own import NamedConfigurations, Postures, read_report
 from posekit.skeleton import JOINT, JOINTS
-from posekit.validation import AskedValidation, ReportBuilder, WantedDetail, files_of, validate_files
+from posekit.validation import (
+    AskedValidation,
+    ReportBuilder,
+    StatedMotion,
+    WantedDetail,
+    files_of,
+    validate_files,
+)
+from posekit.validation.reading import ReadPostures
 from posekit.validators import Validator
 
 FIGURE = posekit.load_figure()
@@ -255,3 +263,10 @@ def test_memory_does_not_grow_with_clips() -> None:
     kept = sum(value.nbytes for value in vars(columns).values() if isinstance(value, np.ndarray))
     assert kept < 100 * len(report)
     assert len(report.postures) == 0
+
+
+def test_the_way_up_that_is_stated_counts_beside_settings() -> None:
+    """Settings of one's own do not turn over what `balance` asks of a robot."""
+    asked = AskedValidation(settings=posekit.ValidateSettings(), stated=StatedMotion(up="+y"))
+    read = ReadPostures(NamedConfigurations(q=np.zeros((1, FIGURE.model.nq)), names=None, source="standing"))
+    assert asked.validator(read).settings.up == (0.0, 1.0, 0.0)
