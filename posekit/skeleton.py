@@ -79,6 +79,9 @@ LIMB_JOINTS: Final = tuple(
 )
 """Right arm, left arm, right leg, left leg: start, middle and end joint of each."""
 
+LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
+"""Upper arms, forearms, thighs and shanks, limb by limb, by their two joints."""
+
 N_TRUNK_JOINTS: Final = len(JOINTS) - 2 * len(LIMB_JOINTS)
 """Joints of torso and hips: the first of the tree, on which limbs hang."""
 

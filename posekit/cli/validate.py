@@ -53,29 +53,6 @@ def validate(
             short="-o",
         ),
     ] = None,
-    body: BodyOptions,
-    stated: StatedOptions,
-    judged: JudgedOptions,
-    distances: Annotated[
-        bool | None,
-        typer.Option(
-            "--distances/--no-distances",
-            help="Whether JSON and CSV have the nearest pair of bodies in every posture of a robot (default: where "
-            "none is a mesh).",
-        ),
-    ] = None,
-    jobs: Annotated[
-        int | None,
-        option("--jobs", "N", "Processes, where --output is a folder. Default: one a core."),
-    ] = None,
-    fail_over: Annotated[
-        str,
-        option(
-            "--fail-over",
-            "N|P%|N clips|P% clips",
-            "How many postures or clips, or what share, may be not valid; then exit 0.",
-        ),
-    ] = "0",
     page: Annotated[
         Path | None, option("--page", "FILE.html", "The page of the report, beside --output.")
     ] = None,
@@ -101,6 +78,29 @@ def validate(
         option(
             "--repair", "FILE|DIR", "The nearest that passes, as a file, or in a folder one of each clip."
         ),
+    ] = None,
+    fail_over: Annotated[
+        str,
+        option(
+            "--fail-over",
+            "N|P%|N clips|P% clips",
+            "How many postures or clips, or what share, may be not valid; then exit 0.",
+        ),
+    ] = "0",
+    body: BodyOptions,
+    stated: StatedOptions,
+    judged: JudgedOptions,
+    distances: Annotated[
+        bool | None,
+        typer.Option(
+            "--distances/--no-distances",
+            help="Whether JSON and CSV have the nearest pair of bodies in every posture of a robot (default: where "
+            "none is a mesh).",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None,
+        option("--jobs", "N", "Processes, where --output is a folder. Default: one a core."),
     ] = None,
     every: Annotated[
         bool, typer.Option("--all", help="List every finding, not only violations and each check's worst.")

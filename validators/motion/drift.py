@@ -9,15 +9,12 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from posekit.geometry import Array
-from posekit.skeleton import JOINTS, LIMB_JOINTS
+from posekit.skeleton import LIMB_SEGMENTS, segment_name
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.explained import explained
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm
-
-LIMB_SEGMENTS: Final = tuple(pair for limb in LIMB_JOINTS for pair in (limb[:2], limb[1:]))
-"""Upper arms, forearms, thighs and shanks, by their two joints."""
 
 DRIFT_FRAMES: Final = 5
 """Whose median length is judged: one frame's is no drift."""
@@ -48,7 +45,7 @@ class Drift(MotionCheck):
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the segments; see `MotionCheck`."""
         del clip
-        return tuple(f"{JOINTS[start]}-{JOINTS[end]}" for start, end in LIMB_SEGMENTS)
+        return tuple(map(segment_name, LIMB_SEGMENTS))
 
     def judge(self, clip: MotionClip) -> Findings:
         """Measure by what share lengths are off their medians; see `MotionCheck`."""
