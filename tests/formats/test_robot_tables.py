@@ -156,7 +156,7 @@ def test_velocities_are_what_leads_to_each_frame(tmp_path: Path) -> None:
     stepped = pin.integrate(robot.model, q()[6], moves["velocity"][7] / RATE)
     np.testing.assert_allclose(stepped, q()[7], atol=1e-9)
     at = moves["velocity_names"].index("left_knee_joint")
-    assert moves["fastest"][at] == robot.model.velocityLimit[at]
+    assert moves["velocity_limits"][at] == robot.model.velocityLimit[at]
 
 
 def changed(layout: str, **arrays: Any) -> dict[str, Any]:
