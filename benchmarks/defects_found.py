@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.clean_clips import CleanClip, clean_clips
-from benchmarks.defects import DEFECTS, DefectCase, draw
+from benchmarks.defect_cases import DefectCase, draw
+from benchmarks.defects import DEFECTS
 from benchmarks.defects_in_files import FOUND_IN_FILES, rejected_in_file
 from posekit.formats.markdown import table_lines
 from posekit.validators.motion import MotionClip, judge_motion, load_profile

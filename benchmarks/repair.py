@@ -24,7 +24,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from benchmarks.clean_clips import CleanClip, clean_clips
-from benchmarks.defects import DEFECTS, draw
+from benchmarks.defect_cases import draw
+from benchmarks.defects import DEFECTS
 from posekit.body import with_head
 from posekit.body.measured import MeasuredPerson, measured_person
 from posekit.formats.markdown import table_lines

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from posekit.body.measured import noise_by_limb, usual_noise
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
+from posekit.formats.motion.motion_table import recorded_rate
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.settings import ValidateSettings
 from posekit.validation.people import Recording
@@ -42,7 +43,7 @@ def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) ->
         head=np.empty(0) if head is None else head[rows],
         feet=held.feet[rows] if held.feet.size else held.feet,
         time=time,
-        rate=rate_of(time),
+        rate=recorded_rate(time),
         # Where each frame has its own origin there is no ground, and nothing goes anywhere.
         up=UP_DIRECTIONS[held.up] if held.up and held.in_world else None,
         ground=settings.ground,
@@ -126,10 +127,3 @@ def _noise_of(joints: NDArray[np.float64], settings: ValidateSettings) -> float:
     if settings.noise is not None or settings.strict:
         return settings.noise or 0.0
     return float(np.nan_to_num(usual_noise(noise_by_limb(joints))))
-
-
-def rate_of(time: NDArray[np.float64]) -> float:
-    """Return the frames a second of times (T,): by their median step; NaN where they say none."""
-    steps = np.diff(time)
-    known = steps[np.isfinite(steps) & (steps > 0)]
-    return float(1.0 / np.median(known)) if len(known) else np.nan

@@ -9,12 +9,12 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.formats.motion.motion_table import recorded_rate
 from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import PER_DEGREE, VerdictColumns
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES
 from posekit.geometry import Array, runs
-from posekit.validation.over_time import rate_of
 
 MERGED_SECONDS: Final = 0.1
 """Seconds between two frames of one span at most; what comes back sooner has one cause."""
@@ -77,7 +77,7 @@ def _verdict(
     most: int,
 ) -> ClipVerdict:
     verdict, time = columns.verdict[rows], frames.time[rows]
-    rate = rate_of(time)
+    rate = recorded_rate(time)
     gap = max(MERGED_FRAMES, round(MERGED_SECONDS * rate)) if np.isfinite(rate) else MERGED_FRAMES
     found = (
         [

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.clean_clips import CleanClip
-from benchmarks.defects import DEFECTS, DefectCase, draw
+from benchmarks.defect_cases import DefectCase, draw
+from benchmarks.defects import DEFECTS
 from benchmarks.defects_found import is_found
 from posekit.body import load_figure
 from posekit.validators.motion import MotionClip
