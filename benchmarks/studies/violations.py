@@ -2,7 +2,7 @@
 
     python -m benchmarks.studies.violations CAPTURE [CAPTURE ...] [--frames 10] [--noise 2] [--seed 0]
 
-A capture is anything that `benchmarks/people.py` reads. Prints the tables of docs/violations.md: the share of frames
+A capture is anything that `benchmarks/people.py` reads. Prints the tables of docs, "Violations": the share of frames
 whose elbows and knees are beyond their limits by more than 10 and 30 degrees, as Table 4 of Xia et al. 2025
 ("Reconstructing Humans with a Biomechanically Accurate Skeleton", CVPR; HSMR) counts them; then the share that each
 check rejects, and every clip with frames that are not valid.

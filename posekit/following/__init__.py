@@ -1,7 +1,7 @@
 """Survivors over time: the motions through a sequence that a body can have made.
 
 `best_paths` weighs all paths at once and returns what is expected, `Follower` does so live; both bridge frames without
-a survivor. `choose_scale` tells lengths by how the sequence moves, `smooth` smooths a path. See docs/sequences.md.
+a survivor. `choose_scale` tells lengths by how the sequence moves, `smooth` smooths a path. See docs, "Sequences".
 """
 
 from posekit.following.beam import Beam as Beam

@@ -4,7 +4,7 @@
 which the tree is grown; `tolerance_of` and `under_noise` say what the tree must allow for; `refine` turns its leaves
 into the most likely postures, with a chi-square test (`Refined.explained`) and a covariance for every joint; `merge`
 makes one of those that became one. How well lengths are known `posekit.body.LengthUncertainty` says; `diagnose` names
-lengths that are wrong. See docs/noise.md.
+lengths that are wrong. See docs, "Noise".
 """
 
 from posekit.refinement.allowance import NoisyRange as NoisyRange

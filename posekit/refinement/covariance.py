@@ -12,7 +12,7 @@ image still shows it to second order: a length l seen too short by the noise :ma
 :math:`t = \sqrt{2 \sigma / l}`, and the estimate :math:`\sqrt{\max(y, 0)}` from :math:`y = t^2 + e` is off by
 :math:`E[(\hat t - t)^2] = E[\max(e, 0)] = 0.8\,\sigma / l` at t = 0. Its inverse would be :math:`1.25\, l / \sigma`;
 but beside t = 0 the error is larger than either order says. :math:`0.5\, l / \sigma` is added as information on the
-turn: with it stated and measured errors agree over random legal postures, at half a pixel as at five (docs/noise.md).
+turn: with it stated and measured errors agree over random legal postures, at half a pixel as at five (docs, "Noise").
 """
 
 from __future__ import annotations
