@@ -17,7 +17,7 @@ from posekit.safe_io.writing import replacing, write_text
 from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS
 from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
-from posekit.viewer.moving import check_speed, find_ffmpeg, write_gif, write_mp4
+from posekit.viewer.moving import check_speed, write_gif
 from posekit.viewer.scene.compose import Composition, Style, compose, row_count
 from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, check_one_scale
 from posekit.viewer.scene.eye import CameraEye, Eye
@@ -25,6 +25,7 @@ from posekit.viewer.scene.framing import fitted_eye, orbit, view_eye
 from posekit.viewer.scene.scene import Scene
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.standalone import standalone_page
+from posekit.viewer.video import video_library, write_mp4
 
 MOVING_SUFFIXES: Final = (".gif", ".mp4")
 PICTURE_SUFFIXES: Final = (".png", ".html", *MOVING_SUFFIXES)
@@ -77,8 +78,9 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
     Raises
     ------
     ViewerError
-        Where the file's name asks for none of png, gif, mp4 and html, for mp4 without ffmpeg, or where the
-        picture's size or speed is none.
+        Where the file's name asks for none of png, gif, mp4 and html, or where the picture's size or speed is none.
+    InputError
+        Where what writes .mp4 is not installed.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURE_SUFFIXES:
@@ -87,7 +89,7 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
         )
     check_size(shot.size, shot.supersample)
     if suffix == ".mp4":
-        find_ffmpeg()
+        video_library("writing .mp4")
     if shot.turntable and suffix not in MOVING_SUFFIXES:
         raise ViewerError(f"{path}: a turntable moves; expected {' or '.join(MOVING_SUFFIXES)}")
     if suffix in MOVING_SUFFIXES:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
-import stat
 import sys
 from pathlib import Path
 
@@ -20,16 +18,9 @@ from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
+from posekit.viewer.video import Video
 
 SMALL = Shot(size=(200, 150), supersample=1)
-FAKE_FFMPEG = """#!{python}
-import sys
-count = len(sys.stdin.buffer.read())
-if {fails}:
-    print("Unknown encoder 'libx264'", file=sys.stderr)
-    sys.exit(1)
-open(sys.argv[-1], "w").write(str(count))
-"""
 
 
 def render(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
@@ -45,12 +36,6 @@ def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
     assert error.startswith("posekit: error: ")
     assert error.count("\n") == 1
     return error
-
-
-def fake_ffmpeg(folder: Path, *, fails: bool = False) -> None:
-    program = folder / "ffmpeg"
-    program.write_text(FAKE_FFMPEG.format(python=sys.executable, fails=fails))
-    program.chmod(program.stat().st_mode | stat.S_IXUSR)
 
 
 def test_sequence_becomes_a_gif_that_moves(subject: DrawnSubject, tmp_path: Path) -> None:
@@ -80,27 +65,23 @@ def test_turntable_goes_around(subject: DrawnSubject, tmp_path: Path) -> None:
         assert gif.info["duration"] == 20
 
 
-def test_mp4_is_handed_to_ffmpeg(
-    subject: DrawnSubject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_mp4_is_a_video_that_moves_with_even_sides(subject: DrawnSubject, tmp_path: Path) -> None:
     film = tmp_path / "walk.mp4"
-    frames = [frame.chosen([0]) for frame in subject.frames[:2]]
-    programs = tmp_path / "programs"
-    programs.mkdir()
-    path = os.environ["PATH"]
-    monkeypatch.setattr("shutil.which", lambda name: None if name == "ffmpeg" else f"/nowhere/{name}")
-    with pytest.raises(ViewerError, match=r"apt-get install ffmpeg\), or write a \.gif"):
-        write_picture(film, subject, frames, shot=SMALL)
-    monkeypatch.undo()
-    monkeypatch.setenv("PATH", f"{programs}{os.pathsep}{path}")
-    fake_ffmpeg(programs)
-    assert write_picture(film, subject, frames, shot=SMALL) == 2
-    assert film.read_text() == str(2 * 200 * 150 * 3)
-    film.unlink()
-    fake_ffmpeg(programs, fails=True)
-    with pytest.raises(ViewerError, match="Unknown encoder 'libx264'"):
-        write_picture(film, subject, frames, shot=SMALL)
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["programs"]
+    frames = [frame.chosen([0]) for frame in subject.frames[:3]]
+    shot = Shot(size=(201, 151), supersample=1, fps=12.5)
+    assert write_picture(film, subject, frames, shot=shot) == 3
+    video = Video.opened(film)
+    assert (video.size, video.rate, video.count) == ((202, 152), 12.5, 3)
+    pictures = [picture.astype(int) for picture in video.pictures([0, 1, 2])]
+    assert all((np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in itertools.pairwise(pictures))
+
+
+def test_mp4_without_its_package_is_refused_before_the_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "av", None)
+    with pytest.raises(InputError, match=r"writing \.mp4 needs av.*pip install 'posekit\[video\]'"):
+        check_picture(tmp_path / "walk.mp4", SMALL)
 
 
 @pytest.mark.parametrize(
