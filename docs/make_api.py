@@ -48,6 +48,7 @@ SECTIONS: Final = (
     ("Inspection", "posekit.inspection"),
     ("Evaluation", "posekit.evaluate"),
     ("The papers", "posekit.papers"),
+    ("Samples", "posekit.samples"),
     ("Command line", "posekit.cli"),
 )
 """Title, and the package or module; those of a package's folders that are packages have pages of their own."""

@@ -37,6 +37,7 @@ COMMAND_NAMES: Final = (
     "render",
     "view",
     "demo",
+    "samples",
 )
 """In the order of the help; each has its own module of that name."""
 

@@ -1,0 +1,30 @@
+"""`posekit samples`: files to try the other commands with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from posekit.cli.options import examples
+
+SAMPLES_EXAMPLES = examples(
+    "posekit samples samples",
+    "posekit recover samples/walk.json -o postures.json",
+)
+
+
+def samples(
+    folder: Annotated[
+        Path, typer.Argument(metavar="DIR", help="Where to write; made where it is not there.")
+    ],
+) -> None:
+    """Write a folder of small files to try posekit with: views, motion, key points, a photograph, robots."""
+    from posekit.samples import write_samples
+
+    contents = write_samples(folder)
+    width = max(map(len, contents))
+    for name, what in contents.items():
+        typer.echo(f"{name:{width}}  {what}")
+    typer.echo(f"written: {folder}")
