@@ -104,6 +104,12 @@ def body_step(clip: MotionClip, span: Span, size: float, rng: np.random.Generato
     return Broken(clip=moved(clip, size * after[:, None] * _direction(rng)), span=(span[0], span[0]))
 
 
+def body_spread_step(clip: MotionClip, span: Span, size: float, rng: np.random.Generator) -> Broken:
+    """Displace the body by metres, evenly over the frames of a span; it stays where it came to."""
+    way = size * np.cumsum(_in_span(clip, span)) / (span[1] - span[0] + 1)
+    return Broken(clip=moved(clip, way[:, None] * _direction(rng)), span=span)
+
+
 def swap(*parts: str) -> Callable[[MotionClip, Span, float, np.random.Generator], Broken]:
     """Return the defect that takes right for left at some parts of the body, in a span."""
 

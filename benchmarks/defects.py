@@ -112,15 +112,16 @@ DEFECTS: Final[Mapping[str, Defect]] = {
                 name=name,
                 checks=("teleport",),
                 unit="m",
-                sizes=(0.3, 0.1, 0.05, 0.03),
-                asked=0.1,
+                sizes=sizes,
+                asked=asked,
                 put=function,
-                frames=_ONE_FRAME,
+                frames=frames,
             )
-            for name, function in (
-                ("jump of a joint", put.joint_jump),
-                ("jump of the body", put.body_jump),
-                ("step of the body", put.body_step),
+            for name, function, frames, sizes, asked in (
+                ("jump of a joint", put.joint_jump, _ONE_FRAME, (0.3, 0.1, 0.05, 0.03), 0.1),
+                ("jump of the body", put.body_jump, _ONE_FRAME, (0.3, 0.1, 0.05, 0.03), 0.1),
+                ("step of the body", put.body_step, _ONE_FRAME, (0.3, 0.1, 0.05, 0.03), 0.1),
+                ("step over frames", put.body_spread_step, (2, 5), (1.0, 0.5, 0.3, 0.2), 0.5),
             )
         ),
         *(

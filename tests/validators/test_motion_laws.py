@@ -127,6 +127,20 @@ def test_a_defect_is_named_once_and_where_it_is(name: str) -> None:
     assert np.abs(np.array(found[name]) - SPANS[name]).max() <= 1
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3, 5])
+@pytest.mark.parametrize("turned_back", [False, True])
+def test_a_body_that_goes_half_a_metre_aside_jumps_while_it_goes(frames: int, turned_back: bool) -> None:
+    way = 0.5 * np.clip((np.arange(90) - 39) / frames, 0.0, 1.0)
+    joints = WALK.joints + way[:, None, None] * np.array([0.6, 0.0, 0.8])
+    found = named(replace(WALK, joints=joints[::-1] if turned_back else joints))
+    assert found == {"teleport": (51 - frames, 50) if turned_back else (40, 39 + frames)}
+
+
+def test_a_body_that_is_pushed_aside_in_a_third_of_a_second_is_none() -> None:
+    way = 0.1 * (1.0 - np.cos(np.pi * np.clip((np.arange(90) - 40) / 10, 0.0, 1.0)))
+    assert named(replace(WALK, joints=WALK.joints + way[:, None, None])) == {}
+
+
 @pytest.mark.parametrize("name", BROKEN)
 def test_where_and_how_a_body_is_turned_changes_nothing(name: str) -> None:
     clip, turn = BROKEN[name], np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -19,15 +19,11 @@ from numpy.typing import NDArray
 from posekit.geometry import Array
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.duplicates import duplicates
-from posekit.validators.motion.jumps import Jumps, jumps_of
+from posekit.validators.motion.jumps import LEAST_JUMP, Jumps, jumps_of
 from posekit.validators.motion.order import ORDERED_RATE, displaced, stretches_of
 from posekit.validators.motion.sides import exchanged_pairs, put_right
 from posekit.validators.motion.timeline import Timeline, timeline_of
 from posekit.validators.motion.trembling import trembling_of, usual_trembling
-
-JUMP_METRES: Final = 0.06
-"""By so much a frame must jump to be left out of what is judged as motion; the bound of `teleport` is the
-profile's."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,8 +95,8 @@ def _explain(clip: MotionClip) -> Explained:
         joints[kept], clip.feet[order][kept], clip.head[order][kept], follows, noise
     )
     joints = timeline.spread(put_right(joints, exchanged)[back])
-    jumps = jumps_of(joints)
-    jumped = (jumps.joint > JUMP_METRES) | (jumps.body > JUMP_METRES)[:, None]
+    jumps = jumps_of(joints, clip.step)
+    jumped = (jumps.joint > LEAST_JUMP) | (jumps.body > LEAST_JUMP)[:, None]
     return Explained(
         timeline=timeline,
         repeats=repeats[back],

@@ -9,14 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
+from posekit.validators.motion.displaced_body import displaced_by, middle
 from posekit.validators.motion.timeline import centred, filtered, norm
+
+LEAST_JUMP: Final = 0.06
+"""Metres by which a frame must jump to be left out of what is judged as motion."""
 
 SIDE_FRAMES: Final = 3
 """Frames on either side that a jump is told by."""
 
-JOINT_MISFITS, STEP_MISFITS, END_MISFITS = 3.0, 3.0, 5.0
-"""Times by which the neighbours' own misfit is taken off a jump: of a joint or body that comes back, of a body that
-stays moved, and at an end of the clip. Fast motion at few frames a second fits no smooth curve, and is no jump."""
+JOINT_MISFITS, END_MISFITS = 3.0, 5.0
+"""Times by which the neighbours' own misfit is taken off a jump: of a joint or body that comes back, and at an end of
+the clip. Fast motion at few frames a second fits no smooth curve, and is no jump."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,25 +57,22 @@ def _filter(times: Array, degree: int, jumped: NDArray[np.bool_]) -> _Filter:
 
 _ONE_FRAME: Final = _filter(np.arange(-3.0, 4.0), 3, np.arange(-3, 4) == 0)
 _NEAR_END: Final = {at: _filter(np.arange(7.0) - at, 3, np.arange(7) == at) for at in (1, 2)}
-_FROM_NOW_ON: Final = _filter(np.arange(-2.5, 3.0), 2, np.arange(6) > 2)
 _THIRD_DIFFERENCE: Final = np.array([1.0, -3.0, 3.0, -1.0])
 
 
-def jumps_of(joints: Array) -> Jumps:
-    """Measure the jumps of joints in slots of even time (S, 14, 3).
+def jumps_of(joints: Array, step: float) -> Jumps:
+    """Measure the jumps of joints in slots of even time (S, 14, 3), so many seconds each (NaN where not known).
 
     Notes
     -----
-    A jump of one frame is how far it is from the cubic through three frames on either side; a step is the offset
-    between the two sides of a parabola through six, said of the first frame after it; at an end it is the third
-    difference. All less some times the misfit of the neighbours themselves.
+    A jump of one frame is how far it is from the cubic through three frames on either side; at an end it is the third
+    difference. All less some times the misfit of the neighbours themselves. A body that stays moved is for
+    `posekit.validators.motion.displaced_body`.
     """
     count = len(joints)
     offset, misfit = _measured(joints, _ONE_FRAME, count)
-    shift, shift_misfit = _measured(joints, _FROM_NOW_ON, count)
-    body = _middle(offset)
-    alone = norm(body) - JOINT_MISFITS * _middle(misfit)
-    moved = norm(_middle(shift)) - STEP_MISFITS * _middle(shift_misfit)
+    body = middle(offset)
+    alone = norm(body) - JOINT_MISFITS * middle(misfit)
     joint = norm(offset) - JOINT_MISFITS * misfit
     beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
     joint = np.where((alone > 0)[:, None], np.minimum(beside, joint), joint)
@@ -84,7 +85,12 @@ def jumps_of(joints: Array) -> Jumps:
                 jump = _near_end(window, by)
                 # A last frame that jumps is off from the curve of those next to it, not they.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
-    return Jumps(joint=joint, body=np.fmax(alone, moved))
+    back = (
+        np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints)
+        if (alone > LEAST_JUMP).any()
+        else joints
+    )
+    return Jumps(joint=joint, body=np.fmax(alone, displaced_by(back, step)))
 
 
 def _near_end(window: Array, by: _Filter) -> Array:
@@ -99,18 +105,3 @@ def _measured(joints: Array, by: _Filter, count: int) -> tuple[Array, Array]:
     parts = [filtered(joints, weights) for weights in by.misfit]
     misfit = np.sqrt(sum(np.einsum("tji,tji->tj", part, part) for part in parts))
     return centred(filtered(joints, by.jump), count, SIDE_FRAMES), centred(misfit, count, SIDE_FRAMES)
-
-
-def _middle(values: Array) -> Array:
-    """Return the median over joints of (S, 14, ...): of those that are known."""
-    known = np.isfinite(values)
-    if known.all():
-        half = values.shape[1] // 2
-        ordered = np.partition(values, (half - 1, half), axis=1)
-        return np.asarray((ordered[:, half - 1] + ordered[:, half]) / 2.0)
-    ordered = np.sort(values, axis=1)  # what is not known comes last
-    number = known.sum(axis=1, keepdims=True)
-    low, high = (
-        np.take_along_axis(ordered, np.maximum(k, 0), axis=1) for k in ((number - 1) // 2, number // 2)
-    )
-    return np.asarray(((low + np.where(number % 2, low, high)) / 2.0)[:, 0])
