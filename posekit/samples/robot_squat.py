@@ -18,7 +18,7 @@ SQUAT_DEPTH: Final = 0.6
 """Radians that the hips are bent at the lowest."""
 ELBOW_BEYOND: Final = slice(10, 35)
 """Frames in which the left elbow bends, beyond its range."""
-ARM_IN_TRUNK: Final = slice(40, 60)
+ARM_IN_TRUNK: Final = slice(46, 55)
 """Frames in which the left arm goes into the trunk, and out of it."""
 FEET_IN_GROUND: Final = slice(65, 85)
 """Frames in which the feet go into the ground, by 6 cm."""
@@ -31,7 +31,7 @@ def write_robot_squat(path: Path) -> None:
     q = _squat(robot, names)
     for frames, column, change in (
         (ELBOW_BEYOND, 7 + names.index("left_elbow_joint"), 2.6),
-        (ARM_IN_TRUNK, 7 + names.index("left_shoulder_roll_joint"), -1.1),
+        (ARM_IN_TRUNK, 7 + names.index("left_shoulder_roll_joint"), -0.75),
         (FEET_IN_GROUND, 2, -0.06),
     ):
         count = frames.stop - frames.start
