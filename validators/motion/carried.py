@@ -52,11 +52,12 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
         # A rest may be of a group that was left before: the body comes down again where it hung from.
         alike = np.flatnonzero(~(np.abs(levels[:k] - levels[k]) > LEVEL_METRES))
         between = slice(rests[k - 1][1], rests[k][0])
-        jumped = (between.stop - between.start) * step >= SHORTEST_FLIGHT and falls(centre[between], step)
-        if jumped or k - 1 in alike:
+        if len(alike):
+            group[k] = group[alike[-1]]
+        elif (between.stop - between.start) * step >= SHORTEST_FLIGHT and falls(centre[between], step):
             group[k] = group[k - 1]
         else:
-            group[k] = group[alike[-1]] if len(alike) else group.max() + 1
+            group[k] = group.max() + 1
     count = np.bincount(group, weights=[stop - start for start, stop in rests])
     left = resting.copy()
     for (start, stop), of in zip(rests, group, strict=True):
