@@ -15,6 +15,8 @@ from posekit.tree import Findings
 from posekit.validators.motion.base_of_support import beyond_support
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import (
+    FOOT_SHARE,
+    FORWARD_SHARE,
     LEG_SHARE,
     ground_of,
     soles,
@@ -22,9 +24,6 @@ from posekit.validators.motion.ground import (
     stature_of,
 )
 from posekit.validators.motion.motion_check import MotionCheck
-
-FOOT_SHARE: Final = 0.152
-"""Length of the foot, of the stature (Winter 2009, figure 4.1)."""
 
 BEARING_METRES: Final = 0.06
 """Above the lowest sole up to which a foot bears."""
@@ -72,7 +71,7 @@ class BalanceStill(MotionCheck):
             bears = height < np.fmin.reduce(height, axis=1)[:, None] + BEARING_METRES
             # What a foot reaches beyond its known points: all of it beyond an ankle, its end and edges beyond a toe.
             toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
-            reach = (0.4 if toes else 0.75) * FOOT_SHARE * stature_of(clip)
+            reach = (0.4 if toes else FORWARD_SHARE) * FOOT_SHARE * stature_of(clip)
             centre = centre_of_mass(np.moveaxis(clip.joints[still], 0, -1)).T
             bearing = np.where(bears[..., None], feet[still], np.nan)
             value[still, 0] = beyond_support(centre, bearing, up) - reach

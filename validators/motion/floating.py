@@ -15,7 +15,7 @@ from posekit.geometry import runs
 from posekit.tree import Findings
 from posekit.validators.motion.carried import FALL_SHARE, falls
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, in_air
+from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.motion_check import MotionCheck
 
 
@@ -53,7 +53,7 @@ class Floating(MotionCheck):
         """Measure how high the lowest point is over the ground; see `MotionCheck`."""
         ground = ground_of(clip)
         over = ground.offset + ground.lifted
-        for start, stop in runs(in_air(ground)):
+        for start, stop in runs(ground.in_air):
             lasts = (stop - start) * clip.step
             if lasts >= self.shortest and not falls(ground.centre[start:stop], clip.step, self.fall):
                 over[start:stop] += ground.lowest[start:stop] - ground.high

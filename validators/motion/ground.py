@@ -27,11 +27,20 @@ from posekit.validators.motion.timeline import norm, timeline_of
 TOE_METRES: Final = 0.02
 """Height of the points of toes and heels over the sole of a foot that stands: joints and labels lie inside it."""
 
+FOOT_SHARE: Final = 0.152
+"""Length of the foot, of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1)."""
+
+FORWARD_SHARE: Final = 0.75
+"""Of the foot's length, that is before the ankle."""
+
 ANKLE_SHARE: Final = 0.039
 """Height of the ankle over the sole, of the stature (Winter 2009, Biomechanics and Motor Control, figure 4.1)."""
 
 LEG_SHARE: Final = THIGH_OF_STATURE + SHANK_OF_STATURE
 """Thigh and shank, of the stature (same figure)."""
+
+USUAL_STATURE: Final = 1.7
+"""Metres, of whoever has no legs to tell it by."""
 
 REST_SPEED: Final = 0.25
 """Metres a second below which a point rests; a foot's parts move so slowly in stance, in no part of a swing."""
@@ -46,6 +55,10 @@ BY_CHANCE: Final = 3
 
 AIR_METRES: Final = 0.03
 """Above the highest level of the ground by which a body that nothing holds is in the air."""
+
+TIPTOE_SHARE: Final = np.hypot(FORWARD_SHARE * FOOT_SHARE, ANKLE_SHARE) - ANKLE_SHARE
+"""Of the stature, by which the ankle rises of a foot that is held by its toes: more than that is in the air, where toes
+are not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +83,8 @@ class Ground:
         Whether what rests got there with no step and no jump.
     centre : array (T,)
         The centre of mass, along up.
+    in_air : bool array (T,)
+        Whether nothing rests, and the body is above all levels of the ground: higher than on the toes that it has.
     """
 
     low: float
@@ -80,6 +95,7 @@ class Ground:
     resting: NDArray[np.bool_]
     hanging: NDArray[np.bool_]
     centre: Array
+    in_air: NDArray[np.bool_]
 
 
 _KNOWN: Final[WeakKeyDictionary[MotionClip, Ground]] = WeakKeyDictionary()
@@ -103,12 +119,16 @@ def stature_of(clip: MotionClip) -> float:
     return 2 * float(np.mean(medians)) / LEG_SHARE if medians else np.nan
 
 
+def _stature(clip: MotionClip) -> float:
+    stature = stature_of(clip)
+    return stature if stature > 0 else USUAL_STATURE
+
+
 def soles(clip: MotionClip) -> tuple[Array, Array]:
     """Return the points of feet (T, 6, 3), toes, heels and ankles, and how high each is over its sole (6,)."""
     ankles = clip.joints[:, [JOINT["right_ankle"], JOINT["left_ankle"]]]
-    stature = stature_of(clip)
     toes = TOE_METRES if clip.q is None else 0.0  # a robot's are the ends of its soles
-    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * (stature if stature > 0 else 1.7)] * 2)
+    over = np.array([toes] * len(FEET_POINTS) + [ANKLE_SHARE * _stature(clip)] * 2)
     return np.concatenate([clip.feet, ankles], axis=1), over
 
 
@@ -149,6 +169,8 @@ def _found(clip: MotionClip) -> Ground:
         low, high = np.percentile(held, (5, 50)) if len(held) else (np.nan, np.nan)
     else:
         low, high = np.percentile(held, (5, 98))
+    toes = np.isfinite(feet[:, : len(FEET_POINTS)]).any()
+    air = AIR_METRES + (0.0 if toes else TIPTOE_SHARE * _stature(clip))
     return Ground(
         low=float(low),
         high=float(high - low),
@@ -158,17 +180,13 @@ def _found(clip: MotionClip) -> Ground:
         resting=resting,
         hanging=still & ~resting,
         centre=centre,
+        in_air=~resting & (lowest > high + air),
     )
 
 
 def _speed_noise(clip: MotionClip) -> float:
     """Return the standard deviation of a speed between the neighbours of a frame."""
     return clip.noise / (np.sqrt(2) * clip.step) if clip.step > 0 else 0.0
-
-
-def in_air(ground: Ground) -> NDArray[np.bool_]:
-    """Say in which frames (T,) nothing rests, and the body is above all levels of the ground."""
-    return np.asarray(~ground.resting & (ground.lowest > ground.high + AIR_METRES))
 
 
 def ground_unknown(clip: MotionClip) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from posekit.geometry import runs
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, in_air
+from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.motion_check import MotionCheck
 
 
@@ -38,6 +38,6 @@ class Support(MotionCheck):
     def judge(self, clip: MotionClip) -> Findings:
         """Measure how long each flight lasts; see `MotionCheck`."""
         lasts = np.zeros((len(clip), 1))
-        for start, stop in runs(in_air(ground_of(clip))):
+        for start, stop in runs(ground_of(clip).in_air):
             lasts[start:stop] = (stop - start) * clip.step
         return Findings(value=lasts, lower=np.array(-np.inf), upper=np.array(self.longest))
