@@ -28,6 +28,9 @@ from posekit.validators.motion.motion_check import MotionCheck
 BEARING_METRES: Final = 0.06
 """Above the lowest sole up to which a foot bears."""
 
+NOISE_FACTOR: Final = 4.0
+"""Standard deviations of measuring by which the fastest of the joints may be faster than it is."""
+
 SITTING_SHARE: Final = 0.8
 """Of the legs' length, by which the hips of whoever stands are above the feet: lower ones may sit on something."""
 
@@ -79,8 +82,11 @@ class BalanceStill(MotionCheck):
 
     def _stands(self, clip: MotionClip) -> NDArray[np.bool_]:
         """Say in which frames (T,) the body stands, and is still for long enough."""
-        noise = clip.noise / (np.sqrt(2) * clip.step)
-        still = np.nan_to_num(speeds(clip, clip.joints), nan=0.0).max(axis=1) < self.slower + 4 * noise
+        # Over so many frames that noise is slow beside what is still.
+        noise = NOISE_FACTOR * clip.noise / (np.sqrt(2) * clip.step)
+        frames = max(int(np.ceil(noise / self.slower)), 1)
+        fast = np.nan_to_num(speeds(clip, clip.joints, frames), nan=0.0).max(axis=1)
+        still = fast < self.slower + noise / frames
         for start, stop in runs(still):
             still[start:stop] = (stop - start) * clip.step >= self.lasting
         hips = clip.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].mean(axis=1)

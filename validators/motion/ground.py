@@ -132,13 +132,13 @@ def soles(clip: MotionClip) -> tuple[Array, Array]:
     return np.concatenate([clip.feet, ankles], axis=1), over
 
 
-def speeds(clip: MotionClip, points: Array) -> Array:
-    """Return how fast points (T, P, 3) move, metres a second, between the neighbours of each frame; NaN at ends."""
+def speeds(clip: MotionClip, points: Array, frames: int = 1) -> Array:
+    """Return how fast points (T, P, 3) move, metres a second, from so many frames before to after; NaN at ends."""
     line = timeline_of(clip)
     placed = line.spread(points)
     fast = np.full(placed.shape[:2], np.nan)
-    if len(placed) > 2:
-        fast[1:-1] = norm(placed[2:] - placed[:-2]) / (2 * clip.step)
+    if len(placed) > 2 * frames:
+        fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (2 * frames * clip.step)
     return line.of_frames(fast)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
 from posekit.validators.motion.ground import ground_of
 from posekit.validators.motion.motion_check import MotionCheck
+
+NOISE_FACTOR: Final = 3.0
+"""Standard deviations of measuring by which the lowest of several points may be lower than they are."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,5 +51,7 @@ class Penetration(MotionCheck):
         lower = ground.lowest + unlevel
         over = ground.offset + ground.lifted + np.minimum(lower, 0.0)
         return Findings(
-            value=over[:, None], lower=np.array(-self.depth - 2 * clip.noise), upper=np.array(np.inf)
+            value=over[:, None],
+            lower=np.array(-self.depth - NOISE_FACTOR * clip.noise),
+            upper=np.array(np.inf),
         )

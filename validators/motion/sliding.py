@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array, runs
-from posekit.skeleton import SIDES
+from posekit.skeleton import JOINT, SIDES
 from posekit.tree import Findings
 from posekit.validators.motion.clip import MotionClip
-from posekit.validators.motion.ground import ground_of, soles
+from posekit.validators.motion.ground import LEG_SHARE, ground_of, soles, stature_of
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.timeline import norm, timeline_of
 
@@ -30,7 +30,13 @@ FOOT_POINTS: Final = ([0, 2, 4], [1, 3, 5])
 """Toe, heel and ankle of the right foot and of the left one among `posekit.validators.motion.ground.soles`."""
 
 EVEN_SHARE: Final = 0.3
-"""Of a fast slide's own speed, by which it may be uneven."""
+"""Of a fast slide's own speed, by which it may be uneven: of several points, as one alone says nothing of a roll."""
+
+SWINGING_SPEED: Final = 1.0
+"""Metres a second above which a foot swings, where noise hides how uneven a swing is."""
+
+UPRIGHT_SHARE: Final = 0.6
+"""Of the legs' length, by which hips are above a foot that stands: who crawls or lies drags feet."""
 
 BEND_FRAMES: Final = 8
 """How far the start of a slide may be from where it was first found."""
@@ -88,7 +94,9 @@ class Sliding(MotionCheck):
         feet, over = soles(clip)
         up = np.zeros(3) if clip.up is None else clip.up
         base = (ground.low + ground.high + ground.lifted)[:, None]
-        down = line.spread((feet @ up - over < base + DOWN_METRES).astype(np.float64)) > 0
+        hips = clip.height[:, [JOINT[f"{side}_hip"] for side in SIDES]].min(axis=1)[:, None]
+        stands = ~(hips - feet @ up < UPRIGHT_SHARE * LEG_SHARE * stature_of(clip))
+        down = line.spread((stands & (feet @ up - over < base + DOWN_METRES)).astype(np.float64)) > 0
         spread = line.spread(feet)
         slides = [self._slides(clip, spread[:, foot], down[:, foot], up) for foot in FOOT_POINTS]
         value = np.zeros((len(spread), len(SIDES)))
@@ -133,10 +141,13 @@ class Sliding(MotionCheck):
         windows = np.lib.stride_tricks.sliding_window_view(mean, count, axis=0)
         even = windows.mean(axis=-1)
         differs = norm(np.moveaxis(windows - even[..., None], 1, -1)).max(axis=1)
-        steady = differs < np.maximum(self.uneven, EVEN_SHARE * norm(even)) + noise
+        share = EVEN_SHARE if known.sum() > 1 else 0.0
+        steady = differs < np.maximum(self.uneven, share * norm(even)) + noise
         steady &= np.lib.stride_tricks.sliding_window_view(flat, count).all(axis=1)
         # Where noise lets feet differ by more than they slide, evenness is no evidence.
         steady &= norm(even) > max(self.fastest, noise / EVEN_SHARE)
+        if noise > self.uneven:
+            steady &= norm(even) < SWINGING_SPEED
         slides = np.zeros(len(points), dtype=np.bool_)
         for window in np.flatnonzero(steady):
             slides[window : window + count + 1] = True
