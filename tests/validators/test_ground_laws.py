@@ -192,7 +192,7 @@ def test_more_frames_a_second_of_the_same_hover_give_the_same_seconds(rate: floa
 def test_a_step_that_no_foot_rests_at_lifts_nothing() -> None:
     height = np.cumsum(np.full((40, 6), 0.05), axis=0)
     height[10:20] += 0.1
-    assert not lifted_by(height, slice(4, 6)).any()
+    assert not lifted_by(height, slice(4, 6), 30.0).any()
 
 
 def test_distance_from_a_support_is_that_from_its_hull() -> None:

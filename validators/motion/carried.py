@@ -22,6 +22,9 @@ SHORTEST_FLIGHT: Final = 0.25
 GRAVITY_ACCELERATION: Final = 9.81
 """Metres a second squared."""
 
+FEWEST_FRAMES: Final = 6
+"""That tell how a centre of mass falls."""
+
 FALL_SHARE: Final = 0.5
 """Of gravity, by which the centre of mass of a body in the air falls; whole jumps have 0.8 to 1.1."""
 
@@ -68,7 +71,7 @@ def carried(resting: NDArray[np.bool_], lowest: Array, centre: Array, step: floa
 def falls(centre: Array, step: float, share: float = FALL_SHARE) -> bool:
     """Tell by its parabola whether a centre of mass (N,) falls, by a share of gravity; yes where it is not known."""
     known = np.isfinite(centre)
-    if known.sum() < 4:
+    if known.sum() < FEWEST_FRAMES:
         return True
     curve = np.polyfit(np.arange(len(centre))[known] * step, centre[known], 2)[0]
     return bool(2 * curve <= -share * GRAVITY_ACCELERATION)

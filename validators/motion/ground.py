@@ -61,6 +61,10 @@ TIPTOE_SHARE: Final = np.hypot(FORWARD_SHARE * FOOT_SHARE, ANKLE_SHARE) - ANKLE_
 are not known."""
 
 
+TURNING_RATE: Final = 20.0
+"""Frames a second: at fewer, who is at the top of a jump is at one height before and after it, and rests nowhere."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ground:
     """The ground of a clip, and T frames against it; heights are along up, in metres.
@@ -133,12 +137,21 @@ def soles(clip: MotionClip) -> tuple[Array, Array]:
 
 
 def speeds(clip: MotionClip, points: Array, frames: int = 1) -> Array:
-    """Return how fast points (T, P, 3) move, metres a second, from so many frames before to after; NaN at ends."""
+    """Return how fast points (T, P, 3) move, metres a second, from so many frames before to after; NaN at ends.
+
+    Under `TURNING_RATE` frames a second it is the faster of the way before and of that after a frame.
+    """
     line = timeline_of(clip)
     placed = line.spread(points)
     fast = np.full(placed.shape[:2], np.nan)
     if len(placed) > 2 * frames:
-        fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (2 * frames * clip.step)
+        if clip.rate < TURNING_RATE:
+            ways = norm(placed[frames:] - placed[:-frames]) / (frames * clip.step)
+            fast[frames:-frames] = np.maximum(ways[:-frames], ways[frames:])
+        else:
+            fast[frames:-frames] = norm(placed[2 * frames :] - placed[: -2 * frames]) / (
+                2 * frames * clip.step
+            )
     return line.of_frames(fast)
 
 
@@ -149,7 +162,7 @@ def _found(clip: MotionClip) -> Ground:
     points = np.concatenate([clip.joints, feet[:, : len(FEET_POINTS)]], axis=1)
     height = points @ up
     legs = slice(JOINT["right_ankle"], None)  # the ankles are the last joints, toes and heels come after them
-    lifted = line.of_frames(lifted_by(line.spread(height), legs, clip.noise))
+    lifted = line.of_frames(lifted_by(line.spread(height), legs, clip.rate, clip.noise))
     lifted = np.where(np.isfinite(lifted), lifted, 0.0)
     over_ground = feet @ up - over
     for side in range(len(SIDES)):
@@ -186,7 +199,8 @@ def _found(clip: MotionClip) -> Ground:
 
 def _speed_noise(clip: MotionClip) -> float:
     """Return the standard deviation of a speed between the neighbours of a frame."""
-    return clip.noise / (np.sqrt(2) * clip.step) if clip.step > 0 else 0.0
+    frames = 1.0 if clip.rate < TURNING_RATE else 2.0
+    return np.sqrt(2) * clip.noise / (frames * clip.step) if clip.step > 0 else 0.0
 
 
 def ground_unknown(clip: MotionClip) -> str:

@@ -19,8 +19,9 @@ from posekit.geometry import Array
 LEAST_STEP_METRES: Final = 0.012
 """Steps below are motion: clean recordings have steps of up to 0.7 cm where a foot is at rest, at 30 Hz."""
 
-SURE_STEP_METRES: Final = 0.15
-"""Steps above need no foot at rest: clean recordings have up to 13 cm, in a backflip at 16 frames a second."""
+SURE_STEP_METRES, SURE_RATE = 0.15, 16.0
+"""Steps above need no foot at rest, in metres at so many frames a second and more: clean recordings have up to 13 cm,
+in a backflip."""
 
 SAME_SHARE: Final = 0.35
 """By so much of the larger of the two the step back may be another."""
@@ -32,7 +33,7 @@ REST_METRES: Final = 0.01
 """A foot rests that goes less far up or down in the frame before a step, and in the one after it."""
 
 
-def lifted_by(height: Array, feet: slice, noise: float = 0.0) -> Array:
+def lifted_by(height: Array, feet: slice, rate: float, noise: float = 0.0) -> Array:
     """Return by how much frames are lifted against those around them.
 
     Parameters
@@ -41,6 +42,8 @@ def lifted_by(height: Array, feet: slice, noise: float = 0.0) -> Array:
         Of points of the body along up, metres; NaN where a point is not known.
     feet : slice
         Which of the points are a foot's: one of them rests where a step is a fault.
+    rate : float
+        Frames a second; NaN where it is not known.
     noise : float
         Standard deviation of measured coordinates, metres.
 
@@ -59,7 +62,9 @@ def lifted_by(height: Array, feet: slice, noise: float = 0.0) -> Array:
     rests = np.zeros(len(height), dtype=np.bool_)
     rests[1:] = (beside < REST_METRES + 3 * noise).any(axis=1)
     start = -1
-    large = np.abs(steps) >= SURE_STEP_METRES
+    # What falls is so much farther off from its neighbours the longer a frame lasts.
+    longer = SURE_RATE / rate if rate < SURE_RATE else 1.0
+    large = np.abs(steps) >= SURE_STEP_METRES * longer**2
     for frame in np.flatnonzero(large | (rests & (np.abs(steps) >= max(LEAST_STEP_METRES, 4 * noise)))):
         size = steps[frame]
         if start >= 0 and size * steps[start] < 0:
