@@ -45,7 +45,7 @@ def check_speed(fps: float) -> None:
 
 def _indexed(pixels: Pixels) -> Image.Image:
     """Choose 256 colours for a picture; translucent ones stand on white."""
-    picture = Image.fromarray(pixels)
+    picture = Image.fromarray(pixels).convert("RGBA")
     ground = Image.new("RGBA", picture.size, (255, 255, 255, 255))
     ground.alpha_composite(picture)
     return ground.convert("RGB").quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)

@@ -17,6 +17,7 @@ from posekit.safe_io.writing import replacing, write_text
 from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS
 from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
+from posekit.viewer.caption import captioned
 from posekit.viewer.moving import check_speed, write_gif
 from posekit.viewer.scene.compose import Composition, Style, compose, row_count
 from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, check_one_scale
@@ -189,11 +190,14 @@ class _Film:
             stage = self._points([self._compose(frame, subject, style, None) for frame in frames])
         self.compositions = [self._compose(frame, subject, style, stage) for frame in frames]
         self.sights = [frame.sight for frame in frames]
+        self.captions = [frame.caption for frame in frames]
 
     def pictures(self, studio: Studio, progress: Callable[[int], None] | None) -> Iterator[Pixels]:
         """Draw them."""
-        for scene, eye in self._shots():
-            yield studio.draw(scene, eye, size=self.shot.size, supersample=self.shot.supersample)
+        still = self.captions[:1] * self.shot.turntable
+        for (scene, eye), caption in zip(self._shots(), still or self.captions, strict=True):
+            pixels = studio.draw(scene, eye, size=self.shot.size, supersample=self.shot.supersample)
+            yield captioned(pixels, caption)
             if progress is not None:
                 progress(1)
 

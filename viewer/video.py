@@ -21,17 +21,17 @@ Pixels = NDArray[np.uint8]
 VIDEO_SUFFIXES: Final = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".webm")
 """What the files are called that are read as videos."""
 
-CONTAINERS: Final = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi"
+VIDEO_CONTAINERS: Final = "mov,mp4,m4a,3gp,3g2,mj2,matroska,webm,avi"
 """FFmpeg's names of what may be in them: play lists, which name other files and addresses, are not."""
 
-ENCODERS: Final = ("libx264", "libopenh264", "mpeg4")
+VIDEO_ENCODERS: Final = ("libx264", "libopenh264", "mpeg4")
 """The first that the package was built with writes: H.264 if it can."""
 
 MAX_VIDEO_BYTES: Final = 50_000_000_000
 MAX_VIDEO_PIXELS: Final = 40_000_000
 """Pixels of one picture of a video, 8K and a little more: a file may claim any size, and each needs memory."""
 
-QUALITY: Final = "18"
+H264_QUALITY: Final = "18"
 """x264's constant rate factor: no difference is seen below."""
 
 
@@ -65,11 +65,11 @@ def write_mp4(file: BinaryIO, pictures: Iterable[Pixels], *, fps: float) -> int:
         for pixels in pictures:
             even = _even(pixels)
             if stream is None:
-                encoder = next(name for name in ENCODERS if name in av.codecs_available)
+                encoder = next(name for name in VIDEO_ENCODERS if name in av.codecs_available)
                 stream = container.add_stream(encoder, rate=rate)
                 stream.height, stream.width = even.shape[:2]
                 stream.pix_fmt = "yuv420p"
-                stream.options = {"crf": QUALITY} if encoder == "libx264" else {}
+                stream.options = {"crf": H264_QUALITY} if encoder == "libx264" else {}
             container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
             count += 1
         if stream is None:
@@ -156,7 +156,7 @@ def _reading(path: Path) -> Iterator[tuple[ModuleType, Any, Any]]:
     expected = "a video of " + ", ".join(VIDEO_SUFFIXES)
     with open_file(path, limit=MAX_VIDEO_BYTES) as file:
         try:
-            with av.open(file, options={"format_whitelist": CONTAINERS}) as container:
+            with av.open(file, options={"format_whitelist": VIDEO_CONTAINERS}) as container:
                 stream = next(iter(container.streams.video), None)
                 if stream is None:
                     raise refusal(path, "", "a file without pictures", expected, "give another file")

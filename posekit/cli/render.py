@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from posekit.cli.chosen_postures import chosen_frames, frame_numbers
 from posekit.cli.given import frame_count, read_given
-from posekit.cli.options import about, examples, numbers, option, progress, split
+from posekit.cli.options import about, examples, numbers, option, options_given, progress
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
@@ -23,10 +24,15 @@ RENDER_EXAMPLES = examples(
     "posekit render postures.json --view walk.json -o first.png --frame 0 --posture 0 --supersample 3",
     "posekit render postures.json -o all.png --layout superposed --background grey",
     "posekit render postures.json -o walk.gif --posture likeliest --fps 5",
+    "posekit render postures.npz --view view.json --over recording.mp4 -o over.mp4",
     "posekit render walk.bvh -o walk.html",
     "posekit render postures.json -o turn.gif --frame 1 --posture 0 --turntable 36 --size 640x480",
     "posekit render explained.json --view walk.json -o rejected.png --rejected",
 )
+
+
+DEFAULT_SIZE = "1280x720"
+DEFAULT_FPS = 10.0
 
 
 class Layout(StrEnum):
@@ -37,11 +43,13 @@ class Layout(StrEnum):
 
 
 def render(
+    ctx: typer.Context,
     given: Annotated[
-        Path,
+        list[Path],
         typer.Argument(
             metavar="RESULT|POSTURES|MOTION|VIEW",
-            help="A file of any format that holds postures; a view is recovered with default settings.",
+            help="A file of any format that holds postures; a view is recovered with default settings. With --over "
+            "several results, one a person.",
         ),
     ],
     output: Annotated[
@@ -49,22 +57,35 @@ def render(
         option(
             "--output",
             "FILE",
-            "The picture: .png, .gif, .mp4; or .html: the page of all survivors, or, with --posture, --layout, "
-            "--rejected or --eye, that scene alone.",
+            "The picture: .png, .gif, .mp4; with --over also a folder; or .html: the page of all survivors, or, with "
+            "--posture, --layout, --rejected or --eye, that scene alone.",
             short="-o",
         ),
     ],
     seen: Annotated[
-        Path | None,
+        list[Path] | None,
         option("--view", "VIEW", "What the result was recovered from: shows its camera and image."),
+    ] = None,
+    over: Annotated[
+        Path | None,
+        option(
+            "--over",
+            "IMAGE|FOLDER|VIDEO",
+            "Draw over the pictures that the frames came from, through the view's camera, lens included.",
+        ),
     ] = None,
     frame: Annotated[
         str, option("--frame", "K|A-B", "From 0. Default: the first with a posture; all where it moves.")
     ] = "",
     posture: Annotated[
         str,
-        option("--posture", "LIST", "From 0, as 0,4; all; likeliest; or groups, the first of each group."),
-    ] = "all",
+        option(
+            "--posture",
+            "LIST",
+            "From 0, as 0,4; all; likeliest; path, the likeliest; or groups, the first of each. Default: the likeliest "
+            "and what else it can be; where it moves, the path, else the likeliest.",
+        ),
+    ] = "",
     rejected: Annotated[
         bool,
         typer.Option(
@@ -79,7 +100,9 @@ def render(
             "--layout", help="Of several postures. Default: side-by-side; superposed where it moves."
         ),
     ] = None,
-    size: Annotated[str, option("--size", "WxH", "Pixels.")] = "1280x720",
+    size: Annotated[
+        str, option("--size", "WxH", "Pixels. Default: 1280x720; with --over the pictures' own.")
+    ] = "",
     supersample: Annotated[
         int, typer.Option("--supersample", min=1, max=8, help="Draw this many times larger, then scale down.")
     ] = 2,
@@ -118,7 +141,14 @@ def render(
         int,
         typer.Option("--turntable", min=0, help="Go around once in this many pictures.", show_default=False),
     ] = 0,
-    fps: Annotated[float, typer.Option("--fps", help="Pictures a second, where it moves.")] = 10.0,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            "--fps",
+            help="Pictures a second, where it moves. Default: 10; with --over as the frames' times say.",
+            show_default=False,
+        ),
+    ] = None,
     timeout: Annotated[
         float, typer.Option("--timeout", min=1, help="Seconds after which a browser that hangs is ended.")
     ] = 60.0,
@@ -128,6 +158,24 @@ def render(
     Right limbs are orange, left ones blue. Pictures are drawn by an installed Chromium or Chrome, found by
     POSEKIT_BROWSER or on PATH, without a window, a server or an open port; pages (.html) need none.
     """
+    if over is not None:
+        _over(
+            options_given(ctx),
+            given,
+            seen or [],
+            over,
+            output,
+            frame=frame,
+            posture=posture,
+            size=size,
+            fps=fps,
+        )
+        return
+    if len(given) > 1 or len(seen or []) > 1:
+        raise InputError(
+            f"got {len(given)} files and {len(seen or [])} views; several are drawn with --over alone"
+        )
+    file, behind_file = given[0], seen[0] if seen else None
     import numpy as np
 
     from posekit.viewer.pictures import Shot, check_picture, write_picture
@@ -141,7 +189,7 @@ def render(
         position, middle = numbers(eye, 3, "--eye"), numbers(target, 3, "--target")
         pose = Eye(position=np.array(position), target=np.array(middle), fov=fov)
     shot = Shot(
-        size=_size(size),
+        size=_size(size or DEFAULT_SIZE),
         supersample=supersample,
         azimuth=azimuth,
         elevation=elevation,
@@ -149,7 +197,7 @@ def render(
         eye=pose,
         through_view=through_view,
         turntable=turntable,
-        fps=fps,
+        fps=DEFAULT_FPS if fps is None else fps,
         timeout=timeout,
     )
     moving = check_picture(output, shot)
@@ -157,19 +205,52 @@ def render(
         Layout.SUPERPOSED if through_view or (moving and not turntable) else Layout.SIDE_BY_SIDE
     )
     style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
-    content, behind = read_given(given, seen, explain=rejected)
-    if output.suffix.lower() == ".html" and posture == "all" and layout is None and not rejected and not eye:
-        with about(given):
-            _write_page(output, content, behind, frame, title=given.name)
+    content, behind = read_given(file, behind_file, explain=rejected)
+    if (
+        output.suffix.lower() == ".html"
+        and posture in ("", "all")
+        and layout is None
+        and not rejected
+        and not eye
+    ):
+        with about(file):
+            _write_page(output, content, behind, frame, title=file.name)
         return
-    with about(given):
+    with about(file):
         subject, frames = _shown(content, behind, frame, posture, rejected, moving=moving and not turntable)
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
-        count = write_picture(
-            output, subject, frames, style=style, shot=shot, title=given.name, progress=done
-        )
+        count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
     pictures = f" ({count} pictures)" if moving else ""
     typer.echo(f"written: {output}{pictures}")
+
+
+OVER_OPTIONS = ("--output", "--view", "--over", "--frame", "--posture", "--size", "--fps")
+"""What is heeded beside ``--over``."""
+
+
+def _over(
+    options: Sequence[str],
+    given: Sequence[Path],
+    seen: Sequence[Path],
+    over: Path,
+    output: Path,
+    *,
+    frame: str,
+    posture: str,
+    size: str,
+    fps: float | None,
+) -> None:
+    """Draw over pictures."""
+    from posekit.cli.render_over import render_over
+    from posekit.viewer.overlay import Overlay
+
+    for name in options:
+        if name not in OVER_OPTIONS:
+            raise InputError(
+                f"{name}: means nothing beside --over; expected some of {', '.join(OVER_OPTIONS)}"
+            )
+    overlay = Overlay(size=_size(size) if size else None, fps=fps)
+    render_over(given, seen, over, output, frame=frame, posture=posture, overlay=overlay)
 
 
 def _write_page(
@@ -177,7 +258,7 @@ def _write_page(
 ) -> None:
     from posekit.viewer.page.page import write_page
 
-    frames = _frames(frame, frame_count(content))
+    frames = frame_numbers(frame, frame_count(content))
     write_page(output, content, view, title=title, frames=frames)
     typer.echo(f"written: {output}")
 
@@ -197,7 +278,7 @@ def _shown(
     from posekit.viewer.scene.drawn_subject import subject_of
 
     subject = subject_of(content, view)
-    numbers_of_frames = _frames(frame, len(subject.frames))
+    numbers_of_frames = frame_numbers(frame, len(subject.frames))
     if numbers_of_frames is None:
         filled = [k for k, shown in enumerate(subject.frames) if len(shown)]
         numbers_of_frames = filled if moving else filled[:1]
@@ -207,48 +288,7 @@ def _shown(
         if not isinstance(content, Result):
             raise InputError("--rejected: postures have no pruned branches; expected a result or a view")
         return subject, [one_a_reason(rejected_of(content, subject, k)) for k in numbers_of_frames]
-    return subject, [_chosen(subject.frames[k], posture, k) for k in numbers_of_frames]
-
-
-def _chosen(shown: Shown, text: str, frame: int) -> Shown:
-    """Choose postures of a frame by a list of numbers from 0, ``all``, ``likeliest`` or ``groups``."""
-    if text == "all" or len(shown) == 0:
-        return shown
-    if text == "likeliest":
-        if shown.probability is None:
-            raise InputError(
-                "--posture likeliest: nothing says how likely the postures are; expected a result"
-            )
-        return shown.chosen([int(shown.probability.argmax())])
-    if text == "groups":
-        if shown.groups is None:
-            raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
-        groups = shown.groups.tolist()
-        return shown.chosen([groups.index(group) for group in sorted(set(groups))])
-    rows = [_number(word, len(shown), f"--posture: frame {frame}: {word!r}") for word in split(text)]
-    if not rows:
-        raise InputError(
-            f"--posture: {text!r}; expected numbers from 0 with commas, all, likeliest or groups"
-        )
-    return shown.chosen(rows)
-
-
-def _frames(text: str, count: int) -> list[int] | None:
-    if not text:
-        return None
-    first, dash, last = text.partition("-")
-    start = _number(first, count, f"--frame: {text!r}")
-    end = _number(last, count, f"--frame: {text!r}") if dash else start
-    if end < start:
-        raise InputError(f"--frame: {text!r}; expected the first frame before the last, as 0-4")
-    return list(range(start, end + 1))
-
-
-def _number(word: str, count: int, what: str) -> int:
-    """Read the number of one of `count`, from 0."""
-    if not (word.isdecimal() and len(word) < 10 and int(word) < count):
-        raise InputError(f"{what}; expected a number from 0 to {count - 1}")
-    return int(word)
+    return subject, chosen_frames(subject, content, posture, numbers_of_frames, moving=moving)
 
 
 def _size(text: str) -> tuple[int, int]:

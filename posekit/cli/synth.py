@@ -27,6 +27,12 @@ Uncalibrated = Annotated[
         help="Forget the camera: write the (perspective) pictures as photographs without one.",
     ),
 ]
+Photographs = Annotated[
+    Path | None,
+    option(
+        "--pictures", "FOLDER|FILE.mp4", "Also write what the camera would have seen: PNG files, or a video."
+    ),
+]
 Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to frame.")]
 
 
@@ -80,6 +86,7 @@ def random(
     noise: Noise = 0.0,
     seed: Seed = 0,
     uncalibrated: Uncalibrated = False,
+    pictures: Photographs = None,
 ) -> None:
     """Draw random legal postures, each seen from anywhere on a sphere around the person."""
     import numpy as np
@@ -90,7 +97,7 @@ def random(
     near, far = numbers(distance, 2, "--distance")
     sphere = synthesis.CameraSphere(distance=(near, far))
     scene = synthesis.random_views(load_figure(), frames, np.random.default_rng(seed), sphere)
-    _write(output, scene, noise, seed, uncalibrated=uncalibrated)
+    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
 
 
 @app.command(
@@ -115,6 +122,7 @@ def mocap(
     noise: Noise = 0.0,
     seed: Seed = 0,
     uncalibrated: Uncalibrated = False,
+    pictures: Photographs = None,
 ) -> None:
     """See a motion-capture clip through a virtual camera, with the segment lengths of the clip."""
     import numpy as np
@@ -130,7 +138,7 @@ def mocap(
         dt=dt,
         position=numbers(camera, 3, "--camera") if camera else None,
     )
-    _write(output, scene, noise, seed, uncalibrated=uncalibrated)
+    _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
 
 
 @app.command(
@@ -165,9 +173,15 @@ def _check_name(output: Path) -> None:
 
 
 def _write(
-    output: Path, scene: SyntheticScene, noise: float, seed: int, *, uncalibrated: bool = False
+    output: Path,
+    scene: SyntheticScene,
+    noise: float,
+    seed: int,
+    *,
+    uncalibrated: bool = False,
+    pictures: Path | None = None,
 ) -> None:
-    """Add noise, write the view, say so."""
+    """Add noise, write the view, and the pictures where they are asked for; say so."""
     from dataclasses import replace
 
     import numpy as np
@@ -181,5 +195,9 @@ def _write(
     view = views.view_of(scene)
     if noise > 0 and scene.lee_chen_f is None:
         view = replace(view, deviation=noise)
+    if pictures is not None:
+        from posekit.viewer.overlay import write_photographs
+
+        typer.echo(f"written: {pictures} ({write_photographs(pictures, view)} pictures)")
     files.write_view(output, views.forget_camera(view) if uncalibrated else view)
     typer.echo(f"written: {output} ({len(scene)} frame{'s' * (len(scene) != 1)})")

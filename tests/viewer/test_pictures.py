@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +12,14 @@ import pytest
 from PIL import Image
 
 import posekit
+from posekit.cli.chosen_postures import chosen_frames, chosen_postures
 from posekit.cli.main import main
-from posekit.cli.render import _chosen
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
+from posekit.viewer.scene.likeliest import MAX_BESIDE
 from posekit.viewer.video import Video
 
 SMALL = Shot(size=(200, 150), supersample=1)
@@ -177,13 +179,45 @@ def test_render_draws_what_is_known_of_postures(
 def test_the_likeliest_posture_is_chosen(subject: DrawnSubject, walked: Result) -> None:
     for shown, frame in zip(subject.frames, walked.frames, strict=True):
         assert frame.probability is not None
-        chosen = _chosen(shown, "likeliest", 0)
-        likeliest = int(np.argmax(frame.probability))
+        assert frame.answer is not None
+        likeliest = int(frame.answer.representatives[0])
+        chosen = chosen_postures(shown, "likeliest", 0)
         np.testing.assert_array_equal(chosen.points, shown.points[likeliest][None])
-        assert chosen.probability == pytest.approx([frame.probability.max()])
-        assert len(_chosen(shown.chosen([]), "likeliest", 0)) == 0
+        assert chosen.probability == pytest.approx(frame.answer.probability[:1])
+        told = f"{100 * frame.answer.probability[0]:.2g} %"
+        assert chosen.caption == f"likeliest: {told}  ({len(shown)} postures)"
+        unsaid = chosen_postures(replace(shown, answer=None), "likeliest", 0)
+        np.testing.assert_array_equal(unsaid.points[0], shown.points[frame.probability.argmax()])
+        assert len(chosen_postures(shown.chosen([]), "likeliest", 0)) == 0
     firsts = [int(np.argmax(np.asarray(frame.probability))) for frame in walked.frames]
     assert any(firsts)  # not always the first
+
+
+def test_a_picture_opens_on_the_likeliest_and_what_else_it_can_be(
+    subject: DrawnSubject, walked: Result
+) -> None:
+    answer = walked.frames[0].answer
+    assert answer is not None
+    [still] = chosen_frames(subject, walked, "", [0], moving=False)
+    rows = answer.representatives[:MAX_BESIDE]
+    assert 1 < len(rows) < len(subject.frames[0])
+    np.testing.assert_array_equal(still.points, subject.frames[0].points[rows])
+    assert still.caption.startswith(f"likeliest: {100 * answer.probability[0]:.2g} %; then ")
+    moving = chosen_frames(subject, walked, "", range(5), moving=True)
+    assert [len(frame) for frame in moving] == [1] * 5
+    [everything] = chosen_frames(subject, walked, "all", [0], moving=False)
+    assert len(everything) == len(subject.frames[0])
+    with pytest.raises(InputError, match="the result has no path; recover it with --follow 1"):
+        chosen_frames(subject, walked, "path", [0], moving=False)
+
+
+def test_what_moves_goes_along_the_likeliest_path(walk: View) -> None:
+    recovery = posekit.recover(walk)
+    result = posekit.result_of(recovery, following=posekit.follow(recovery, k=2))
+    assert result.paths is not None
+    shown = chosen_frames(subject_of(result, walk), result, "", range(len(walk)), moving=True)
+    for k, frame in enumerate(shown):
+        np.testing.assert_allclose(frame.points[0, :14], result.paths.joints[0, k], atol=1e-9)
 
 
 def test_render_refuses(

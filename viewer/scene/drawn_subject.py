@@ -13,6 +13,7 @@ from posekit.errors import FigureError, ViewerError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import Inferred, OpenCVModel, Postures, Result, ResultFrame, View
+from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.geometry import Array
 from posekit.skeleton import JOINTS
 from posekit.viewer.scene.image_sight import ImageSight
@@ -46,6 +47,10 @@ class Shown:
         That each is the one nearest to the truth.
     time : float
         Seconds.
+    answer : FrameAnswer, optional
+        What is said of the frame first, of all its postures.
+    caption : str
+        What is written into the picture.
     """
 
     points: Array
@@ -57,6 +62,8 @@ class Shown:
     inferred: Sequence[Mapping[str, Inferred]] = ()
     probability: Array | None = None
     time: float = 0.0
+    answer: FrameAnswer | None = None
+    caption: str = ""
 
     def __len__(self) -> int:
         """Count the postures."""
@@ -95,6 +102,7 @@ class Shown:
             scales=scales,
             inferred=[self.inferred[row] for row in rows] if self.inferred else (),
             probability=None if self.probability is None else self.probability[index],
+            answer=None,
         )
 
 
@@ -209,6 +217,7 @@ def _of_frame(frame: ResultFrame, figure: Figure, view: View | None, index: int)
         inferred=frame.inferred or (),
         probability=frame.probability,
         time=frame.time,
+        answer=frame.answer,
     )
 
 

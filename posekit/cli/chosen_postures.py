@@ -1,0 +1,113 @@
+"""Which frames, and which postures of each, `posekit render` draws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from posekit.cli.options import split
+from posekit.errors import InputError
+
+if TYPE_CHECKING:
+    from posekit.formats.held_postures import HeldPostures
+    from posekit.formats.own import Postures, Result, View
+    from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
+
+POSTURE_WORDS = "numbers from 0 with commas, all, likeliest, path or groups"
+
+
+def chosen_frames(
+    subject: DrawnSubject,
+    content: Result | Postures | HeldPostures | View,
+    posture: str,
+    frames: Sequence[int],
+    *,
+    moving: bool,
+    over: bool = False,
+) -> list[Shown]:
+    """Choose what is drawn of some frames.
+
+    Where nothing is asked for, that is the likeliest path if there is one and the picture moves, else the likeliest
+    posture, and in a picture that does not move, or over a photograph, with what else it can be.
+
+    Parameters
+    ----------
+    subject : DrawnSubject
+        All frames.
+    content : Result, Postures, HeldPostures or View
+        What they are of.
+    posture : str
+        As ``--posture`` has it; empty where nothing is asked for.
+    frames : sequence of int
+        Which frames.
+    moving : bool
+        Whether they are drawn one after another.
+    over : bool
+        Whether they are drawn over a photograph.
+    """
+    from posekit.formats.own import Result
+    from posekit.viewer.scene.likeliest import MAX_BESIDE, along_path, by_probability, likeliest_first
+
+    if not posture and moving and isinstance(content, Result) and content.paths is not None:
+        posture = "path"
+    if posture == "path":
+        path = along_path(subject, content)
+        return [path[k] for k in frames]
+    if posture == "all" and over:
+        return [by_probability(subject.frames[k]) for k in frames]
+    if posture:
+        return [chosen_postures(subject.frames[k], posture, k) for k in frames]
+    most = None if over else 1 if moving else MAX_BESIDE
+    return [likeliest_first(subject.frames[k], most) for k in frames]
+
+
+def chosen_postures(shown: Shown, text: str, frame: int) -> Shown:
+    """Choose postures of a frame by a list of numbers from 0, ``all``, ``likeliest`` or ``groups``.
+
+    Parameters
+    ----------
+    shown : Shown
+        All of the frame.
+    text : str
+        The list or the word.
+    frame : int
+        The frame's number, for errors.
+    """
+    from posekit.viewer.scene.likeliest import likeliest_first
+
+    if text == "all" or len(shown) == 0:
+        return shown
+    if text == "likeliest":
+        if shown.probability is None:
+            raise InputError(
+                "--posture likeliest: nothing says how likely the postures are; expected a result"
+            )
+        return likeliest_first(shown, 1)
+    if text == "groups":
+        if shown.groups is None:
+            raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
+        groups = shown.groups.tolist()
+        return shown.chosen([groups.index(group) for group in sorted(set(groups))])
+    rows = [number_of(word, len(shown), f"--posture: frame {frame}: {word!r}") for word in split(text)]
+    if not rows:
+        raise InputError(f"--posture: {text!r}; expected {POSTURE_WORDS}")
+    return shown.chosen(rows)
+
+
+def frame_numbers(text: str, count: int) -> list[int] | None:
+    """Read ``K`` or ``A-B`` of `count` frames, from 0; None where nothing is asked for."""
+    if not text:
+        return None
+    first, dash, last = text.partition("-")
+    start = number_of(first, count, f"--frame: {text!r}")
+    end = number_of(last, count, f"--frame: {text!r}") if dash else start
+    if end < start:
+        raise InputError(f"--frame: {text!r}; expected the first frame before the last, as 0-4")
+    return list(range(start, end + 1))
+
+
+def number_of(word: str, count: int, what: str) -> int:
+    """Read the number of one of `count`, from 0."""
+    if not (word.isdecimal() and len(word) < 10 and int(word) < count):
+        raise InputError(f"{what}; expected a number from 0 to {count - 1}")
+    return int(word)

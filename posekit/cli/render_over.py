@@ -1,0 +1,96 @@
+"""`posekit render … --over`: postures drawn over the pictures that they came from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from posekit.cli.chosen_postures import chosen_frames, frame_numbers
+from posekit.cli.given import read_given
+from posekit.cli.options import about, distinct, progress
+from posekit.errors import InputError
+
+if TYPE_CHECKING:
+    from posekit.viewer.overlay import OverlaidPerson, Overlay
+
+
+def render_over(
+    given: Sequence[Path],
+    seen: Sequence[Path],
+    over: Path,
+    output: Path,
+    *,
+    frame: str,
+    posture: str,
+    overlay: Overlay,
+) -> None:
+    """Draw everybody of some results over their pictures.
+
+    Parameters
+    ----------
+    given : sequence of Path
+        Results or views, one a person.
+    seen : sequence of Path
+        What they were recovered from: one of each, or one of all.
+    over : Path
+        A photograph, a folder of them, or a video.
+    output : Path
+        The file, or a folder.
+    frame, posture : str
+        Which, as the options have it.
+    overlay : Overlay
+        How.
+    """
+    from posekit.viewer.overlay import check_overlay, frame_pictures, write_overlay
+
+    check_overlay(output, overlay)
+    distinct(output, over, *given, *seen)
+    source = frame_pictures(over)
+    if len(seen) not in (0, 1, len(given)):
+        raise InputError(
+            f"--view: {len(seen)} views of {len(given)} results; expected one of each, or one of all"
+        )
+    people = [
+        _person(path, seen[k if len(seen) > 1 else 0] if seen else None, posture)
+        for k, path in enumerate(given)
+    ]
+    frames = frame_numbers(frame, len(people[0].frames))
+    with progress("drawing", len(frames or people[0].frames)) as done:
+        count, said = write_overlay(output, people, source, replace(overlay, frames=frames), progress=done)
+    for line in said:
+        typer.echo(line)
+    typer.echo(f"written: {output} ({count} picture{'s' * (count != 1)})")
+
+
+def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:
+    from posekit.formats.own import LeeChenModel, OpenCVModel, Result, View
+    from posekit.viewer.overlay import OverlaidPerson
+    from posekit.viewer.scene.drawn_subject import subject_of
+    from posekit.viewer.scene.likeliest import numbered
+
+    content, view = read_given(path, seen)
+    if not isinstance(content, Result | View):
+        raise InputError(
+            f"{path}: got motion or postures; --over expected a result: nothing says which camera saw it"
+        )
+    known = [one.camera["f"] for one in content.frames] if isinstance(content, Result) else []
+    if (view is not None and isinstance(view.camera, LeeChenModel)) or any(f is not None for f in known):
+        raise InputError(
+            f"{path}: its camera is Lee & Chen's, whose image is in metres; --over expected one in pixels; without "
+            "--over the image is drawn beside the postures"
+        )
+    with about(path):
+        subject = subject_of(content, view)
+        frames = range(len(subject.frames))
+        shown = numbered(chosen_frames(subject, content, posture, frames, moving=True, over=True), frames)
+    if view is None and not any(one.sight is not None for one in shown):
+        raise InputError(
+            f"{path}: a result does not hold the camera that it was recovered with; give the view beside it: "
+            "--view VIEW"
+        )
+    size = view.camera.size if view is not None and isinstance(view.camera, OpenCVModel) else None
+    return OverlaidPerson(name=str(path), frames=shown, figure=subject.figure, size=size)

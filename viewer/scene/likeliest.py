@@ -1,0 +1,103 @@
+"""What is drawn of a frame where nothing is asked for: its likeliest posture first, then what else it can be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from posekit.body import with_head
+from posekit.errors import InputError
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.own import Postures, Result, View
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
+
+MAX_BESIDE: Final = 6
+"""Postures that stand side by side where nothing is asked for."""
+
+MAX_TOLD: Final = 4
+"""Probabilities in a caption."""
+
+
+def likeliest_first(shown: Shown, most: int | None = None) -> Shown:
+    """Return the postures that stand for all of a frame, the likeliest first; all, where nothing says how likely.
+
+    Parameters
+    ----------
+    shown : Shown
+        All postures of a frame.
+    most : int, optional
+        How many are returned at most.
+    """
+    if not len(shown) or (shown.answer is None and shown.probability is None):
+        return shown
+    if shown.answer is not None:
+        rows, share = shown.answer.representatives, shown.answer.probability
+    else:
+        assert shown.probability is not None
+        rows = np.argsort(-shown.probability, kind="stable")
+        share = shown.probability[rows]
+    told = [f"{100 * one:.2g} %" for one in share[:MAX_TOLD].tolist()]
+    said = f"likeliest: {told[0]}"
+    if len(rows) > 1 and most != 1:
+        said += f"; then {', '.join(told[1:])}" + (", …" if len(rows) > MAX_TOLD else "")
+    rows = rows[:most]
+    chosen = shown.chosen(rows.tolist())
+    return replace(chosen, caption=f"{said}  ({len(shown)} postures)", probability=share[: len(rows)])
+
+
+def by_probability(shown: Shown) -> Shown:
+    """Return all postures of a frame, the likeliest first."""
+    if shown.probability is None:
+        return shown
+    rows = np.argsort(-shown.probability, kind="stable").tolist()
+    return replace(shown.chosen(rows), caption=f"{len(shown)} postures")
+
+
+def along_path(subject: DrawnSubject, content: Result | Postures | HeldPostures | View) -> list[Shown]:
+    """Return the frames of a subject with the postures of a result's likeliest path.
+
+    Raises
+    ------
+    InputError
+        Where the result has no path.
+    """
+    paths = content.paths if isinstance(content, Result) else None
+    if paths is None:
+        raise InputError("--posture path: the result has no path; recover it with --follow 1")
+    points = with_head(np.asarray(paths.joints[0]))
+    frames = []
+    for k, shown in enumerate(subject.frames):
+        scale, survivor = float(paths.scale[0, k]), int(paths.survivor[0, k])
+        sight = shown.sight
+        if sight is not None and np.isfinite(scale):
+            sight = sight.rescaled(scale)
+        said = "likeliest path" + (", bridged" if survivor < 0 else "")
+        if survivor >= 0:
+            chosen = shown.chosen([survivor])
+        else:
+            known = bool(np.isfinite(points[k]).any())
+            chosen = Shown(
+                points=points[k : k + int(known)],
+                scales=np.array([scale])[: int(known)] if np.isfinite(scale) else None,
+                time=shown.time,
+            )
+        frames.append(replace(chosen, sight=sight, caption=said))
+    return frames
+
+
+def numbered(frames: Sequence[Shown], numbers: Sequence[int]) -> list[Shown]:
+    """Write the number of each frame into its caption, with its time where it has one."""
+    return [
+        replace(
+            shown, caption=f"frame {k}{when(shown.time)}" + (f"\n{shown.caption}" if shown.caption else "")
+        )
+        for shown, k in zip(frames, numbers, strict=True)
+    ]
+
+
+def when(time: float) -> str:
+    """Spell a time in seconds; nothing where it is not known."""
+    return f", {time:.2f} s" if np.isfinite(time) else ""
