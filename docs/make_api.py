@@ -16,6 +16,7 @@ SECTIONS: Final = (
     ("Errors", "posekit.errors"),
     ("Names loaded on demand", "posekit.on_demand"),
     ("Names of joints", "posekit.skeleton"),
+    ("How objects show themselves", "posekit.display"),
     ("Vectors and rotations", "posekit.geometry"),
     ("Damped least squares", "posekit.least_squares"),
     ("Settings", "posekit.settings"),

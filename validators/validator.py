@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from posekit.body import Figure, with_head
 from posekit.body.measured import LIMB_NAMES, MeasuredPerson, figure_of, measured_person
+from posekit.display.short_repr import ShortRepr, short
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.robots import Robot
@@ -40,7 +41,7 @@ NO_NOISE_METRES = 1e-6
 """Metres that noise may change a distance by: less is rounding, and a robot is judged as without."""
 
 
-class Validator:
+class Validator(ShortRepr):
     """Judges postures against a human figure, or any robot.
 
     Parameters
@@ -121,6 +122,10 @@ class Validator:
         """Refuse to judge by nothing."""
         if not self.checks and not self.profile.checks:
             raise InputError("--checks: none is given, so nothing would be judged; expected one or more")
+
+    def _facts(self) -> list[str]:
+        body = short(self._figure.source) if self.robot is None and self._figure else short(self.robot)
+        return [body, f"checks={short(self.checks)}", f"lengths={self.lengths!r}"]
 
     @property
     def figure(self) -> Figure:

@@ -15,6 +15,8 @@ from posekit.answers.cover import cover, held_by, most_held
 from posekit.answers.depth_order import DepthOrder, depth_orders
 from posekit.answers.listed_bodies import ListedBodies
 from posekit.answers.regions import JointRegions, joint_regions
+from posekit.display.pictured import Pictured
+from posekit.display.stick_drawing import posture_drawing
 from posekit.geometry import Array
 
 DISTINCT_METRES: Final = 0.05
@@ -25,7 +27,7 @@ REPRESENTED_PROBABILITY: Final = 0.95
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Answer:
+class Answer(Pictured):
     """The answer of one frame: its likeliest posture, how sure it is, and what else it can be.
 
     Parameters
@@ -75,6 +77,9 @@ class Answer:
     def __repr__(self) -> str:
         """Say how sure it is, and of how many postures."""
         return f"Answer(sure={self.sure:.3g}, representatives={len(self)}, bodies={len(self.bodies)})"
+
+    def _drawing(self) -> str:
+        return posture_drawing(self.joints, np.array([0.0, -1.0, 0.0]))
 
     @cached_property
     def regions(self) -> JointRegions:

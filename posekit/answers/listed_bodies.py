@@ -8,6 +8,7 @@ from typing import Final, Protocol
 
 import numpy as np
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.formats.own import Inferred
 from posekit.geometry import Array
@@ -51,7 +52,7 @@ class ListedFrame(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ListedBodies:
+class ListedBodies(ShortRepr):
     """The N bodies of a frame.
 
     Parameters

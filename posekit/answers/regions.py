@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from posekit.answers.cover import cover
 from posekit.answers.listed_bodies import ListedBodies
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 
 REGION_PROBABILITY: Final = 0.95
@@ -41,7 +42,7 @@ LEAST_LOG_DENSITY: Final = -700.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class JointRegions:
+class JointRegions(ShortRepr):
     """The 95 % region of each of the 14 joints of a frame: as many modes as the joint has places.
 
     Parameters

@@ -26,6 +26,7 @@ from posekit.body.side import side_is_certain
 from posekit.body.stature import lengths_from_stature
 from posekit.body.uncertainty import LengthUncertainty
 from posekit.body.urdf import as_figure_error, parse, replace_limits, rewrite, write_texts
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import FigureError
 from posekit.geometry import Array, quaternion_from_rotation
 from posekit.robots.kinematics import Kinematics, body_points
@@ -84,7 +85,7 @@ class Configurations(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Figure:
+class Figure(ShortRepr):
     """A stick figure, made from URDF and SRDF text by `load_figure` and changed by `scaled`.
 
     Parameters

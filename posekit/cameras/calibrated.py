@@ -11,6 +11,7 @@ import numpy as np
 
 from posekit.cameras import PinholeCamera
 from posekit.cameras.rotation import rotation_from_rounded
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import CameraError, InputError
 from posekit.geometry import Array
 from posekit.safe_io import nearest, refusal, shown
@@ -31,7 +32,7 @@ def _none() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CalibratedCamera:
+class CalibratedCamera(ShortRepr):
     """One camera.
 
     Parameters

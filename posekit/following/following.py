@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.following.best_paths import PATH_SEPARATION_METRES
 from posekit.following.switches import Switch, switches_of
@@ -14,7 +15,7 @@ from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Following:
+class Following(ShortRepr):
     """K paths through the T frames of a recovery, the likeliest first.
 
     Parameters

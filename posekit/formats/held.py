@@ -8,12 +8,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own import Postures
 from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class HeldPostures:
+class HeldPostures(ShortRepr):
     """Postures of a file, N of them.
 
     Parameters

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from posekit.answers import Answer
+from posekit.display.short_repr import ShortRepr
 from posekit.following.follower import LiveEstimate
 from posekit.following.survivor_frame import SurvivorFrame
 from posekit.geometry import Array
@@ -25,7 +26,7 @@ def unknown_deviation() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class TrackedPosture:
+class TrackedPosture(ShortRepr):
     """The likeliest posture in one picture, how sure it is, and the path as it is known by now.
 
     Parameters

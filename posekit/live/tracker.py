@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from posekit.body import load_figure
 from posekit.compiled.compiling import PAYS_FROM, expect
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError, PosekitError
 from posekit.following import Follower
 from posekit.following.follower import LiveEstimate
@@ -30,7 +31,7 @@ DEFAULT_LAG: Final = 5
 """Pictures that the path looks ahead: a sixth of a second at 30 a second."""
 
 
-class Tracker:
+class Tracker(ShortRepr):
     """Recovers one picture a call, and follows the person.
 
     All that does not depend on the picture is made and loaded once, here. A picture's postures are those that
@@ -102,6 +103,9 @@ class Tracker:
         # What the first picture would have to load and make is loaded and made by one that nobody sees.
         standing = recover(self.sight.standing(load_figure()), self.settings)
         Follower(lag=0).push(ranked_frames(standing)[0])
+
+    def _facts(self) -> list[str]:
+        return [f"{len(self.names)} points", f"{self._frame} pictures so far"]
 
     @property
     def names(self) -> tuple[str, ...]:

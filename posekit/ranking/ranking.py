@@ -10,11 +10,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ranking:
+class Ranking(ShortRepr):
     """The probabilities of N survivors, over the frames that they are of.
 
     Parameters

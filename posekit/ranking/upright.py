@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.geometry import Array
 
@@ -16,7 +17,7 @@ LEVEL_WITHIN = 20.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Up:
+class Up(ShortRepr):
     """The direction against gravity.
 
     Parameters

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from posekit.body import Figure, LengthUncertainty
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera, lee_chen
 from posekit.compiled.compiling import n_threads
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import HeadError, InputError
 from posekit.formats.own import Family, LeeChenModel, OpenCVModel, ScaledOrthographicModel, View
 from posekit.geometry import Array
@@ -30,7 +31,7 @@ ROOT_WARNED, ROOT_REFUSED = 0.005, 0.2
 
 
 @dataclass(frozen=True, kw_only=True)
-class CameraFit:
+class CameraFit(ShortRepr):
     """The camera of F frames, and where it sees the root and the head, in H hypotheses.
 
     A calibrated frame is one hypothesis, or as many as depths were taken for its neck; an uncalibrated one as many as

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.cameras import Camera
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.recovery.body import FigureBody, LiftedBody, suite_of
@@ -43,7 +44,7 @@ TRUNK_JOINTS = tuple(JOINT[name] for name in TORSO[1:])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Grower:
+class Grower(ShortRepr):
     """Grows trees over hypotheses of a view: its frames, or its frames at several scales.
 
     Parameters

@@ -12,7 +12,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.answers.wording import plural
 from posekit.body import Figure
+from posekit.display.pictured import Pictured
+from posekit.display.stick_drawing import posture_drawing
 from posekit.formats.own import Family, Inferred, Root
 from posekit.formats.own.posture_set import PostureSet
 from posekit.geometry import Array
@@ -37,6 +40,12 @@ if TYPE_CHECKING:
 
 REFINED_LEVEL_METRES: Final = 0.05
 """Metres of depth up to which neither end of a refined segment is nearer: what photographs leave open."""
+
+
+MAX_DRAWN: Final = 8
+"""Postures of a frame in its small drawing."""
+CAMERA_UP: Final = np.array([0.0, -1.0, 0.0])
+"""Up in a picture."""
 
 
 def _inferred(completion: CompletedSurvivors, row: int) -> dict[str, Inferred]:
@@ -79,7 +88,7 @@ class PrunedBranch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrameRecovery:
+class FrameRecovery(Pictured):
     """One frame: its survivors and its losses.
 
     Parameters
@@ -305,6 +314,14 @@ class FrameRecovery:
         """How the neck's depth was found; None where it was given, or the camera is not known."""
         return None if self.placement is None else root_of(self.placement)
 
+    def _facts(self) -> list[str]:
+        found = f"nothing grown: {self.reason}" if self.reason else plural(len(self), "posture")
+        judged = [] if self.judged is None else [f"judged {self.judged}"]
+        return [f"frame {self.number}", f"{self.time:g} s", found, *judged]
+
+    def _drawing(self) -> str:
+        return posture_drawing(self.joints[:MAX_DRAWN], CAMERA_UP)
+
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""
         if self.batch is None or not self.hypotheses:
@@ -340,7 +357,7 @@ class FrameRecovery:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Recovery:
+class Recovery(Pictured):
     """All frames of a view.
 
     Parameters
@@ -392,3 +409,13 @@ class Recovery:
         from posekit.recovery.answered import answered
 
         return answered(self.frames, self.probability, [frame.spread for frame in self.frames])
+
+    def _facts(self) -> list[str]:
+        counts = [len(frame) for frame in self.frames]
+        none = f", none in {counts.count(0)}" if 0 in counts else ""
+        facts = [plural(len(counts), "frame"), f"{plural(sum(counts), 'posture')}{none}"]
+        return [*facts, f"ranges={self.settings['ranges']!r}"] if "ranges" in self.settings else facts
+
+    def _drawing(self) -> str:
+        answer = next((one for one in self.answers if len(one)), None)
+        return "" if answer is None else posture_drawing(answer.joints[:MAX_DRAWN], CAMERA_UP)

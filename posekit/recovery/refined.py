@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.refinement import Merged, Refined
 
@@ -68,7 +69,7 @@ class Covariances:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class RefinedSurvivors:
+class RefinedSurvivors(ShortRepr):
     """N survivors under noise, in the order of the leaves that they came from.
 
     Parameters

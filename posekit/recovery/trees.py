@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.closed_form import Alike
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.objects.mirror import mirrored
 from posekit.settings import Judged, Tolerance
@@ -31,7 +32,7 @@ LEVEL_METRES = 5e-10
 
 
 @dataclass(frozen=True, kw_only=True)
-class Batch:
+class Batch(ShortRepr):
     """Frames whose trees were grown together.
 
     Parameters
@@ -152,7 +153,7 @@ class Batch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrameTrees:
+class FrameTrees(ShortRepr):
     """Where the trees of one frame are.
 
     Parameters

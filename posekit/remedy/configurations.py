@@ -19,6 +19,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from posekit.body.measured import MeasuredPerson
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.remedy.nearest import bounded_forces
 from posekit.remedy.record import Repaired, left_of, spans_of
@@ -135,7 +136,7 @@ def _as_postures(q: Array, validator: Validator) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NearestConfiguration:
+class NearestConfiguration(ShortRepr):
     """Finds the nearest configurations of one model.
 
     Parameters

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.measured import MeasuredPerson, measured_person
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.remedy.between import interpolated, smoothed
 from posekit.remedy.exchange import CLIP_MARKS, exchanged
@@ -73,7 +74,7 @@ class Rejected:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MotionRepair:
+class MotionRepair(ShortRepr):
     """A motion as far as it is repaired.
 
     Parameters

@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.least_squares import Damping, Rows, State, Stopping, minimise
 from posekit.remedy.constraints import MarginConstraints
@@ -43,7 +44,7 @@ REPAIR_STOPPING: Final = Stopping(steps=50, precision=1e-6, smallest=1e-13)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NearestPosture:
+class NearestPosture(ShortRepr):
     """Postures that are sought near targets; see `posekit.least_squares.LeastSquaresProblem`.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array, runs
 from posekit.skeleton import JOINTS
 from posekit.validators.suite import Judgement
@@ -78,7 +79,7 @@ class UnrepairedFrame:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Repaired:
+class Repaired(ShortRepr):
     """The nearest postures, or configurations, that pass, and the record of it.
 
     Parameters

@@ -11,6 +11,7 @@ from xml.etree import ElementTree
 
 import pinocchio as pin
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.robots.geometry import build_geometry, link_of
 from posekit.robots.meshes import with_resolved_meshes
@@ -22,7 +23,7 @@ from posekit.safe_io import nearest, refusal, shown
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Robot:
+class Robot(ShortRepr):
     """A robot, made from texts; `posekit.robots.load_robot` makes one from files.
 
     Everything is loaded and checked at construction. A pickle holds the texts alone; a robot with meshes reads

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, get_args
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.settings.check import CheckSettings
 from posekit.settings.judging import JudgingSettings
@@ -23,7 +24,7 @@ DEFAULT_CHECKS: Final = tuple(
 
 
 @dataclass(frozen=True, kw_only=True)
-class RecoverSettings(JudgingSettings):
+class RecoverSettings(JudgingSettings, ShortRepr):
     """Everything that is asked of a recovery; the view, the figure and the computer come from elsewhere.
 
     Command line, Python, batch and evaluation make one each in their own way, and hand it down whole.

@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.settings.judging import JudgingSettings
 from posekit.settings.tolerance import EXACT_TOLERANCE, MEASURED_TOLERANCE
@@ -20,7 +21,7 @@ Lengths = Literal["model", "median", "each"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValidateSettings(JudgingSettings):
+class ValidateSettings(JudgingSettings, ShortRepr):
     """Everything that is asked of a validation, of the stick figure or of a robot.
 
     Parameters

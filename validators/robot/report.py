@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.validators.robot.collision import SelfCollision
 from posekit.validators.robot.contacts import Contacts
@@ -20,7 +21,7 @@ VERDICT_WORDS = ("valid", "invalid", "undecided")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Report:
+class Report(ShortRepr):
     """Verdicts on N postures, with the findings behind them.
 
     Parameters
@@ -48,6 +49,10 @@ class Report:
     points: tuple[str, ...] = ()
     residual: Array = field(default_factory=lambda: np.zeros((0, 0)))
     colliders: tuple[SelfCollision, ...] = ()
+
+    def _facts(self) -> list[str]:
+        found = [(int(getattr(self, word).sum()), word) for word in VERDICT_WORDS]
+        return [f"{len(self.complete)} postures", *[f"{count} {word}" for count, word in found]]
 
     @cached_property
     def invalid(self) -> NDArray[np.bool_]:

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
@@ -22,7 +23,7 @@ def _nothing() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class KeyPoints:
+class KeyPoints(ShortRepr):
     """D detections of people in F pictures, K points each; a row is one person in one picture.
 
     Parameters

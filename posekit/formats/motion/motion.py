@@ -8,10 +8,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.pictured import Pictured
+from posekit.display.short_repr import short
+from posekit.display.stick_drawing import points_drawing, posture_drawing
 from posekit.errors import InputError
 from posekit.formats.distinct import check_distinct
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal, shown
+from posekit.skeleton import JOINTS
 
 UP_DIRECTIONS: Final = {
     f"{sign}{axis}": (1.0 if sign == "+" else -1.0) * np.eye(3)[k]
@@ -22,7 +26,7 @@ UP_DIRECTIONS: Final = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Motion:
+class Motion(Pictured):
     """T frames of P named points in space.
 
     Parameters
@@ -112,6 +116,27 @@ class Motion:
     def __len__(self) -> int:
         """Return the number of frames."""
         return len(self.time)
+
+    def _facts(self) -> list[str]:
+        several = [f"{len(self.clips)} clips"] if len(self.clips) > 1 else []
+        up = [f"up={self.up!r}"] if self.up else []
+        return [
+            f"{len(self)} frames",
+            *several,
+            f"{self.rate:g} a second",
+            f"{len(self.names)} points",
+            *up,
+            f"source={short(self.source)}",
+        ]
+
+    def _drawing(self) -> str:
+        if not len(self):
+            return ""
+        points = self.points[int(np.isfinite(self.points[..., 0]).sum(axis=1).argmax())]
+        up = UP_DIRECTIONS[self.up or "+y"]
+        if not set(JOINTS) <= set(self.names):
+            return points_drawing(points, up)
+        return posture_drawing(points[None, [self.names.index(name) for name in JOINTS]], up)
 
     def of_clip(self, name: str) -> Motion:
         """Take one clip out of several.

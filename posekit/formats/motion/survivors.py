@@ -16,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.safe_io import cut, one_line, refusal, shown
 from posekit.skeleton import JOINTS
@@ -25,7 +26,7 @@ KEY_COLUMNS: Final = ("frame", "time", "survivor")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SurvivorTable:
+class SurvivorTable(ShortRepr):
     """N survivors of some frames, a row each.
 
     Parameters

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.units import PER_METRE, Unit
 from posekit.safe_io.refusal import refusal
 
@@ -20,7 +21,7 @@ def _nothing() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Family:
+class Family(ShortRepr):
     """Which scales an uncalibrated frame can have, and which were taken.
 
     Parameters

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.family import Family
 from posekit.formats.own.npz import suffix
 from posekit.formats.own.object_result_schema import OBJECT_SCHEMA, ObjectFile, ObjectFrameRecord
@@ -104,7 +105,7 @@ class ObjectFrame:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ObjectResult:
+class ObjectResult(ShortRepr):
     """Every survivor of every frame of a view of an object.
 
     Parameters

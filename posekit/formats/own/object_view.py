@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.camera_model import ScaledOrthographicModel
 from posekit.formats.own.object_view_schema import OBJECT_VIEW_SCHEMA, ObjectViewFile
 from posekit.formats.own.units import PER_METRE, Unit
@@ -27,7 +28,7 @@ def _no_frames() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ObjectView:
+class ObjectView(ShortRepr):
     """What an uncalibrated camera saw of an object. NaN marks what is not known.
 
     Lengths are metres where the linkage has a unit; else they are in its own relative unit.

@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.column import column, columns_in
 from posekit.geometry import Array
 from posekit.safe_io.refusal import refusal
@@ -22,7 +23,7 @@ from posekit.tree.factors import Rows, factor_postures, whole_bodies
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class PostureSet:
+class PostureSet(ShortRepr):
     """T trunks and the L limbs that they can have, from 0.
 
     A whole body is a trunk with one limb of each kind, all on that trunk, of which no two exclude each other.

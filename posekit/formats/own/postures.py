@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.pictured import Pictured
+from posekit.display.stick_drawing import posture_drawing
 from posekit.formats.own.npz import suffix, write_npz
 from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
 from posekit.formats.own.result import RESULT_SCHEMAS, Result
@@ -27,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Postures:
+class Postures(Pictured):
     """Postures to be judged, drawn or converted.
 
     Parameters
@@ -52,6 +54,9 @@ class Postures:
             check_points("postures", name, values)
             values.flags.writeable = False
             object.__setattr__(self, name, values)
+
+    def _drawing(self) -> str:
+        return posture_drawing(self.joints[:1], np.array([0.0, 0.0, 1.0]))
 
 
 def read_postures(path: str | Path) -> Postures:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.npz import suffix, write_npz
 from posekit.formats.own.postures_q_schema import CONFIGURATIONS_SCHEMA, ConfigurationsFile
 from posekit.safe_io.json_file import read_json
@@ -25,7 +26,7 @@ ROOT_NAMES = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class NamedConfigurations:
+class NamedConfigurations(ShortRepr):
     """Configurations as a file has them.
 
     Parameters

@@ -6,14 +6,20 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
+from posekit.display.pictured import Pictured
+from posekit.display.short_repr import ShortRepr
+from posekit.display.stick_drawing import shares_drawing
 from posekit.formats.own.report_clips import ClipVerdict, Still
 from posekit.formats.own.report_columns import CheckCount, ReportPlace, VerdictColumns, joined
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES, Verdict
+
+VERDICT_COLOURS: Final = {"valid": "#009e73", "invalid": "#d55e00", "undecided": "#b0b0b0"}
+"""Which the colour-blind tell apart (Okabe & Ito 2008)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,7 +59,7 @@ class Worst:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PostureReport:
+class PostureReport(ShortRepr):
     """The verdict on one posture.
 
     Parameters
@@ -91,7 +97,7 @@ class PostureReport:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ValidationReport:
+class ValidationReport(Pictured):
     """The verdicts on a file of postures.
 
     Parameters
@@ -140,6 +146,15 @@ class ValidationReport:
             return {verdict: self.verdicts.count(verdict[0]) for verdict in VERDICT_NAMES}
         counts = Counter(posture.verdict for posture in self.postures)
         return {verdict: counts[verdict] for verdict in VERDICT_NAMES}
+
+    def _facts(self) -> list[str]:
+        clips = [f"{len(self.clips)} clips"] if self.clips else []
+        refused = [f"{len(self.refused)} files refused"] if self.refused else []
+        counts = [f"{count} {verdict}" for verdict, count in self.summary.items()]
+        return [f"{len(self)} postures", *counts, *clips, *refused]
+
+    def _drawing(self) -> str:
+        return shares_drawing([(name, count, VERDICT_COLOURS[name]) for name, count in self.summary.items()])
 
 
 def columns_of(report: ValidationReport) -> VerdictColumns:

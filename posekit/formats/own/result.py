@@ -9,6 +9,8 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.display.pictured import Pictured
+from posekit.display.stick_drawing import posture_drawing
 from posekit.formats.own.digits import Precision
 from posekit.formats.own.family import Family
 from posekit.formats.own.frame_answer import FrameAnswer
@@ -116,7 +118,7 @@ class ResultFrame(SurvivorColumns):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Result:
+class Result(Pictured):
     """A recovery, as it is written and read.
 
     Parameters
@@ -144,6 +146,15 @@ class Result:
     frames: Sequence[ResultFrame]
     paths: FollowedPaths | None = None
     decimals: int | None = None
+
+    def _facts(self) -> list[str]:
+        count = sum(len(frame.joints) for frame in self.frames)
+        paths = [] if self.paths is None else [f"{len(self.paths.joints)} paths"]
+        return [f"{len(self.frames)} frames", f"{count} postures", *paths, f"unit={self.unit!r}"]
+
+    def _drawing(self) -> str:
+        frame = next((one for one in self.frames if len(one.joints)), None)
+        return "" if frame is None else posture_drawing(frame.joints[:8], np.array([0.0, -1.0, 0.0]))
 
     def __post_init__(self) -> None:
         for name in ("joint_names", "configuration_names", "frames"):

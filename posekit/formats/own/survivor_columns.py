@@ -15,6 +15,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.short_repr import ShortRepr
 from posekit.formats.own.column import column, columns_in
 from posekit.formats.own.inferred import Inferred
 from posekit.geometry import Array
@@ -87,7 +88,7 @@ class Likelihoods:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SurvivorColumns:
+class SurvivorColumns(ShortRepr):
     """The N survivors of one frame: a table of columns, in memory in metres and radians, in arrays (N, …)."""
 
     schema_title: ClassVar = ("ResultPosture", "One survivor.")

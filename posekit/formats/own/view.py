@@ -9,6 +9,9 @@ from typing import Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.pictured import Pictured
+from posekit.display.short_repr import short
+from posekit.display.stick_drawing import image_drawing
 from posekit.formats.own.camera_model import CameraModel, ScaledOrthographicModel
 from posekit.formats.own.units import Unit
 from posekit.formats.own.view_schema import HEAD_NAMES
@@ -27,7 +30,7 @@ def _no_frames() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class View:
+class View(Pictured):
     """One view, a frame or a sequence. NaN marks what is not known.
 
     Parameters
@@ -125,6 +128,26 @@ class View:
     def take(self, rows: NDArray[np.intp] | Sequence[int] | slice) -> View:
         """Return some of its frames."""
         return replace(self, **{name: getattr(self, name)[rows] for name in FRAME_ARRAYS})
+
+    def _facts(self) -> list[str]:
+        known = [name for name in ("root", "truth") if np.isfinite(getattr(self, name)).any()]
+        seen = np.isfinite(self.image).all(axis=2)
+        return [
+            f"{len(self)} frame{'s' * (len(self) != 1)}",
+            f"{self.time[0]:g} to {self.time[-1]:g} s",
+            f"camera={type(self.camera).__name__}",
+            f"{seen.mean():.0%} of joints seen",
+            *[f"with {name}" for name in known],
+            *[
+                f"{name}={short(getattr(self, name))}"
+                for name in ("stature", "deviation")
+                if getattr(self, name)
+            ],
+        ]
+
+    def _drawing(self) -> str:
+        most = int(np.isfinite(self.image).all(axis=2).sum(axis=1).argmax())
+        return image_drawing(self.image[most])
 
     def _check_figure(self) -> None:
         for name, length in self.lengths.items():
