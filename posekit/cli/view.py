@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -45,6 +43,7 @@ def view(
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
     from posekit.viewer.page.page import page_html
     from posekit.viewer.page.server import PageServer
+    from posekit.viewer.showing import has_screen
 
     content, behind = read_given(given, seen)
     chosen = _frames(frames)
@@ -53,7 +52,7 @@ def view(
     with PageServer(page, port) as server:
         try:
             typer.echo(f"{server.url}  (this machine only; Ctrl-C ends)")
-            if open_ and _has_screen():
+            if open_ and has_screen():
                 webbrowser.open(server.url)
             server.serve_forever()
         except KeyboardInterrupt:
@@ -73,10 +72,3 @@ def _frames(text: str) -> range | None:
             f"--frames: {text!r}; expected numbers from 0, the first not after the last, as 0-99"
         )
     return range(int(first), int(last) + 1)
-
-
-def _has_screen() -> bool:
-    """Whether a browser would have a window; without one, a text browser would take the terminal over."""
-    return sys.platform in ("darwin", "win32") or any(
-        os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY")
-    )

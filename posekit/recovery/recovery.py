@@ -31,12 +31,16 @@ from posekit.settings import Judged, Tolerance
 from posekit.skeleton import JOINT, JOINTS, PARENTS
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from posekit.answers import Answer
     from posekit.cameras.neck import NeckPlacement
+    from posekit.formats.own import View
     from posekit.hidden import CompletedSurvivors
     from posekit.recovery.fit_camera import CameraFit
     from posekit.recovery.grower import Grower
     from posekit.recovery.refined import RefinedSurvivors
+    from posekit.viewer.showing import ShownPage
 
 REFINED_LEVEL_METRES: Final = 0.05
 """Metres of depth up to which neither end of a refined segment is nearer: what photographs leave open."""
@@ -322,6 +326,23 @@ class FrameRecovery(Pictured):
     def _drawing(self) -> str:
         return posture_drawing(self.joints[:MAX_DRAWN], CAMERA_UP)
 
+    def show(self, path: str | Path | None = None) -> ShownPage:
+        """Show the frame's survivors to be turned by hand: in the notebook, or in the browser.
+
+        Parameters
+        ----------
+        path : path, optional
+            Where the page is written; a new temporary file if not given.
+
+        Raises
+        ------
+        InputError
+            Where the frame has no posture.
+        """
+        from posekit.recovery.showing import show_frame
+
+        return show_frame(self, path)
+
     def too_short(self) -> tuple[str, float] | None:
         """Return the first segment that is too short for its image in every branch, and by how much (m)."""
         if self.batch is None or not self.hypotheses:
@@ -409,6 +430,43 @@ class Recovery(Pictured):
         from posekit.recovery.answered import answered
 
         return answered(self.frames, self.probability, [frame.spread for frame in self.frames])
+
+    def show(self, view: View | None = None, path: str | Path | None = None) -> ShownPage:
+        """Show the page of all survivors: in the notebook, or in the browser.
+
+        Parameters
+        ----------
+        view : View, optional
+            What was recovered: the page then shows the image, too.
+        path : path, optional
+            Where the page is written; a new temporary file if not given.
+
+        Raises
+        ------
+        PosekitError
+            Where there is no posture, or too many for one page.
+        """
+        from posekit.recovery.showing import show_recovery
+
+        return show_recovery(self, view, path)
+
+    def save(self, path: str | Path) -> None:
+        """Write the result, as `posekit recover -o` does.
+
+        Parameters
+        ----------
+        path : path
+            ``.json`` or ``.npz``.
+
+        Raises
+        ------
+        InputError
+            Where the name is neither, or the file cannot be written.
+        """
+        from posekit.formats.own import write_result
+        from posekit.recovery.result import result_of
+
+        write_result(path, result_of(self))
 
     def _facts(self) -> list[str]:
         counts = [len(frame) for frame in self.frames]

@@ -1,0 +1,62 @@
+"""Pages shown from Python: in a notebook, in a browser, and where there is neither."""
+
+import types
+
+import pytest
+
+import posekit
+from posekit.errors import InputError
+from posekit.viewer import showing
+
+
+@pytest.fixture(scope="module")
+def recovery():
+    return posekit.recover(posekit.builtin_view("seq1"))
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """Take the place of the browser."""
+    asked: list[str] = []
+    monkeypatch.setattr(showing.webbrowser, "open", lambda url: asked.append(url) or True)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(showing.sys, "platform", "linux")
+    return asked
+
+
+def test_without_a_screen_the_place_of_the_page_is_said(recovery, opened, tmp_path):
+    shown = recovery.frames[0].show(tmp_path / "frame.html")
+    assert opened == []
+    assert repr(shown).startswith(str(tmp_path / "frame.html")) and "open it in a browser" in repr(shown)
+    assert "frame 0" in shown.path.read_text(encoding="utf-8")
+
+
+def test_with_a_screen_the_browser_opens_it(recovery, opened, monkeypatch, tmp_path):
+    monkeypatch.setenv("DISPLAY", ":0")
+    shown = recovery.show(path=tmp_path / "all.html")
+    assert opened == [shown.path.as_uri()] and shown.opened
+
+
+def test_a_notebook_has_it_in_a_frame_and_opens_nothing(recovery, opened, monkeypatch):
+    monkeypatch.setenv("DISPLAY", ":0")
+    shell = types.SimpleNamespace(kernel=object())
+    monkeypatch.setitem(showing.sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    shown = recovery.show(posekit.builtin_view("seq1"))
+    assert opened == []
+    frame = shown._repr_html_()
+    assert frame.startswith('<iframe srcdoc="&lt;!DOCTYPE html') and 'sandbox="allow-scripts"' in frame
+    assert frame.count('"') == 2 * 5
+
+
+def test_a_frame_without_postures_says_why(recovery):
+    empty = posekit.Recovery(figure=recovery.figure, fit=recovery.fit, frames=[], settings=recovery.settings)
+    assert repr(empty).startswith("Recovery(0 frames")
+    frame = type(recovery.frames[0])(time=0.0, batch=None, index=0, reason="the neck is not seen")
+    with pytest.raises(InputError, match="frame 0: no posture to show: the neck is not seen"):
+        frame.show()
+
+
+def test_what_is_saved_is_read_again(recovery, tmp_path):
+    recovery.save(tmp_path / "found.npz")
+    assert len(posekit.read_result(tmp_path / "found.npz").frames) == 5
