@@ -13,6 +13,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from posekit.body.capsules import Capsule
+from posekit.body.inertias import inertias
 from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import FigureError, InputError
 from posekit.geometry import Array
@@ -86,7 +87,8 @@ def rewrite(
     """Write the figure's URDF with other lengths and another head; capsules grow with their part.
 
     A capsule keeps its place on its link's line, its length in proportion to that line. Its radius grows with
-    the same ratio, the torso's with the width of the shoulders.
+    the same ratio, the torso's with the width of the shoulders. Masses and moments are those of a person of these
+    lengths.
 
     Parameters
     ----------
@@ -144,6 +146,14 @@ def rewrite(
         origin.set("rpy", _numbers(np.array([0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)])))
         cylinder.set("length", repr(2 * capsule.half_length * ratio))
         cylinder.set("radius", repr(capsule.radius * (shoulders if capsule.link == "torso" else ratio)))
+    for name, (mass, centre, moments) in inertias(lengths).items():
+        inertial = robot.find(f"link[@name='{name}']/inertial")
+        if inertial is None:  # a figure of one's own may do without masses
+            continue
+        _find(inertial, "origin").set("xyz", _numbers(centre))
+        _find(inertial, "mass").set("value", repr(float(mass)))
+        for axis_name, moment in zip(("ixx", "iyy", "izz"), moments.tolist(), strict=True):
+            _find(inertial, "inertia").set(axis_name, repr(moment))
     return _text(robot)
 
 

@@ -1,8 +1,6 @@
 """Where a body's centre of mass is, from its joints and the mass of each segment.
 
-Masses and centres are de Leva 1996, "Adjustments to Zatsiorsky-Seluyanov's segment inertia parameters", J Biomech
-29:1223, Table 4, means of women and men, fractions of the body's mass and of the segment's length. The trunk is that
-from the cervicale to the middle of the hips, the shank that to the ankle's centre. Head and hand have no segment in the
+Masses and centres are de Leva's (1996), as `posekit.body.inertias` has them. Head and hand have no segment in the
 figure: the head's centre is beyond the neck by its height above the cervicale over the trunk's length, the hand's past
 the wrist in the forearm's line; the foot's is put into the ankle.
 """
@@ -13,26 +11,13 @@ from typing import Final
 
 import numpy as np
 
+from posekit.body.inertias import LIMB_PARTS, LINE_OF_LIMB, TRUNK_PARTS
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, SIDES
 
-HEAD_MASS: Final = 0.0681
-TRUNK_MASS: Final = 0.43015
-"""Fractions of the body's mass."""
-
-HEAD_ABOVE_NECK: Final = 0.203
-TRUNK_BELOW_NECK: Final = 0.5051
-"""Where their centres are on the line from the neck to the middle of the hips, in its lengths."""
-
-LIMB_MASSES: Final = (
-    ("shoulder", "elbow", 0.0263, 0.5763),
-    ("elbow", "wrist", 0.0150, 0.4567),
-    ("elbow", "wrist", 0.00585, 1.237),
-    ("hip", "knee", 0.1447, 0.3854),
-    ("knee", "ankle", 0.0457, 0.4374),
-    ("knee", "ankle", 0.0133, 1.0),
-)
-"""Upper arm, forearm, hand, thigh, shank, foot: between which joints, mass, how far along its centre is."""
+TRUNK_MASS: Final = sum(part.mass for part in TRUNK_PARTS.values())
+TRUNK_MOMENT: Final = sum(part.mass * part.along for part in TRUNK_PARTS.values())
+"""Of head and trunk: fractions of the body's mass, and of that times the line from neck to mid-hips."""
 
 
 def centre_of_mass(joints: Array) -> Array:
@@ -50,13 +35,13 @@ def centre_of_mass(joints: Array) -> Array:
     """
     neck = joints[JOINT["neck"]]
     down = (joints[JOINT["right_hip"]] + joints[JOINT["left_hip"]]) / 2 - neck
-    total = (HEAD_MASS + TRUNK_MASS) * neck + (
-        TRUNK_MASS * TRUNK_BELOW_NECK - HEAD_MASS * HEAD_ABOVE_NECK
-    ) * down
+    total = TRUNK_MASS * neck + TRUNK_MOMENT * down
     known = np.isfinite(joints).all()
-    mass: Array | float = HEAD_MASS + TRUNK_MASS
+    mass: Array | float = TRUNK_MASS
     for side in SIDES:
-        for upper, lower, share, along in LIMB_MASSES:
+        for name, segment in LIMB_PARTS.items():
+            upper, lower = LINE_OF_LIMB[name]
+            share, along = segment.mass, segment.along
             start, end = joints[JOINT[f"{side}_{upper}"]], joints[JOINT[f"{side}_{lower}"]]
             part = share * ((1 - along) * start + along * end)
             if known:

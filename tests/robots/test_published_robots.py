@@ -67,7 +67,7 @@ class TestPublishedRobots:
         robot, figure = load_robot("stick_figure"), load_figure()
         assert robot.hash == figure.hash
         assert robot.configuration_names == figure.configuration_names
-        assert not any(inertia.mass for inertia in robot.model.inertias)
+        assert all(inertia.mass > 0 for inertia in robot.model.inertias[2:])
         names = [figure.capsules[k].link for k in range(len(figure.capsules))]
         pairs = {tuple(sorted((names[a], names[b]))) for a, b in figure.collision_pairs}
         links = dict(zip(robot.body_names, robot.body_links, strict=True))

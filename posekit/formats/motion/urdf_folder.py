@@ -4,8 +4,8 @@
 forward, y left, z up). ``configurations.npz`` has ``q`` (T, 29) in Pinocchio's order (``buildModelFromUrdf`` with
 ``JointModelFreeFlyer``: x, y, z, then the quaternion x, y, z, w, then the joints), ``configuration_names`` (29,) and
 ``time`` (T,), and is a file of schema ``posekit.configurations/1``; ``configurations.csv`` has the same, a row a frame,
-empty where an angle is not known. ``figure_mujoco.urdf`` is the same figure on a floating joint ``root``, with a mass
-and an inertia for each link, which MuJoCo demands: they are placeholders. Its quaternion is w, x, y, z.
+empty where an angle is not known. ``figure_mujoco.urdf`` is the same figure on a floating joint ``root``, which MuJoCo
+does not add by itself. Its quaternion is w, x, y, z.
 """
 
 from __future__ import annotations
@@ -119,10 +119,10 @@ def read_urdf_folder(path: str | Path, unit: str | None = None) -> Motion:
 
 
 def mujoco_text(figure: Figure) -> str:
-    """Return the figure's URDF as MuJoCo takes it: a floating root, and something to weigh in every link."""
+    """Return the figure's URDF as MuJoCo takes it: with a floating root; wrists and ankles stay bodies of their own."""
     robot = parse(figure.urdf, figure.source)
     base = next(iter({link.get("name") for link in robot.findall("link")} - _children(robot)))
-    settings = {"fusestatic": "false", "boundmass": "1e-3", "boundinertia": "1e-4"}
+    settings = {"fusestatic": "false"}
     ElementTree.SubElement(ElementTree.SubElement(robot, "mujoco"), "compiler", settings)
     ElementTree.SubElement(robot, "link", name="world")
     joint = ElementTree.SubElement(robot, "joint", name="root", type="floating")
