@@ -15,7 +15,7 @@ from posekit.formats.motion import Motion, postures_of, read_motion
 from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
 from posekit.formats.motion.body_size import FARTHEST_COORDINATE, BodyUnit, body_unit, stature_of
 from posekit.formats.motion.detected import read_detected
-from posekit.formats.motion.ground_up import FoundUp, find_up
+from posekit.formats.motion.ground_up import FoundUp, against_stated_up, find_up
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.people_in_motion import people_apart
 from posekit.formats.own import Postures
@@ -115,7 +115,7 @@ def held_motion(
     if up is None:
         way = find_up(joints, motion.clip, motion.up, motion.source, told="up" in motion.told)
     else:
-        way = FoundUp(up)
+        way = FoundUp(up, "; ".join(against_stated_up(joints, motion.clip, up)))
     said += [way.said] if way.said else []
     in_world = _in_world(joints)
     if not in_world:

@@ -11,6 +11,7 @@ import numpy as np
 from posekit.formats.own import ValidationReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
 from posekit.settings import DEFAULT_RANGES, EXACT_TOLERANCE
+from posekit.validation.causes import CAUSING_CHECKS, FOLLOWING_CHECKS
 
 FEW_DEGREES: Final = 15.0
 """Degrees within which somebody may well be more mobile, or a skeleton's joints placed otherwise."""
@@ -27,11 +28,11 @@ MOST_OF_THEM: Final = 0.95
 MANY_METRES: Final = 3.0
 """Metres: what misses a length by so much is in another unit."""
 
-CAUSING_CHECKS: Final = ("timing", "repeated", "swap", "teleport")
-"""Checks that name what others fail by, too."""
-
 ALMOST_AS_MANY: Final = 0.9
 """Share of the most frequent violation's postures from which a cause is said instead."""
+
+FEWER_CAUSES: Final = 3
+"""Times as many postures may be rejected by what follows from another violation as by that."""
 
 INVALID_VERDICT: Final = 1
 """Of a verdict in `VerdictColumns.verdict`."""
@@ -49,9 +50,13 @@ def why_most_fail(columns: VerdictColumns, told: Mapping[str, Any]) -> str:
     """
     if not np.any(columns.verdict == INVALID_VERDICT) or not len(columns.place):
         return ""
-    often = np.bincount(columns.place, minlength=len(columns.places))
+    often = np.bincount(columns.place, minlength=len(columns.places)) / [
+        FEWER_CAUSES if one.check in FOLLOWING_CHECKS else 1 for one in columns.places
+    ]
     many = often >= ALMOST_AS_MANY * often.max()
-    causes = [k for k in np.flatnonzero(many).tolist() if columns.places[k].check in CAUSING_CHECKS]
+    causes = [
+        k for k in np.flatnonzero(many).tolist() if columns.places[k].check in (*CAUSING_CHECKS, "teleport")
+    ]
     most = int(causes[0] if causes else often.argmax())
     mine, place = columns.place == most, columns.places[most]
     count, beyond = len(np.unique(columns.posture[mine])), -columns.margin[mine]

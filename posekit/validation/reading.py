@@ -20,6 +20,7 @@ from posekit.formats.held_postures import (
 )
 from posekit.formats.listing import Wanted, listed
 from posekit.formats.motion import UP_DIRECTIONS
+from posekit.formats.motion.ground_up import against_stated_up
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
 from posekit.formats.own import NamedConfigurations, Result, read_result
 from posekit.formats.recognising import recognise
@@ -71,7 +72,8 @@ class StatedMotion:
     def applied(self, held: HeldPostures) -> HeldPostures:
         """Return postures with the direction up and the times that are stated."""
         if self.up:
-            held = replace(held, up=self.up)
+            against = against_stated_up(held.postures.joints, held.clip, self.up)
+            held = replace(held, up=self.up, said=(*held.said, *against))
         if self.rate is None:
             return held
         if held.in_time:

@@ -15,6 +15,7 @@ from posekit.formats.own.report_columns import PER_DEGREE, VerdictColumns
 from posekit.formats.own.report_frames import ReportFrames
 from posekit.formats.own.report_schema import VERDICT_NAMES
 from posekit.geometry import Array, runs
+from posekit.validation.causes import follows
 
 MERGED_SECONDS: Final = 0.1
 """Seconds between two frames of one span at most; what comes back sooner has one cause."""
@@ -133,14 +134,18 @@ def _beyond(margin: Array, bound: Array, unit: str) -> Array:
 
 
 def _listed(spans: Sequence[Span], most: int) -> tuple[Span, ...]:
-    """Choose spans, of each check as many as there is room for, and list the worst first."""
+    """Choose spans, of each check as many as there is room for; list causes before what follows, the worst first."""
     ranks: Counter[str] = Counter()
     ranked = []
     for span in sorted(spans, key=_badness):
         ranked.append((ranks[span.check], span))
         ranks[span.check] += 1
-    chosen = sorted(ranked, key=lambda pair: pair[0])[:most]
-    return tuple(sorted((span for _, span in chosen), key=_badness))
+    chosen = [span for _, span in sorted(ranked, key=lambda pair: pair[0])[:most]]
+    after = follows(chosen).tolist()
+    order = sorted(
+        range(len(chosen)), key=lambda k: (chosen[k].verdict == "undecided", after[k], _badness(chosen[k]))
+    )
+    return tuple(chosen[k] for k in order)
 
 
 def _behind(columns: VerdictColumns, row: int, firsts: NDArray[np.intp]) -> Sequence[str]:

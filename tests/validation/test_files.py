@@ -270,3 +270,9 @@ def test_the_way_up_that_is_stated_counts_beside_settings() -> None:
     asked = AskedValidation(settings=posekit.ValidateSettings(), stated=StatedMotion(up="+y"))
     read = ReadPostures(NamedConfigurations(q=np.zeros((1, FIGURE.model.nq)), names=None, source="standing"))
     assert asked.validator(read).settings.up == (0.0, 1.0, 0.0)
+
+
+def test_a_way_up_that_is_stated_against_the_body_is_said() -> None:
+    said = "+y is up as was stated, though bodies stand along +z"
+    assert said in posekit.validate(walk(0), rate=30, up="+y").settings["recognised"]
+    assert said not in posekit.validate(walk(0), rate=30, up="+z").settings.get("recognised", [])

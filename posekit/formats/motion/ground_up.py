@@ -80,6 +80,28 @@ def find_up(joints: Array, clip: NDArray[np.intp], up: str, source: str, *, told
     return FoundUp(up, f"{up} is up by the file's own word, though {how} {other} (--up)")
 
 
+def against_stated_up(joints: Array, clip: NDArray[np.intp], up: str) -> tuple[str, ...]:
+    """Say that bodies stand along another axis than the one that was stated to be up; nothing where they do not.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        In tree order, metres.
+    clip : int array (T,)
+        The recording of each frame.
+    up : str
+        One of `UP_DIRECTIONS`.
+    """
+    try:
+        stands = guess_up(joints)
+    except InputError:
+        return ()
+    level = (
+        ground_spread(joints, clip, up) < FLAT_METRES and ground_spread(joints, clip, stands) > STEEP_METRES
+    )
+    return () if stands == up or level else (f"{up} is up as was stated, though bodies stand along {stands}",)
+
+
 def _level(flat: Mapping[str, float]) -> str:
     """Return the axis along which the lowest joint stays level, and clearly more so than along the others."""
     best, second = sorted(flat, key=lambda name: flat[name])[:2]
