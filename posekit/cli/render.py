@@ -25,6 +25,7 @@ RENDER_EXAMPLES = examples(
     "posekit render postures.json -o all.png --layout superposed --background grey",
     "posekit render postures.json -o walk.gif --posture likeliest --fps 5",
     "posekit render postures.npz --view view.json --over recording.mp4 -o over.mp4",
+    "posekit render postures.npz --view view.json -o angles.png --angles knee,elbow",
     "posekit render walk.bvh -o walk.html",
     "posekit render postures.json -o turn.gif --frame 1 --posture 0 --turntable 36 --size 640x480",
     "posekit render explained.json --view walk.json -o rejected.png --rejected",
@@ -94,6 +95,23 @@ def render(
             "of a result that was recovered with --explain.",
         ),
     ] = False,
+    angles: Annotated[
+        str,
+        option(
+            "--angles",
+            "LIST",
+            "Instead of figures, joint angles over time with their limits: all, or some as knee,left_elbow.flexion; "
+            "-o is a .png, .svg or .pdf.",
+        ),
+    ] = "",
+    truth: Annotated[
+        Path | None,
+        option(
+            "--truth",
+            "FILE",
+            "A view with truth, or motion of the same seconds: its figure beside the others, its angles dashed.",
+        ),
+    ] = None,
     layout: Annotated[
         Layout | None,
         typer.Option(
@@ -171,6 +189,12 @@ def render(
             fps=fps,
         )
         return
+    if angles:
+        from posekit.cli.render_angles import render_angles
+
+        _refuse_others(options_given(ctx), "--angles", ANGLE_OPTIONS)
+        render_angles(given, seen or [], output, angles=angles, frame=frame, posture=posture, truth=truth)
+        return
     if len(given) > 1 or len(seen or []) > 1:
         raise InputError(
             f"got {len(given)} files and {len(seen or [])} views; several are drawn with --over alone"
@@ -225,7 +249,15 @@ def render(
 
 
 OVER_OPTIONS = ("--output", "--view", "--over", "--frame", "--posture", "--size", "--fps")
-"""What is heeded beside ``--over``."""
+ANGLE_OPTIONS = ("--output", "--view", "--angles", "--frame", "--posture", "--truth")
+"""What is heeded beside ``--over``, and beside ``--angles``."""
+
+
+def _refuse_others(options: Sequence[str], beside: str, heeded: Sequence[str]) -> None:
+    """Refuse options that would have no effect."""
+    for name in options:
+        if name not in heeded:
+            raise InputError(f"{name}: means nothing beside {beside}; expected some of {', '.join(heeded)}")
 
 
 def _over(

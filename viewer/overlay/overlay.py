@@ -143,7 +143,7 @@ def write_overlay(
     check_overlay(path, overlay)
     if kind == ".gif" and overlay.size is None:
         overlay = replace(overlay, size=GIF_SIZE)
-    film = _Film(people, source, overlay, moving=kind not in (".png", ".jpg"))
+    film = _DrawnFilm(people, source, overlay, moving=kind not in (".png", ".jpg"))
     drawn = film.drawn(progress)
     if not kind:
         make_folder(path)
@@ -163,7 +163,7 @@ def write_overlay(
         return write_mp4(file, moving, fps=film.fps), film.said
 
 
-class _Film:
+class _DrawnFilm:
     """Which pictures are drawn, and who is in each."""
 
     def __init__(

@@ -12,6 +12,7 @@ from posekit.body import with_head
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures, Result, View
+from posekit.skeleton import JOINTS
 from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 MAX_BESIDE: Final = 6
@@ -57,7 +58,7 @@ def by_probability(shown: Shown) -> Shown:
 
 
 def along_path(subject: DrawnSubject, content: Result | Postures | HeldPostures | View) -> list[Shown]:
-    """Return the frames of a subject with the postures of a result's likeliest path.
+    """Return the frames of a subject with the postures of a result's likeliest path, its depths smoothed where it can.
 
     Raises
     ------
@@ -67,23 +68,27 @@ def along_path(subject: DrawnSubject, content: Result | Postures | HeldPostures 
     paths = content.paths if isinstance(content, Result) else None
     if paths is None:
         raise InputError("--posture path: the result has no path; recover it with --follow 1")
-    points = with_head(np.asarray(paths.joints[0]))
+    smoothed = paths.smoothed[0]
+    points = with_head(np.where(np.isnan(smoothed), paths.joints[0], smoothed))
     frames = []
     for k, shown in enumerate(subject.frames):
         scale, survivor = float(paths.scale[0, k]), int(paths.survivor[0, k])
         sight = shown.sight
         if sight is not None and np.isfinite(scale):
             sight = sight.rescaled(scale)
-        said = "likeliest path" + (", bridged" if survivor < 0 else "")
         if survivor >= 0:
             chosen = shown.chosen([survivor])
+            moved = points[k] - chosen.points[0]
+            moved[len(JOINTS) :] = moved[0]  # a path says nothing of the head, which stays on the neck
+            chosen = replace(chosen, points=chosen.points + moved, q=None)
         else:
-            known = bool(np.isfinite(points[k]).any())
+            known = int(np.isfinite(points[k]).any())
             chosen = Shown(
-                points=points[k : k + int(known)],
-                scales=np.array([scale])[: int(known)] if np.isfinite(scale) else None,
+                points=points[k : k + known],
+                scales=np.array([scale] * known) if np.isfinite(scale) else None,
                 time=shown.time,
             )
+        said = "likeliest path" + (", bridged" if survivor < 0 else "")
         frames.append(replace(chosen, sight=sight, caption=said))
     return frames
 

@@ -1,0 +1,81 @@
+"""The truth that `posekit render` draws beside what was recovered: of the view itself, or of another file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from posekit.errors import InputError
+
+if TYPE_CHECKING:
+    from posekit.formats.own import View
+    from posekit.geometry import Array
+
+
+def true_joints(path: Path, view: View | None, view_path: Path | None, times: Array) -> tuple[Array, bool]:
+    """Read the truth of some frames.
+
+    Parameters
+    ----------
+    path : Path
+        A view with truth, or motion of the same frames or seconds.
+    view : View, optional
+        What was recovered; where its camera's place in the world is known, motion is turned into its frame.
+    view_path : Path, optional
+        Its file.
+    times : array (F,)
+        Of the frames, seconds.
+
+    Returns
+    -------
+    joints, in_camera
+        (F, 14, 3) metres, NaN where not known; and whether they are in the camera's frame.
+
+    Raises
+    ------
+    InputError
+        Where the file has no truth of these frames.
+    """
+    import numpy as np
+
+    from posekit.formats.format import Content
+    from posekit.formats.held_postures import held_postures
+    from posekit.formats.own import OpenCVModel, read_view
+    from posekit.formats.recognising import recognise
+
+    found = recognise(path)
+    if found.holds is Content.VIEW:
+        given = read_view(path)
+        if len(given) != len(times) or not np.isfinite(given.truth).any():
+            raise InputError(
+                f"--truth {path}: a view of {len(given)} frames"
+                + ("" if np.isfinite(given.truth).any() else " without truth")
+                + f"; expected the truth of {len(times)} frames; give the view that was recovered"
+            )
+        return given.truth, True
+    placed = view is not None and isinstance(view.camera, OpenCVModel) and view.camera.R is not None
+    if placed and view_path is not None and found.holds is Content.MOTION:
+        from posekit.views.given_views import given_views
+        from posekit.views.source import Source
+
+        return given_views(view_path, Source(), path)[0].view.truth, True
+    held = held_postures(path, found)
+    joints = np.full((len(times), 14, 3), np.nan)
+    last = int(held.frame.max(initial=-1))
+    if last + 1 == len(times):
+        joints[held.frame] = held.postures.joints
+        return joints, False
+    since, asked = held.time - held.time[:1], times - times[:1]
+    if not len(since) or not (np.isfinite(since).all() and np.isfinite(asked).all()):
+        raise InputError(
+            f"--truth {path}: {last + 1} frames; expected {len(times)}, or times of both that say which is which"
+        )
+    nearest = np.abs(since[None] - asked[:, None]).argmin(axis=1)
+    step = float(np.median(np.diff(since))) if len(since) > 1 else 0.0
+    near = np.abs(since[nearest] - asked) <= max(0.51 * step, 1e-9)
+    if not near.any():
+        raise InputError(
+            f"--truth {path}: none of its frames is at the time of a picture; expected the same seconds"
+        )
+    joints[near] = held.postures.joints[nearest[near]]
+    return joints, False
