@@ -23,8 +23,16 @@ NOISE_FACTOR: Final = 5.0
 """Standard deviations of measuring by which a difference may be off."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class Derivative(MotionCheck):
     """A derivative of the way of each joint against bounds for the trunk and for limbs.
+
+    Parameters
+    ----------
+    trunk : float
+        Of neck, shoulders, pelvis and hips, in metres and seconds.
+    limbs : float
+        Of the other joints.
 
     Attributes
     ----------
@@ -35,14 +43,13 @@ class Derivative(MotionCheck):
     order: ClassVar[int]
     needs: ClassVar[tuple[str, ...]] = ("time",)
 
+    trunk: float
+    limbs: float
+
     def places(self, clip: MotionClip) -> tuple[str, ...]:
         """Name the joints; see `MotionCheck`."""
         del clip
         return JOINTS
-
-    def bounds(self) -> Array:
-        """Return the upper bound of each joint (14,)."""
-        raise NotImplementedError
 
     def judge(self, clip: MotionClip) -> Findings:
         """Take the difference of that order over a sixtieth of a second or a frame; see `MotionCheck`."""
@@ -59,7 +66,7 @@ class Derivative(MotionCheck):
         return Findings(
             value=found.timeline.of_frames(values),
             lower=np.array(-np.inf),
-            upper=self.bounds(),
+            upper=np.where(np.arange(len(JOINTS)) < N_TRUNK_JOINTS, self.trunk, self.limbs),
             tolerance=NOISE_FACTOR * float(spread),
         )
 
@@ -78,22 +85,9 @@ def _over_gaps(joints: Array) -> Array:
     return ways
 
 
-def trunk_and_limbs(trunk: float, limbs: float) -> Array:
-    """Return a bound for each joint (14,)."""
-    return np.where(np.arange(len(JOINTS)) < N_TRUNK_JOINTS, trunk, limbs)
-
-
 @dataclass(frozen=True, kw_only=True)
 class JointSpeed(Derivative):
-    """Whether joints move faster than people have been measured to.
-
-    Parameters
-    ----------
-    trunk : float
-        Metres a second of neck, shoulders, pelvis and hips.
-    limbs : float
-        Metres a second of the other joints.
-    """
+    """Whether joints move faster than people have been measured to; see `Derivative`."""
 
     name = "speed"
     unit = "m/s"
@@ -103,6 +97,28 @@ class JointSpeed(Derivative):
     trunk: float = 14.0
     limbs: float = 30.0
 
-    def bounds(self) -> Array:
-        """Return the upper bound of each joint (14,)."""
-        return trunk_and_limbs(self.trunk, self.limbs)
+
+@dataclass(frozen=True, kw_only=True)
+class JointAcceleration(Derivative):
+    """Whether joints change their speed faster than people can; see `Derivative`."""
+
+    name = "acceleration"
+    unit = "m/s²"
+    meaning = "the speed of a joint changes faster than that of people can"
+    order = 2
+
+    trunk: float = 400.0
+    limbs: float = 1200.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointJerk(Derivative):
+    """Whether the acceleration of joints changes faster than that of people can; see `Derivative`."""
+
+    name = "jerk"
+    unit = "m/s³"
+    meaning = "the acceleration of a joint changes faster than that of people can"
+    order = 3
+
+    trunk: float = 48_000.0
+    limbs: float = 144_000.0
