@@ -114,6 +114,14 @@ browser: ## install Debian's chromium where no browser is found
 demo: $(VENV)/runtime.stamp browser ## run posekit on the built-in views, results in demo-results/
 	$(BIN)/posekit demo -o $(DEMO_RESULTS)
 
+.PHONY: dist
+dist: $(VENV)/dev.stamp ## build wheel and sdist into dist/
+	$(BIN)/python -m build --no-isolation --outdir dist .
+
+.PHONY: newcomer
+newcomer: ## clone to first picture and to each tutorial's result, by the docs' own commands
+	$(PYTHON) benchmarks/newcomer.py
+
 .PHONY: pictures
 pictures: $(VENV)/runtime.stamp browser ## make the pictures of README and docs anew
 	$(BIN)/python docs/make_pictures.py docs/pictures

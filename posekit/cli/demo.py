@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
 from posekit.cli.options import Pictures, examples, option
 
 DEMO_EXAMPLES = examples("posekit demo -o demo-results")
+
+TRY_NEXT: Final = (
+    "samples samples",
+    "recover samples/walk.json -o postures.json",
+    "render postures.json --view samples/walk.json -o postures.html",
+)
+"""What somebody does who has seen the demo: the page is then the first result of their own."""
 
 
 def demo(
@@ -23,3 +32,16 @@ def demo(
     make_folder(output)
     for line in papers.demo(output, pictures=pictures):
         typer.echo(line)
+    typer.echo("\ntry next, and open postures.html in a browser:")
+    for command in TRY_NEXT:
+        typer.echo(f"  {program()} {command}")
+
+
+def program() -> str:
+    """Return what to type for this command: its name where that is on PATH, else its path."""
+    found = shutil.which("posekit")
+    run = Path(sys.argv[0])
+    if run.name != "posekit" or not run.is_file() or (found and Path(found).samefile(run)):
+        return "posekit"
+    here = run.absolute()
+    return str(here.relative_to(Path.cwd()) if here.is_relative_to(Path.cwd()) else here)
