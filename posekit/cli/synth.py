@@ -118,7 +118,10 @@ def mocap(
             "Camera position in the file's world, metres. Default: drawn on a sphere around the person.",
         ),
     ] = "",
-    dt: Dt = 0.2,
+    dt: Annotated[
+        float | None,
+        option("--dt", "SECONDS", "Seconds between frames. Default: 0.2; less where the clip is too short."),
+    ] = None,
     noise: Noise = 0.0,
     seed: Seed = 0,
     uncalibrated: Uncalibrated = False,
@@ -130,14 +133,18 @@ def mocap(
     from posekit import synthesis
 
     capture = synthesis.read_capture(file)
-    scene = synthesis.mocap_scene(
-        capture,
-        clip or capture.names[0],
-        np.random.default_rng(seed),
-        frames=frames,
-        dt=dt,
-        position=numbers(camera, 3, "--camera") if camera else None,
-    )
+    position = numbers(camera, 3, "--camera") if camera else None
+    name = clip or capture.names[0]
+    for step in (0.2, None) if dt is None else (dt,):
+        scene = synthesis.mocap_scene(
+            capture, name, np.random.default_rng(seed), frames=frames, dt=step, position=position
+        )
+        if len(scene.joints_cam) == frames:
+            break
+    else:
+        typer.echo(
+            f"{len(scene.joints_cam)} of {frames} frames: the clip has no more; name another --clip or --dt"
+        )
     _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
 
 

@@ -167,6 +167,12 @@ def test_synth_mocap_takes_lengths_from_the_clip(run, assert_refused) -> None:
         "synth", "mocap", "clips.npz", "-o", "m.json", "--clip", "walk", "--frames", "4", "--dt", "0.0333"
     )
     assert outcome == (0, "written: m.json (4 frames)\n", "")
+    assert (
+        run("synth", "mocap", "clips.npz", "-o", "all.json", "--frames", "6").out
+        == "written: all.json (6 frames)\n"
+    )
+    fewer = run("synth", "mocap", "clips.npz", "-o", "few.json", "--frames", "6", "--dt", "0.0667")
+    assert fewer.out.startswith("3 of 6 frames: the clip has no more")
     view = read_view("m.json")
     assert view.lengths["right_hip-right_knee"] == pytest.approx(0.33, abs=1e-6)
     assert np.isfinite(view.root).all()

@@ -40,6 +40,7 @@ def test_options_are_read(text, metres):
     ("text", "remedy"),
     [
         ("5", "add cm, m or mm, as in 5cm"),
+        ("1.75", "add cm, m or mm, as in 1.75m"),
         ("0", "add cm"),
         ("5in", "the unit cm, m or mm"),
         ("5CM", "the unit cm, m or mm"),

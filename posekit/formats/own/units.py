@@ -20,6 +20,9 @@ UNIT_METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units in one metre. Whole numbers: dividing by them errs by half a unit in the last place, no more."""
 
+METRES_BELOW: Final = 3.0
+"""A number with a decimal point below this, and without a unit, was most likely meant in metres: 1.75."""
+
 _EXPONENTS: Final[dict[str, int]] = {"m": 0, "cm": -2, "mm": -3}
 _LENGTH = re.compile(
     r"([+-]?(?:\d{1,40}\.?\d{0,40}|\.\d{1,40})(?:e[+-]?\d{1,4})?)\s*([a-z]*)", re.ASCII | re.I
@@ -66,7 +69,10 @@ def parse_length(text: str, *, name: str = "") -> float:
     if match is None or not np.isfinite(number):
         raise refusal(name, "", shown(text), "a length with its unit", "write it as 5cm, 0.05m or 50mm")
     if not match[2]:
-        raise refusal(name, "", shown(text), "a length with its unit", f"add cm, m or mm, as in {match[1]}cm")
+        unit = "m" if "." in match[1] and number < METRES_BELOW else "cm"
+        raise refusal(
+            name, "", shown(text), "a length with its unit", f"add cm, m or mm, as in {match[1]}{unit}"
+        )
     if match[2] not in PER_METRE:
         raise refusal(name, "", shown(text), "the unit cm, m or mm", "convert it to one of these")
     if number < 0:
