@@ -17,6 +17,7 @@ from posekit.errors import InputError, ViewerError
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
     from posekit.formats.own import Postures, Result, View
+    from posekit.geometry import Array
     from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 RENDER_EXAMPLES = examples(
@@ -225,9 +226,8 @@ def render(
         timeout=timeout,
     )
     moving = check_picture(output, shot)
-    arranged = layout or (
-        Layout.SUPERPOSED if through_view or (moving and not turntable) else Layout.SIDE_BY_SIDE
-    )
+    together = through_view or truth is not None or (moving and not turntable)
+    arranged = layout or (Layout.SUPERPOSED if together else Layout.SIDE_BY_SIDE)
     style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
     content, behind = read_given(file, behind_file, explain=rejected)
     if (
@@ -236,12 +236,18 @@ def render(
         and layout is None
         and not rejected
         and not eye
+        and truth is None
     ):
         with about(file):
             _write_page(output, content, behind, frame, title=file.name)
         return
     with about(file):
-        subject, frames = _shown(content, behind, frame, posture, rejected, moving=moving and not turntable)
+        true = None
+        if truth is not None:
+            true = _truth_of(truth, content, behind, behind_file, rejected)
+        subject, frames = _shown(
+            content, behind, frame, posture, rejected, moving=moving and not turntable, truth=true
+        )
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
         count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
     pictures = f" ({count} pictures)" if moving else ""
@@ -303,11 +309,14 @@ def _shown(
     rejected: bool,
     *,
     moving: bool,
+    truth: Array | None = None,
 ) -> tuple[DrawnSubject, list[Shown]]:
     """Choose what is drawn of a file."""
     from posekit.formats.own import Result
+    from posekit.viewer.scene.beside_truth import beside_truth
     from posekit.viewer.scene.branch import one_a_reason, rejected_of
     from posekit.viewer.scene.drawn_subject import subject_of
+    from posekit.viewer.scene.likeliest import numbered
 
     subject = subject_of(content, view)
     numbers_of_frames = frame_numbers(frame, len(subject.frames))
@@ -320,7 +329,37 @@ def _shown(
         if not isinstance(content, Result):
             raise InputError("--rejected: postures have no pruned branches; expected a result or a view")
         return subject, [one_a_reason(rejected_of(content, subject, k)) for k in numbers_of_frames]
-    return subject, chosen_frames(subject, content, posture, numbers_of_frames, moving=moving)
+    chosen = chosen_frames(subject, content, posture, numbers_of_frames, moving=moving or truth is not None)
+    if truth is not None:
+        chosen = [beside_truth(one, truth[k]) for one, k in zip(chosen, numbers_of_frames, strict=True)]
+    if isinstance(content, Result):
+        chosen = numbered(chosen, numbers_of_frames)
+    return subject, chosen
+
+
+def _truth_of(
+    path: Path,
+    content: Result | Postures | HeldPostures,
+    view: View | None,
+    view_path: Path | None,
+    rejected: bool,
+) -> Array:
+    """Read the truth of a result's frames in the camera's frame."""
+    import numpy as np
+
+    from posekit.cli.true_joints import true_joints
+    from posekit.formats.own import Result
+
+    if not isinstance(content, Result) or rejected:
+        raise InputError("--truth: is drawn beside what was recovered; expected a result, without --rejected")
+    times = np.array([one.time for one in content.frames])
+    joints, in_camera = true_joints(path, view, view_path, times)
+    if not in_camera:
+        raise InputError(
+            f"--truth {path}: nothing says how it stands before the camera; expected a view with truth, or a --view "
+            "whose camera has R and t; angles need neither: --angles all"
+        )
+    return joints
 
 
 def _size(text: str) -> tuple[int, int]:

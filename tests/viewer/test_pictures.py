@@ -17,9 +17,10 @@ from posekit.cli.main import main
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
 from posekit.viewer.pictures import Shot, check_picture, write_picture
+from posekit.viewer.scene.beside_truth import BESIDE_METRES, beside_truth
 from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
-from posekit.viewer.scene.likeliest import MAX_BESIDE
+from posekit.viewer.scene.likeliest import MAX_BESIDE, likeliest_first
 from posekit.viewer.video import Video
 
 SMALL = Shot(size=(200, 150), supersample=1)
@@ -185,7 +186,7 @@ def test_the_likeliest_posture_is_chosen(subject: DrawnSubject, walked: Result) 
         np.testing.assert_array_equal(chosen.points, shown.points[likeliest][None])
         assert chosen.probability == pytest.approx(frame.answer.probability[:1])
         told = f"{100 * frame.answer.probability[0]:.2g} %"
-        assert chosen.caption == f"likeliest: {told}  ({len(shown)} postures)"
+        assert chosen.caption == f"likeliest: {told} ({len(shown)} postures)"
         unsaid = chosen_postures(replace(shown, answer=None), "likeliest", 0)
         np.testing.assert_array_equal(unsaid.points[0], shown.points[frame.probability.argmax()])
         assert len(chosen_postures(shown.chosen([]), "likeliest", 0)) == 0
@@ -221,6 +222,46 @@ def test_what_moves_goes_along_the_likeliest_path(walk: View) -> None:
         joints = np.where(known, result.paths.joints[0, k], result.paths.smoothed[0, k])
         np.testing.assert_allclose(frame.points[0, :14], joints, atol=1e-9)
         assert np.isfinite(frame.points[0, 14:]).all()
+
+
+def test_truth_stands_beside_the_likeliest(subject: DrawnSubject, walk: View) -> None:
+    for shown, joints in zip(subject.frames, walk.truth, strict=True):
+        both = beside_truth(likeliest_first(shown, 1), joints)
+        assert len(both) == 2
+        np.testing.assert_array_equal(both.points[:1], likeliest_first(shown, 1).points)
+        step = both.points[1, :14] - joints
+        np.testing.assert_allclose(step, np.broadcast_to([BESIDE_METRES, 0, 0], (14, 3)), atol=1e-12)
+        assert both.caption.endswith("right: truth")
+        assert len(beside_truth(shown, np.full((14, 3), np.nan))) == len(shown)
+
+
+def test_truth_of_an_uncalibrated_view_is_where_the_survivor_is(flat: Result) -> None:
+    shown = subject_of(flat).frames[0].chosen([0])
+    away = shown.points[0, :14] + np.array([3.0, -2.0, 40.0])
+    both = beside_truth(shown, away)
+    np.testing.assert_allclose(
+        both.points[1, :14] - both.points[0, :14], [[BESIDE_METRES, 0, 0]] * 14, atol=1e-9
+    )
+
+
+def test_command_draws_truth_beside_and_refuses_what_is_none(
+    walk_files: tuple[Path, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    result, view = walk_files
+    small = ("--size", "160x120", "--supersample", 1)
+    assert render(monkeypatch, result, "--truth", view, "-o", tmp_path / "a.html") == 0
+    motion = tmp_path / "truth.json"
+    posekit.write_postures(motion, np.asarray(posekit.read_view(view).truth))
+    for words, said in (
+        ((result, "--truth", motion), "expected 5"),
+        ((view, "--truth", view, "--rejected"), "expected a result, without --rejected"),
+        ((motion, "--truth", view), "expected a result"),
+    ):
+        capsys.readouterr()
+        assert said in refused(monkeypatch, capsys, *words, "-o", tmp_path / "b.png", *small)
 
 
 def test_render_refuses(

@@ -40,13 +40,14 @@ def likeliest_first(shown: Shown, most: int | None = None) -> Shown:
         assert shown.probability is not None
         rows = np.argsort(-shown.probability, kind="stable")
         share = shown.probability[rows]
+    apart = ", from left to right" if most == MAX_BESIDE and len(rows) > 1 else ""
     told = [f"{100 * one:.2g} %" for one in share[:MAX_TOLD].tolist()]
     said = f"likeliest: {told[0]}"
     if len(rows) > 1 and most != 1:
         said += f"; then {', '.join(told[1:])}" + (", …" if len(rows) > MAX_TOLD else "")
     rows = rows[:most]
     chosen = shown.chosen(rows.tolist())
-    return replace(chosen, caption=f"{said}  ({len(shown)} postures)", probability=share[: len(rows)])
+    return replace(chosen, caption=f"{said}{apart} ({len(shown)} postures)", probability=share[: len(rows)])
 
 
 def by_probability(shown: Shown) -> Shown:
