@@ -1,7 +1,7 @@
 """Collision: arms, legs, torso and head must not penetrate each other (Lee & Chen 1985, §3.2.C).
 
 Coal is the judge, through Pinocchio: for each pair of capsules a model of two free-flyers is kept, and a
-batch of postures is one call. Only pairs whose bounding spheres meet are asked; the others are proven clear.
+batch of postures is one call. Only pairs that the closed form finds in contact, or nearly, are asked.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ from posekit.tree import Check, Findings, Place, Rule
 
 CONTACT_TOLERANCE = 1e-9
 """Metres of penetration below which the verdict would be rounding noise: not a collision."""
+
+CLEAR_METRES = 1e-6
+"""Metres between two capsules, by the closed form, from which coal need not be asked: a thousand times the rounding."""
 
 
 def collision(figure: Figure, *, contact_margin: float = 0.0, exact: bool = False) -> list[Check]:
@@ -76,7 +79,7 @@ class PairCollision(Check):
         return self.a.points + self.b.points
 
     def judge(self, points: Array) -> Findings:
-        """Ask coal about the pairs whose bounding spheres meet; see `posekit.tree.Check`."""
+        """Measure the pairs, and ask coal about those that may be in contact; see `posekit.tree.Check`."""
         split = len(self.a.points)
         middle_a, axis_a = self.a.place(points[:, :split])
         middle_b, axis_b = self.b.place(points[:, split:])
@@ -84,20 +87,17 @@ class PairCollision(Check):
         radii = self.a.radius + self.b.radius
         reach = self.a.half_length + self.b.half_length + radii
         value = np.sqrt(np.einsum("ni,ni->n", gap, gap)) - reach
-        asked = value <= self.contact_margin
+        near = ~np.isnan(value) if self.exact else value <= self.contact_margin
+        distance = segment_distance(
+            gap[near], axis_a[near] * self.a.half_length, axis_b[near] * self.b.half_length
+        )
         rejects = np.zeros(len(points), dtype=bool)
-        if asked.any():
+        # The closed form agrees with coal to a thousandth of this: it leaves to it what may be in contact.
+        asked = np.flatnonzero(near)[distance <= max(radii + self.contact_margin, 0.0) + CLEAR_METRES]
+        if asked.size:
             rejects[asked] = self._coal(middle_a[asked], axis_a[asked], middle_b[asked], axis_b[asked])
-        measured = ~np.isnan(value) if self.exact else rejects
-        if measured.any():
-            value[measured] = (
-                segment_distance(
-                    gap[measured],
-                    axis_a[measured] * self.a.half_length,
-                    axis_b[measured] * self.b.half_length,
-                )
-                - radii
-            )
+        measured = near if self.exact else rejects
+        value[measured] = distance[measured[near]] - radii
         return Findings(
             value=value[:, None],
             lower=np.array([self.contact_margin]),

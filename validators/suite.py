@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,8 +108,14 @@ def _gathered(name: str, checks: Sequence[Check], by_point: Array) -> Judgement:
     value, lower, upper, margin = np.empty((4, len(units), by_point.shape[1]))
     violated = np.empty((len(units), by_point.shape[1]), dtype=np.bool_)
     written: set[str] = set()
-    for check in checks:
-        findings = check.judge(np.moveaxis(by_point[list(check.points)], 0, 1))
+    # The last that knows a place holds: those before it are asked about postures that it left open, mostly none.
+    for check in reversed(checks):
+        rows: Any = slice(None)
+        if written.issuperset(check.where):
+            rows = np.flatnonzero(np.isnan(margin[[column[where] for where in check.where]]).any(axis=0))
+            if not rows.size:
+                continue
+        findings = check.judge(np.moveaxis(by_point[list(check.points)][:, rows], 0, 1))
         shape = findings.value.shape
         new = (
             findings.value,
@@ -119,9 +125,13 @@ def _gathered(name: str, checks: Sequence[Check], by_point: Array) -> Judgement:
             findings.violated,
         )
         for k, where in enumerate(check.where):
-            known: Any = ~np.isnan(new[3][:, k]) if where in written else slice(None)
+            at, own, into = column[where], cast(Any, slice(None)), rows
+            if where in written:
+                # A posture that is open in one of the places may be known in another.
+                own = np.flatnonzero(np.isnan(margin[at, rows]))
+                into = own if isinstance(rows, slice) else rows[own]
             for held, found in zip((value, lower, upper, margin, violated), new, strict=True):
-                held[column[where], known] = found[known, k]
+                held[at, into] = found[own, k]
         written.update(check.where)
     return Judgement(
         check=name,

@@ -60,6 +60,8 @@ def best_rotation(matrix: Array) -> tuple[Array, Array]:
         the only best one where the last two add up to more than zero.
     """
     known = np.asarray(np.isfinite(matrix).all(axis=(-2, -1)))
+    if not known.any():
+        return np.full(matrix.shape, np.nan), np.full(matrix.shape[:-1], np.nan)
     U, values, Vt = np.linalg.svd(np.where(known[..., None, None], matrix, 0.0))
     sign = np.sign(np.linalg.det(U @ Vt))
     U[..., 2] *= sign[..., None]
