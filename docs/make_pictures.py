@@ -1,6 +1,7 @@
 """Make the pictures of the README and the documentation: `make pictures`."""
 
 import sys
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,18 @@ from posekit.formats.own import Postures
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.safe_io.writing import make_folder
+from posekit.samples import write_samples
 from posekit.skeleton import JOINT
+from posekit.synthesis import CameraSphere, random_views
 from posekit.viewer import Shot, Style, subject_of, write_picture
+from posekit.viewer.overlay import OverlaidPerson, Overlay, frame_pictures, write_overlay, write_photographs
 from posekit.viewer.plots import plot_image, plot_projections, plot_tree, save
+from posekit.viewer.plots.angle_plot import plot_angles
+from posekit.viewer.plots.angle_tracks import angle_tracks, chosen_angles
 from posekit.viewer.plots.timeline_plot import write_timelines
-from posekit.views.builtin import builtin_view
+from posekit.viewer.scene.likeliest import along_path, likeliest_first, numbered
+from posekit.views.builtin import builtin_view, view_of
+from posekit.views.given_views import given_views
 
 
 def main(folder: Path) -> None:
@@ -40,7 +48,45 @@ def main(folder: Path) -> None:
     save(plot_image(view), folder / "image.png")
     save(plot_projections(frame.joints[firsts]), folder / "projections.png")
     save(plot_tree(frame), folder / "tree.png")
+    write_over(folder / "over.png")
+    write_angles(folder / "angles.png")
     write_timelines(folder / "timelines.svg", posekit.validate(damaged_walk()).clips or ())
+
+
+def write_over(path: Path) -> None:
+    """Draw a posture that nobody had as a photograph, and over it what is recovered from its points."""
+    scene = random_views(
+        posekit.load_figure(), 1, np.random.default_rng(6), CameraSphere(distance=(2.5, 2.5))
+    )
+    view = view_of(scene)
+    with tempfile.TemporaryDirectory() as drawn:
+        write_photographs(Path(drawn), view)
+        subject = subject_of(result_of(recover(view)), view)
+        frames = numbered([likeliest_first(shown) for shown in subject.frames], [0])
+        person = OverlaidPerson(name="view", frames=frames, figure=subject.figure)
+        write_overlay(path, [person], frame_pictures(Path(drawn)), Overlay(size=(1000, 600)))
+
+
+def write_angles(path: Path) -> None:
+    """Plot knees and elbows of the samples' walker, followed through his pictures, beside the truth."""
+    with tempfile.TemporaryDirectory() as samples:
+        write_samples(samples)
+        source = posekit.Source(camera=f"{samples}/calibration.toml:cam_01", stature=1.75, rate=10.0)
+        opened = given_views(Path(samples) / "keypoints", source, Path(samples) / "walk.npz")
+        view = opened[0].view
+    recovery = recover(view)
+    result = result_of(recovery, following=posekit.follow(recovery, k=1))
+    subject = subject_of(result, view)
+    limits = {name: (low, high) for name, (low, high) in result.settings["range_limits"].items()}
+    tracks = angle_tracks(
+        subject.frames,
+        along_path(subject, result),
+        subject.figure,
+        chosen_angles("elbow,knee"),
+        limits=limits,
+        truth=view.truth,
+    )
+    save(plot_angles(tracks, line="likeliest path"), path)
 
 
 def damaged_walk() -> HeldPostures:

@@ -228,7 +228,9 @@ def render(
     moving = check_picture(output, shot)
     together = through_view or truth is not None or (moving and not turntable)
     arranged = layout or (Layout.SUPERPOSED if together else Layout.SIDE_BY_SIDE)
-    style = Style(layout=arranged.value, background=background, camera=camera, ground=ground)
+    style = Style(
+        layout=arranged.value, background=background, camera=camera and truth is None, ground=ground
+    )
     content, behind = read_given(file, behind_file, explain=rejected)
     if (
         output.suffix.lower() == ".html"

@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import posekit
+from posekit.answers.wording import percent
 from posekit.cli.chosen_postures import chosen_frames, chosen_postures
 from posekit.cli.main import main
 from posekit.errors import InputError, ViewerError
@@ -185,7 +186,7 @@ def test_the_likeliest_posture_is_chosen(subject: DrawnSubject, walked: Result) 
         chosen = chosen_postures(shown, "likeliest", 0)
         np.testing.assert_array_equal(chosen.points, shown.points[likeliest][None])
         assert chosen.probability == pytest.approx(frame.answer.probability[:1])
-        told = f"{100 * frame.answer.probability[0]:.2g} %"
+        told = percent(float(frame.answer.probability[0]))
         assert chosen.caption == f"likeliest: {told} ({len(shown)} postures)"
         unsaid = chosen_postures(replace(shown, answer=None), "likeliest", 0)
         np.testing.assert_array_equal(unsaid.points[0], shown.points[frame.probability.argmax()])
@@ -203,7 +204,7 @@ def test_a_picture_opens_on_the_likeliest_and_what_else_it_can_be(
     rows = answer.representatives[:MAX_BESIDE]
     assert 1 < len(rows) < len(subject.frames[0])
     np.testing.assert_array_equal(still.points, subject.frames[0].points[rows])
-    assert still.caption.startswith(f"likeliest: {100 * answer.probability[0]:.2g} %; then ")
+    assert still.caption.startswith(f"likeliest: {percent(float(answer.probability[0]))}; then ")
     moving = chosen_frames(subject, walked, "", range(5), moving=True)
     assert [len(frame) for frame in moving] == [1] * 5
     [everything] = chosen_frames(subject, walked, "all", [0], moving=False)

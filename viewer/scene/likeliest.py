@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.answers.wording import percent
 from posekit.body import with_head
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
@@ -41,7 +42,7 @@ def likeliest_first(shown: Shown, most: int | None = None) -> Shown:
         rows = np.argsort(-shown.probability, kind="stable")
         share = shown.probability[rows]
     apart = ", from left to right" if most == MAX_BESIDE and len(rows) > 1 else ""
-    told = [f"{100 * one:.2g} %" for one in share[:MAX_TOLD].tolist()]
+    told = [percent(one) for one in share[:MAX_TOLD].tolist()]
     said = f"likeliest: {told[0]}"
     if len(rows) > 1 and most != 1:
         said += f"; then {', '.join(told[1:])}" + (", …" if len(rows) > MAX_TOLD else "")
