@@ -59,6 +59,15 @@ def convert(
         Path | None,
         option("--view", "VIEW", "What a result was recovered from: puts it into its camera's world."),
     ] = None,
+    gaps: Annotated[
+        str,
+        option(
+            "--gaps",
+            "interpolate|hold|leave-out",
+            "What to do in a result where a frame has no posture or a joint was not seen. Default: interpolate "
+            "in bvh and c3d, which have no place for it; else leave-out.",
+        ),
+    ] = "",
     up: Annotated[
         str, option("--up", "AXIS", "The axis that shall point up, as +z. Default: by custom.")
     ] = "",
@@ -92,6 +101,7 @@ def convert(
         output=output,
         to=to,
         posture=posture,
+        gaps=gaps,
         view=None if view is None else files.read_view(view),
         up=up,
         input_up=input_up,

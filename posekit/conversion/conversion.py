@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from posekit.conversion.gaps import GAP_FILLINGS
 from posekit.conversion.motion_output import (
     TABLE_FORMATS,
     MotionOutput,
@@ -47,8 +48,8 @@ CAMERA_AND_PERSON_OPTIONS: Final = (
 )
 OPTIONS_OF: Final = {
     Content.MOTION: MOTION_OPTIONS,
-    Content.RESULT: ("--posture", "--view", "--up", "--input-up"),
-    Content.VIEW: ("--skeleton", "--up", "--input-up"),
+    Content.RESULT: ("--posture", "--view", "--up", "--input-up", "--gaps"),
+    Content.VIEW: ("--skeleton", "--up", "--input-up", "--gaps"),
     Content.POSTURES: ("--up", "--input-up"),
     Content.CONFIGURATIONS: ("--up", "--input-up"),
 }
@@ -77,6 +78,9 @@ class Conversion:
         The axis that points up in what is read, where the file does not say it or is wrong.
     clip, unit : str
         Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
+    gaps : str
+        How frames without a posture and unseen joints are filled: ``interpolate``, ``hold``, or ``leave-out``; by what
+        the format can hold if empty.
 
     Raises
     ------
@@ -94,6 +98,7 @@ class Conversion:
     input_up: str = ""
     clip: str = ""
     unit: str = ""
+    gaps: str = ""
 
     def __post_init__(self) -> None:
         written = (*OWN_TARGETS, *(one.name for one in motion_formats().values() if one.writes))
@@ -102,6 +107,10 @@ class Conversion:
             raise refusal("--to", "", got, ", ".join(written), "choose one of them")
         if self.to and self.to not in written:
             raise refusal("--to", "", shown(self.to), "a known format", nearest(self.to, written))
+        if self.gaps and self.gaps not in GAP_FILLINGS:
+            raise refusal(
+                "--gaps", "", shown(self.gaps), ", ".join(GAP_FILLINGS), nearest(self.gaps, GAP_FILLINGS)
+            )
         for option, axis in (("--up", self.up), ("--input-up", self.input_up)):
             if axis not in ("", *UP_DIRECTIONS):
                 raise refusal(option, "", shown(axis), ", ".join(UP_DIRECTIONS), "name an axis")
@@ -116,6 +125,7 @@ class Conversion:
             "--input-up": bool(self.input_up),
             "--clip": bool(self.clip),
             "--unit": bool(self.unit),
+            "--gaps": bool(self.gaps),
         }
         for name, is_given in given.items():
             if is_given and name not in telling:
@@ -145,7 +155,7 @@ def convert(job: Conversion) -> list[str]:
         raise refusal(
             job.given, "--to", f"view, of {what.holds.value}", "key points", "convert to postures or motion"
         )
-    output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up)
+    output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up, gaps=job.gaps)
     if what.holds is Content.MOTION and carries_points(output.to):
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
@@ -160,7 +170,7 @@ def convert(job: Conversion) -> list[str]:
         unit=job.unit,
         up=job.input_up,
     )
-    return [*found.says, *write_moving(output, found, every=job.posture == "all")]
+    return write_moving(output, found, every=job.posture == "all")
 
 
 def of_person(path: Path, one: Opened, *, alone: bool) -> Path:

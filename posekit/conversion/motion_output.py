@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from posekit.body import Figure
+from posekit.conversion.gaps import fill_gaps
 from posekit.conversion.posture_sequence import PostureSequence
 from posekit.errors import InputError
 from posekit.formats import own as files
@@ -39,7 +40,7 @@ ALWAYS_Y_UP: Final = ("trc", "bvh", "glb")
 """Formats in whose files y points up, and nothing else."""
 
 EVENLY_TIMED: Final = ("bvh", "c3d")
-"""Formats that have one time from frame to frame."""
+"""Formats that have one time from frame to frame: what is missing between two frames is put in."""
 
 TABLE_FORMATS: Final = ("csv", "npz", "parquet")
 """Formats that carry all survivors of a frame, and motion in several clips."""
@@ -57,6 +58,8 @@ class MotionOutput:
         ``postures``, or a format of motion.
     up : str
         The axis that shall point up; by custom if empty.
+    gaps : str
+        How frames without a posture and unseen joints are filled; by what the format can hold if empty.
 
     Raises
     ------
@@ -67,6 +70,7 @@ class MotionOutput:
     path: Path
     to: str
     up: str = ""
+    gaps: str = ""
 
     def __post_init__(self) -> None:
         if self.to in ALWAYS_Y_UP and self.up not in ("", "+y"):
@@ -144,14 +148,10 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
     if every:
         return _write_every(output, found)
     if output.to == "postures":
-        return _write_postures(output, found)
-    if found.gaps and output.to in EVENLY_TIMED:
-        raise InputError(
-            f"{output.path}: {found.gaps} of the frames have no posture, and {output.to} has one in every frame; "
-            "expected a format with times; choose trc, csv, npz, parquet, mot, glb or urdf"
-        )
+        return _write_postures(output, fill_gaps(found, output.gaps or "leave-out"))
+    found = fill_gaps(found, output.gaps or ("interpolate" if output.to in EVENLY_TIMED else "leave-out"))
     if carries_points(output.to):
-        return write_points(output, found.motion(str(output.path)))
+        return [*found.says, *write_points(output, found.motion(str(output.path)))]
     # In BVH and GLB the writers turn z to y.
     up = "+z" if output.to in ALWAYS_Y_UP else output.up_of(found.up)
     q, off = found.configurations(up)
@@ -161,6 +161,7 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
     else:
         write_configurations(output.path, found.figure, q, found.time, output.to)
     return [
+        *found.says,
         *says,
         f"{len(q)} frame{'s' * (len(q) != 1)} of joint angles, {output.up_of(up)} up; the figure's joints are "
         f"within {off * 100:.2g} cm of the postures'",
@@ -183,7 +184,7 @@ def _write_postures(output: MotionOutput, found: PostureSequence) -> list[str]:
     points = found.turned(output.up) if output.up else found.points
     head = points[:, 14:] if np.isfinite(points[:, 14:]).any() else None
     files.write_postures(output.path, Postures(joints=points[:, :14], head=head))
-    return [f"{len(points)} postures, {output.up or found.up} up"]
+    return [*found.says, f"{len(points)} postures, {output.up or found.up} up"]
 
 
 def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
@@ -201,7 +202,7 @@ def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
 def _write_table(output: MotionOutput, found: PostureSequence) -> list[str]:
     up = output.up or found.up
     write_survivors(output.path, replace(found, points=found.turned(up)).table())
-    return [f"{len(found)} survivors of {len(np.unique(found.frame))} frames, {up} up"]
+    return [*found.says, f"{len(found)} survivors of {len(np.unique(found.frame))} frames, {up} up"]
 
 
 def _write_bodies(output: MotionOutput, found: PostureSequence) -> list[str]:
@@ -217,4 +218,4 @@ def _write_bodies(output: MotionOutput, found: PostureSequence) -> list[str]:
         else f"the {len(first)} survivors"
     )
     whose = " whose lengths fit best" if len(kept) < len(first) else ""
-    return [f"{some}{whose}, of frame {int(found.frame[0])}, the first that has any; +y up"]
+    return [*found.says, f"{some}{whose}, of frame {int(found.frame[0])}, the first that has any; +y up"]

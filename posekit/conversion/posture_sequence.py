@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -64,8 +64,8 @@ class PostureSequence:
         More numbers (N,) by name; of a result also ``rank``, 1 for the survivor of a frame whose lengths fit best.
     branches : tuple of str
         The branch code of each row; empty where there is none.
-    gaps : int
-        How many frames have no posture, and are left out.
+    lost : mapping of int to float
+        The frames that have no posture, and are left out, with their times.
     """
 
     points: Array
@@ -77,7 +77,7 @@ class PostureSequence:
     says: tuple[str, ...] = ()
     values: dict[str, Array]
     branches: tuple[str, ...] = ()
-    gaps: int = 0
+    lost: Mapping[int, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Count the rows."""
@@ -225,12 +225,12 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         return _of_path(result, figure, view, stated)
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
-    empty = 0
+    lost: dict[int, float] = {}
     probability = probabilities(result, figure.lengths)
     for k in range(len(result.frames)):
         order = np.argsort(-probability[k], kind="stable")
         if not len(order):
-            empty += 1
+            lost[k] = result.frames[k].time
             continue
         if posture == "all":
             chosen = list(range(len(order)))
@@ -242,7 +242,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         raise InputError("result: no frame has a posture; nothing to convert")
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
-    says = [f"{empty} of {len(result.frames)} frames without a posture are left out"] if empty else []
+    says = [f"{len(lost)} of {len(result.frames)} frames without a posture are left out"] if lost else []
     points, up = _placed(points, view, stated, says)
     values = {
         "probability": np.array([probability[k][row] for k, row in rows]),
@@ -268,7 +268,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         says=tuple(says),
         values=values,
         branches=tuple(result.frames[k].branches[row] for k, row in rows),
-        gaps=empty,
+        lost=lost,
     )
 
 
@@ -303,7 +303,9 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
         says=tuple(says),
         values={"interpolated": interpolated},
         branches=tuple(codes),
-        gaps=len(result.frames) - len(known),
+        lost={k: result.frames[k].time for k in np.setdiff1d(np.arange(len(result.frames)), known).tolist()}
+        if len(time) == len(known)
+        else {},
     )
 
 

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import posekit
 from posekit.formats import own as files
+from posekit.formats.motion import read_motion
 from posekit.formats.motion.urdf_folder import LINK_OF
 from posekit.formats.own import OpenCVModel, View
 from posekit.geometry import Array
@@ -436,14 +437,30 @@ def test_frames_without_a_posture_are_left_out_and_missing_joints_stay_missing(
 
 
 @pytest.mark.parametrize("name", ["bvh", "c3d"])
-def test_formats_with_one_time_from_frame_to_frame_name_the_others(
+def test_formats_with_one_time_from_frame_to_frame_have_every_frame(
     name: str, broken: Path, command: Callable[..., Any], tmp_path: Path
 ) -> None:
     done = command("convert", broken, tmp_path / f"out.{name}")
-    assert done.code == 2
-    assert f"1 of the frames have no posture, and {name} has one in every frame" in done.err
-    assert "choose trc, csv" in done.err
-    assert not list(tmp_path.iterdir())
+    assert done.code == 0, done.err
+    assert f"1 of {FRAMES} frames had no posture, 1 joints were not seen: interpolated" in done.out
+    written = read_motion(tmp_path / f"out.{name}")
+    np.testing.assert_allclose(written.time, np.arange(FRAMES) / RATE, rtol=0, atol=1e-6)
+    assert np.isfinite(written.points).all()
+
+
+def test_gaps_are_filled_as_asked(broken: Path, command: Callable[..., Any], tmp_path: Path) -> None:
+    points = {}
+    for how in ("interpolate", "hold", "leave-out"):
+        done = command("convert", broken, tmp_path / f"{how}.trc", "--gaps", how)
+        assert done.code == 0, done.err
+        points[how], _ = READERS["trc"](tmp_path / f"{how}.trc")
+    assert [len(one) for one in points.values()] == [FRAMES, FRAMES, FRAMES - 1]
+    np.testing.assert_allclose(points["hold"][3], points["hold"][2], rtol=0, atol=1e-9)
+    between = np.sort([points["interpolate"][2, 0], points["interpolate"][4, 0]], axis=0)
+    assert (between[0] - 1e-9 <= points["interpolate"][3, 0]).all()
+    assert (points["interpolate"][3, 0] <= between[1] + 1e-9).all()
+    refused = command("convert", broken, tmp_path / "no.trc", "--gaps", "linear")
+    assert refused.code == 2 and "interpolate, hold, leave-out" in refused.err
 
 
 def test_angles_that_are_not_known_are_held_by_bodies_that_move_and_that_is_said(
