@@ -296,10 +296,11 @@ def _over(
 def _write_page(
     output: Path, content: Result | Postures | HeldPostures, view: View | None, frame: str, *, title: str
 ) -> None:
+    from posekit.validation.page_findings import page_findings
     from posekit.viewer.page.page import write_page
 
     frames = frame_numbers(frame, frame_count(content))
-    write_page(output, content, view, title=title, frames=frames)
+    write_page(output, content, view, title=title, frames=frames, findings=page_findings(content))
     typer.echo(f"written: {output}")
 
 

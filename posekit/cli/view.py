@@ -41,6 +41,7 @@ def view(
     ] = True,
 ) -> None:
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
+    from posekit.validation.page_findings import page_findings
     from posekit.viewer.page.page import page_html
     from posekit.viewer.page.server import PageServer
     from posekit.viewer.showing import has_screen
@@ -48,7 +49,7 @@ def view(
     content, behind = read_given(given, seen)
     chosen = _frames(frames)
     with about(given):
-        page = page_html(content, behind, title=given.name, frames=chosen)
+        page = page_html(content, behind, title=given.name, frames=chosen, findings=page_findings(content))
     with PageServer(page, port) as server:
         try:
             typer.echo(f"{server.url}  (this machine only; Ctrl-C ends)")

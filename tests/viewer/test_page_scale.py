@@ -17,7 +17,7 @@ from posekit.viewer.page.family_page import walk
 from posekit.viewer.page.page import write_page
 from posekit.viewer.scene.branch import lift_branch
 from posekit.viewer.scene.drawn_subject import subject_of
-from posekit.viewer.scene.world import upright_world
+from posekit.viewer.scene.world import World
 
 FLAGS = [
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
@@ -79,10 +79,11 @@ def flat_tab(chromium, flat, tmp_path_factory):
     assert wrong == []
 
 
-def world_of(result):
-    """Return the page's world: it stands on all survivors where they are drawn."""
-    subject = subject_of(result)
-    return upright_world(np.concatenate([frame.aligned_points[:, : len(JOINTS)] for frame in subject.frames]))
+def world_of(result, view=None):
+    """Return the world that the result's page says it has."""
+    camera = page_data(result, view)["camera"]
+    axes = np.array([camera["right"], camera["down"], camera["forward"]])
+    return World(R_world_cam=axes.T, t_world_cam=np.array(camera["position"]))
 
 
 def drawn(tab):
@@ -98,7 +99,9 @@ def lifted(tab, s):
 
 
 def choose(tab, frame, survivor):
-    tab.evaluate(f"page.chooseFrame({frame}); page.chooseSurvivor({survivor})")
+    # The page has the likeliest first; survivors are named by their number in the result.
+    order = f"Array.from({{ length: page.frame().held }}, (_, k) => pack.number(page.frame(), k)).indexOf({survivor})"
+    tab.evaluate(f"page.chooseFrame({frame}); page.chooseSurvivor({order})")
 
 
 def scales_to_try(family):
@@ -222,13 +225,7 @@ def test_the_walk_of_taylors_twelve_points_keeps_his_eleven_lengths(opened, tayl
 def test_from_the_camera_nothing_moves_whatever_the_scale(opened, scales):
     tab = opened(scales)
     tab.click("[data-look=camera]")
-    assert tab.evaluate("viewer.camera.type") == "OrthographicCamera"
-    on_screen = """() => {
-      viewer.render();
-      const place = (mesh) => mesh.getWorldPosition(new MeshCat.THREE.Vector3());
-      const joints = scene.layers.joints.children.slice(0, 14);
-      return joints.map((mesh) => place(mesh).project(viewer.camera).toArray().slice(0, 2));
-    }"""
+    on_screen = "scene.projected()"
     for k in (0, 3):
         seen = []
         for survivor in (0, 2, 5):  # of three scales, one mirrored
@@ -241,15 +238,15 @@ def test_from_the_camera_nothing_moves_whatever_the_scale(opened, scales):
         assert np.abs(seen[0]).max() < 1
         # It is the image, upright and of one scale in both directions.
         image = scales.frames[k].joints[0, :, :2] * scales.frames[k].scales[0]
-        pane = np.array([840, -800]) / 2
+        wide, high = tab.evaluate("[sight.size().width, sight.size().height]")
+        pane = np.array([wide, -high]) / 2
         slope = [np.polyfit(image[:, axis], np.array(seen[0])[:, axis] * pane[axis], 1)[0] for axis in (0, 1)]
         assert slope[0] == pytest.approx(slope[1], rel=2e-3)
         assert slope[0] > 0
     tab.click("[data-look=side]")
-    assert tab.evaluate("viewer.camera.type") == "PerspectiveCamera"
     for layer in ("others", "rays"):
         tab.check(f"[data-show={layer}]")
-        assert tab.evaluate(f"scene.layers.{layer}.children.length") > 0
+        assert tab.evaluate(f"scene.layers().{layer}") > 0
 
 
 def test_survivors_of_several_scales_are_listed_and_drawn_in_one_place(opened, scales, flat_view):
@@ -280,7 +277,7 @@ def test_survivors_of_several_scales_are_listed_and_drawn_in_one_place(opened, s
     assert tab.evaluate("scale.now()") == pytest.approx(family.minima_s[3])
     # The truth of an uncalibrated view is drawn where the survivors are.
     tab.check("[data-show=truth]")
-    truth = np.array(page_data(scales, flat_view)["frames"][0]["truth"][:42]).reshape(14, 3) / 10_000
+    truth = np.array(tab.evaluate("pack.truth(0).slice(0, 14)"))
     expected = world.place(scales.frames[0].joints[0])
     assert np.linalg.norm((truth - expected).mean(axis=0)[1]) < 1e-3
 
@@ -316,19 +313,14 @@ def test_inferred_joints_are_hollow_boxed_and_named(opened, hidden_elbow):
     result, view = hidden_elbow
     tab = opened(result, view)
     assert tab.inner_text("#survivors-note") == "Inferred: right elbow, right wrist."
-    hollow = """DATA.points.filter((_, k) => scene.layers.joints.children[k].material.opacity < 1)"""
+    hollow = "DATA.points.filter((_, joint) => page.unseen(joint))"
     assert tab.evaluate(hollow) == ["right_elbow", "right_wrist"]
-    boxes = """scene.layers.regions.children.filter((one) => one.isMesh).map((one) => {
-      one.geometry.computeBoundingBox();
-      one.updateWorldMatrix(true, false);
-      const box = one.geometry.boundingBox.clone().applyMatrix4(one.matrix);
-      return [one.name, box.min.toArray(), box.max.toArray()];
-    })"""
-    found = {name: np.array([low, high]) for name, low, high in tab.evaluate(boxes)}
-    world = world_of(result)
+    found = {one["name"]: np.array(one["corners"]) for one in tab.evaluate("scene.regions()")}
+    world = world_of(result, view)
     for name, one in result.frames[0].inferred[0].items():
         ends = np.sort(world.place(np.array([one.lower, one.upper])), axis=0)
-        assert np.abs(found[name] - ends).max() < 2e-3  # an interval is drawn 3 mm thick
+        corners = np.array([found[name].min(axis=0), found[name].max(axis=0)])
+        np.testing.assert_allclose(corners, ends, atol=2 * TENTH_OF_MM)
     tab.click("#unseen-tab")
     rows = tab.locator("#unseen tbody tr").all_inner_texts()
     plain = [row.replace("\N{MINUS SIGN}", "-").split() for row in rows]
@@ -336,7 +328,7 @@ def test_inferred_joints_are_hollow_boxed_and_named(opened, hidden_elbow):
     assert plain[1] == ["right", "wrist", "interval", "0.0", "0.0", "-20…40", "40"]
     # At another scale the boxes, which were found at this one, are gone; the hollow limb goes along.
     tab.evaluate("scale.choose(1.2 * scale.now())")
-    assert tab.evaluate("scene.layers.regions.children.length") == 0
+    assert tab.evaluate("scene.regions().length") == 0
     frame = result.frames[0]
     points = lifted(tab, 480.0)
     forearm = frame.joints[0, JOINT["right_elbow"]] - frame.joints[0, JOINT["right_shoulder"]]
@@ -363,7 +355,7 @@ def test_inferred_joints_of_a_calibrated_view_need_no_family(opened, walked, wal
     tab = opened(dataclasses.replace(walked, frames=frames), walk)
     assert tab.is_hidden("#family")
     assert tab.inner_text("#survivors-note") == "Inferred: left wrist."
-    assert tab.evaluate("scene.layers.regions.children.length") == 2
+    assert tab.evaluate("scene.regions().length") == 1
 
 
 def test_calibrated_results_have_no_slider(opened, walked, walk):

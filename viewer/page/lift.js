@@ -1,5 +1,5 @@
 // Lifts the chosen posture at another scale (Taylor 2000, eq. 1 and 2): x = u / s, y = v / s, and along each segment of
-// the tree dZ = sqrt(l^2 - d^2 / s^2), nearer or farther as the posture has it. It needs no WebGL.
+// the tree dZ = sqrt(l^2 - d^2 / s^2), nearer or farther as the posture has it.
 "use strict";
 const lift = (() => {
   const axes = [DATA.camera.right, DATA.camera.down, DATA.camera.forward];
@@ -12,11 +12,11 @@ const lift = (() => {
 
   // The posture as it was recovered, camera axes, metres from the middle of the image; with the girdles' middles.
   function recovered(frame, survivor) {
-    const row = frame.points[survivor], { anchor } = frame.family, found = [];
-    for (let k = 0; k < row.length; k += 3) {
-      const from = row[k] === null ? null : minus(row.slice(k, k + 3).map((step) => step / DATA.steps), anchor);
-      found.push(from && axes.map((axis) => dot(from, axis)));
-    }
+    const { anchor } = frame.family;
+    const found = pack.points(frame, survivor).map((point) => {
+      const from = point && minus(point, anchor);
+      return from && axes.map((axis) => dot(from, axis));
+    });
     for (const [, a, b] of DATA.tree.middles) found.push(middle(found[a], found[b]));
     return found;
   }

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-
-import numpy as np
 
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own.postures import Postures
@@ -14,15 +13,20 @@ from posekit.formats.own.result import Result
 from posekit.formats.own.view import View
 from posekit.safe_io.writing import write_text
 from posekit.viewer.page.data import page_data
-from posekit.viewer.scene.eye import Eye
-from posekit.viewer.scene.scene import Scene
-from posekit.viewer.standalone import script_json, standalone_page
+from posekit.viewer.page.findings_page import PageFindings
+from posekit.viewer.standalone import CONTENT_POLICY, script_json
 
-START_EYE = Eye(position=np.array([-2.6, -3.0, 1.7]), target=np.array([0.0, 0.0, 0.85]))
-"""Until the page's own script has measured the postures."""
-
-PAGE_SCRIPTS = ("lift.js", "panel.js", "scale.js")
-"""In the order that they need each other; ``scene.js`` runs after them."""
+PAGE_SCRIPTS = (
+    "unpack.js",
+    "lift.js",
+    "panel.js",
+    "tables.js",
+    "scale.js",
+    "sight.js",
+    "scene.js",
+    "play.js",
+)
+"""In the order that they need each other."""
 
 
 def page_html(
@@ -31,18 +35,15 @@ def page_html(
     *,
     title: str = "posekit",
     frames: Sequence[int] | None = None,
+    findings: PageFindings | None = None,
 ) -> str:
     """Make the page, as text; see `write_page`."""
-    data = page_data(given, view, title=title, frames=frames)
-    scripts = "\n".join(_file(name) for name in PAGE_SCRIPTS)
-    panel = f"<script>\nconst DATA = {script_json(data)};\n{scripts}\npage.chooseFrame(0);\n</script>"
-    return standalone_page(
-        Scene(),
-        eye=START_EYE,
-        title=f"{title} - posekit" if title != "posekit" else title,
+    return _file("page.html").format(
+        policy=CONTENT_POLICY,
+        title=html.escape(f"{title} - posekit" if title != "posekit" else title),
         style=_file("page.css"),
-        body=f"{_file('page.html')}\n{panel}",
-        script=_file("scene.js"),
+        data=script_json(page_data(given, view, title=title, frames=frames, findings=findings)),
+        scripts="\n".join(_file(name) for name in PAGE_SCRIPTS),
     )
 
 
@@ -53,8 +54,9 @@ def write_page(
     *,
     title: str = "",
     frames: Sequence[int] | None = None,
+    findings: PageFindings | None = None,
 ) -> None:
-    """Write the interactive page of a result: one HTML file that loads nothing, about 1 MB and the postures.
+    """Write the interactive page of a result: one HTML file that loads nothing, 10 MB at most.
 
     Parameters
     ----------
@@ -68,15 +70,17 @@ def write_page(
         Shown on top; by default the file's name.
     frames : sequence of int, optional
         Which frames, from 0; all by default.
+    findings : PageFindings, optional
+        What checks found in postures that are no result's (`posekit.validation.page_findings`).
 
     Raises
     ------
     ViewerError
-        Where there is no posture at all, too many for one page, or the view has other frames.
+        Where there is no posture at all, or the view has other frames.
     InputError
         Where the file cannot be written.
     """
-    text = page_html(given, view, title=title or Path(path).stem, frames=frames)
+    text = page_html(given, view, title=title or Path(path).stem, frames=frames, findings=findings)
     write_text(path, [text])
 
 

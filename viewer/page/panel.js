@@ -1,14 +1,16 @@
-// The page's panel: frames, survivors, levels and reasons. DATA comes from data.py; all text that a
-// file gave is set as text, never as HTML. scene.js draws what is chosen here.
+// The page's panel: frames, paths, survivors and what is said of them. DATA comes from data.py; all text that a file
+// gave is set as text, never as HTML. scene.js draws what is chosen here; tables.js has the tabs.
 "use strict";
 const page = (() => {
-  const state = { frame: 0, survivor: 0, scale: null, sort: { key: "number", down: false } };
+  const state = { frame: 0, survivor: 0, path: DATA.paths ? 0 : null, scale: null, example: null, sort: { key: "likeliest", down: false }, listed: 50, playing: false };
   const listeners = [];
   const byId = (id) => document.getElementById(id);
   const frame = () => DATA.frames[state.frame];
   const words = (name) => name.replaceAll(/[_.]/g, " ");
   const css = (colour) => "#" + colour.toString(16).padStart(6, "0");
   const plural = (count, one, many) => `${count.toLocaleString("en")} ${count === 1 ? one : many}`;
+  const NEUTRAL = 0x5d5a88;
+  let told = 0;
 
   function element(tag, text, className) {
     const made = document.createElement(tag);
@@ -25,7 +27,7 @@ const page = (() => {
   }
 
   function shown(value, scale) {
-    if (value === null || value === undefined) return "–";
+    if (value === null || value === undefined || Number.isNaN(value)) return "–";
     const scaled = value * scale, size = Math.abs(scaled);
     if (size !== 0 && size < 0.001) return scaled.toExponential(0);
     return scaled.toFixed(size !== 0 && size < 0.1 ? 3 : size < 100 ? 1 : 0);
@@ -33,43 +35,41 @@ const page = (() => {
 
   function percent(share) {
     if (share > 0 && share < 0.0005) return "< 0.1 %";
-    return `${(100 * share).toFixed(1)} %`;
+    return `${(100 * share).toFixed(share > 0.0995 && share < 0.9995 ? 0 : 1)} %`;
   }
 
-  function likeliest() {
-    const { probability } = frame();
-    return probability?.length ? probability.indexOf(Math.max(...probability)) : 0;
-  }
+  // The survivor that is shown where nobody chose one: the path's, else the likeliest, which comes first.
+  const usual = () => (state.path === null ? 0 : pack.onPath(state.frame, state.path));
 
-  // Chooses a frame; the survivor with the same near-far choices stays chosen where it is there too, else the likeliest.
   function chooseFrame(index) {
-    const code = frame().branches?.[state.survivor];
     state.frame = Math.min(Math.max(index, 0), DATA.frames.length - 1);
-    const same = frame().branches?.indexOf(code) ?? -1;
-    state.survivor = same < 0 ? likeliest() : same;
-    state.scale = null;
+    if (state.path === null && DATA.paths) state.path = state.left ?? null;
+    state.survivor = usual();
+    state.scale = state.example = null;
     byId("frame").value = state.frame;
-    showTime();
-    showSurvivors();
-    showLevels();
-    showRejected();
-    showInferred();
-    showSeen();
-    changed();
+    refresh();
   }
 
   function chooseSurvivor(index) {
-    if (!(index in frame().points)) return;
+    if (!(index >= 0 && index < frame().held)) return;
+    if (state.path !== null) state.left = state.path;
+    state.path = null;
     state.survivor = index;
-    state.scale = null;
+    state.scale = state.example = null;
     for (const made of byId("survivors-body").rows) {
       const chosen = Number(made.dataset.survivor) === index;
       made.setAttribute("aria-selected", chosen);
       if (chosen) made.scrollIntoView({ block: "nearest" });
     }
-    showLevels();
-    showInferred();
+    markAnswer();
     changed();
+  }
+
+  // Follows a path through all frames, or takes the likeliest of each frame (null).
+  function choosePath(path) {
+    state.path = state.left = path;
+    byId("path").value = path ?? "";
+    chooseFrame(state.frame);
   }
 
   // Draws the chosen posture at another scale; null is its own.
@@ -78,14 +78,31 @@ const page = (() => {
     changed();
   }
 
+  function chooseExample(example) {
+    state.example = state.example === example ? null : example;
+    changed();
+  }
+
+  // While it plays, words and tables follow a few times a second.
+  function refresh() {
+    showTime();
+    if (state.playing && performance.now() - told < 400) return listeners.forEach((listener) => listener());
+    told = performance.now();
+    showAnswer();
+    showSurvivors();
+    showSeen();
+    changed();
+  }
+
   function changed() {
     listeners.forEach((listener) => listener());
     showMargins();
+    showCaption();
   }
 
   // Margins are judged at the scale that a posture was recovered at, wherever the slider is.
   function showMargins() {
-    const { family } = frame(), own = family && lift.scaleOf(family, state.survivor);
+    const { family } = frame(), own = family && lift.scaleOf(family, Math.max(state.survivor, 0));
     const away = Boolean(family) && state.scale !== null && Math.abs(state.scale / own - 1) > 1e-9;
     byId("survivors").classList.toggle("elsewhere", away);
     byId("margins-of")?.replaceChildren(
@@ -97,178 +114,215 @@ const page = (() => {
     const { number, time } = frame();
     const at = time === undefined ? "" : `, ${Number(time.toPrecision(4))} s`;
     byId("frame-text").textContent = `frame ${number} of ${DATA.frames[0].number} to ${DATA.frames.at(-1).number}${at}`;
+    byId("frame").setAttribute("aria-valuetext", `frame ${number}${at}`);
+  }
+
+  // What is drawn, in a line.
+  function showCaption() {
+    const here = frame(), { survivor, path } = state;
+    let said = here.held ? "" : "no posture in this frame";
+    if (path !== null) {
+      const bridged = survivor < 0;
+      said = `path ${path} (${percent(DATA.paths.probability[path])})` + (bridged ? ", bridged in this frame" : `, posture ${pack.number(here, survivor)}`);
+    } else if (here.held) {
+      const share = pack.probability(here, survivor);
+      said = DATA.kind === "motion" ? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
+    }
+    if (state.example !== null) said += " – dashed: a rejected branch";
+    byId("caption").textContent = said;
+  }
+
+  function showAnswer() {
+    const here = frame(), { answer } = here, box = byId("answer");
+    box.hidden = !answer && !DATA.judged;
+    if (DATA.judged) return showVerdict(box, here);
+    if (!answer) return;
+    const [first, ...rest] = answer.lines, sure = element("p"), said = first.match(/^likeliest: (.* %) sure(, .*)$/);
+    if (said) sure.append(element("strong", said[1], "sure"), ` sure of the likeliest posture${said[2]}`);
+    else sure.textContent = first;
+    // What the buttons say is not said twice.
+    const short = answer.representatives.length > 1 ? rest.map((line) => line.replace(/ \([^)]*\);.*$/, ":")) : rest;
+    box.replaceChildren(sure, ...short.map((line) => element("p", line)));
+    if (answer.representatives.length > 1) {
+      const list = element("div", undefined, "others");
+      list.setAttribute("role", "group");
+      list.setAttribute("aria-label", "the likeliest posture, and what else it can be");
+      for (const { at, p, how } of answer.representatives) {
+        const made = element("button");
+        made.type = "button";
+        made.dataset.at = at;
+        made.append(element("b", percent(p)), ` ${how || "the likeliest"}`);
+        made.onclick = () => chooseSurvivor(at);
+        list.append(made);
+      }
+      if (answer.more) list.append(element("span", `and ${plural(answer.more, "other", "others")}`, "soft"));
+      box.append(list);
+    }
+    markAnswer();
+  }
+
+  function markAnswer() {
+    for (const made of document.querySelectorAll("#answer button")) made.setAttribute("aria-pressed", state.path === null && Number(made.dataset.at) === state.survivor);
+  }
+
+  function showVerdict(box, here) {
+    const all = findings(), bad = DATA.frames.filter((one) => one.findings).length;
+    const line = element("p", all.length ? `${plural(all.length, "check finds", "checks find")} something in this posture:` : "No check finds anything in this posture.");
+    const list = element("ul");
+    for (const one of all) list.append(element("li", one.text));
+    box.replaceChildren(line, list);
+    if (DATA.frames.length > 1) box.append(element("p", `${bad} of ${plural(DATA.frames.length, "frame has", "frames have")} findings: red marks above the time line.`, "soft"));
+  }
+
+  // What the checks find in the posture that is drawn.
+  function findings() {
+    const here = frame().findings?.[state.survivor] ?? [];
+    return here.map(([place, value, bound]) => {
+      const { check, where, unit, joints } = DATA.findings[place];
+      return { joints, text: `${words(check)}, ${words(where)}: ${value}${unit && " "}${unit} (bound ${bound}${unit && " "}${unit})` };
+    });
+  }
+
+  // Which end of each segment is nearer, by the joint that ends it.
+  function depth(joint) {
+    const { answer } = frame(), k = DATA.answerSegments?.findIndex((pair) => pair[1] === joint) ?? -1;
+    if (!answer || k < 0 || answer.near[k] === null) return null;
+    return { start: DATA.answerSegments[k][0], near: answer.near[k], far: answer.far[k] };
+  }
+
+  const unseen = (joint) => (state.path === null ? joint in (frame().inferred?.[state.survivor] ?? {}) : joint < DATA.joints && pack.bridged(state.frame, state.path, joint));
+
+  // What is told of a joint under the pointer; the first line is its name.
+  function about(joint) {
+    const lines = [words(DATA.points[joint])], sides = depth(joint);
+    if (sides) lines.push(`nearer than the ${words(DATA.points[sides.start])}: ${percent(sides.near)}, farther: ${percent(sides.far)}`);
+    if (unseen(joint)) lines.push(state.path === null ? "not seen: inferred" : "bridged between frames");
+    lines.push(...findings().filter((one) => one.joints.includes(joint)).map((one) => `! ${one.text}`));
+    const rejected = example();
+    if (rejected?.joints.includes(joint)) lines.push(`rejected branch: ${rejected.text}`);
+    return lines;
+  }
+
+  // The rejected branch that is drawn, with its reason.
+  function example() {
+    const here = frame(), k = state.example;
+    if (k === null || !(k in here.examples)) return null;
+    const [check, where] = DATA.reasons[here.examples[k]], points = pack.rejected(here, k);
+    const joints = DATA.points.flatMap((name, joint) => (joint < DATA.joints && where.split(/[.-]/).includes(name) ? [joint] : []));
+    return { points, joints, text: `${words(check)}, ${words(where)}` };
   }
 
   function columns() {
     const found = [{ key: "number", title: "posture" }];
     if (frame().family?.scales.length > 1) found.push({ key: "scale", title: "s (px/m)" });
-    if (frame().groups) found.push({ key: "group", title: "group" });
-    if (frame().probability) found.push({ key: "probability", title: "probability" });
-    for (const margin of DATA.margins) {
-      found.push({ key: margin.name, title: words(margin.name) + (margin.unit ? ` (${margin.unit})` : ""), margin });
-    }
+    if (pack.has("groups")) found.push({ key: "group", title: "group" });
+    if (pack.has("probability")) found.push({ key: "probability", title: "probability" });
+    DATA.margins.forEach((margin, index) => found.push({ key: `margin${index}`, title: words(margin.name) + (margin.unit ? ` (${margin.unit})` : ""), margin, index }));
     return found;
   }
 
   function sorted() {
     const { key, down } = state.sort, here = frame();
-    const value = (index) =>
-      key === "number" ? index : key === "scale" ? lift.scaleOf(here.family, index) : key === "group" ? here.groups[index] : key === "probability" ? here.probability[index] : here.margins[key][index] ?? -Infinity;
-    const order = here.points.map((_, index) => index);
+    const order = Array.from({ length: here.held }, (_, index) => index);
+    if (key === "likeliest") return order;
+    const value = (index) => {
+      if (key === "number") return pack.number(here, index);
+      if (key === "scale") return lift.scaleOf(here.family, index);
+      if (key === "group") return pack.group(here, index);
+      if (key === "probability") return pack.probability(here, index);
+      const margin = pack.margin(here, index, Number(key.slice(6)));
+      return Number.isNaN(margin) ? -Infinity : margin;
+    };
     return order.sort((a, b) => (value(a) - value(b) || 0) * (down ? -1 : 1) || a - b);
+  }
+
+  function cell(column, index) {
+    const here = frame();
+    if (column.key === "number") return element("td", pack.number(here, index));
+    if (column.key === "scale") return element("td", lift.scaleOf(here.family, index).toPrecision(4));
+    if (column.key === "group") {
+      const made = element("td"), chip = element("span", undefined, "chip");
+      chip.style.background = css(groupColour(index));
+      made.append(chip, pack.group(here, index));
+      return made;
+    }
+    if (column.key === "probability") return element("td", percent(pack.probability(here, index)));
+    const value = pack.margin(here, index, column.index);
+    return element("td", (value < 0 ? "▼ " : "") + shown(value, column.margin.scale), value < 0 ? "low" : "");
   }
 
   function showSurvivors() {
     const here = frame(), head = byId("survivors-head"), body = byId("survivors-body");
     head.replaceChildren();
     body.replaceChildren();
-    const count = here.points.length;
-    byId("answer").replaceChildren(...(here.answer ?? []).map((line) => element("p", line)));
-    const groups = here.groups ? `, in ${plural(new Set(here.groups).size, "group", "groups")}` : "";
+    byId("survivors").hidden = DATA.kind === "motion";
+    if (DATA.kind === "motion") return;
+    const groups = here.held && pack.has("groups") ? new Set(Array.from({ length: here.held }, (_, index) => pack.group(here, index))).size : 0;
     byId("survivors-title").textContent =
-      count === 0
+      here.count === 0
         ? "No posture survived in this frame"
         : DATA.kind === "result"
-          ? `${plural(count, "posture survives", "postures survive")}${groups}`
-          : plural(count, "posture", "postures");
-    if (count && DATA.margins.length) {
+          ? `${plural(here.count, "posture survives", "postures survive")}${groups ? `, in ${plural(groups, "group", "groups")}` : ""}`
+          : plural(here.count, "posture", "postures");
+    if (here.held && DATA.margins.length) {
       const made = element("span", undefined, "soft");
       made.id = "margins-of";
       byId("survivors-title").append(made);
       showMargins();
     }
-    row(
-      head,
-      columns().map((column) => {
-        const mark = state.sort.key === column.key ? (state.sort.down ? "\u00a0▾" : "\u00a0▴") : "";
-        const made = element("th", column.title + mark, "sort");
-        made.onclick = () => {
-          const again = state.sort.key === column.key;
-          state.sort = { key: column.key, down: again ? !state.sort.down : column.key === "probability" };
-          showSurvivors();
-        };
-        return made;
-      }),
-    );
-    for (const index of sorted()) {
-      const cells = columns().map((column) => {
-        if (column.key === "number") return element("td", index);
-        if (column.key === "scale") return element("td", lift.scaleOf(here.family, index).toPrecision(4));
-        if (column.key === "group") {
-          const made = element("td"), chip = element("span", undefined, "chip");
-          chip.style.background = css(groupColour(index));
-          made.append(chip, here.groups[index]);
-          return made;
-        }
-        if (column.key === "probability") return element("td", percent(here.probability[index]));
-        const value = here.margins[column.margin.name][index];
-        return element("td", shown(value, column.margin.scale), value < 0 ? "low" : "");
-      });
-      const made = row(body, cells);
+    row(head, columns().map((column) => {
+      const on = state.sort.key === column.key, made = element("th"), button = element("button", column.title + (on ? (state.sort.down ? "\u00a0▾" : "\u00a0▴") : ""));
+      button.type = "button";
+      made.setAttribute("aria-sort", on ? (state.sort.down ? "descending" : "ascending") : "none");
+      button.onclick = () => {
+        state.sort = { key: column.key, down: on ? !state.sort.down : column.key === "probability" };
+        showSurvivors();
+        byId("survivors-head").querySelectorAll("button")[columns().findIndex((one) => one.key === column.key)].focus();
+      };
+      made.append(button);
+      return made;
+    }));
+    const order = sorted();
+    for (const index of order.slice(0, state.listed)) {
+      const made = row(body, columns().map((column) => cell(column, index)));
       made.dataset.survivor = index;
       made.tabIndex = 0;
       made.setAttribute("aria-selected", index === state.survivor);
       made.onclick = () => chooseSurvivor(index);
       made.onkeydown = (event) => event.key === "Enter" && chooseSurvivor(index);
     }
+    showRest(order.length);
   }
 
-  function groupColour(index) {
-    return DATA.groupColours[(frame().groups?.[index] ?? 0) % DATA.groupColours.length];
-  }
-
-  function showLevels() {
-    if (DATA.kind !== "result") return;
-    const { levels, branches } = frame(), section = byId("levels");
-    const [head, body] = [section.querySelector("thead"), section.querySelector("tbody")];
-    const motion = levels.motion.some((count, level) => count !== levels.physical[level]);
-    const top = Math.log2(1 + Math.max(1, ...levels.physical));
-    section.querySelector("p").textContent =
-      "Each joint may be nearer to the camera or farther: the tree doubles at every level, and checks prune it. " +
-      "Shown are the branches that survive, and what the chosen posture took.";
-    head.replaceChildren();
-    body.replaceChildren();
-    const titles = ["joint", "physical checks", ...(motion ? ["and motion model"] : []), "chosen"];
-    row(head, titles.map((title) => element("th", title, "text")));
-    const code = branches[state.survivor];
-    levels.joint.forEach((joint, level) => {
-      const bars = [["physical", levels.physical[level]], ...(motion ? [["motion", levels.motion[level]]] : [])];
-      const cells = bars.map(([stage, count]) => {
-        const made = element("td", undefined, "bars"), bar = element("span", undefined, `bar ${stage}`);
-        bar.style.width = `${(Math.log2(1 + count) / top) * 60}%`;
-        made.append(bar, count.toLocaleString("en"));
-        return made;
-      });
-      const choice = level === 0 ? "start" : code === undefined ? "–" : code[level - 1] === "1" ? "farther" : "nearer";
-      row(body, [element("td", words(joint), "text"), ...cells, element("td", choice, "text")]);
-    });
-  }
-
-  function showRejected() {
-    if (DATA.kind !== "result") return;
-    const here = frame(), section = byId("rejected");
-    const [head, body] = [section.querySelector("thead"), section.querySelector("tbody")];
-    const lost = here.rejected.reduce((sum, entry) => sum + entry[2], 0);
-    section.querySelector("p").textContent =
-      `${plural(lost + here.points.length, "possible posture", "possible postures")}: ${plural(lost, "was", "were")} ` +
-      `rejected, ${here.points.length.toLocaleString("en")} survived. A posture counts where it broke its first check.`;
-    head.replaceChildren();
-    body.replaceChildren();
-    row(head, [element("th", "check", "text"), element("th", "where", "text"), element("th", "postures", "text")]);
-    const top = Math.max(1, ...here.rejected.map((entry) => entry[2]));
-    for (const [check, where, leaves] of here.rejected) {
-      const count = element("td", undefined, "bars"), bar = element("span", undefined, "bar");
-      bar.style.width = `${(leaves / top) * 55}%`;
-      count.append(bar, leaves.toLocaleString("en"));
-      row(body, [element("td", words(check), "text"), element("td", words(where), "text wrap"), count]);
+  // What is not in the table, and what is not in the page.
+  function showRest(held) {
+    const here = frame(), box = byId("rest"), lines = [];
+    if (held > state.listed) {
+      const made = element("button", `show ${Math.min(held - state.listed, 200)} more of ${held.toLocaleString("en")}`);
+      made.type = "button";
+      made.onclick = () => {
+        state.listed += 200;
+        showSurvivors();
+      };
+      lines.push(made);
     }
+    if (here.count > here.held) {
+      lines.push(element("p", `This page holds the ${here.held.toLocaleString("en")} likeliest of the ${here.count.toLocaleString("en")} postures of this frame. For more of them, a page of this frame alone:`));
+      lines.push(element("code", `posekit render RESULT --frame ${here.number} -o frame-${here.number}.html`));
+    }
+    if (here.unlisted > 0.0005) lines.push(element("p", `Further postures, which the result does not list, hold ${percent(here.unlisted)} at most.`));
+    box.replaceChildren(...lines);
+    box.hidden = !lines.length;
   }
 
-  // Joints that the image does not show: where they can be, from where they are drawn.
-  function showInferred() {
-    const here = frame().inferred?.[state.survivor] ?? {}, section = byId("unseen"), note = byId("survivors-note");
-    const names = Object.keys(here).map((joint) => DATA.points[joint]);
-    const [head, body] = [section.querySelector("thead"), section.querySelector("tbody")];
-    note.hidden = !names.length;
-    note.textContent = `Inferred: ${names.map(words).join(", ")}.`;
-    section.querySelector("p").textContent = names.length
-      ? "No image point places these joints. They are drawn hollow, in the middle of all positions that lengths, ranges and neighbours allow; a box holds them all. Here it is counted from the joint. All other joints are exact."
-      : "The image places all joints of this posture.";
-    head.replaceChildren();
-    body.replaceChildren();
-    if (!names.length) return;
-    row(head, ["joint", "right (cm)", "down (cm)", "deeper (cm)", "within"].map((title, k) => element("th", title, k ? "" : "text")));
-    const cm = (value, digits) => (100 * value).toFixed(digits).replace(/^-(0(\.0)?)$/, "$1").replace("-", "−");
-    for (const [joint, one] of Object.entries(here)) {
-      const share = one.fraction < 1 ? `, ${(100 * one.fraction).toPrecision(2)} %` : "";
-      const name = element("td", words(DATA.points[joint]), "text");
-      name.append(element("div", words(one.kind) + share, "soft"));
-      const cells = [name];
-      for (const k of [0, 1, 2]) {
-        const [low, high] = [one.lower[k], one.upper[k]], digits = high - low < 0.1 ? 1 : 0;
-        cells.push(element("td", high - low < 1e-4 ? cm(low, digits) : `${cm(low, digits)}…${cm(high, digits)}`));
-      }
-      row(body, [...cells, element("td", cm(one.radius, one.radius < 0.1 ? 1 : 0))]);
-    }
-  }
-
-  function showSettings() {
-    const body = byId("settings").querySelector("tbody");
-    for (const [name, value] of DATA.settings) {
-      row(body, [element("td", words(name), "text"), element("td", value, "text wrap")]);
-    }
-  }
+  const groupColour = (index) => (pack.has("groups") ? DATA.groupColours[(pack.group(frame(), index) ?? 0) % DATA.groupColours.length] : NEUTRAL);
 
   function showSeen() {
     const here = frame(), drawing = byId("seen-image");
     byId("seen").hidden = !here.image;
     drawing.replaceChildren();
     if (!here.image) return;
-    const all = DATA.frames.flatMap((one) => one.image ?? []).filter((point) => point);
-    const [us, vs] = [all.map((point) => point[0]), all.map((point) => point[1])];
-    const [left, top] = [Math.min(...us), Math.min(...vs)];
-    const [width, height] = [Math.max(...us) - left || 1, Math.max(...vs) - top || 1];
-    const size = Math.max(width, height);
+    const [left, top, size, width, height] = seenWindow();
     drawing.setAttribute("viewBox", `${left - 0.05 * size} ${top - 0.05 * size} ${width + 0.1 * size} ${height + 0.1 * size}`);
     const add = (tag, attributes) => {
       const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
@@ -283,78 +337,48 @@ const page = (() => {
         "stroke-linecap": "round", ...(side === "left" ? { "stroke-dasharray": `${0.03 * size} ${0.03 * size}` } : {}),
       });
     }
-    for (const point of here.image) {
-      if (point) add("circle", { cx: point[0], cy: point[1], r: 0.011 * size, fill: "#1d2329" });
-    }
+    for (const point of here.image) if (point) add("circle", { cx: point[0], cy: point[1], r: 0.011 * size, fill: "#1d2329" });
   }
 
-  function play() {
-    const button = byId("play");
-    if (state.timer) {
-      clearTimeout(state.timer);
-      state.timer = undefined;
-    } else {
-      const step = () => {
-        const next = (state.frame + 1) % DATA.frames.length;
-        const apart = (DATA.frames[next].time - frame().time) * 1000;
-        chooseFrame(next);
-        state.timer = setTimeout(step, apart >= 20 && apart <= 1000 ? apart : 400);
-      };
-      state.timer = setTimeout(step, 0);
-    }
-    button.textContent = state.timer ? "⏸" : "▶";
-    button.setAttribute("aria-label", state.timer ? "stop" : "play");
+  let seen;
+  function seenWindow() {
+    if (seen) return seen;
+    const all = DATA.frames.flatMap((one) => one.image ?? []).filter((point) => point);
+    const [left, right, top, bottom] = all.reduce(([l, r, t, b], [u, v]) => [Math.min(l, u), Math.max(r, u), Math.min(t, v), Math.max(b, v)], [Infinity, -Infinity, Infinity, -Infinity]);
+    const [width, height] = [right - left || 1, bottom - top || 1];
+    return (seen = [left, top, Math.max(width, height), width, height]);
   }
 
-  function chooseTab(name) {
-    for (const tab of document.querySelectorAll("#tabs button")) {
-      tab.setAttribute("aria-selected", tab.dataset.tab === name);
-      byId(tab.dataset.tab).hidden = tab.dataset.tab !== name;
-    }
-  }
-
-  function keys(event) {
-    if (event.target instanceof HTMLInputElement || event.ctrlKey || event.altKey || event.metaKey) return;
-    const order = sorted(), place = order.indexOf(state.survivor);
-    const moves = {
-      ArrowDown: () => chooseSurvivor(order[place + 1]),
-      ArrowUp: () => chooseSurvivor(order[place - 1]),
-      ArrowRight: () => chooseFrame(state.frame + 1),
-      ArrowLeft: () => chooseFrame(state.frame - 1),
-    };
-    if (event.key in moves) {
-      event.preventDefault();
-      moves[event.key]();
-    }
+  // What is true of the postures and the picture: exact ones give the same image, refined ones nearly.
+  function lead() {
+    if (DATA.kind === "motion") return "A motion, frame by frame. Play it, turn it, point at a joint.";
+    if (DATA.kind !== "result") return "Choose a posture from the list.";
+    const off = DATA.frames.flatMap((one) => (one.off ? [one.off] : [])), px = (value) => Number(value.toPrecision(2));
+    const half = off.map((one) => one[0]).sort((a, b) => a - b)[Math.floor(off.length / 2)], most = Math.max(...off.map((one) => one[1]));
+    const measured = off.length ? ` Those of the likeliest are ${px(half)} px from the picture's points in the median joint, ${px(most)} at most.` : "";
+    if (!DATA.refined) return "Every posture in the list gives the same image, but for tolerances. Choose one, and look at it from the camera, then from the side." + (half >= 0.1 ? measured : "");
+    const noise = DATA.deviation === null ? "" : ` (${px(DATA.deviation)} px)`;
+    return `The postures fit the picture's points to within their noise${noise}, not exactly.${measured}`;
   }
 
   byId("title").textContent = DATA.title;
-  byId("lead").textContent =
-    DATA.kind === "result"
-      ? "Every posture in the list gives exactly the same image. Choose one, and look at it from the camera, then from the side."
-      : "Choose a posture from the list.";
+  byId("lead").textContent = lead();
   byId("key-right").style.background = css(DATA.colours.right);
   byId("key-left").style.background = css(DATA.colours.left);
-  byId("truth-box").hidden = !DATA.frames.some((one) => one.truth?.some((step) => step !== null));
+  byId("truth-box").hidden = !pack.has("truth") || !DATA.frames.some((_, index) => pack.truth(index).some((point) => point));
   byId("look-camera").hidden = byId("rays-box").hidden = DATA.kind !== "result";
-  byId("unseen-tab").hidden = !DATA.frames.some((one) => one.inferred?.some((joints) => Object.keys(joints).length));
-  if (DATA.level) byId("hint").textContent += " – upright as if the camera was held level";
-  byId("time").hidden = DATA.frames.length < 2;
-  byId("tabs").hidden = byId("levels").hidden = DATA.kind !== "result";
-  byId("frame").max = DATA.frames.length - 1;
-  byId("frame").oninput = (event) => chooseFrame(Number(event.target.value));
-  byId("play").onclick = play;
-  for (const tab of document.querySelectorAll("#tabs button")) tab.onclick = () => chooseTab(tab.dataset.tab);
-  document.addEventListener("keydown", keys);
-  state.survivor = likeliest();
-  showSettings();
-  // Without WebGL meshcat's viewer throws when it is made, and scene.js is never reached.
-  window.addEventListener("error", () => {
-    if (state.drawn) return;
-    byId("meshcat-pane").replaceChildren(
-      element("p", "The scene cannot be drawn: this browser has no WebGL. The tables work without it.", "failed"),
-    );
-  });
+  byId("others-box").hidden = DATA.kind === "motion";
+  byId("path-box").hidden = !DATA.paths;
+  if (DATA.paths) {
+    byId("path").append(...DATA.paths.probability.map((share, path) => Object.assign(element("option", `path ${path} (${percent(share)})`), { value: path })), Object.assign(element("option", "each frame's likeliest"), { value: "" }));
+    byId("path").title = DATA.paths.words;
+    byId("path").onchange = (event) => choosePath(event.target.value === "" ? null : Number(event.target.value));
+  }
+  byId("hint").textContent += { level: " – upright as if the camera was held level", trunks: " – upright as the trunks are on average: the camera's tilt is not known" }[DATA.upright] ?? "";
+  if (DATA.left) byId("lead").textContent += ` The page holds the likeliest postures; ${DATA.left.toLocaleString("en")} more are in the file.`;
 
-  return { state, frame, chooseFrame, chooseSurvivor, chooseScale, groupColour, onChange: (listener) => listeners.push(listener) };
+  return {
+    state, frame, chooseFrame, chooseSurvivor, choosePath, chooseScale, chooseExample, groupColour, findings, depth, unseen, about, example, sorted, refresh,
+    tools: { byId, element, row, words, percent, plural }, onChange: (listener) => listeners.push(listener),
+  };
 })();

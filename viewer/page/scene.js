@@ -1,327 +1,392 @@
-// The page's scene: the chosen survivor's body is moved, not made again; positions are whole steps of DATA.steps
-// a metre, in a world whose z is up. It runs after meshcat's viewer was made; `page` is panel.js.
+// The page's picture, drawn on a plain canvas: the chosen posture as a body, and what else is asked for. A figure of
+// a dozen capsules needs no WebGL, and is quick where there is no graphics card.
 "use strict";
 const scene = (() => {
-  const T = MeshCat.THREE;
-  const UP = new T.Vector3(0, 1, 0);
-  const JOINT_RADIUS = 0.03, BONE_RADIUS = 0.009, IMAGE_DEPTH = 0.6, SOLID = 0.55, HOLLOW = 0.32, FADED = 0.2, FAR = 50;
+  const canvas = document.getElementById("picture"), pen = canvas.getContext("2d");
+  const { dot, minus, along, cross, unit } = sight.vectors;
+  const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16;
+  const { position: eye, forward, right, down } = DATA.camera, axes = [right, down, forward];
   const shownNow = { bodies: true, others: false, rays: false, truth: false };
-  const ball = new T.SphereGeometry(1, 24, 16), dome = new T.SphereGeometry(1, 24, 8, 0, 2 * Math.PI, 0, Math.PI / 2), tube = new T.CylinderGeometry(1, 1, 1, 20, 1, true);
-  const layers = {};
-  for (const name of ["bodies", "joints", "regions", "others", "rays", "truth"]) {
-    layers[name] = new T.Group();
-    viewer.set_object(["posekit", name], layers[name]);
-  }
-  const eye = new T.Vector3(...DATA.camera.position), forward = new T.Vector3(...DATA.camera.forward);
-  const right = new T.Vector3(...DATA.camera.right), down = new T.Vector3(...DATA.camera.down), axes = [right, down, forward];
-  const perspective = viewer.camera, parallel = new T.OrthographicCamera(-1, 1, 1, -1, 0.1, 200);
-  let following = false; // the parallel camera shows the image at the same place, whatever the scale
+  const css = (colour, alpha = 1) => `rgba(${colour >> 16},${(colour >> 8) & 255},${colour & 255},${alpha})`;
+  const mixed = (colour, other, t) => [16, 8, 0].reduce((sum, bit) => sum | (Math.round(((colour >> bit) & 255) * (1 - t) + ((other >> bit) & 255) * t) << bit), 0);
+  const shades = Object.fromEntries(Object.entries(DATA.colours).map(([side, colour]) => [side, { light: mixed(colour, 0xffffff, 0.5), plain: colour, dark: mixed(colour, 0x10202c, 0.42) }]));
+  let chosenNow = null, places = [], drawnLayers = {}, boxes = [];
 
-  function points(row) {
-    const found = [];
-    for (let k = 0; k < row.length; k += 3) {
-      found.push(row[k] === null ? null : new T.Vector3(row[k], row[k + 1], row[k + 2]).divideScalar(DATA.steps));
-    }
-    return found;
-  }
-
-  // The chosen survivor: as it was recovered, or at the slider's scale.
+  // The chosen posture: as it was recovered, at the slider's scale, on the path, or a rejected branch beside it.
   function chosen() {
-    const frame = page.frame(), { survivor, scale: s } = page.state, row = frame.points[survivor];
-    if (!row) return null;
-    if (s === null || !frame.family) return points(row);
-    return lift.world(frame, survivor, s).map((point) => point && new T.Vector3(...point));
-  }
-
-  const material = (colour, options) => new T.MeshLambertMaterial({ color: colour, ...options });
-
-  // A tube from a to b: made once, laid anew for every posture.
-  function lay(mesh, a, b, radius) {
-    mesh.visible = a !== null && b !== null;
-    if (!mesh.visible) return;
-    const axis = b.clone().sub(a), length = axis.length();
-    mesh.position.copy(a).addScaledVector(axis, 0.5);
-    mesh.scale.set(radius, Math.max(length, 1e-6), radius);
-    if (length > 0) mesh.quaternion.setFromUnitVectors(UP, axis.divideScalar(length));
+    const { survivor, scale: s, path } = page.state, frame = page.frame();
+    if (path !== null) return pack.path(page.state.frame, path);
+    if (!(survivor >= 0 && survivor < frame.held)) return null;
+    return s === null || !frame.family ? pack.points(frame, survivor) : lift.world(frame, survivor, s);
   }
 
   function mean(all, indices) {
-    const chosen = indices.map((index) => all[index]);
-    if (chosen.some((point) => !point)) return null;
-    return chosen.reduce((sum, point) => sum.add(point), new T.Vector3()).divideScalar(chosen.length);
+    const some = indices.map((index) => all[index]);
+    if (some.some((point) => !point)) return null;
+    return [0, 1, 2].map((axis) => some.reduce((sum, point) => sum + point[axis], 0) / some.length);
   }
 
-  const capsules = DATA.capsules.map((capsule) => {
-    const skin = material(DATA.colours[capsule.side], { transparent: true, opacity: SOLID, depthWrite: false });
-    const parts = [new T.Mesh(tube, skin), new T.Mesh(dome, skin), new T.Mesh(dome, skin)];
-    layers.bodies.add(...parts);
-    return { ...capsule, parts };
-  });
-  const joints = DATA.points.map((name, index) => {
-    const mesh = new T.Mesh(ball, material(DATA.colours[DATA.pointSides[index]]));
-    mesh.scale.setScalar(index < DATA.joints ? JOINT_RADIUS : 0.4 * JOINT_RADIUS);
-    mesh.name = name;
-    layers.joints.add(mesh);
-    return mesh;
-  });
-  const bones = DATA.segments.map(([, , side]) => {
-    const mesh = new T.Mesh(tube, material(DATA.colours[side]));
-    layers.joints.add(mesh);
-    return mesh;
-  });
+  // The outline of two circles and what is between them.
+  function outline([ax, ay, , , ra], [bx, by, , , rb]) {
+    const length = Math.hypot(bx - ax, by - ay), path = new Path2D();
+    if (length <= Math.abs(ra - rb) + 1e-6) {
+      path.arc(...(ra > rb ? [ax, ay, ra] : [bx, by, rb]), 0, 2 * Math.PI);
+      return path;
+    }
+    const turn = Math.atan2(by - ay, bx - ax), open = Math.acos((ra - rb) / length);
+    path.arc(ax, ay, ra, turn + open, turn - open);
+    path.arc(bx, by, rb, turn - open, turn + open);
+    path.closePath();
+    return path;
+  }
 
-  // What follows from a joint that was not seen is hollow.
-  function hollow(mesh, unseen) {
-    if (mesh.material.transparent === unseen) return;
-    mesh.material.transparent = unseen;
-    mesh.material.opacity = unseen ? HOLLOW : 1;
-    mesh.material.depthWrite = !unseen;
-    mesh.material.needsUpdate = true;
+  function drawCapsule({ from, to, side, guessed }) {
+    const path = outline(from, to), shade = shades[side], wide = Math.max(from[4], to[4]);
+    if (guessed) {
+      pen.fillStyle = css(shade.plain, 0.16);
+      pen.setLineDash([5, 4]);
+      pen.strokeStyle = css(shade.dark, 0.8);
+    } else {
+      const [x, y] = [(from[0] + to[0]) / 2, (from[1] + to[1]) / 2];
+      let [nx, ny] = unit([from[1] - to[1], to[0] - from[0], 0]);
+      if (nx + 1.7 * ny > 0) [nx, ny] = [-nx, -ny]; // light comes from above, and a little from the left
+      if (!nx && !ny) [nx, ny] = [-0.5, -0.86];
+      const light = pen.createLinearGradient(x + wide * nx, y + wide * ny, x - wide * nx, y - wide * ny);
+      light.addColorStop(0, css(shade.light));
+      light.addColorStop(0.45, css(shade.plain));
+      light.addColorStop(1, css(shade.dark));
+      pen.fillStyle = light;
+      pen.strokeStyle = css(shade.dark, 0.7);
+    }
+    pen.lineWidth = 1;
+    pen.fill(path);
+    pen.stroke(path);
+    pen.setLineDash([]);
+  }
+
+  function capsulesOf(all, unseen) {
+    const found = [];
+    for (const capsule of DATA.capsules) {
+      const [start, end] = [mean(all, capsule.start), mean(all, capsule.end)];
+      if (!start || !end) continue;
+      const axis = minus(end, start);
+      const ends = [-1, 1].map((way) => along(start, capsule.center + way * capsule.half, axis));
+      const [from, to] = ends.map(sight.project);
+      if (!from || !to) continue;
+      [from, to].forEach((place) => place.push(place[3] * capsule.radius));
+      const guessed = [...capsule.start, ...capsule.end].some((index) => unseen(index));
+      found.push({ from, to, ends, side: capsule.side, radius: capsule.radius, guessed, depth: (from[2] + to[2]) / 2 });
+    }
+    return found.sort((a, b) => b.depth - a.depth);
+  }
+
+  function polyline(ends, colour, width, dash = []) {
+    pen.beginPath();
+    for (const [a, b] of ends) {
+      const cut = sight.segment(a, b);
+      if (!cut) continue;
+      pen.moveTo(cut[0][0], cut[0][1]);
+      pen.lineTo(cut[1][0], cut[1][1]);
+    }
+    pen.strokeStyle = colour;
+    pen.lineWidth = width;
+    pen.setLineDash(dash);
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+
+  const stick = (all) => DATA.segments.flatMap(([a, b]) => (all[a] && all[b] ? [[all[a], all[b]]] : []));
+
+  function drawGround(index) {
+    if (sight.state.elevation < -0.02) return;
+    const [x, y] = sight.middle(index).map((value) => Math.round(value * 2) / 2), wide = 3;
+    for (let k = -2 * wide; k <= 2 * wide; k++) {
+      const fade = 0.34 * (1 - Math.abs(k) / (2 * wide + 1));
+      const reach = Math.sqrt(Math.max(0, wide * wide - (k * k) / 4));
+      polyline([[[x + k / 2, y - reach, 0], [x + k / 2, y + reach, 0]], [[x - reach, y + k / 2, 0], [x + reach, y + k / 2, 0]]], `rgba(96,112,128,${fade})`, 1);
+    }
+    if (DATA.kind !== "result" || sight.state.look === "camera") return;
+    // Which way the camera is: an arrow on the ground.
+    const [cx, cy] = sight.middle(index), away = 0.75 * sight.reach, towards = sight.back, side = [-towards[1], towards[0], 0];
+    const foot = [cx + away * towards[0], cy + away * towards[1], 0];
+    const tip = along(foot, 0.22, towards), corners = [tip, along(foot, 0.1, side), along(foot, -0.1, side)].map(sight.project);
+    if (corners.some((corner) => !corner)) return;
+    pen.beginPath();
+    corners.forEach(([px, py], k) => (k ? pen.lineTo(px, py) : pen.moveTo(px, py)));
+    pen.fillStyle = "rgba(60,74,88,.75)";
+    pen.fill();
+    pen.font = "12px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.fillText("camera", corners[0][0], Math.max(...corners.map((corner) => corner[1])) + 15);
+  }
+
+  function drawShadow(parts) {
+    if (sight.state.elevation < -0.02 || sight.state.look === "camera") return;
+    pen.beginPath();
+    let wide = 4;
+    for (const { ends, radius } of parts) {
+      const cut = sight.segment(...ends.map(([x, y]) => [x, y, 0]));
+      if (!cut) continue;
+      wide = Math.max(wide, 1.1 * radius * cut[0][3]);
+      pen.moveTo(cut[0][0], cut[0][1]);
+      pen.lineTo(cut[1][0] + 0.01, cut[1][1]);
+    }
+    pen.lineCap = "round";
+    pen.lineWidth = Math.min(wide, 60);
+    pen.strokeStyle = "rgba(40,52,64,.13)";
+    pen.stroke();
+    pen.lineCap = "butt";
   }
 
   function drawBody(all) {
-    const unseen = page.frame().inferred?.[page.state.survivor] ?? {};
-    joints.forEach((mesh, index) => {
-      mesh.visible = Boolean(all?.[index]);
-      if (mesh.visible) mesh.position.copy(all[index]);
-      hollow(mesh, index in unseen);
-    });
-    bones.forEach((mesh, index) => {
-      const [a, b] = DATA.segments[index];
-      lay(mesh, all?.[a] ?? null, all?.[b] ?? null, BONE_RADIUS);
-      hollow(mesh, a in unseen || b in unseen);
-    });
-    for (const capsule of capsules) {
-      const [start, end] = all ? [mean(all, capsule.start), mean(all, capsule.end)] : [null, null];
-      const known = start !== null && end !== null;
-      capsule.parts.forEach((part) => (part.visible = known));
-      if (!known) continue;
-      const guessed = [...capsule.start, ...capsule.end].some((index) => index in unseen);
-      capsule.parts[0].material.opacity = guessed ? FADED : SOLID;
-      const axis = end.clone().sub(start);
-      const [low, high] = [-1, 1].map((end) => start.clone().addScaledVector(axis, capsule.center + end * capsule.half));
-      lay(capsule.parts[0], low, high, capsule.radius);
-      [low, high].forEach((place, k) => {
-        capsule.parts[1 + k].position.copy(place);
-        capsule.parts[1 + k].scale.setScalar(capsule.radius);
-        capsule.parts[1 + k].quaternion.setFromUnitVectors(UP, axis.clone().normalize().multiplyScalar(k ? 1 : -1));
-      });
+    const unseen = (joint) => page.unseen(joint), parts = capsulesOf(all, unseen);
+    drawShadow(parts);
+    if (shownNow.bodies) parts.forEach(drawCapsule);
+    else for (const side of ["middle", "right", "left"]) {
+      const of = DATA.segments.filter((one) => one[2] === side);
+      for (const guessed of [false, true]) {
+        const ends = of.flatMap(([a, b]) => (all[a] && all[b] && (unseen(a) || unseen(b)) === guessed ? [[all[a], all[b]]] : []));
+        polyline(ends, css(DATA.colours[side]), 5, guessed ? [6, 4] : []);
+      }
     }
+    const findings = page.findings();
+    places = all.map((point) => point && sight.project(point));
+    places.forEach((place, joint) => {
+      if (!place) return;
+      const shade = shades[DATA.pointSides[joint]], radius = Math.max(joint < DATA.joints ? 2.5 : 1.2, place[3] * (joint < DATA.joints ? 0.017 : 0.008));
+      pen.beginPath();
+      pen.arc(place[0], place[1], radius, 0, 2 * Math.PI);
+      pen.fillStyle = unseen(joint) ? "#fff" : css(shade.dark);
+      pen.strokeStyle = unseen(joint) ? css(shade.dark) : "rgba(255,255,255,.85)";
+      pen.lineWidth = unseen(joint) ? 2 : 1.2;
+      pen.fill();
+      pen.stroke();
+    });
+    for (const joint of new Set(findings.flatMap((one) => one.joints))) ring(places[joint]);
   }
 
-  function lines(layer, ends, colour, options) {
-    const shape = new T.BufferGeometry().setFromPoints(ends);
-    layer.add(new T.LineSegments(shape, new T.LineBasicMaterial({ color: colour, ...options })));
+  // What a check finds is ringed, and has a mark: not by colour alone.
+  function ring(place) {
+    if (!place) return;
+    const radius = Math.max(9, 0.07 * place[3]);
+    pen.beginPath();
+    pen.arc(place[0], place[1], radius, 0, 2 * Math.PI);
+    pen.strokeStyle = css(DATA.colours.alarm);
+    pen.lineWidth = 2.5;
+    pen.stroke();
+    pen.font = "bold 14px system-ui, sans-serif";
+    pen.textAlign = "center";
+    pen.lineWidth = 3;
+    pen.strokeStyle = "#fff";
+    pen.strokeText("!", place[0] + radius + 5, place[1] - radius + 6);
+    pen.fillStyle = css(DATA.colours.alarm);
+    pen.fillText("!", place[0] + radius + 5, place[1] - radius + 6);
   }
 
-  function clear(layer) {
-    for (const made of [...layer.children]) {
-      if (made.geometry !== tube) made.geometry.dispose();
-      made.material.dispose();
-      layer.remove(made);
-    }
-  }
-
-  function stick(all) {
-    return DATA.segments.flatMap(([a, b]) => (all[a] && all[b] ? [all[a], all[b]] : []));
-  }
-
-  // One mesh for the bones of all: hundreds of their own would be slow without a graphics card.
+  // The likelier, the stronger: the rest of the survivors as lines, those of a group in its colour.
   function drawOthers() {
-    clear(layers.others);
-    if (!shownNow.others) return;
-    const bones = page.frame().points.flatMap((row, index) => {
-      const ends = index === page.state.survivor ? [] : stick(points(row));
-      return ends.flatMap((end, k) => (k % 2 ? [] : [[end, ends[k + 1], page.groupColour(index)]]));
-    });
-    if (!bones.length) return;
-    const mesh = new T.InstancedMesh(tube, new T.MeshLambertMaterial({ color: 0xffffff }), bones.length);
-    const one = new T.Object3D();
-    bones.forEach(([a, b, colour], k) => {
-      lay(one, a, b, 0.5 * BONE_RADIUS);
-      one.updateMatrix();
-      mesh.setMatrixAt(k, one.matrix);
-      mesh.setColorAt(k, new T.Color(colour));
-    });
-    mesh.frustumCulled = false;
-    layers.others.add(mesh);
-  }
-
-  function drawTruth() {
-    clear(layers.truth);
-    const row = page.frame().truth;
-    if (shownNow.truth && row) lines(layers.truth, stick(points(row)), 0x111111);
+    const frame = page.frame(), most = Math.min(frame.held, MOST_OTHERS), best = pack.probability(frame, 0);
+    let drawn = 0;
+    for (let index = most - 1; index >= 0; index--) {
+      if (index === page.state.survivor) continue;
+      const share = best ? Math.sqrt((pack.probability(frame, index) ?? 0) / best) : 0.5;
+      const ends = stick(pack.points(frame, index));
+      polyline(ends, css(page.groupColour(index), 0.12 + 0.68 * Math.min(1, share)), 1.2 + 1.6 * share);
+      drawn += 1;
+    }
+    return drawn;
   }
 
   // The boxes that hold all positions of joints that were not seen, at the recovered scale.
   function drawRegions(all) {
-    clear(layers.regions);
-    if (!all || scale.elsewhere()) return;
+    boxes = [];
+    if (page.state.path !== null || scale.elsewhere()) return;
     for (const [joint, one] of Object.entries(page.frame().inferred?.[page.state.survivor] ?? {})) {
       const size = one.upper.map((high, k) => high - one.lower[k]);
       if (!all[joint] || Math.max(...size) < 1e-4) continue;
-      const centre = all[joint].clone();
-      axes.forEach((axis, k) => centre.addScaledVector(axis, (one.upper[k] + one.lower[k]) / 2));
-      const box = new T.BoxGeometry(...size.map((width) => Math.max(width, 0.003)));
-      const colour = DATA.colours[DATA.pointSides[joint]];
-      const faces = new T.Mesh(box, new T.MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.09, depthWrite: false }));
-      const edges = new T.LineSegments(new T.EdgesGeometry(box), new T.LineBasicMaterial({ color: colour }));
-      for (const made of [faces, edges]) {
-        made.position.copy(centre);
-        made.quaternion.setFromRotationMatrix(new T.Matrix4().makeBasis(...axes));
-        made.name = DATA.points[joint];
-        layers.regions.add(made);
-      }
+      const corner = (bits) => axes.reduce((sum, axis, k) => along(sum, (bits >> k) & 1 ? one.upper[k] : one.lower[k], axis), all[joint]);
+      const corners = [0, 1, 2, 3, 4, 5, 6, 7].map(corner);
+      const edges = corners.flatMap((from, k) => [1, 2, 4].flatMap((bit) => (k & bit ? [] : [[from, corners[k | bit]]])));
+      polyline(edges, css(DATA.colours[DATA.pointSides[joint]], 0.8), 1.2);
+      boxes.push({ name: DATA.points[joint], corners });
     }
   }
 
   // The camera's pyramid, the rays to the joints, and the image that they make on a plane in front of it.
   function drawRays(every) {
-    clear(layers.rays);
-    if (!shownNow.rays || !every) return;
-    const { image: onPicture, inferred } = page.frame(), unseen = inferred?.[page.state.survivor] ?? {};
-    const all = every.map((point, k) => (k in unseen && !onPicture?.[k] ? null : point));
-    if (DATA.camera.parallel) return drawParallel(all);
-    const onImage = (point) => {
-      const ray = point.clone().sub(eye), depth = ray.dot(forward);
-      return depth > IMAGE_DEPTH ? eye.clone().addScaledVector(ray, IMAGE_DEPTH / depth) : null;
-    };
-    const image = all.map((point) => point && onImage(point));
-    const seen = image.filter((point) => point);
-    if (!seen.length) return;
-    lines(layers.rays, all.slice(0, DATA.joints).flatMap((point) => (point ? [eye, point] : [])), 0x8a949e, { transparent: true, opacity: 0.6 });
+    const frame = page.frame(), unseen = frame.inferred?.[page.state.survivor] ?? {};
+    const all = every.slice(0, DATA.joints).map((point, k) => (k in unseen && !frame.image?.[k] ? null : point));
+    const known = all.filter((point) => point);
+    if (!known.length) return 0;
+    const { parallel } = DATA.camera, depths = known.map((point) => dot(minus(point, eye), forward));
+    const depth = parallel ? Math.min(...depths) - IMAGE_DEPTH : Math.min(IMAGE_DEPTH, 0.5 * Math.min(...depths));
+    const image = all.map((point) => {
+      if (!point) return null;
+      const from = minus(point, eye), far = dot(from, forward);
+      return parallel ? along(point, depth - far, forward) : along(eye, depth / far, from);
+    });
+    const seen = image.filter((point) => point).map((point) => minus(point, eye));
+    polyline(all.flatMap((point, k) => (point ? [[parallel ? image[k] : eye, point]] : [])), "rgba(110,124,138,.55)", 1);
     for (const side of ["middle", "right", "left"]) {
-      const ends = DATA.segments.filter((one) => one[2] === side).flatMap(([a, b]) => (image[a] && image[b] ? [image[a], image[b]] : []));
-      lines(layers.rays, ends, DATA.colours[side]);
+      polyline(DATA.segments.filter((one) => one[2] === side).flatMap(([a, b]) => (image[a] && image[b] ? [[image[a], image[b]]] : [])), css(DATA.colours[side]), 2);
     }
-    const reach = (axis) => Math.max(...seen.map((point) => Math.abs(point.clone().sub(eye).dot(axis)))) * 1.15 + 0.01;
-    const corner = (x, y) => eye.clone().addScaledVector(forward, IMAGE_DEPTH).addScaledVector(right, x * reach(right)).addScaledVector(down, y * reach(down));
-    const corners = [corner(-1, -1), corner(1, -1), corner(1, 1), corner(-1, 1)];
-    lines(layers.rays, corners.flatMap((place, k) => [place, corners[(k + 1) % 4], eye, place]), 0x303030);
+    const [[west, east], [north, south]] = [right, down].map((axis) => seen.map((from) => dot(from, axis))).map((values) => {
+      const [low, high] = [Math.min(...values), Math.max(...values)], border = 0.15 * (high - low) + 0.02;
+      return [low - border, high + border];
+    });
+    const corner = (x, y) => along(along(along(eye, depth, forward), x, right), y, down);
+    const corners = [corner(west, north), corner(east, north), corner(east, south), corner(west, south)];
+    polyline(corners.flatMap((place, k) => [[place, corners[(k + 1) % 4]], ...(parallel ? [] : [[eye, place]])]), "#303030", 1.3);
+    return 1;
   }
 
-  // A camera that is infinitely far: its image hangs before the body, its rays are parallel.
-  function drawParallel(all) {
-    const known = all.slice(0, DATA.joints).filter((point) => point);
-    if (!known.length) return;
-    const depth = Math.min(...known.map((point) => point.dot(forward))) - IMAGE_DEPTH;
-    const image = all.map((point) => point && point.clone().addScaledVector(forward, depth - point.dot(forward)));
-    lines(layers.rays, all.slice(0, DATA.joints).flatMap((point, k) => (point ? [image[k], point] : [])), 0x8a949e, { transparent: true, opacity: 0.6 });
-    for (const side of ["middle", "right", "left"]) {
-      const ends = DATA.segments.filter((one) => one[2] === side).flatMap(([a, b]) => (image[a] && image[b] ? [image[a], image[b]] : []));
-      lines(layers.rays, ends, DATA.colours[side]);
-    }
-    const reach = (axis) => known.map((point) => point.dot(axis)).reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
-    const [[west, east], [north, south]] = [reach(right), reach(down)], border = 0.08;
-    const corner = (x, y) => new T.Vector3().addScaledVector(forward, depth).addScaledVector(right, x).addScaledVector(down, y);
-    const corners = [corner(west - border, north - border), corner(east + border, north - border), corner(east + border, south + border), corner(west - border, south + border)];
-    lines(layers.rays, corners.flatMap((place, k) => [place, corners[(k + 1) % 4]]), 0x303030);
+  function drawRejected() {
+    const example = page.example();
+    if (!example) return 0;
+    polyline(stick(example.points), css(DATA.colours.alarm), 3, [9, 4, 2, 4]);
+    for (const joint of example.joints) if (example.points[joint]) ring(sight.project(example.points[joint]));
+    return 1;
   }
 
   function draw() {
-    const all = chosen();
-    drawBody(all);
-    drawRegions(all);
-    drawOthers();
-    drawRays(all);
-    drawTruth();
-    layers.bodies.visible = shownNow.bodies;
-    if (following) lookAlong();
-    viewer.set_dirty();
+    const ratio = Math.min(window.devicePixelRatio || 1, 2), { width, height } = sight.size();
+    if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
+      canvas.width = Math.round(width * ratio);
+      canvas.height = Math.round(height * ratio);
+    }
+    pen.setTransform(ratio, 0, 0, ratio, 0, 0);
+    pen.clearRect(0, 0, width, height);
+    const index = page.state.frame;
+    sight.prepare(index);
+    drawGround(index);
+    chosenNow = chosen();
+    places = [];
+    boxes = [];
+    const truth = shownNow.truth && pack.truth(index);
+    drawnLayers = { others: shownNow.others ? drawOthers() : 0, rays: shownNow.rays && chosenNow ? drawRays(chosenNow) : 0 };
+    if (chosenNow) {
+      drawBody(chosenNow);
+      drawRegions(chosenNow);
+    }
+    if (truth) polyline(stick(truth), "#111", 2.2, [7, 4]);
+    drawnLayers.truth = truth ? stick(truth).length : 0;
+    drawnLayers.rejected = drawRejected();
+    scene.pictures += 1;
   }
 
-  // Where all postures are, for the points of view.
-  const low = new T.Vector3(Infinity, Infinity, Infinity), high = low.clone().negate();
-  for (const frame of DATA.frames) {
-    for (const row of frame.points) {
-      for (const point of points(row)) {
-        if (point) {
-          low.min(point);
-          high.max(point);
-        }
-      }
-    }
+  // Draws once before the browser shows its next picture, however much changes until then.
+  let waiting = false;
+  function soon() {
+    if (waiting) return;
+    waiting = true;
+    requestAnimationFrame(() => {
+      waiting = false;
+      draw();
+    });
   }
-  const middle = low.clone().add(high).multiplyScalar(0.5), extent = Math.max(0.5, low.distanceTo(high));
+
+  function press() {
+    for (const button of document.querySelectorAll("#looks button")) button.setAttribute("aria-pressed", button.dataset.look === sight.state.look);
+  }
 
   function look(name) {
-    const pane = document.getElementById("meshcat-pane"), narrow = Math.min(1, pane.offsetWidth / pane.offsetHeight);
-    const back = new T.Vector3(-forward.x, -forward.y, 0).normalize();
-    const across = new T.Vector3(-back.y, back.x, 0);
-    const along = {
-      camera: back,
-      side: across,
-      above: back.clone().multiplyScalar(0.02).add(new T.Vector3(0, 0, 1)),
-      free: back.clone().add(across).add(new T.Vector3(0, 0, 0.45)),
-    }[name];
-    const fov = 30, distance = (0.68 * extent) / Math.tan((fov * Math.PI) / 360) / narrow;
-    following = name === "camera" && DATA.camera.parallel;
-    use(following ? parallel : perspective);
-    press(name);
-    if (following) return lookAlong();
-    let position = middle.clone().addScaledVector(along.normalize(), distance), angle = fov;
-    if (name === "camera") {
-      position = eye;
-      angle = (2 * Math.atan((0.68 * extent) / narrow / eye.distanceTo(middle)) * 180) / Math.PI;
-    }
-    posekit.look({ position: position.toArray(), target: middle.toArray(), fov: angle });
+    sight.look(name);
+    press();
+    draw();
   }
 
-  function press(name) {
-    for (const button of document.querySelectorAll("#looks button")) {
-      button.setAttribute("aria-pressed", button.dataset.look === name);
-    }
+  function show(name, on) {
+    const box = document.querySelector(`[data-show=${name}]`);
+    if (box.closest("label").hidden) return;
+    box.checked = on ?? !box.checked;
+    shownNow[name] = box.checked;
+    draw();
   }
 
-  function use(camera) {
-    if (viewer.camera === camera) return;
-    viewer.camera = camera;
-    viewer.controls.object = camera;
-    viewer.set_3d_pane_size();
+  // The joint, or the part of the body, under a finger.
+  function jointAt(x, y) {
+    let best = null, least = FINGER;
+    places.forEach((place, joint) => {
+      const away = place && joint < DATA.joints ? Math.hypot(place[0] - x, place[1] - y) : Infinity;
+      if (away < least) [best, least] = [joint, away];
+    });
+    return best;
   }
 
-  // Looks with the uncalibrated camera: the images of all frames fill the picture, at the scale that is chosen.
-  const frameOfImages = imageWindow();
-  function imageWindow() {
-    const all = DATA.frames.flatMap(({ family }) => (family ? family.image.flatMap((point) => (point ? [[point[0] + family.middle[0], point[1] + family.middle[1]]] : [])) : []));
-    const [us, vs] = [0, 1].map((k) => all.map((point) => point[k]));
-    const [low, high] = [[Math.min(...us), Math.min(...vs)], [Math.max(...us), Math.max(...vs)]];
-    return { middle: low.map((value, k) => (value + high[k]) / 2), half: low.map((value, k) => 0.66 * (high[k] - value)) };
+  function turned(change) {
+    change();
+    press();
+    soon();
   }
 
-  function lookAlong() {
-    const { family } = page.frame();
-    if (!family) return;
-    const s = scale.now(), pane = document.getElementById("meshcat-pane"), aspect = pane.offsetWidth / pane.offsetHeight;
-    const target = new T.Vector3(...family.anchor);
-    [right, down].forEach((axis, k) => target.addScaledVector(axis, (frameOfImages.middle[k] - family.middle[k]) / s));
-    const position = target.clone().addScaledVector(forward, -FAR), tall = Math.max(frameOfImages.half[1], frameOfImages.half[0] / aspect, 1) / s;
-    Object.assign(parallel, { top: tall, bottom: -tall, left: -tall * aspect, right: tall * aspect, zoom: 1 });
-    parallel.position.set(position.x, position.z, -position.y);
-    viewer.controls.target.set(target.x, target.z, -target.y);
-    viewer.controls.update();
-    parallel.updateProjectionMatrix();
-    viewer.set_dirty();
-  }
-
-  viewer.set_property(["Background"], "top_color", [0.97, 0.98, 0.99]);
-  viewer.set_property(["Background"], "bottom_color", [0.88, 0.9, 0.93]);
-  viewer.set_property(["Axes"], "visible", false);
-  for (const button of document.querySelectorAll("#looks button")) button.onclick = () => look(button.dataset.look);
-  for (const box of document.querySelectorAll("#shown input")) {
-    box.onchange = () => {
-      shownNow[box.dataset.show] = box.checked;
-      draw();
+  const fingers = new Map();
+  let apart = 0;
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    fingers.set(event.pointerId, [event.offsetX, event.offsetY]);
+    apart = 0;
+  });
+  for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => fingers.delete(event.pointerId));
+  canvas.addEventListener("pointermove", (event) => {
+    const before = fingers.get(event.pointerId), now = [event.offsetX, event.offsetY];
+    if (!before) return tell(jointAt(...now), ...now);
+    tell(null);
+    fingers.set(event.pointerId, now);
+    const [x, y] = [now[0] - before[0], now[1] - before[1]];
+    if (fingers.size > 1) {
+      const [p, q] = [...fingers.values()], wide = Math.hypot(p[0] - q[0], p[1] - q[1]);
+      if (apart) turned(() => sight.zoom(apart / Math.max(wide, 1)));
+      apart = wide;
+    } else if (event.buttons & 2 || event.shiftKey) turned(() => sight.move(x, y));
+    else turned(() => sight.turn(0.008 * x, 0.008 * y));
+  });
+  canvas.addEventListener("pointerleave", () => tell(null));
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    turned(() => sight.zoom(Math.exp(0.0012 * event.deltaY)));
+  }, { passive: false });
+  canvas.addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey) return;
+    const step = 0.12, moves = {
+      ArrowLeft: () => sight.turn(-step, 0), ArrowRight: () => sight.turn(step, 0), ArrowUp: () => sight.turn(0, step), ArrowDown: () => sight.turn(0, -step),
+      "+": () => sight.zoom(0.88), "=": () => sight.zoom(0.88), "-": () => sight.zoom(1.14),
     };
-  }
-  viewer.controls.addEventListener("start", () => (following = false));
-  window.addEventListener("resize", () => following && lookAlong());
-  page.onChange(draw);
-  draw();
-  look("free");
-  page.state.drawn = true;
+    if (!(event.key in moves)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    turned(moves[event.key]);
+  });
 
-  // What is drawn now, metres; for tests and for the console.
-  const drawn = () => joints.slice(0, DATA.joints).map((mesh) => (mesh.visible ? mesh.position.toArray() : null));
-  return { drawn, look, layers };
+  function tell(joint, x, y) {
+    const tip = document.getElementById("tip");
+    tip.hidden = joint === null;
+    if (joint === null) return;
+    tip.replaceChildren(...page.about(joint).map((line, k) => {
+      const made = document.createElement(k ? "div" : "strong");
+      made.textContent = line;
+      return made;
+    }));
+    tip.style.left = `${Math.max(4, Math.min(x + 14, sight.size().width - tip.offsetWidth - 8))}px`;
+    tip.style.top = `${Math.max(4, y - tip.offsetHeight - 8)}px`;
+  }
+
+  for (const button of document.querySelectorAll("#looks button")) button.onclick = () => look(button.dataset.look);
+  for (const box of document.querySelectorAll("#shown input")) box.onchange = () => show(box.dataset.show, box.checked);
+  new ResizeObserver(() => {
+    if (sight.state.look) sight.look(sight.state.look);
+    draw();
+  }).observe(canvas);
+  page.onChange(soon);
+
+  return {
+    look, show, draw, pictures: 0,
+    // What is drawn now, metres, and where in the picture, from -1 to 1; for tests and for the console.
+    drawn: () => { const all = chosen(); return Array.from({ length: DATA.joints }, (_, k) => all?.[k] ?? null); },
+    projected: () => { draw(); const { width, height } = sight.size(); return places.slice(0, DATA.joints).map((place) => place && [(2 * place[0]) / width - 1, 1 - (2 * place[1]) / height]); },
+    layers: () => { draw(); return drawnLayers; },
+    regions: () => { draw(); return boxes; },
+  };
 })();
+scene.look("free");
+
