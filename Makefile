@@ -144,14 +144,14 @@ lint: $(VENV)/dev.stamp ## ruff: format and rules
 
 .PHONY: types
 types: $(VENV)/dev.stamp ## mypy --strict
-	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/*/*.py benchmarks/*/*/*.py examples/*.py)
+	$(BIN)/mypy posekit tests $(wildcard benchmarks/*.py benchmarks/*/*.py benchmarks/*/*/*.py examples/*.py examples/*/*.py)
 
 .PHONY: layers
 layers: $(VENV)/dev.stamp ## import-linter: who may import whom
 	$(BIN)/lint-imports
 
 .PHONY: docs
-docs: $(VENV)/dev.stamp ## build the documentation, warnings are errors
+docs: $(VENV)/dev.stamp browser ## build the documentation, warnings are errors
 	$(BIN)/sphinx-build -j $(WORKERS) -W --keep-going -q -b html docs docs/_build/html
 	@echo "docs/_build/html/index.html"
 
@@ -172,6 +172,6 @@ bench-all: $(VENV)/dev.stamp ## run every file of benchmarks/
 
 .PHONY: clean
 clean: ## remove everything that make made
-	rm -rf $(VENV) build dist *.egg-info docs/_build $(DEMO_RESULTS) $(BENCH_RESULTS)
+	rm -rf $(VENV) build dist *.egg-info docs/_build docs/gallery docs/sg_execution_times.rst $(DEMO_RESULTS) $(BENCH_RESULTS)
 	rm -rf .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
 	find posekit validators urdf viewer tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true

@@ -18,9 +18,21 @@ extensions = [
     "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx_gallery.gen_gallery",
     "warned_again",
 ]
 exclude_patterns = ["_build"]
+
+# Each picture is made by its code, in examples/gallery; a build makes those again whose code has changed.
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples/gallery",
+    "gallery_dirs": "gallery",
+    "image_scrapers": ("gallery_pictures.scrape",),
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "min_reported_time": 10_000,
+    "show_signature": False,
+}
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
