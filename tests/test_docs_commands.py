@@ -33,7 +33,6 @@ NOT_RUN = {
     r"posekit demo ": "tests/cli runs it",
     r"posekit batch .*--cluster": "a cluster",
     r"posekit render (?!.*--(over|angles)).*\.(png|gif|mp4)\b": "a browser draws it: tests/viewer do",
-    r"posekit evaluate .*--frames-per-clip": "minutes of one core",
 }
 """Commands that are shown and not run here, with the reason."""
 
