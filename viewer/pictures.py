@@ -13,7 +13,7 @@ from PIL import Image
 
 from posekit.errors import ViewerError
 from posekit.geometry import Array
-from posekit.safe_io.writing import replacing, write_text
+from posekit.safe_io.writing import check_target, replacing, write_text
 from posekit.viewer.browser.browser import STEP_TIMEOUT_SECONDS
 from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Pixels, Studio, check_size
@@ -81,7 +81,7 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
     ViewerError
         Where the file's name asks for none of png, gif, mp4 and html, or where the picture's size or speed is none.
     InputError
-        Where what writes .mp4 is not installed.
+        Where the place cannot be written, or what writes .mp4 is not installed.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in PICTURE_SUFFIXES:
@@ -89,6 +89,7 @@ def check_picture(path: str | Path, shot: Shot) -> bool:
             f"{path}: the format is {suffix or 'none'}; expected one of {', '.join(PICTURE_SUFFIXES)}"
         )
     check_size(shot.size, shot.supersample)
+    check_target(path)
     if suffix == ".mp4":
         video_library("writing .mp4")
     if shot.turntable and suffix not in MOVING_SUFFIXES:

@@ -49,6 +49,10 @@ def render_over(
 
     check_overlay(output, overlay)
     distinct(output, over, *given, *seen)
+    if over.is_dir() and output.resolve().is_relative_to(over.resolve()):
+        raise InputError(
+            f"-o {output}: is in the folder of the photographs, which it would join; choose another folder"
+        )
     source = frame_pictures(over)
     if len(seen) not in (0, 1, len(given)):
         raise InputError(

@@ -20,6 +20,7 @@ from posekit.errors import InputError, ViewerError
 from posekit.formats.own import OpenCVModel, ScaledOrthographicModel, View
 from posekit.skeleton import JOINTS
 from posekit.synthesis import random_views
+from posekit.viewer.browser.studio import Studio
 from posekit.viewer.overlay import (
     DrawnPerson,
     OverlaidPerson,
@@ -32,7 +33,10 @@ from posekit.viewer.overlay import (
 from posekit.viewer.overlay.figure_painter import outlines
 from posekit.viewer.overlay.frame_pictures import matched
 from posekit.viewer.overlay.image_file import read_image
+from posekit.viewer.scene.compose import Style, compose
 from posekit.viewer.scene.drawn_subject import subject_of
+from posekit.viewer.scene.framing import view_eye
+from posekit.viewer.scene.world import upright_world
 from posekit.viewer.video import Video
 from posekit.views import view_of
 
@@ -139,6 +143,24 @@ def test_outline_of_a_sphere_is_where_its_tangent_rays_are(person: OverlaidPerso
         ends = np.concatenate([middle - capsule.half_length * axis, middle + capsule.half_length * axis])
         beside = np.linalg.norm(np.cross(ends[:, None], rays), axis=2).min(axis=0)
         np.testing.assert_allclose(beside, capsule.radius, rtol=1e-6)
+
+
+def test_painted_bodies_cover_what_a_browser_draws(random_view: View, studio: Studio) -> None:
+    view = seen_by(random_view, None)
+    subject = subject_of(posekit.result_of(posekit.recover(view)), view)
+    shown = subject.frames[0].chosen([0])
+    painted = paint(
+        Image.new("RGB", SIZE, "white"), [DrawnPerson(shown=shown, figure=subject.figure, points=False)]
+    )
+    ours = np.asarray(painted).min(axis=2) < 250
+    world = upright_world(shown.points.reshape(-1, 3), None)
+    style = Style(camera=False, ground=False, layout="superposed")
+    composition = compose(shown, figure=subject.figure, world=world, style=style)
+    drawn = studio.draw(composition.scene, view_eye(shown.sight, world, SIZE), size=SIZE, supersample=1)
+    theirs = drawn[..., :3].min(axis=2) < 250
+    # Joints are balls there and dots here: thin rims differ.
+    assert (ours & theirs).sum() > 0.85 * (ours | theirs).sum()
+    assert np.abs(middle_of(ours) - middle_of(theirs)).max() < 1.0
 
 
 def test_video_in_video_out(person: OverlaidPerson, film: Path, tmp_path: Path) -> None:
@@ -340,3 +362,9 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
     assert command(monkeypatch, result, "--over", film, "-o", tmp_path / "no.png") == 2
     assert "--view VIEW" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()
+    posekit.write_view(tmp_path / "view.json", view)
+    photographs = tmp_path / "photographs"
+    write_photographs(photographs, view)
+    words = [result, "--view", tmp_path / "view.json", "--over", photographs, "-o"]
+    assert command(monkeypatch, *words, photographs / "over.png", "--frame", 0) == 2
+    assert "is in the folder of the photographs" in capsys.readouterr().err
