@@ -12,7 +12,7 @@ import numpy as np
 
 from posekit.errors import InputError
 from posekit.geometry import perpendicular, unit
-from posekit.safe_io import cut, one_line, read_toml
+from posekit.safe_io import cut, one_line, perhaps, read_toml
 from posekit.skeleton import HIPS, JOINT
 from posekit.tables.built_in import built_in_document
 
@@ -100,7 +100,7 @@ def load_ranges(name: str) -> Ranges:
         raise InputError(
             one_line(
                 f"--ranges {cut(name)}: no such table or file; expected urdf, {', '.join(NAMED_TABLES)} or the path "
-                "of a TOML file"
+                f"of a TOML file{perhaps(name, NAMED_TABLES)}"
             )
         )
     return _ranges(read_toml(name, limit=MAX_BYTES), name)

@@ -18,7 +18,7 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.errors import InputError
-from posekit.safe_io import cut
+from posekit.safe_io import cut, perhaps
 from posekit.settings import CheckSettings
 from posekit.settings.check import check_settings
 from posekit.skeleton import POINTS
@@ -170,8 +170,9 @@ def _found(name: str) -> Callable[..., Any]:
     known = {entry.name: entry for entry in entry_points(group=ENTRY_POINTS)}
     module, _, inside = name.partition(":")
     if name not in known and not (module and inside):
+        names = (*ALL_CHECKS, *sorted(known))
         raise InputError(
-            f"--checks: {cut(name)!r} is not a check; expected some of {', '.join((*ALL_CHECKS, *sorted(known)))}"
+            f"--checks: {cut(name)!r} is not a check; expected some of {', '.join(names)}{perhaps(name, names)}"
         )
     try:
         if name in known:

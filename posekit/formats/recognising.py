@@ -15,6 +15,9 @@ from posekit.formats.registry import FOLDER_SUFFIX, formats, names, with_suffix
 from posekit.safe_io import cut, nearest, refusal, shown
 from posekit.safe_io.regular_file import check_file, unreadable
 
+PICTURE_SUFFIXES: Final = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".gif", ".heic")
+VIDEO_SUFFIXES: Final = (".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v")
+"""The ends of names of what detectors look at."""
 PICKLE_SUFFIXES: Final = (".pkl", ".pickle", ".p", ".pt", ".pth", ".joblib")
 """The ends of names of Python's pickles, which are never opened."""
 
@@ -155,7 +158,15 @@ def _of_folder(given: GivenFile) -> Recognised:
 def _nothing_known(given: GivenFile) -> InputError:
     """Word the refusal of a file that no format looks like."""
     known = ", ".join(names(Content.KEY_POINTS, Content.MOTION))
+    for suffixes, what in ((PICTURE_SUFFIXES, "a picture"), (VIDEO_SUFFIXES, "a video")):
+        if given.suffix in suffixes:
+            expected = "the key points that a detector found in it, or a view"
+            remedy = "run a pose detector (OpenPose, MediaPipe, MMPose, …) on it, and give what it writes"
+            return refusal(given.path, "", what, expected, remedy)
     if given.suffix == ".json":
+        if isinstance(given.document, dict) and {"images", "annotations"} <= given.document.keys():
+            got, expected = "a COCO file without key points", 'annotations with "keypoints"'
+            return refusal(given.path, "annotations", got, expected, "give the file of its key points")
         got = f"JSON of no known format, {shown(given.document)}"
         return refusal(given.path, "", got, known, "say which with --format")
     if given.suffix in PICKLE_SUFFIXES:

@@ -15,6 +15,7 @@ from posekit.safe_io.npz_file import read_npy as read_npy
 from posekit.safe_io.refusal import cut as cut
 from posekit.safe_io.refusal import nearest as nearest
 from posekit.safe_io.refusal import one_line as one_line
+from posekit.safe_io.refusal import perhaps as perhaps
 from posekit.safe_io.refusal import refusal as refusal
 from posekit.safe_io.refusal import shown as shown
 from posekit.safe_io.regular_file import open_file as open_file

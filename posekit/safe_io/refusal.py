@@ -73,3 +73,9 @@ def nearest(name: str, names: Iterable[str]) -> str:
     if near:
         return f"did you mean {' or '.join(near)}?"
     return f"valid names are {', '.join(valid)}"
+
+
+def perhaps(name: str, names: Iterable[str]) -> str:
+    """Suggest what a name was meant to be, as the end of a sentence that lists the names; empty where none is near."""
+    near = difflib.get_close_matches(name[:MAX_SHOWN_CHARACTERS], list(names), n=1)
+    return f"; did you mean {near[0]}?" if near else ""

@@ -6,12 +6,16 @@ import os
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
+from difflib import get_close_matches
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 from posekit.errors import InputError
 from posekit.safe_io.refusal import cut, refusal
 
+MAX_NEIGHBOURS = 2000
+"""Names of a folder among which a misspelt one is sought."""
 _OPEN_FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0)
 """Opening a pipe would wait for its other end: one that took the file's place after the first look must not."""
 
@@ -69,7 +73,20 @@ def check_file(path: str | Path, *, limit: int, too_large: str = "split it") -> 
 def unreadable(path: str | Path, error: Exception) -> InputError:
     """Word the operating system's refusal to give a file."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    if isinstance(error, FileNotFoundError) and (near := _neighbours(Path(path))):
+        return refusal(path, "", cut(reason), "the name of a file that is there", near)
     return refusal(path, "", cut(reason), "a readable file", "check the name and the permissions")
+
+
+def _neighbours(path: Path) -> str:
+    """Suggest files of nearly that name beside it; empty where there is none."""
+    try:
+        with os.scandir(path.parent) as entries:
+            names = [entry.name for entry in islice(entries, MAX_NEIGHBOURS)]
+    except (OSError, ValueError):
+        return ""
+    near = get_close_matches(path.name, names, n=2)
+    return f"did you mean {' or '.join(str(path.with_name(name)) for name in near)}?" if near else ""
 
 
 def _check_status(path: str | Path, status: os.stat_result, limit: int, too_large: str) -> None:

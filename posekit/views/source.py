@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from posekit.errors import InputError
+from posekit.safe_io import perhaps
 
 OPTION_NAMES: Final = {"rate": "--fps", "minimum_confidence": "--min-confidence"}
 """The options that are called otherwise than what they set."""
@@ -83,7 +84,10 @@ class Source:
 
             names = (*OWN_PROPORTIONS, *proportion_names())
             if self.proportions not in names:
-                raise InputError(f"--proportions: {self.proportions!r}; expected one of {', '.join(names)}")
+                raise InputError(
+                    f"--proportions: {self.proportions!r}; expected one of {', '.join(names)}"
+                    + perhaps(self.proportions, names)
+                )
         _one_of({"--lengths": self.lengths, "--calibrate": self.calibrate}, "one source of lengths")
         inf = float("inf")
         bounds = (

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from posekit.errors import InputError
-from posekit.safe_io import cut, nearest, one_line, read_toml, refusal
+from posekit.safe_io import cut, nearest, one_line, perhaps, read_toml, refusal
 from posekit.settings import ValidateSettings
 from posekit.tables.built_in import built_in_document
 from posekit.validators.motion.motion_check import MotionCheck
@@ -56,7 +56,7 @@ def load_profile(name: str) -> Profile:
         raise InputError(
             one_line(
                 f"--profile {cut(name)}: no such profile or file; expected {', '.join(BUILT_IN_PROFILES)} or the "
-                "path of a TOML file"
+                f"path of a TOML file{perhaps(name, BUILT_IN_PROFILES)}"
             )
         )
     return _profile(read_toml(name), name)

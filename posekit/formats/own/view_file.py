@@ -22,12 +22,22 @@ from posekit.formats.own.view_schema import (
     ViewFile,
 )
 from posekit.safe_io.json_file import read_json
-from posekit.safe_io.refusal import refusal
+from posekit.safe_io.refusal import refusal, shown
 from posekit.safe_io.writing import json_pieces, write_text
 from posekit.skeleton import HEAD_POINTS, JOINTS, POINTS
 from posekit.tables.file_model import validated
 
 Array = NDArray[np.float64]
+
+
+def _refuse_objects(document: Any, path: str | Path) -> None:
+    """Refuse the view of an object that is no person: none of its points is a joint."""
+    frames = document.get("frames") if isinstance(document, dict) else None
+    first = frames[0] if isinstance(frames, list) and frames else None
+    image = first.get("image") if isinstance(first, dict) else None
+    if isinstance(image, dict) and len(image) > 1 and not any(name in POINTS for name in image):
+        remedy = "where it is another articulated object, say which with --linkage"
+        raise refusal(path, "frames[0].image", shown(image), "the joints of a person", remedy)
 
 
 def read_view(path: str | Path) -> View:
@@ -48,7 +58,9 @@ def read_view(path: str | Path) -> View:
     InputError
         Where the file breaks the schema: the first error, with how many more.
     """
-    file = validated(ViewFile, read_json(path), path)
+    document = read_json(path)
+    _refuse_objects(document, path)
+    file = validated(ViewFile, document, path)
     frames, unit, figure = file.frames, file.unit, file.figure
     image = _gather([frame.image for frame in frames], JOINTS, 2)
     head_image = _gather([frame.head_image for frame in frames], HEAD_POINTS, 2)
