@@ -19,9 +19,8 @@ ROOT: Final = Path(__file__).parents[1]
 PAGE: Final = ROOT / "docs/reference/mistakes.md"
 HEAD: Final = """# What the answers to mistakes look like
 
-Whatever is wrong, `posekit` writes one line to the standard error, ends with 2, and leaves nothing half-written. The line
-says where
-and what was found, what is expected, and what to do. These are made in the tests, among the files that
+Whatever is wrong, `posekit` writes one line to the standard error, ends with 2, and leaves nothing half-written. The
+line says where and what was found, what is expected, and what to do. These are made in the tests, among the files that
 `posekit samples` writes, a result `postures.npz`, and files of other programs.
 
 """
