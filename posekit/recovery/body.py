@@ -81,6 +81,11 @@ class LiftedBody(Protocol):
         ...
 
     @property
+    def overlap(self) -> float:
+        """How deep bodies may be in each other because of the body's own proportions, metres; zero or negative."""
+        ...
+
+    @property
     def inferred(self) -> tuple[str, ...]:
         """The joints of the figure that the tree has not, and that are completed."""
         ...
@@ -114,6 +119,7 @@ class FigureBody:
     stature: float
     inferred: tuple[str, ...] = ()
     derived: tuple[str, ...] = ()
+    overlap: float = 0.0
 
     @cached_property
     def tree(self) -> InterpretationTree:

@@ -156,6 +156,7 @@ def recover(
     _refuse_impossible(frames)
     up = up_of(view.camera)
     record = {**_record(asked, tolerance, body.figure, frames, noise, up), **_told(refiner, trees)}
+    record["contact_margin"] += body.overlap
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
 
 

@@ -188,6 +188,8 @@ def test_taylors_human_needs_neither_neck_nor_pelvis(scale: str | None) -> None:
     assert frame.inferred is not None
     assert set(frame.inferred[0]) == {"neck", "pelvis"}
     assert len(frame) + sum(frame.rejected.values()) == 8192
+    # Bodies of his proportions are in each other where they stand, and the result says by how much they may be.
+    assert recovery.settings["contact_margin"] <= frame.margins["collision"].min() < -0.01
 
 
 @pytest.mark.parametrize("suffix", ["json", "npz"])
