@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from posekit.body.measured import MeasuredPerson, measured_person
 from posekit.display.short_repr import ShortRepr
-from posekit.geometry import Array
+from posekit.geometry import Array, runs
 from posekit.remedy.between import interpolated, smoothed
 from posekit.remedy.exchange import CLIP_MARKS, exchanged
 from posekit.remedy.ground import grounded, held_feet
@@ -188,7 +188,12 @@ def _interpolate(clip: MotionClip, points: Array, found: Rejected, person: Measu
             some, own = points.copy(), np.concatenate([bad, np.zeros((len(bad), 9), dtype=bool)], axis=1)
             some[own] = whole[own]
             tried += [some, whole]
-        tried.append(_stepped_back(points, np.asarray(jumps.any(axis=1))))
+        bad = np.asarray(jumps.any(axis=1))
+        # What goes aside over several frames stays there: between them there is nothing to interpolate.
+        tried.insert(
+            0 if max(stop - start for start, stop in runs(bad)) > 1 else len(tried),
+            _stepped_back(points, bad),
+        )
     return tried
 
 
@@ -199,12 +204,14 @@ def _whole(points: Array, bad: Bools) -> Array:
 
 
 def _stepped_back(points: Array, bad: Bools) -> Array:
-    """Move all that comes after a jump of the body back to where it would have gone on."""
+    """Move a body that goes aside, and all that comes after, back to where it would have gone on."""
     out = points.copy()
-    for at in np.flatnonzero(bad & ~np.roll(bad, 1)).tolist():
-        if 1 < at < len(points) - 1:
-            way = np.nanmedian(np.diff(out[at - 2 : at + 2, : len(JOINTS)], axis=0), axis=1)
-            out[at:] -= way[1] - (way[0] + way[2]) / 2
+    for start, stop in runs(bad):
+        if 1 < start and stop < len(points):
+            ways = np.nanmedian(np.diff(out[start - 2 : stop + 1, : len(JOINTS)], axis=0), axis=1)
+            aside = np.cumsum(ways[1:-1] - (ways[0] + ways[-1]) / 2, axis=0)
+            out[start:stop] -= aside[:, None]
+            out[stop:] -= aside[-1]
     return out
 
 
