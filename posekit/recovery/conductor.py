@@ -155,8 +155,7 @@ def recover(
     frames = _frames(view, trees, fit, asked.group, bare)
     _refuse_impossible(frames)
     up = up_of(view.camera)
-    record = {**_record(asked, tolerance, body.figure, frames, noise, up), **_told(refiner, trees)}
-    record["contact_margin"] += body.overlap
+    record = {**_record(asked, tolerance, body, frames, noise, up), **_told(refiner, trees)}
     return Recovery(figure=body.figure, fit=grower.fit, frames=frames, settings=record, grower=grower, up=up)
 
 
@@ -218,7 +217,7 @@ def _frames(
 def _record(
     asked: RecoverSettings,
     tolerance: Tolerance | None,
-    figure: Figure,
+    body: LiftedBody,
     frames: Sequence[FrameRecovery],
     noise: Noise | None,
     up: Up,
@@ -226,14 +225,15 @@ def _record(
     """Gather what decided the result; the noise of photographs only where one was refined with it."""
     photographs = any(frame.family is not None for frame in frames)
     unused = photographs and all(frame.judged != "refined" for frame in frames)
-    return record_of(
+    record = record_of(
         asked,
         tolerance,
-        figure,
+        body.figure,
         [(frame.judged, frame.tolerance) for frame in frames],
         None if noise is None or unused else noise.document(),
         up,
     )
+    return record | {"contact_margin": record["contact_margin"] + body.overlap}
 
 
 def _told(refiner: Refiner | None, trees: Mapping[int, FrameTrees]) -> dict[str, Any]:
