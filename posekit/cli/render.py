@@ -324,7 +324,9 @@ def _shown(
     subject = subject_of(content, view)
     numbers_of_frames = frame_numbers(frame, len(subject.frames))
     if numbers_of_frames is None:
-        filled = [k for k, shown in enumerate(subject.frames) if len(shown)]
+        # A path bridges frames without a survivor.
+        path = posture in ("", "path") and isinstance(content, Result) and content.paths is not None
+        filled = [k for k, shown in enumerate(subject.frames) if len(shown) or (path and moving)]
         numbers_of_frames = filled if moving else filled[:1]
     if not moving:
         numbers_of_frames = numbers_of_frames[:1]
