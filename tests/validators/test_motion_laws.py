@@ -136,6 +136,15 @@ def test_a_body_that_goes_half_a_metre_aside_jumps_while_it_goes(frames: int, tu
     assert found == {"teleport": (51 - frames, 50) if turned_back else (40, 39 + frames)}
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3, 5, 8])
+def test_a_body_that_is_aside_for_some_frames_jumps_there_and_back(frames: int) -> None:
+    clip = with_joints(WALK, slice(40, 40 + frames), lambda joints: joints + np.array([0.3, 0.0, 0.4]))
+    rejected = verdicts(clip)
+    assert [name for name, found in rejected.items() if found.any()] == ["teleport"]
+    ends = [40] if frames == 1 else [40, 40 + frames]
+    assert np.flatnonzero(rejected["teleport"].any(axis=1)).tolist() == ends
+
+
 def test_a_body_that_is_pushed_aside_in_a_third_of_a_second_is_none() -> None:
     way = 0.1 * (1.0 - np.cos(np.pi * np.clip((np.arange(90) - 40) / 10, 0.0, 1.0)))
     assert named(replace(WALK, joints=WALK.joints + way[:, None, None])) == {}

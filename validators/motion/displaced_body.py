@@ -27,6 +27,9 @@ PUSHED_ACCELERATION: Final = 20.0
 """Metres a second squared by which a body that goes as one is pushed: three times its weight, less its own; runners
 and jumpers have such (Cavanagh & Lafortune 1980, J. Biomech. 13)."""
 
+BESIDE_SHARE: Final = 0.75
+"""Of a displacement's speed, that another one beside it has: half of it comes of velocities that it misleads."""
+
 APART_TIMES: Final = 2.0
 """By which the median difference of joints from the body's displacement is taken off it."""
 
@@ -63,9 +66,11 @@ def displaced_by(joints: Array, step: float) -> Array:
         first = int(best.argmax()) + 1
         last = first + int(over[first - 1]) - 1
         found[first : last + 1] = best[first - 1] * over[first - 1]
-        # Windows that these frames are in say the same again, or what comes of it.
-        starts = np.arange(len(best))
-        best[(starts - side < last + apart) & (starts + over + side >= first - apart)] = 0.0
+        # Windows with these frames say the same again; those beside them what comes of it, where they say less.
+        starts, fastest = np.arange(len(best)), best[first - 1]
+        again = (starts < last) & (starts + over >= first)
+        beside = (starts - side < last + apart) & (starts + over + side >= first - apart)
+        best[again | (beside & (best < BESIDE_SHARE * fastest))] = 0.0
     return found
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
@@ -14,6 +15,9 @@ from posekit.validators.motion.timeline import centred, filtered, norm
 
 LEAST_JUMP: Final = 0.06
 """Metres by which a frame must jump to be left out of what is judged as motion."""
+
+DISPLACED_SHARE: Final = 0.5
+"""Of a displacement for good near it, that a jump of one frame is more than."""
 
 SIDE_FRAMES: Final = 3
 """Frames on either side that a jump is told by."""
@@ -73,6 +77,13 @@ def jumps_of(joints: Array, step: float) -> Jumps:
     offset, misfit = _measured(joints, _ONE_FRAME, count)
     body = middle(offset)
     alone = norm(body) - JOINT_MISFITS * middle(misfit)
+    displaced = displaced_by(joints, step)
+    if (alone > LEAST_JUMP).any():
+        # Beside a body that goes aside, what is off from a curve is off from where it went.
+        beside = sliding_window_view(np.pad(np.nan_to_num(displaced), SIDE_FRAMES), 2 * SIDE_FRAMES + 1)
+        alone[alone < DISPLACED_SHARE * beside.max(axis=1)] = np.nan
+        if (alone > LEAST_JUMP).any():
+            displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
     joint = norm(offset) - JOINT_MISFITS * misfit
     beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
     joint = np.where((alone > 0)[:, None], np.minimum(beside, joint), joint)
@@ -85,12 +96,7 @@ def jumps_of(joints: Array, step: float) -> Jumps:
                 jump = _near_end(window, by)
                 # A last frame that jumps is off from the curve of those next to it, not they.
                 joint[frame] = np.where((joint[end] > 0) & (joint[end] > jump), np.nan, jump)
-    back = (
-        np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints)
-        if (alone > LEAST_JUMP).any()
-        else joints
-    )
-    return Jumps(joint=joint, body=np.fmax(alone, displaced_by(back, step)))
+    return Jumps(joint=joint, body=np.fmax(alone, displaced))
 
 
 def _near_end(window: Array, by: _Filter) -> Array:
