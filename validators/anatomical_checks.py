@@ -9,8 +9,10 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
+from posekit.compiled import limb_kernels
 from posekit.compiled import screen_kinds as kernels
-from posekit.geometry import Array
+from posekit.compiled.compiling import compiled
+from posekit.geometry import Array, rotate_back, unit
 from posekit.skeleton import DOFS, JOINT, TORSO
 from posekit.tree import Check, Findings, Loosening, Place, Rule
 from posekit.validators.anatomical import Anatomy
@@ -80,8 +82,7 @@ class AnatomicalLimb(Check):
 
     def judge(self, points: Array) -> Findings:
         """Judge the limb's angles; see `posekit.tree.Check`."""
-        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
-        R_parent = (torso_frame if self._on_torso else hips_frame)(*rigid)
+        R_parent, limb = self._parts(points)
         end = limb[2] if len(limb) == 3 else None
         angles = np.degrees(self.figure.ik.limb(self.limb[0], R_parent, limb[0], limb[1], end))
         walls = limb_walls(
@@ -107,6 +108,37 @@ class AnatomicalLimb(Check):
             np.take_along_axis(each, best, axis=1)[:, 0, judged] for each in (value, lower, upper)
         )
         return Findings(value=value, lower=lower, upper=upper, tolerance=tolerance[:, judged])
+
+    def judge_looped(self, points: Array) -> Findings:
+        """Judge whole limbs by a loop, but for those that it is not sure of; see `posekit.tree.Check`."""
+        if len(self.limb) == 2:
+            return self.judge(points)
+        R_parent, (start, middle, end) = self._parts(points)
+        upper, lower = (rotate_back(R_parent, unit(b - a)) for a, b in ((start, middle), (middle, end)))
+        value, low, high = np.empty((3, len(points), len(self.places)))
+        loose, writing = np.empty(len(points)), np.empty(len(points), dtype=np.int64)
+        upper, lower = np.ascontiguousarray(upper), np.ascontiguousarray(lower)
+        loop = compiled(limb_kernels).limbs_read
+        loop(upper, lower, self._ends, self.rule.numbers, value, low, high, loose, writing)
+        tolerance = np.full(value.shape, self.tolerance, dtype=np.float64)
+        tolerance[:, judged_names(self.anatomy, self._joint, 4).index(f"{self._joint}.rotation")] = loose
+        rows = np.flatnonzero(writing < 0)
+        if rows.size:
+            asked = self.judge(points[rows])
+            value[rows], low[rows], high[rows] = asked.value, asked.lower, asked.upper
+            tolerance[rows] = asked.tolerance
+        return Findings(value=value, lower=low, upper=high, tolerance=tolerance)
+
+    def _parts(self, points: Array) -> tuple[Array, Array]:
+        """Return the frames of what the limb hangs on (N, 3, 3), and its joints (2 or 3, N, 3)."""
+        rigid, limb = np.split(np.moveaxis(points, 1, 0), [len(self._parent)])
+        return (torso_frame if self._on_torso else hips_frame)(*rigid), limb
+
+    @cached_property
+    def _ends(self) -> Array:
+        """The figure's own limits of the four angles (4, 2), degrees: of ways to write a limb they choose the first."""
+        first, limits = DOFS.index(f"{self.limb[0]}.flexion"), self.figure.ik.limits
+        return np.degrees(np.stack([limits.lower, limits.upper], axis=-1)[first : first + 4])
 
     @cached_property
     def _turn(self) -> tuple[float, float]:

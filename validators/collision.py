@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.capsules import Capsule
 from posekit.body.pool import collides, make_pool
+from posekit.compiled import capsule_kernels
 from posekit.compiled import screen_kinds as kernels
+from posekit.compiled.compiling import compiled
 from posekit.geometry import Array, cross
 from posekit.skeleton import JOINTS
 from posekit.tree import Check, Findings, Place, Rule
@@ -80,31 +82,51 @@ class PairCollision(Check):
 
     def judge(self, points: Array) -> Findings:
         """Measure the pairs, and ask coal about those that may be in contact; see `posekit.tree.Check`."""
-        split = len(self.a.points)
-        middle_a, axis_a = self.a.place(points[:, :split])
-        middle_b, axis_b = self.b.place(points[:, split:])
+        middle_a, axis_a, middle_b, axis_b = self._placed(points)
         gap = middle_b - middle_a
-        radii = self.a.radius + self.b.radius
-        reach = self.a.half_length + self.b.half_length + radii
-        value = np.sqrt(np.einsum("ni,ni->n", gap, gap)) - reach
-        near = ~np.isnan(value) if self.exact else value <= self.contact_margin
-        distance = segment_distance(
-            gap[near], axis_a[near] * self.a.half_length, axis_b[near] * self.b.half_length
-        )
+        half_a, half_b = self.a.half_length, self.b.half_length
+        bound = np.sqrt(np.einsum("ni,ni->n", gap, gap)) - (half_a + half_b)
+        near = ~np.isnan(bound) if self.exact else bound - self._radii <= self.contact_margin
+        distance = bound.copy()
+        distance[near] = segment_distance(gap[near], axis_a[near] * half_a, axis_b[near] * half_b)
+        rejects = self._touching(points, distance)
+        return self._findings(distance if self.exact else np.where(rejects, distance, bound), rejects)
+
+    def judge_looped(self, points: Array) -> Findings:
+        """Measure the pairs by a loop; see `posekit.tree.Check`."""
+        if not self.exact:
+            return self.judge(points)
+        distance = np.empty(len(points))
+        loop = compiled(capsule_kernels).axis_distances
+        loop(np.ascontiguousarray(points, dtype=np.float64), self.rule.numbers, distance)
+        return self._findings(distance, self._touching(points, distance))
+
+    def _touching(self, points: Array, distance: Array) -> NDArray[np.bool_]:
+        """Ask coal about the pairs whose axes (N,) are so near that they may be in contact."""
         rejects = np.zeros(len(points), dtype=bool)
-        # The closed form agrees with coal to a thousandth of this: it leaves to it what may be in contact.
-        asked = np.flatnonzero(near)[distance <= max(radii + self.contact_margin, 0.0) + CLEAR_METRES]
+        # The closed form agrees with coal to a thousandth of this.
+        asked = np.flatnonzero(distance <= max(self._radii + self.contact_margin, 0.0) + CLEAR_METRES)
         if asked.size:
-            rejects[asked] = self._coal(middle_a[asked], axis_a[asked], middle_b[asked], axis_b[asked])
-        measured = near if self.exact else rejects
-        value[measured] = distance[measured[near]] - radii
+            rejects[asked] = self._coal(*self._placed(points[asked]))
+        return rejects
+
+    def _findings(self, distance: Array, rejects: NDArray[np.bool_]) -> Findings:
         return Findings(
-            value=value[:, None],
+            value=(distance - self._radii)[:, None],
             lower=np.array([self.contact_margin]),
             upper=np.array([np.inf]),
             tolerance=CONTACT_TOLERANCE,
             rejects=rejects[:, None],
         )
+
+    @property
+    def _radii(self) -> float:
+        return self.a.radius + self.b.radius
+
+    def _placed(self, points: Array) -> tuple[Array, Array, Array, Array]:
+        """Return middle and axis of both capsules."""
+        split = len(self.a.points)
+        return *self.a.place(points[:, :split]), *self.b.place(points[:, split:])
 
     def confirm(self, presumed: Array) -> bool:
         """Ask coal whether pairs that seem to penetrate do; see `posekit.tree.Check.confirm`."""

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body.closed_form import Alike
+from posekit.compiled.compiling import is_fast
 from posekit.geometry import Array
 from posekit.tree import Check
+
+GROWN_WORTH: Final = 10
+"""Postures whose judging gains by compiled loops what growing the trees of one frame does."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,13 +96,14 @@ def judge(checks: Sequence[Check], points: Array) -> list[Judgement]:
     """
     # Each point in one piece: checks read a few of them, over all postures.
     by_point = np.ascontiguousarray(np.moveaxis(points, 1, 0))
+    looped = is_fast(len(points) // GROWN_WORTH)
     return [
-        _gathered(name, [check for check in checks if check.name == name], by_point)
+        _gathered(name, [check for check in checks if check.name == name], by_point, looped)
         for name in dict.fromkeys(check.name for check in checks)
     ]
 
 
-def _gathered(name: str, checks: Sequence[Check], by_point: Array) -> Judgement:
+def _gathered(name: str, checks: Sequence[Check], by_point: Array, looped: bool) -> Judgement:
     """Ask the checks of one validator about points (19, N, 3); each of its places has one column."""
     units: dict[str, str] = {}
     for check in checks:
@@ -115,7 +120,8 @@ def _gathered(name: str, checks: Sequence[Check], by_point: Array) -> Judgement:
             rows = np.flatnonzero(np.isnan(margin[[column[where] for where in check.where]]).any(axis=0))
             if not rows.size:
                 continue
-        findings = check.judge(np.moveaxis(by_point[list(check.points)][:, rows], 0, 1))
+        own_points = np.moveaxis(by_point[list(check.points)][:, rows], 0, 1)
+        findings = check.judge_looped(own_points) if looped else check.judge(own_points)
         shape = findings.value.shape
         new = (
             findings.value,

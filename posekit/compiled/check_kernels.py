@@ -16,12 +16,14 @@ from typing import Any
 from posekit.compiled import (
     anatomical_kernels,
     angle_kernels,
+    capsule_kernels,
     noise_kernels,
     projected_kernels,
     rigid_kernels,
 )
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
+from posekit.compiled.capsule_kernels import least_apart, mean
 from posekit.compiled.frame_kernels import PRESUMED_AT
 from posekit.compiled.noise_kernels import AT_COUNT, AT_PAIRS, PAIR_NUMBERS, allow, forget
 from posekit.compiled.projected_kernels import head_plane, hip_plane, projected_ball, projected_hinge
@@ -58,29 +60,6 @@ CLEAR_GAP = 1e-6
 """Metres between two capsules from which they are clear of contact: a thousand times what the judge cares for."""
 
 
-def clamp(value: Any) -> Any:
-    """Bring a value into [-1, 1]."""
-    return min(max(value, -1.0), 1.0)
-
-
-def mean(w: Array, first: int, count: int) -> Any:
-    """Return the mean of some points."""
-    x, y, z = 0.0, 0.0, 0.0
-    for i in range(3 * first, 3 * (first + count), 3):
-        x += w[i]
-        y += w[i + 1]
-        z += w[i + 2]
-    return x / count, y / count, z / count
-
-
-def apart(
-    gx: Any, gy: Any, gz: Any, ax: Any, ay: Any, az: Any, s: Any, bx: Any, by: Any, bz: Any, t: Any
-) -> Any:
-    """Return the squared distance between s on the one segment and t on the other."""
-    x, y, z = gx + t * bx - s * ax, gy + t * by - s * ay, gz + t * bz - s * az
-    return x * x + y * y + z * z
-
-
 def capsules(w: Array, at: int) -> Any:
     """Screen two capsules: they are clear of each other, or they penetrate, which coal must confirm.
 
@@ -110,20 +89,7 @@ def capsules(w: Array, at: int) -> Any:
     if far > 0 and squared > far * far:
         return NO_VIOLATION
     ax, ay, az, bx, by, bz = half_a * ux, half_a * uy, half_a * uz, half_b * vx, half_b * vy, half_b * vz
-    aa, bb = half_a * half_a, half_b * half_b
-    ab = ax * bx + ay * by + az * bz
-    ag, bg = ax * gx + ay * gy + az * gz, bx * gx + by * gy + bz * gz
-    nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    determinant = nx * nx + ny * ny + nz * nz
-    s = 0.0
-    if determinant > 1e-30 * aa * bb:
-        mx, my, mz = gy * bz - gz * by, gz * bx - gx * bz, gx * by - gy * bx
-        s = clamp((nx * mx + ny * my + nz * mz) / determinant)
-    t = clamp((s * ab - bg) / bb)
-    least = apart(gx, gy, gz, ax, ay, az, clamp((ag + t * ab) / aa), bx, by, bz, t)
-    for end in (-1.0, 1.0):
-        least = min(least, apart(gx, gy, gz, ax, ay, az, clamp((ag + end * ab) / aa), bx, by, bz, end))
-        least = min(least, apart(gx, gy, gz, ax, ay, az, end, bx, by, bz, clamp((end * ab - bg) / bb)))
+    least = least_apart(gx, gy, gz, ax, ay, az, bx, by, bz)
     if least > near * near:
         return NO_VIOLATION
     if not (deep > 0 and least < deep * deep):
@@ -192,7 +158,14 @@ def screen(kind: int, w: Array, at: int) -> Any:  # noqa: PLR0912 - a branch a k
     return NOT_CLEAR
 
 
-KERNEL_PARTS = (rigid_kernels, noise_kernels, angle_kernels, anatomical_kernels, projected_kernels)
+KERNEL_PARTS = (
+    rigid_kernels,
+    capsule_kernels,
+    noise_kernels,
+    angle_kernels,
+    anatomical_kernels,
+    projected_kernels,
+)
 """Other modules whose kernels are compiled with these."""
 
 COMPILED_TYPES = {
@@ -203,9 +176,6 @@ COMPILED_TYPES = {
     "side": "(f8[::1], i8)",
     "distance": "(f8[::1], i8)",
     "placement": "(f8[::1], i8)",
-    "clamp": "",
-    "mean": "",
-    "apart": "",
     "onto": "",
     "capsules": "",
     "noisy": "(f8[::1], i8)",

@@ -258,6 +258,49 @@ def limbs_beyond(
         writing[n] = beyond_limits(upper[n], lower[n], ends, w, writing[n], above[n], below[n])
 
 
+def limbs_read(
+    upper: Array,
+    lower: Array,
+    ends: Array,
+    numbers: Array,
+    value: Array,
+    low: Array,
+    high: Array,
+    loose: Array,
+    writing: NDArray[np.int64],
+) -> None:
+    """Read limbs (N, 3), (N, 3) in the writing that the judge reports: the angles that are judged, and their limits.
+
+    Parameters
+    ----------
+    upper, lower, ends, numbers
+        As `limbs_beyond` takes them.
+    value, low, high : array (N, K)
+        Filled, degrees: K places of the check.
+    loose : array (N,)
+        Filled: the tolerance of the rotation, degrees.
+    writing : int array (N,)
+        Filled: -1 where the judge must be asked.
+    """
+    w = np.empty(NUMBERS_AT + len(numbers))
+    w[NUMBERS_AT:] = numbers
+    above, below = np.empty(4), np.empty(4)
+    for n in range(len(upper)):
+        best = beyond_limits(upper[n], lower[n], ends, w, -1, above, below)
+        if best >= 0:
+            best = beyond_limits(upper[n], lower[n], ends, w, best, above, below)
+        writing[n] = best
+        if best < 0:
+            continue
+        loose[n] = w[NUMBERS_AT + AT_TOLERANCE] / abs(math.sin(w[READ_AT + OF_HINGE] / PER_RADIAN))
+        for place in range(value.shape[1]):
+            i = int(w[NUMBERS_AT + AT_JUDGED + 1 + place])
+            unseen = i == OF_ROTATION and loose[n] > w[NUMBERS_AT + AT_UNSEEN]
+            value[n, place] = math.nan if unseen else w[READ_AT + i]
+            low[n, place] = w[LOW_AT + i] if w[LOW_AT + i] > -BEYOND_ALL else -math.inf
+            high[n, place] = w[HIGH_AT + i] if w[HIGH_AT + i] < BEYOND_ALL else math.inf
+
+
 COMPILED_TYPES = {
     "near": "",
     "worst": "",
@@ -272,5 +315,8 @@ COMPILED_TYPES = {
     "judge_writing": "",
     "beyond_limits": "",
     "limbs_beyond": "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], i8[::1])",
+    "limbs_read": (
+        "(f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], f8[:,::1], f8[:,::1], f8[:,::1], f8[::1], i8[::1])"
+    ),
 }
 """The kernels, in the order in which they need each other, with the types of those that are called."""

@@ -225,6 +225,10 @@ class Check:
         """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""
         raise NotImplementedError
 
+    def judge_looped(self, points: Array) -> Findings:
+        """Judge many postures by compiled loops, to rounding as `judge` does; by that, where there are none."""
+        return self.judge(points)
+
     def confirm(self, presumed: Array) -> bool:
         """Ask whoever has the last word whether all that its screen presumed (M, …) is so; see `Rule`."""
         del presumed
