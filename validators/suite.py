@@ -57,6 +57,13 @@ class Judgement:
         """The smallest margin of each posture (N,); NaN where nothing was decided."""
         return np.asarray(np.fmin.reduce(self.margin, axis=1))
 
+    def without(self, rows: NDArray[np.bool_]) -> Judgement:
+        """Return it with nothing decided of some postures (N,)."""
+        changed = {name: np.array(getattr(self, name)) for name in ("value", "margin", "violated")}
+        for array in changed.values():
+            array[rows] = False if array.dtype == np.bool_ else np.nan
+        return replace(self, **changed)
+
     def of(self, rows: NDArray[np.intp] | slice) -> Judgement:
         """Return what it says about some of the postures."""
         names = ("value", "lower", "upper", "margin", "violated")

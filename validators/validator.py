@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from posekit.body import Figure, with_head
@@ -168,7 +169,8 @@ class Validator(ShortRepr):
         head : array (N, 5, 3), optional
             Nose, eyes and ears; without them the neck is undecided and no arm collides with the head.
         q : array (N, nq), optional
-            Configurations in Pinocchio's order, instead of postures; they are taken as they are.
+            Configurations in Pinocchio's order, instead of postures; they are taken as they are, and nothing is decided
+            of those that hold NaN.
         sequence : int array (N,), optional
             Which sequence in time each posture belongs to: a robot's fit then starts from the one before.
         lengths : mapping, optional
@@ -265,6 +267,19 @@ class Validator(ShortRepr):
         return self._robot.models.known_kinematics if self.robot is not None else None
 
     def _check_configurations(self, q: ArrayLike) -> Report:
+        """Judge configurations; of those with NaN nothing is decided, and Pinocchio sees a neutral one instead."""
+        unknown = (
+            np.isnan(q) if isinstance(q, np.ndarray) and q.ndim == 2 and q.dtype.kind == "f" else np.empty(0)
+        )
+        if not unknown.any():
+            return self._check_known(q)
+        given, rows = np.array(q), unknown.any(axis=1)
+        neutral = pin.neutral(self.configured[0].model)
+        if given.shape[1] == len(neutral):
+            given[rows] = neutral
+        return self._check_known(given).without(rows)
+
+    def _check_known(self, q: ArrayLike) -> Report:
         if self._figure is None:
             return _report(self._robot.judge_configurations(q))
         checked, judgements = self._configurations.judge(q)

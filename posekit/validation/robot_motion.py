@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -38,13 +39,34 @@ def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPos
     """
     names = validator.configuration_names
     if validator.robot is None:
-        return held_configurations(configurations, names, validator.figure.forward_kinematics)
+        return held_configurations(configurations, names, of_known(validator.figure.forward_kinematics))
     kinematics = validator.kinematics
     if kinematics is None:
         return held_configurations(configurations, names, _nowhere)
-    held = held_configurations(configurations, names, partial(mapped_positions, kinematics))
+    held = held_configurations(configurations, names, of_known(partial(mapped_positions, kinematics)))
     feet = soles(kinematics, validator.robot.geometry)
-    return held if feet is None else replace(held, feet=feet.positions(held.q))
+    return held if feet is None else replace(held, feet=of_known(feet.positions)(held.q))
+
+
+def of_known(positions: Callable[[Array], Array]) -> Callable[[Array], Array]:
+    """Return forward kinematics that place nothing where a configuration holds NaN.
+
+    Parameters
+    ----------
+    positions : callable
+        From q (N, nq), finite, to points (N, P, 3).
+    """
+
+    def place(q: Array) -> Array:
+        known = ~np.isnan(q).any(axis=1)
+        if known.all():
+            return positions(q)
+        some = positions(q[known])
+        points = np.full((len(q), *some.shape[1:]), np.nan)
+        points[known] = some
+        return points
+
+    return place
 
 
 @lru_cache(maxsize=4)
@@ -102,7 +124,7 @@ def moves_of(
     """Return what a clip has of a robot: its configurations, velocities (T, nv) and their limits (nv,).
 
     A frame's velocity is that of the step to it, on the manifold of the configurations; NaN in the first, and where its
-    time is not known or not after the one before.
+    time is not known or not after the one before, or a number of the two is not known.
 
     Parameters
     ----------
@@ -119,7 +141,8 @@ def moves_of(
         return {}
     velocity = np.full((len(q), model.nv), np.nan)
     step = np.diff(time)
-    ahead = np.flatnonzero(step > 0)
+    known = ~np.isnan(q).any(axis=1)
+    ahead = np.flatnonzero((step > 0) & known[:-1] & known[1:])
     if len(ahead):
         moved = ConfigurationSpace(model).difference(q[ahead], q[ahead + 1])
         velocity[ahead + 1] = moved / step[ahead, None]

@@ -91,12 +91,22 @@ def test_what_was_judged_is_described() -> None:
     assert "collision bodies" in own["bodies"]
 
 
+@pytest.mark.parametrize("subject", ["human", "figure"])
+def test_nothing_is_decided_of_a_configuration_with_nan_and_the_others_are_judged(subject: str) -> None:
+    q = np.repeat(NEUTRAL if subject == "human" else NEUTRAL[:, :29], 4, axis=0)
+    q[1, 9], q[3, 7:] = np.nan, 3.0
+    report = Validator(HUMAN if subject == "human" else None, checks=LIMITS).check(q=q)
+    alone = Validator(HUMAN if subject == "human" else None, checks=LIMITS).check(q=q[[0, 2, 3]])
+    assert [report.verdicts[k] for k in (0, 2, 3)] == alone.verdicts and "invalid" in alone.verdicts
+    assert report.verdicts[1] == "undecided" and np.isnan(report.q[1]).all()
+    assert not (report.contacts(nearest=True).posture == 1).any()
+
+
 @pytest.mark.parametrize(
     ("q", "text"),
     [
         (NEUTRAL[:, :5], r"got shape \(1, 5\); expected shape \(N, 43\)"),
         (NEUTRAL[0], r"got shape \(43,\)"),
-        (np.where(np.arange(43) == 9, np.nan, NEUTRAL), "got nan; expected finite numbers"),
         (np.where(np.arange(43) == 9, np.inf, NEUTRAL), "got inf"),
         (0 * NEUTRAL, "the quaternion of 'root_joint' of length 0"),
         (2 * NEUTRAL, "of length 2"),

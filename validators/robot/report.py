@@ -110,6 +110,14 @@ class Report(ShortRepr):
             **{name: getattr(self, name)[part] for name in ("complete", "q", "fk_distance")},
         )
 
+    def without(self, rows: NDArray[np.bool_]) -> Report:
+        """Return the report with nothing decided of some postures (N,): what was judged in their place was another's."""
+        kept = {"complete": self.complete & ~rows}
+        for name in ("q", "fk_distance"):
+            kept[name] = np.array(getattr(self, name))
+            kept[name][rows] = np.nan
+        return replace(self, judgements=[judgement.without(rows) for judgement in self.judgements], **kept)
+
     def joined(self, judgements: Sequence[Judgement]) -> Report:
         """Return the report with further judgements of the same postures, as those of checks over time."""
         own = self.judgements

@@ -44,7 +44,7 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
         Whether names are escaped for Markdown, or for a terminal.
     """
     counts = ", ".join(f"{count} {verdict}" for verdict, count in columns.summary.items())
-    lines = [f"{len(columns)} postures: {counts}", ""]
+    lines = [f"{len(columns)} posture{'s' * (len(columns) != 1)}: {counts}", ""]
     head = ("check", "rejected", "undecided", "most often", "worst")
     total = max(len(columns), 1)
     rows = [
@@ -121,7 +121,8 @@ def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> lis
         How many are shown.
     """
     counts = Counter(clip.verdict for clip in clips)
-    lines = [f"{len(clips)} clips: " + ", ".join(f"{counts[name]} {name}" for name in VERDICT_NAMES), ""]
+    told = ", ".join(f"{counts[name]} {name}" for name in VERDICT_NAMES)
+    lines = [f"{len(clips)} clip{'s' * (len(clips) != 1)}: {told}", ""]
     bad = worst_first(clips)
     if not bad:
         return lines[:1]
