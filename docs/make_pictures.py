@@ -16,12 +16,10 @@ from posekit.samples import write_samples
 from posekit.skeleton import JOINT
 from posekit.synthesis import CameraSphere, random_views
 from posekit.viewer import Shot, Style, subject_of, write_picture
-from posekit.viewer.overlay import OverlaidPerson, Overlay, frame_pictures, write_overlay, write_photographs
+from posekit.viewer.overlay import Overlay, frame_pictures, overlaid_person, write_overlay, write_photographs
 from posekit.viewer.plots import plot_image, plot_projections, plot_tree, save
 from posekit.viewer.plots.angle_plot import plot_angles
-from posekit.viewer.plots.angle_tracks import angle_tracks, chosen_angles
 from posekit.viewer.plots.timeline_plot import write_timelines
-from posekit.viewer.scene.likeliest import along_path, likeliest_first, numbered
 from posekit.views.builtin import builtin_view, view_of
 from posekit.views.given_views import given_views
 
@@ -61,9 +59,7 @@ def write_over(path: Path) -> None:
     view = view_of(scene)
     with tempfile.TemporaryDirectory() as drawn:
         write_photographs(Path(drawn), view)
-        subject = subject_of(result_of(recover(view)), view)
-        frames = numbered([likeliest_first(shown) for shown in subject.frames], [0])
-        person = OverlaidPerson(name="view", frames=frames, figure=subject.figure)
+        person = overlaid_person(result_of(recover(view)), view)
         write_overlay(path, [person], frame_pictures(Path(drawn)), Overlay(size=(1000, 600)))
 
 
@@ -76,17 +72,7 @@ def write_angles(path: Path) -> None:
         view = opened[0].view
     recovery = recover(view)
     result = result_of(recovery, following=posekit.follow(recovery, k=1))
-    subject = subject_of(result, view)
-    limits = {name: (low, high) for name, (low, high) in result.settings["range_limits"].items()}
-    tracks = angle_tracks(
-        subject.frames,
-        along_path(subject, result),
-        subject.figure,
-        chosen_angles("elbow,knee"),
-        limits=limits,
-        truth=view.truth,
-    )
-    save(plot_angles(tracks, line="likeliest path"), path)
+    save(plot_angles(result, view, angles="elbow,knee"), path)
 
 
 def damaged_walk() -> HeldPostures:

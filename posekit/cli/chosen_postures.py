@@ -25,10 +25,7 @@ def chosen_frames(
     moving: bool,
     over: bool = False,
 ) -> list[Shown]:
-    """Choose what is drawn of some frames.
-
-    Where nothing is asked for, that is the likeliest path if there is one and the picture moves, else the likeliest
-    posture, and in a picture that does not move, or over a photograph, with what else it can be.
+    """Choose what is drawn of some frames: see `opening_frames` for what that is where nothing is asked for.
 
     Parameters
     ----------
@@ -45,11 +42,8 @@ def chosen_frames(
     over : bool
         Whether they are drawn over a photograph.
     """
-    from posekit.formats.own import Result
-    from posekit.viewer.scene.likeliest import MAX_BESIDE, along_path, by_probability, likeliest_first
+    from posekit.viewer.scene.likeliest import MAX_BESIDE, along_path, by_probability, opening_frames
 
-    if not posture and moving and isinstance(content, Result) and content.paths is not None:
-        posture = "path"
     if posture == "path":
         path = along_path(subject, content)
         return [path[k] for k in frames]
@@ -58,7 +52,7 @@ def chosen_frames(
     if posture:
         return [chosen_postures(subject.frames[k], posture, k) for k in frames]
     most = None if over else 1 if moving else MAX_BESIDE
-    return [likeliest_first(subject.frames[k], most) for k in frames]
+    return opening_frames(subject, content, frames, moving=moving, most=most)
 
 
 def chosen_postures(shown: Shown, text: str, frame: int) -> Shown:

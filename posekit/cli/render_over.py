@@ -71,8 +71,8 @@ def render_over(
 
 
 def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:
-    from posekit.formats.own import LeeChenModel, OpenCVModel, Result, View
-    from posekit.viewer.overlay import OverlaidPerson
+    from posekit.formats.own import Result, View
+    from posekit.viewer.overlay import overlaid_person
     from posekit.viewer.scene.drawn_subject import subject_of
     from posekit.viewer.scene.likeliest import numbered
 
@@ -81,20 +81,10 @@ def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:
         raise InputError(
             f"{path}: got motion or postures; --over expected a result: nothing says which camera saw it"
         )
-    known = [one.camera["f"] for one in content.frames] if isinstance(content, Result) else []
-    if (view is not None and isinstance(view.camera, LeeChenModel)) or any(f is not None for f in known):
-        raise InputError(
-            f"{path}: its camera is Lee & Chen's, whose image is in metres; --over expected one in pixels; without "
-            "--over the image is drawn beside the postures"
-        )
-    with about(path):
-        subject = subject_of(content, view)
-        frames = range(len(subject.frames))
-        shown = numbered(chosen_frames(subject, content, posture, frames, moving=True, over=True), frames)
-    if view is None and not any(one.sight is not None for one in shown):
-        raise InputError(
-            f"{path}: a result does not hold the camera that it was recovered with; give the view beside it: "
-            "--view VIEW"
-        )
-    size = view.camera.size if view is not None and isinstance(view.camera, OpenCVModel) else None
-    return OverlaidPerson(name=str(path), frames=shown, figure=subject.figure, size=size)
+    frames = None
+    if posture:
+        with about(path):
+            subject = subject_of(content, view)
+            every = range(len(subject.frames))
+            frames = numbered(chosen_frames(subject, content, posture, every, moving=True, over=True), every)
+    return overlaid_person(content, view, name=str(path), frames=frames)

@@ -14,7 +14,7 @@ from posekit.cli.main import main
 from posekit.errors import ViewerError
 from posekit.formats.own import Result, View
 from posekit.skeleton import DOFS
-from posekit.viewer.plots.angle_plot import plot_angles
+from posekit.viewer.plots.angle_plot import plot_angles, plot_tracks
 from posekit.viewer.plots.angle_tracks import AngleTrack, angle_names, angle_tracks, chosen_angles
 from posekit.viewer.scene.drawn_subject import DrawnSubject
 from posekit.viewer.scene.likeliest import likeliest_first
@@ -78,7 +78,7 @@ def test_half_of_the_probability_is_between_the_quartiles(subject: DrawnSubject)
 
 
 def test_panels_show_limits_bands_line_and_truth(tracks: list[AngleTrack]) -> None:
-    figure = plot_angles(tracks)
+    figure = plot_tracks(tracks)
     panels = {panel.get_title(): panel for panel in figure.axes}
     assert len(panels) == len(tracks) == 22
     knee = panels["right knee, flexion"]
@@ -88,6 +88,16 @@ def test_panels_show_limits_bands_line_and_truth(tracks: list[AngleTrack]) -> No
     line = next(one for one in knee.lines if one.get_gid() == "line")
     track = next(track for track in tracks if track.name == "right_knee.flexion")
     np.testing.assert_array_equal(np.asarray(line.get_ydata()), track.value)
+
+
+def test_a_result_is_plotted_with_what_it_was_judged_by_and_the_views_truth(
+    walked: Result, walk: View
+) -> None:
+    [left, right] = plot_angles(walked, walk, angles="elbow", frames=[1, 2, 3]).axes
+    assert [left.get_title(), right.get_title()] == ["right elbow, flexion", "left elbow, flexion"]
+    limits = sorted(float(np.ravel(one.get_ydata())[0]) for one in left.lines if one.get_gid() == "limit")
+    assert limits == sorted(walked.settings["range_limits"]["right_elbow.flexion"])
+    assert any(one.get_gid() == "truth" for one in left.lines)
 
 
 def test_angles_are_chosen_by_joint_side_or_name() -> None:
@@ -116,7 +126,7 @@ def test_command_draws_angles_of_results_and_motion(
 ) -> None:
     result, view = walk_files
     assert command(monkeypatch, result, "--view", view, "--angles", "knee", "-o", tmp_path / "a.svg") == 0
-    assert "limits: anatomical, as the result was judged" in capsys.readouterr().out
+    assert "limits: as the result was judged" in capsys.readouterr().out
     assert "right knee, flexion" in (tmp_path / "a.svg").read_text()
     joints = posekit.read_view(view).truth
     posekit.write_postures(tmp_path / "p.json", joints)

@@ -10,13 +10,12 @@ from typing import Final
 import numpy as np
 from PIL import Image
 
-from posekit.body import Figure
 from posekit.errors import InputError, ViewerError
 from posekit.safe_io.writing import check_target, make_folder, replacing
 from posekit.viewer.moving import check_speed, write_gif
 from posekit.viewer.overlay.figure_painter import DrawnPerson, paint
 from posekit.viewer.overlay.frame_pictures import ImageFiles, VideoImages, matched
-from posekit.viewer.scene.drawn_subject import Shown
+from posekit.viewer.overlay.overlaid_person import OverlaidPerson
 from posekit.viewer.video import Pixels, video_library, write_mp4
 
 OVERLAY_SUFFIXES: Final = (".png", ".jpg", ".gif", ".mp4")
@@ -28,31 +27,6 @@ ASPECT_PIXELS: Final = 1.5
 
 GIF_SIZE: Final = (800, 800)
 """Pixels that an animated GIF fits into where no size is asked for: photographs make large files."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class OverlaidPerson:
-    """One person through the frames of a recording.
-
-    Parameters
-    ----------
-    name : str
-        What errors call it: the file.
-    frames : sequence of Shown
-        What is drawn of each frame, the posture that is a body first; none where a frame has no posture.
-    figure : Figure
-        Whose capsules.
-    size : (int, int), optional
-        Of the view's pictures, pixels; None where it is not known.
-    files : sequence of str
-        The pictures that the frames were detected in, by name; empty where nobody says.
-    """
-
-    name: str
-    frames: Sequence[Shown]
-    figure: Figure
-    size: tuple[int, int] | None = None
-    files: Sequence[str] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from posekit.viewer.plots.angle_tracks import AngleTrack
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.own import Postures, Result, View
+from posekit.geometry import Array
+from posekit.viewer.plots.angle_tracks import AngleTrack, angle_tracks, chosen_angles
 from posekit.viewer.plots.panels import panels
 from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR, drawing
+from posekit.viewer.scene.drawn_subject import Shown, subject_of
+from posekit.viewer.scene.likeliest import opening_frames
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +30,72 @@ LIMIT_MARGIN: Final = 12.0
 """Degrees beyond the limits that a panel shows at least."""
 
 
-def plot_angles(tracks: Sequence[AngleTrack], *, line: str = "likeliest") -> Figure:
-    """Draw angles over time.
+def plot_angles(
+    given: Result | Postures | HeldPostures | View,
+    view: View | None = None,
+    *,
+    angles: str = "all",
+    drawn: Sequence[Shown] | None = None,
+    frames: Sequence[int] | None = None,
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    truth: Array | None = None,
+) -> Figure:
+    """Draw joint angles over time.
+
+    Parameters
+    ----------
+    given : Result, Postures, HeldPostures or View
+        A result, or motion.
+    view : View, optional
+        What the result was recovered from: its truth is drawn, if it has one.
+    angles : str
+        ``all``, or some as ``knee,left_elbow.flexion``.
+    drawn : sequence of Shown, optional
+        Of each of the frames, what the line goes through; by default the likeliest path, or the likeliest posture.
+    frames : sequence of int, optional
+        Which; all if not given.
+    limits : mapping of str to (float, float), optional
+        Degrees, by angle; by default those that a result was judged by.
+    truth : array (F, 14, 3), optional
+        The true joints of all frames, in any frame, metres; by default the view's.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    ViewerError
+        Where matplotlib is missing, or there is nothing to draw.
+    """
+    names = chosen_angles(angles)
+    subject = subject_of(given, view)
+    rows = list(range(len(subject.frames)) if frames is None else frames)
+    every = [subject.frames[k] for k in rows]
+    if drawn is None:
+        drawn = opening_frames(subject, given, rows, moving=True, most=1)
+    if truth is None and view is not None and np.isfinite(view.truth).any():
+        truth = view.truth
+    if limits is None:
+        limits = judged_limits(given) or {}
+    true = None if truth is None else truth[rows]
+    tracks = angle_tracks(every, drawn, subject.figure, names, limits=limits, truth=true)
+    if drawn and drawn[0].caption.startswith("likeliest path"):
+        return plot_tracks(tracks, line="likeliest path")
+    return plot_tracks(tracks, line="likeliest" if any(len(one) > 1 for one in every) else "angle")
+
+
+def judged_limits(given: object) -> dict[str, tuple[float, float]] | None:
+    """Return the ends of the ranges that a result was judged by, degrees; None of what is no result."""
+    settings = given.settings if isinstance(given, Result) else {}
+    found = settings.get("range_limits")
+    if not isinstance(found, Mapping):
+        return None
+    return {str(name): (float(ends[0]), float(ends[1])) for name, ends in found.items()}
+
+
+def plot_tracks(tracks: Sequence[AngleTrack], *, line: str = "likeliest") -> Figure:
+    """Draw angles that were measured over time.
 
     Parameters
     ----------

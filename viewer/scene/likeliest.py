@@ -51,6 +51,38 @@ def likeliest_first(shown: Shown, most: int | None = None) -> Shown:
     return replace(chosen, caption=f"{said}{apart} ({len(shown)} postures)", probability=share[: len(rows)])
 
 
+def opening_frames(
+    subject: DrawnSubject,
+    content: Result | Postures | HeldPostures | View,
+    frames: Sequence[int],
+    *,
+    moving: bool,
+    most: int | None = MAX_BESIDE,
+) -> list[Shown]:
+    """Choose what is drawn of some frames where nothing is asked for.
+
+    That is the likeliest path if there is one and the picture moves, else the likeliest posture with what else it can
+    be.
+
+    Parameters
+    ----------
+    subject : DrawnSubject
+        All frames.
+    content : Result, Postures, HeldPostures or View
+        What they are of.
+    frames : sequence of int
+        Which frames.
+    moving : bool
+        Whether they are drawn one after another.
+    most : int, optional
+        Postures of a frame, at most.
+    """
+    if moving and isinstance(content, Result) and content.paths is not None:
+        path = along_path(subject, content)
+        return [path[k] for k in frames]
+    return [likeliest_first(subject.frames[k], most) for k in frames]
+
+
 def by_probability(shown: Shown) -> Shown:
     """Return all postures of a frame, the likeliest first."""
     if shown.probability is None:
