@@ -16,6 +16,7 @@ from posekit.conversion.motion_output import (
     write_points,
 )
 from posekit.conversion.posture_sequence import one_clip, read_clips, read_sequence
+from posekit.conversion.rerun_recording import write_rerun_result
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
@@ -160,6 +161,8 @@ def convert(job: Conversion) -> list[str]:
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
         return write_points(output, carried, job.source.skeleton)
+    if what.holds is Content.RESULT and output.to == "rerun":
+        return write_rerun_result(job.output, files.read_result(job.given), job.view)
     found = read_sequence(
         job.given,
         what,

@@ -46,6 +46,7 @@ BUILT_IN: Final[Mapping[Content, Mapping[str, tuple[str, ...]]]] = {
         "motion.npy:NPY_FORMAT": (".npy",),
         "motion.caliscope:CALISCOPE_FORMAT": (".csv",),
         "motion.urdf_folder:URDF_FORMAT": (FOLDER_SUFFIX,),
+        "motion.rerun_file:RERUN_FORMAT": (".rrd",),
     },
     Content.CONFIGURATIONS: {
         "motion.robot_table:ROBOT_NPZ_FORMAT": (".npz",),
