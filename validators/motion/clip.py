@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, wraps
+from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.skeleton import FEET_POINTS, HEAD_POINTS, JOINTS
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,3 +90,16 @@ class MotionClip:
     def complete(self) -> NDArray[np.bool_]:
         """Which frames have all joints (T,)."""
         return np.asarray(np.isfinite(self.joints).all(axis=(1, 2)))
+
+
+def once_a_clip(find: Callable[[MotionClip], Found]) -> Callable[[MotionClip], Found]:
+    """Let several checks share what is found in a clip: it is sought once, and kept as long as the clip is."""
+    known: WeakKeyDictionary[MotionClip, Found] = WeakKeyDictionary()
+
+    @wraps(find)
+    def found(clip: MotionClip) -> Found:
+        if clip not in known:
+            known[clip] = find(clip)
+        return known[clip]
+
+    return found

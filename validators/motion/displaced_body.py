@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.geometry import Array
 from posekit.validators.motion.timeline import filtered, norm
@@ -54,10 +55,14 @@ def displaced_by(joints: Array, step: float) -> Array:
         max(round(seconds / step), 1) if timed else 2 for seconds in (VELOCITY_SECONDS, BETWEEN_SECONDS)
     )
     most = int(LONGEST_SECONDS / step + 1e-6) if timed else 1
+    known = np.isfinite(joints[..., 0])
+    # The mean is quickly found, and is displaced where the body is.
+    centre = np.nan_to_num(joints).sum(axis=1) / np.maximum(known.sum(axis=1), 1)[:, None]
+    gaps = np.concatenate([[0], np.cumsum(~known.any(axis=1))])
     best, over = np.full(len(joints), -np.inf), np.ones(len(joints), dtype=np.intp)
     for count in sorted({1, *range(max(apart, 2), most + 1, apart)}):
         pushed = PUSHED_ACCELERATION * (count * step) ** 2 / 4 if timed else 0.0
-        beyond = _beyond(joints, count, side, pushed) / count
+        beyond = _beyond(joints, centre, gaps, count, side, pushed) / count
         better = beyond > best
         best[better], over[better] = beyond[better], count
     # Where it goes fastest is where it goes: a window that ends amid that is misled by a velocity of half of it.
@@ -74,18 +79,18 @@ def displaced_by(joints: Array, step: float) -> Array:
     return found
 
 
-def _beyond(joints: Array, count: int, side: int, pushed: float) -> Array:
-    """Return the displacement (S,) within so many slots after each, above what explains it; 0 where all of it is."""
+def _beyond(
+    joints: Array, centre: Array, gaps: NDArray[np.intp], count: int, side: int, pushed: float
+) -> Array:
+    """Return the displacement (S,) within so many slots after each, above what explains it; 0 where all of it is.
+
+    Of the joints, by their mean (S, 3), and by how many slots without any there are before each (S + 1,).
+    """
     weights = np.zeros(count + 2 * side + 1)
     share = count / (2.0 * side)
     weights[[0, side, side + count, -1]] = share, -1.0 - share, 1.0 + share, -share
-    known = np.isfinite(joints[..., 0])
-    number = np.maximum(known.sum(axis=1), 1)[:, None]
-    # The mean is quickly found, and is displaced where the body is.
-    centre = np.nan_to_num(joints).sum(axis=1) / number
     beyond = np.zeros(len(joints))
     at = np.flatnonzero(norm(filtered(centre, weights)) > pushed / 2.0)
-    gaps = np.concatenate([[0], np.cumsum(~known.any(axis=1))])
     at = at[gaps[at + len(weights)] == gaps[at]]
     if len(at):
         ways = sum(weights[k] * joints[at + k] for k in np.flatnonzero(weights))

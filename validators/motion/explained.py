@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.clip import MotionClip, once_a_clip
 from posekit.validators.motion.duplicates import duplicates
 from posekit.validators.motion.jumps import LEAST_JUMP, Jumps, jumps_of
 from posekit.validators.motion.order import ORDERED_RATE, displaced, stretches_of
@@ -62,17 +60,9 @@ class Explained:
         return trembling_of(self.joints, self.noise)
 
 
-_KNOWN: Final[WeakKeyDictionary[MotionClip, Explained]] = WeakKeyDictionary()
-
-
+@once_a_clip
 def explained(clip: MotionClip) -> Explained:
     """Find what is wrong with the frames of a clip; of one clip once."""
-    if clip not in _KNOWN:
-        _KNOWN[clip] = _explain(clip)
-    return _KNOWN[clip]
-
-
-def _explain(clip: MotionClip) -> Explained:
     timeline = timeline_of(clip)
     # Frames without a place in time come last, and nothing is said of them.
     order = np.argsort(np.where(timeline.slots < 0, timeline.count, timeline.slots), kind="stable")

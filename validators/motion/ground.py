@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Final
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +19,7 @@ from posekit.geometry import Array
 from posekit.ranking.centre_of_mass import centre_of_mass
 from posekit.skeleton import FEET_POINTS, JOINT, SIDES
 from posekit.validators.motion.carried import carried
-from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.clip import MotionClip, once_a_clip
 from posekit.validators.motion.lifted import lifted_by
 from posekit.validators.motion.timeline import norm, timeline_of
 
@@ -102,16 +101,7 @@ class Ground:
     in_air: NDArray[np.bool_]
 
 
-_KNOWN: Final[WeakKeyDictionary[MotionClip, Ground]] = WeakKeyDictionary()
-
-
-def ground_of(clip: MotionClip) -> Ground:
-    """Find the ground of a clip whose way up is known; of one clip once."""
-    if clip not in _KNOWN:
-        _KNOWN[clip] = _found(clip)
-    return _KNOWN[clip]
-
-
+@once_a_clip
 def stature_of(clip: MotionClip) -> float:
     """Return the stature, metres, by the median length of the legs; NaN where no leg is known."""
     legs = [
@@ -155,7 +145,9 @@ def speeds(clip: MotionClip, points: Array, frames: int = 1) -> Array:
     return line.of_frames(fast)
 
 
-def _found(clip: MotionClip) -> Ground:
+@once_a_clip
+def ground_of(clip: MotionClip) -> Ground:
+    """Find the ground of a clip whose way up is known; of one clip once."""
     feet, over = soles(clip)
     up = np.zeros(3) if clip.up is None else clip.up
     line = timeline_of(clip)

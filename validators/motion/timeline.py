@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.geometry import Array
-from posekit.validators.motion.clip import MotionClip
+from posekit.validators.motion.clip import MotionClip, once_a_clip
 
 LONGEST_GAP: Final = 16
 """Slots that a gap is given at most: longer ones say nothing more."""
@@ -53,6 +53,7 @@ class Timeline:
         return found
 
 
+@once_a_clip
 def timeline_of(clip: MotionClip) -> Timeline:
     """Place the frames of a clip by their times, or one after the other where those say nothing."""
     count = len(clip)
