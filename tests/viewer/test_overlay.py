@@ -353,6 +353,7 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
         (["--azimuth", "3"], "--azimuth: means nothing beside --over"),
         (["--posture", "path"], "the result has no path"),
         (["--frame", "7"], "expected a number from 0 to 2"),
+        (["--size", "99999x99999"], "99999x99999"),
     ):
         capsys.readouterr()
         assert command(monkeypatch, *words, "-o", tmp_path / "no.png", *more) == 2

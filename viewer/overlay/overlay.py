@@ -12,6 +12,7 @@ from PIL import Image
 
 from posekit.errors import InputError, ViewerError
 from posekit.safe_io.writing import check_target, make_folder, replacing
+from posekit.viewer.browser.studio import check_size
 from posekit.viewer.moving import check_speed, write_gif
 from posekit.viewer.overlay.figure_painter import DrawnPerson, paint
 from posekit.viewer.overlay.frame_pictures import ImageFiles, VideoImages, matched
@@ -60,7 +61,7 @@ def check_overlay(path: Path, overlay: Overlay) -> None:
     Raises
     ------
     ViewerError
-        Where the name is of no format, or the speed is none.
+        Where the name is of no format, the size too large, or the speed none.
     InputError
         Where the place cannot be written, or a package is missing.
     """
@@ -69,6 +70,8 @@ def check_overlay(path: Path, overlay: Overlay) -> None:
         raise ViewerError(
             f"{path}: the format is {kind}; expected {', '.join(OVERLAY_SUFFIXES)}, or a folder for all pictures"
         )
+    if overlay.size is not None:
+        check_size(overlay.size, 1)
     if kind:
         check_target(path)
     if kind == ".mp4":
