@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,12 +13,19 @@ from posekit.cli.given import read_given
 from posekit.cli.options import about, examples, option
 from posekit.errors import InputError
 
+if TYPE_CHECKING:
+    from posekit.formats.held_postures import HeldPostures
+    from posekit.formats.own import Postures, Result, View
+    from posekit.viewer.page.server import PageServer
+    from posekit.viewer.viser_viewer import ViserViewer
+
 LAST_PORT = 65535
 
 VIEW_EXAMPLES = examples(
     "posekit view postures.json --view walk.json",
     "posekit view trial.trc",
     "posekit view walk.json --frames 0-19 --no-open --port 8000",
+    "posekit view postures.json --viser",
 )
 
 
@@ -39,18 +47,23 @@ def view(
     open_: Annotated[
         bool, typer.Option("--open/--no-open", help="Open the browser, where there is a screen.")
     ] = True,
+    viser: Annotated[
+        bool,
+        typer.Option("--viser", help="In viser's viewer: the figure by Pinocchio's visualizer, playing."),
+    ] = False,
 ) -> None:
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
-    from posekit.validation.page_findings import page_findings
-    from posekit.viewer.page.page import page_html
-    from posekit.viewer.page.server import PageServer
     from posekit.viewer.showing import has_screen
 
     content, behind = read_given(given, seen)
     chosen = _frames(frames)
     with about(given):
-        page = page_html(content, behind, title=given.name, frames=chosen, findings=page_findings(content))
-    with PageServer(page, port) as server:
+        served: PageServer | ViserViewer = (
+            _in_viser(content, behind, chosen, port)
+            if viser
+            else _as_page(content, behind, chosen, port, title=given.name)
+        )
+    with served as server:
         try:
             typer.echo(f"{server.url}  (this machine only; Ctrl-C ends)")
             if open_ and has_screen():
@@ -58,6 +71,38 @@ def view(
             server.serve_forever()
         except KeyboardInterrupt:
             typer.echo("stopped")
+
+
+def _as_page(
+    content: Result | Postures | HeldPostures,
+    behind: View | None,
+    frames: range | None,
+    port: int,
+    *,
+    title: str,
+) -> PageServer:
+    from posekit.validation.page_findings import page_findings
+    from posekit.viewer.page.page import page_html
+    from posekit.viewer.page.server import PageServer
+
+    page = page_html(content, behind, title=title, frames=frames, findings=page_findings(content))
+    return PageServer(page, port)
+
+
+def _in_viser(
+    content: Result | Postures | HeldPostures, behind: View | None, frames: range | None, port: int
+) -> ViserViewer:
+    from posekit.viewer.scene.drawn_subject import subject_of
+    from posekit.viewer.viser_viewer import ViserViewer
+
+    subject = subject_of(content, behind)
+    if frames is not None:
+        if frames.stop > len(subject.frames):
+            raise InputError(
+                f"--frames: {frames.start}-{frames.stop - 1}; expected numbers from 0 to {len(subject.frames) - 1}"
+            )
+        subject = replace(subject, frames=[subject.frames[k] for k in frames])
+    return ViserViewer(subject, port)
 
 
 def _frames(text: str) -> range | None:
