@@ -31,10 +31,10 @@ from posekit.formats.registry import names as format_names
 from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
-from posekit.skeleton import JOINTS
+from posekit.skeleton import JOINTS, POINTS
 
 if TYPE_CHECKING:
-    from posekit.robots.kinematics import Kinematics
+    pass
 
 __all__ = [
     "POSTURE_CONTENTS",
@@ -42,7 +42,6 @@ __all__ = [
     "configurations_of",
     "held_configurations",
     "held_postures",
-    "mapped_positions",
     "postures_of_result",
 ]
 
@@ -170,7 +169,8 @@ def held_configurations(
         The robot's ``configuration_names``.
     positions : callable
         Forward kinematics: from q (N, nq) in the robot's order to points (N, 19, 3) in the order of
-        `posekit.skeleton.POINTS`, metres, NaN where the robot has none.
+        `posekit.skeleton.POINTS`, metres, NaN where the robot has none; and after them those of feet, in the order of
+        `posekit.skeleton.FEET_POINTS`, or none.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def held_configurations(
     """
     q = configurations.in_order_of(names)
     points = positions(q)
-    head = points[:, len(JOINTS) :]
+    head, feet = points[:, len(JOINTS) : len(POINTS)], points[:, len(POINTS) :]
     count = len(points)
     return HeldPostures(
         postures=Postures(joints=points[:, : len(JOINTS)], head=head if np.isfinite(head).any() else None),
@@ -189,22 +189,8 @@ def held_configurations(
         up="+z",
         said=configurations.said,
         q=q,
+        feet=feet if feet.size else np.empty(0),
     )
-
-
-def mapped_positions(kinematics: Kinematics, q: Array) -> Array:
-    """Place a robot's points: q (N, nq) to (N, 19, 3), NaN for points that it has not.
-
-    Parameters
-    ----------
-    kinematics : Kinematics
-        Of its joint map: see `posekit.robots.joint_map.JointMap.kinematics`.
-    q : array (N, nq)
-        In the robot's order.
-    """
-    from posekit.robots.joint_map import postures_of as mapped
-
-    return mapped(kinematics.positions(q), kinematics)
 
 
 def _held(postures: Postures, frame: NDArray[np.intp], time: Array) -> HeldPostures:

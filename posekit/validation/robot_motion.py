@@ -12,10 +12,11 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from posekit.formats.held import HeldPostures
-from posekit.formats.held_postures import held_configurations, mapped_positions
+from posekit.formats.held_postures import held_configurations
 from posekit.formats.own.postures_q import NamedConfigurations
 from posekit.geometry import Array
 from posekit.robots.configuration_space import ConfigurationSpace
+from posekit.robots.joint_map import postures_of
 from posekit.robots.kinematics import BodyPoint, BodySite, Kinematics
 from posekit.skeleton import FEET_POINTS, POINTS, SIDES
 from posekit.validators import Validator
@@ -43,9 +44,8 @@ def placed(validator: Validator, configurations: NamedConfigurations) -> HeldPos
     kinematics = validator.kinematics
     if kinematics is None:
         return held_configurations(configurations, names, _nowhere)
-    held = held_configurations(configurations, names, of_known(partial(mapped_positions, kinematics)))
-    feet = soles(kinematics, validator.robot.geometry)
-    return held if feet is None else replace(held, feet=of_known(feet.positions)(held.q))
+    whole = with_soles(kinematics, validator.robot.geometry)
+    return held_configurations(configurations, names, of_known(partial(_with_feet, kinematics, whole)))
 
 
 def of_known(positions: Callable[[Array], Array]) -> Callable[[Array], Array]:
@@ -70,6 +70,12 @@ def of_known(positions: Callable[[Array], Array]) -> Callable[[Array], Array]:
 
 
 @lru_cache(maxsize=4)
+def with_soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> Kinematics:
+    """Return what places a robot's points and, where it has both feet, those of its soles after them."""
+    feet = soles(kinematics, geometry)
+    return kinematics if feet is None else replace(kinematics, points=kinematics.points + feet.points)
+
+
 def soles(kinematics: Kinematics, geometry: pin.GeometryModel | None) -> Kinematics | None:
     """Return what places toes and heels, in the order of `FEET_POINTS`: the middles of a sole's two ends.
 
@@ -141,7 +147,7 @@ def moves_of(
         return {}
     velocity = np.full((len(q), model.nv), np.nan)
     step = np.diff(time)
-    known = ~np.isnan(q).any(axis=1)
+    known: NDArray[np.bool_] = np.asarray(~np.isnan(q).any(axis=1))
     ahead = np.flatnonzero((step > 0) & known[:-1] & known[1:])
     if len(ahead):
         moved = ConfigurationSpace(model).difference(q[ahead], q[ahead + 1])
@@ -152,6 +158,11 @@ def moves_of(
             called[model.idx_vs[joint] + k] = name if model.nvs[joint] == 1 else f"{name}.{k}"
     limits = np.array(model.velocityLimit, dtype=np.float64)
     return {"q": q, "velocity": velocity, "velocity_limits": limits, "velocity_names": tuple(called)}
+
+
+def _with_feet(kinematics: Kinematics, whole: Kinematics, q: Array) -> Array:
+    points, own = whole.positions(q), len(kinematics.points)
+    return np.concatenate([postures_of(points[:, :own], kinematics), points[:, own:]], axis=1)
 
 
 def _nowhere(q: Array) -> Array:
