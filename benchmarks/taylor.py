@@ -3,7 +3,7 @@
     python benchmarks/taylor.py [CAPTURE.npz] [--pictures 1000] [--seed 0]
 
 The capture is an NPZ as `posekit synth mocap` reads it; without one, only random legal postures are studied. Prints
-the Markdown tables of docs/explanation/taylor.md.
+the Markdown tables of docs/research/taylor.md.
 """
 
 from __future__ import annotations
