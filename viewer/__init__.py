@@ -1,7 +1,7 @@
 """Pictures: postures as meshcat scenes, drawn without a server; the paper's plots; pages to be opened anywhere.
 
-`scene` says what is drawn, `browser` draws it, `pictures` and `moving` write files, `page` is the interactive page,
-`plots` the paper's figures.
+`scene` says what is drawn, `browser` draws it, `pictures`, `moving` and `video` write files, `overlay` draws over
+photographs and videos, `page` is the interactive page, `plots` has the paper's figures and joint angles.
 """
 
 from posekit.viewer.pictures import Shot as Shot

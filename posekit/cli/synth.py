@@ -195,8 +195,10 @@ def _write(
 
     from posekit import views
     from posekit.formats import own as files
+    from posekit.safe_io.writing import check_target
 
     _check_name(output)
+    check_target(output)
     if noise > 0:
         scene = scene.with_noise(noise, np.random.default_rng([seed, 1]))
     view = views.view_of(scene)
