@@ -25,6 +25,8 @@ class Browser:
         Seconds that any step may take; after them the browser is ended.
     size : (int, int)
         Width and height of its pages, pixels.
+    webgl : bool
+        Whether pages may draw with WebGL, as those of pictures do; without, the rest is drawn faster.
 
     Raises
     ------
@@ -42,9 +44,10 @@ class Browser:
         *,
         timeout: float = STEP_TIMEOUT_SECONDS,
         size: tuple[int, int] = (1280, 720),
+        webgl: bool = True,
     ) -> None:
         self.size = size
-        self._tools = DevTools(program or find_browser(), timeout=timeout)
+        self._tools = DevTools(program or find_browser(), timeout=timeout, webgl=webgl)
         try:
             self._session = self._attach()
         except BaseException:

@@ -28,9 +28,6 @@ Message = dict[str, Any]
 BROWSER_FLAGS = (
     "--headless",
     "--remote-debugging-pipe",
-    "--use-gl=angle",
-    "--use-angle=swiftshader",
-    "--enable-unsafe-swiftshader",
     "--force-device-scale-factor=1",
     "--hide-scrollbars",
     "--mute-audio",
@@ -46,6 +43,10 @@ BROWSER_FLAGS = (
     "--password-store=basic",
     "--host-resolver-rules=MAP * ~NOTFOUND",  # whatever it would look up outside, it does not find
 )
+WEBGL_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+"""WebGL by the processor: the rest of the page is then drawn through it too, at a third of the speed."""
+
+NO_WEBGL_FLAGS = ("--disable-gpu",)
 READ_FD, WRITE_FD = 3, 4
 """The descriptors at which Chromium expects its two pipes."""
 
@@ -64,16 +65,20 @@ class DevTools:
         The browser.
     timeout : float
         Seconds that any answer may take; after them the browser is ended.
+    webgl : bool
+        Whether pages may draw with WebGL.
     """
 
-    def __init__(self, program: str, *, timeout: float) -> None:
+    def __init__(self, program: str, *, timeout: float, webgl: bool = True) -> None:
         self.program, self.timeout = program, timeout
         self.folder = Path(tempfile.mkdtemp(prefix="posekit-browser-"))
         self._count = 0
         self._pending = b""
         self.events: list[Message] = []
         try:
-            self.pid, self._write, self._read = _start(program, self.folder)
+            self.pid, self._write, self._read = _start(
+                program, self.folder, WEBGL_FLAGS if webgl else NO_WEBGL_FLAGS
+            )
         except OSError as error:
             shutil.rmtree(self.folder, ignore_errors=True)
             raise ViewerError(f"{program}: cannot be started: {error.strerror}; {BROWSER_REMEDY}") from None
@@ -149,9 +154,9 @@ class DevTools:
         )
 
 
-def _start(program: str, folder: Path) -> tuple[int, int, int]:
+def _start(program: str, folder: Path, drawing: tuple[str, ...]) -> tuple[int, int, int]:
     """Start the browser in its own process group; return its id and our ends of the pipes."""
-    flags = [*BROWSER_FLAGS, f"--user-data-dir={folder / 'profile'}"]
+    flags = [*BROWSER_FLAGS, *drawing, f"--user-data-dir={folder / 'profile'}"]
     if os.geteuid() == 0:
         flags.append("--no-sandbox")  # Chromium refuses to run as root with it
     pipes = [_high(fd) for pair in (os.pipe(), os.pipe()) for fd in pair]

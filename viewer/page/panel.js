@@ -112,7 +112,7 @@ const page = (() => {
 
   function showTime() {
     const { number, time } = frame();
-    const at = time === undefined ? "" : `, ${Number(time.toPrecision(4))} s`;
+    const at = time === undefined ? "" : `, ${Number(time.toFixed(3))} s`;
     byId("frame-text").textContent = `frame ${number} of ${DATA.frames[0].number} to ${DATA.frames.at(-1).number}${at}`;
     byId("frame").setAttribute("aria-valuetext", `frame ${number}${at}`);
   }
@@ -319,10 +319,10 @@ const page = (() => {
 
   function showSeen() {
     const here = frame(), drawing = byId("seen-image");
-    byId("seen").hidden = !here.image;
+    byId("seen").hidden = !here.image?.some((point) => point);
     drawing.replaceChildren();
-    if (!here.image) return;
-    const [left, top, size, width, height] = seenWindow();
+    if (!here.image?.some((point) => point)) return;
+    const [left, top, size, width, height] = seenWindow(here.image);
     drawing.setAttribute("viewBox", `${left - 0.05 * size} ${top - 0.05 * size} ${width + 0.1 * size} ${height + 0.1 * size}`);
     const add = (tag, attributes) => {
       const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
@@ -340,13 +340,10 @@ const page = (() => {
     for (const point of here.image) if (point) add("circle", { cx: point[0], cy: point[1], r: 0.011 * size, fill: "#1d2329" });
   }
 
-  let seen;
-  function seenWindow() {
-    if (seen) return seen;
-    const all = DATA.frames.flatMap((one) => one.image ?? []).filter((point) => point);
-    const [left, right, top, bottom] = all.reduce(([l, r, t, b], [u, v]) => [Math.min(l, u), Math.max(r, u), Math.min(t, v), Math.max(b, v)], [Infinity, -Infinity, Infinity, -Infinity]);
-    const [width, height] = [right - left || 1, bottom - top || 1];
-    return (seen = [left, top, Math.max(width, height), width, height]);
+  function seenWindow(image) {
+    const [us, vs] = [0, 1].map((axis) => image.flatMap((point) => (point ? [point[axis]] : [])));
+    const [left, top] = [Math.min(...us), Math.min(...vs)], [width, height] = [Math.max(...us) - left || 1, Math.max(...vs) - top || 1];
+    return [left, top, Math.max(width, height), width, height];
   }
 
   // What is true of the postures and the picture: exact ones give the same image, refined ones nearly.

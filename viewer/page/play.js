@@ -121,4 +121,7 @@ const play = (() => {
   page.chooseFrame(0);
   return { toggle, go };
 })();
+scene.draw();
 page.state.drawn = true;
+// Milliseconds from the page being asked for; the picture is shown with the next frame of the browser.
+requestAnimationFrame(() => setTimeout(() => (page.state.firstPicture = performance.now())));

@@ -3,6 +3,7 @@
 const tables = (() => {
   const { byId, element, row, words, percent, plural } = page.tools;
   const text = (value, kind = "text") => element("td", value, kind);
+  const MOST_SPANS = 200;
   let last = "", open = "joints";
 
   function parts(name) {
@@ -32,6 +33,34 @@ const tables = (() => {
       const cells = sides ? (depth ? [depth.near, depth.far] : [NaN, NaN]).map((share) => text(Number.isNaN(share) ? "–" : percent(share), share > 0.5 ? "strong" : "")) : [];
       row(body, [text(words(name)), ...cells, text(said.join("; "), "text wrap")]);
     });
+  }
+
+  // What the checks find in a motion: frames in a row are one line, which leads to the worst of them.
+  function showFindings() {
+    const [note, head, body] = parts("findings"), spans = new Map();
+    DATA.frames.forEach((one, index) => {
+      for (const [place, value, bound] of one.findings?.[0] ?? []) {
+        const over = Math.abs(value - bound), list = spans.get(place) ?? spans.set(place, []).get(place), last = list.at(-1);
+        if (!last || last.end < index - 1) list.push({ start: index, end: index, worst: index, value, bound, over });
+        else {
+          last.end = index;
+          if (over > last.over) Object.assign(last, { worst: index, value, bound, over });
+        }
+      }
+    });
+    const all = [...spans].flatMap(([place, list]) => list.map((one) => ({ ...DATA.findings[place], ...one }))).sort((a, b) => b.end - b.start - a.end + a.start);
+    note.textContent = all.length ? "What each check finds, the longest first; choose one to see its worst frame." : "No check of single postures finds anything; posekit validate asks those over time, too.";
+    if (!all.length) return;
+    row(head, ["frames", "check", "where", "worst", "bound"].map((title) => element("th", title, "text")));
+    const number = (index) => DATA.frames[index].number;
+    for (const one of all.slice(0, MOST_SPANS)) {
+      const button = element("button", one.start === one.end ? number(one.start) : `${number(one.start)}–${number(one.end)}`), place = text(undefined);
+      button.type = "button";
+      button.onclick = () => play.go(one.worst);
+      place.append(button);
+      row(body, [place, text(words(one.check), "text wrap"), text(words(one.where), "text wrap"), text(`${one.value} ${one.unit}`), text(`${one.bound} ${one.unit}`)]);
+    }
+    if (all.length > MOST_SPANS) note.textContent += ` Shown are ${MOST_SPANS} of ${all.length}.`;
   }
 
   function showLevels() {
@@ -137,9 +166,11 @@ const tables = (() => {
     };
   }
   for (const tab of tabs) if (["levels", "rejected", "settings"].includes(tab.dataset.tab)) tab.hidden = DATA.kind !== "result";
+  for (const tab of tabs) if (tab.dataset.tab === "findings") tab.hidden = DATA.kind !== "motion" || !DATA.judged;
   byId("unseen-tab").hidden = !DATA.frames.some((one) => one.inferred?.some((joints) => Object.keys(joints).length));
   for (const [name, value] of DATA.settings) row(byId("settings").querySelector("tbody"), [text(words(name)), text(value, "text wrap")]);
   page.onChange(show);
-  choose("joints");
+  choose(DATA.kind === "motion" && DATA.judged ? "findings" : "joints");
+  if (DATA.kind === "motion" && DATA.judged) showFindings();
   return { choose };
 })();

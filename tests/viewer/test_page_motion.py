@@ -1,0 +1,194 @@
+"""The page of what moves: motion of a file with what checks find in it, and the paths of a result that was followed."""
+
+import dataclasses
+import os
+import time
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.errors import ViewerError
+from posekit.formats.held import HeldPostures
+from posekit.formats.own import Postures
+from posekit.formats.own.paths import FollowedPaths
+from posekit.skeleton import JOINT, JOINTS
+from posekit.validation.page_findings import page_findings
+from posekit.viewer.browser.find_browser import find_browser
+from posekit.viewer.page.data import page_data
+from posekit.viewer.page.page import write_page
+
+FRAMES, BENT = 12, 4
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    sync_api = pytest.importorskip("playwright.sync_api")
+    try:
+        program = find_browser()
+    except ViewerError as error:
+        pytest.fail(f"these tests look at a page with a real browser: {error}", pytrace=False)
+    flags = ["--disable-gpu", "--disable-dev-shm-usage"] + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=flags)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(chromium, tmp_path):
+    tabs, wrong = [], list[str]()
+
+    def open_page(given, **options):
+        path = tmp_path / "page.html"
+        write_page(path, given, **options)
+        tab = chromium.new_page(viewport={"width": 1280, "height": 800})
+        tabs.append(tab)
+        tab.on("request", lambda one: wrong.append(one.url) if one.url != path.as_uri() else None)
+        tab.on("pageerror", lambda error: wrong.append(str(error)))
+        tab.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+        tab.goto(path.as_uri())
+        wait_until(tab, "page.state.drawn === true")
+        return tab
+
+    yield open_page
+    for tab in tabs:
+        tab.close()
+    assert wrong == []
+
+
+def wait_until(tab, condition):
+    deadline = time.monotonic() + 10
+    while not tab.evaluate(condition):
+        assert time.monotonic() < deadline, condition
+        tab.wait_for_timeout(20)
+
+
+@pytest.fixture(scope="module")
+def motion():
+    """Return a standing person whose right elbow bends the wrong way in one frame."""
+    joints = np.repeat(posekit.load_figure().neutral_points[None, :14], FRAMES, axis=0)
+    joints += np.arange(FRAMES)[:, None, None] * [0.02, 0.0, 0.0]
+    elbow, wrist = JOINT["right_elbow"], JOINT["right_wrist"]
+    length = np.linalg.norm(joints[BENT, wrist] - joints[BENT, elbow])
+    joints[BENT, wrist] = joints[BENT, elbow] + length * np.array([-0.8, 0.0, -0.6])
+    return HeldPostures(
+        postures=Postures(joints=joints),
+        frame=np.arange(FRAMES),
+        clip=np.zeros(FRAMES, dtype=np.intp),
+        time=np.arange(FRAMES) / 20,
+        up="+z",
+    )
+
+
+def test_a_motion_plays_and_says_what_checks_find(opened, motion):
+    findings = page_findings(motion)
+    assert list(findings.by_posture) == [BENT]
+    tab = opened(motion, findings=findings)
+    assert tab.inner_text("#answer").startswith("No check finds anything")
+    assert f"1 of {FRAMES} frames" in tab.inner_text("#answer")
+    tab.click("#findings tbody button")
+    assert tab.evaluate("page.state.frame") == BENT
+    said = tab.inner_text("#answer li")
+    one = findings.by_posture[BENT][0]
+    assert one.check.replace("_", " ") in said
+    assert f"{one.value:.4g}"[:5] in said
+    assert "bound" in said
+    # The joint under the pointer tells it, too, and so does the table of joints.
+    box = tab.locator("#picture").bounding_box()
+    joint = tab.evaluate("page.findings()[0].joints[0]")
+    x, y = tab.evaluate("scene.projected()")[joint]
+    tab.mouse.move(box["x"] + (x + 1) / 2 * box["width"], box["y"] + (1 - y) / 2 * box["height"])
+    assert JOINTS[joint].replace("_", " ") in tab.inner_text("#tip")
+    assert "bound" in tab.inner_text("#tip")
+    tab.click("[data-tab=joints]")
+    assert "bound" in tab.inner_text("#joints tbody")
+    tab.click("#play")
+    wait_until(tab, f"page.state.frame === {FRAMES - 1}")
+    tab.click("#play")
+    assert tab.is_hidden("#survivors")
+
+
+def test_what_is_too_much_to_be_judged_and_results_are_not(motion, walked):
+    assert page_findings(walked) is None
+    assert page_data(motion)["judged"] is False
+
+
+@pytest.fixture(scope="module")
+def followed(walked):
+    """Return a result with two paths, along the next to the likeliest and along the likeliest; one frame is bridged."""
+    ranks = np.array(
+        [[np.argsort(-frame.probability, kind="stable")[k] for frame in walked.frames] for k in (1, 0)]
+    )
+    joints = np.array(
+        [
+            [frame.joints[row] for frame, row in zip(walked.frames, path, strict=True)]
+            for path in ranks.tolist()
+        ]
+    )
+    survivor = ranks.copy()
+    survivor[0, 2] = -1
+    bridged = np.zeros(joints.shape[:3], dtype=bool)
+    bridged[0, 2] = True
+    paths = FollowedPaths(
+        survivor=survivor,
+        joints=joints,
+        smoothed=joints + np.array([0.0, 0.0, 0.01]),
+        interpolated=bridged,
+        deviation=np.full(joints.shape[:3], 0.01),
+        cost=np.array([1.0, 2.0]),
+        share=np.array([0.7, 0.3]),
+        scale=np.full(survivor.shape, np.nan),
+        lead=0.8,
+        exact=True,
+        apart=0.05,
+    )
+    return dataclasses.replace(walked, paths=paths)
+
+
+def test_a_followed_result_opens_on_its_likeliest_path_and_paths_can_be_chosen(opened, followed):
+    tab = opened(followed)
+    camera = tab.evaluate("DATA.camera")
+    axes = np.array([camera["right"], camera["down"], camera["forward"]])
+
+    def drawn():
+        return (np.array(tab.evaluate("scene.drawn()"), dtype=float) - camera["position"]) @ axes.T
+
+    np.testing.assert_allclose(drawn(), followed.paths.smoothed[0, 0], atol=2e-4)
+    assert tab.inner_text("#caption").startswith("path 0 (70 %), posture ")
+    tab.locator("#frame").fill("2")
+    np.testing.assert_allclose(drawn(), followed.paths.smoothed[0, 2], atol=2e-4)
+    assert "bridged" in tab.inner_text("#caption")
+    assert all(tab.evaluate("DATA.points.slice(0, 14).map((_, joint) => page.unseen(joint))"))
+    tab.select_option("#path", "1")
+    np.testing.assert_allclose(drawn(), followed.paths.smoothed[1, 2], atol=2e-4)
+    # One posture may be looked at; the next frame is the path's again.
+    tab.click("#survivors-body tr:nth-child(3)")
+    assert tab.evaluate("page.state.path") is None
+    tab.keyboard.press("ArrowRight")
+    np.testing.assert_allclose(drawn(), followed.paths.smoothed[1, 3], atol=2e-4)
+    tab.select_option("#path", "")
+    row = int(followed.frames[3].probability.argmax())
+    np.testing.assert_allclose(drawn(), followed.frames[3].joints[row], atol=2e-4)
+    tab.keyboard.press("l")
+    assert tab.evaluate("page.state.path") == 0
+
+
+def test_a_reason_shows_a_branch_that_it_rejected(opened, walked, walk):
+    tab = opened(walked, view=walk)
+    tab.click("[data-tab=rejected]")
+    button = tab.locator("#rejected tbody button").first
+    button.click()
+    assert tab.evaluate("scene.layers().rejected") == 1
+    assert button.get_attribute("aria-pressed") == "true"
+    assert "a rejected branch" in tab.inner_text("#caption")
+    said = tab.evaluate("page.example().text")
+    assert button.inner_text() in said
+    # It is a branch that the result lists with that reason.
+    reasons = {
+        one["reason"].replace("_", " ").replace(".", " ").replace("/", ", ")
+        for one in walked.frames[0].pruned
+    }
+    assert said in reasons
+    button.click()
+    assert tab.evaluate("scene.layers().rejected") == 0
