@@ -59,10 +59,13 @@ class Judgement:
 
     def without(self, rows: NDArray[np.bool_]) -> Judgement:
         """Return it with nothing decided of some postures (N,)."""
-        changed = {name: np.array(getattr(self, name)) for name in ("value", "margin", "violated")}
-        for array in changed.values():
-            array[rows] = False if array.dtype == np.bool_ else np.nan
-        return replace(self, **changed)
+        column = rows[:, None]
+        return replace(
+            self,
+            value=np.where(column, np.nan, self.value),
+            margin=np.where(column, np.nan, self.margin),
+            violated=self.violated & ~column,
+        )
 
     def of(self, rows: NDArray[np.intp] | slice) -> Judgement:
         """Return what it says about some of the postures."""

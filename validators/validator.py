@@ -273,7 +273,7 @@ class Validator(ShortRepr):
         )
         if not unknown.any():
             return self._check_known(q)
-        given, rows = np.array(q), unknown.any(axis=1)
+        given, rows = np.array(q), np.asarray(unknown.any(axis=1))
         neutral = pin.neutral(self.configured[0].model)
         if given.shape[1] == len(neutral):
             given[rows] = neutral

@@ -147,7 +147,7 @@ def moves_of(
         return {}
     velocity = np.full((len(q), model.nv), np.nan)
     step = np.diff(time)
-    known: NDArray[np.bool_] = np.asarray(~np.isnan(q).any(axis=1))
+    known = np.asarray(np.isfinite(q).all(axis=1))
     ahead = np.flatnonzero((step > 0) & known[:-1] & known[1:])
     if len(ahead):
         moved = ConfigurationSpace(model).difference(q[ahead], q[ahead + 1])

@@ -111,12 +111,14 @@ class Report(ShortRepr):
         )
 
     def without(self, rows: NDArray[np.bool_]) -> Report:
-        """Return the report with nothing decided of some postures (N,): what was judged in their place was another's."""
-        kept = {"complete": self.complete & ~rows}
-        for name in ("q", "fk_distance"):
-            kept[name] = np.array(getattr(self, name))
-            kept[name][rows] = np.nan
-        return replace(self, judgements=[judgement.without(rows) for judgement in self.judgements], **kept)
+        """Return the report with nothing decided of some postures (N,): another was judged in their place."""
+        return replace(
+            self,
+            judgements=[judgement.without(rows) for judgement in self.judgements],
+            complete=self.complete & ~rows,
+            q=np.where(rows[:, None], np.nan, self.q),
+            fk_distance=np.where(rows, np.nan, self.fk_distance),
+        )
 
     def joined(self, judgements: Sequence[Judgement]) -> Report:
         """Return the report with further judgements of the same postures, as those of checks over time."""
