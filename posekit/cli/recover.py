@@ -121,10 +121,12 @@ def recover(
     ] = False,
 ) -> None:
     """Recover every posture behind a view that passes the checks, each as a configuration of the figure."""
+    from posekit.cli.look_further import tell_further
     from posekit.formats import own as files
     from posekit.recovery.conductor import recover as recover_view
     from posekit.recovery.result import result_of
     from posekit.views.given_views import given_views
+    from posekit.views.opened import of_person
 
     for read in (view, nearer, truth, who.calibrate, who.lengths):
         distinct(output, write_urdf, read)
@@ -170,8 +172,6 @@ def recover(
             typer.echo(line)
         path, figure_path = output, write_urdf
         if len(people) > 1:
-            from posekit.conversion.conversion import of_person
-
             path = of_person(output, one, alone=False)
             figure_path = None if write_urdf is None else of_person(write_urdf, one, alone=False)
         if figure_path is not None:
@@ -182,6 +182,10 @@ def recover(
         summarize(recovery)
         _tell(recovery, scaled, following, None if truth is None else one.view)
         typer.echo(f"written: {path}")
+    first, found, _ = recovered[0]
+    if any(len(frame) for frame in found.frames):
+        written = output if len(people) == 1 else of_person(output, first, alone=False)
+        tell_further(written, None if first.says else view)
 
 
 def _check_urdf_path(path: Path | None) -> None:

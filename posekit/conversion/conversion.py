@@ -26,7 +26,7 @@ from posekit.formats.motion import UP_DIRECTIONS, motion_formats
 from posekit.formats.own import View
 from posekit.formats.recognising import recognise
 from posekit.safe_io import nearest, refusal, shown
-from posekit.views.opened import Opened
+from posekit.views.opened import of_person
 from posekit.views.opening import open_views
 from posekit.views.source import Source
 
@@ -174,11 +174,6 @@ def convert(job: Conversion) -> list[str]:
         up=job.input_up,
     )
     return write_moving(output, found, every=job.posture == "all")
-
-
-def of_person(path: Path, one: Opened, *, alone: bool) -> Path:
-    """Name the file of one of several people: ``out.json`` becomes ``out.person2.json``."""
-    return path if alone else path.with_name(f"{path.stem}.person{one.person}{path.suffix}")
 
 
 def _key_points(job: Conversion) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from posekit.formats.own import View
 
@@ -24,3 +25,8 @@ class Opened:
     person: int
     view: View
     says: tuple[str, ...]
+
+
+def of_person(path: Path, one: Opened, *, alone: bool) -> Path:
+    """Name the file of one of several people: ``out.json`` becomes ``out.person2.json``."""
+    return path if alone else path.with_name(f"{path.stem}.person{one.person}{path.suffix}")

@@ -45,7 +45,8 @@ def test_recover_writes_what_it_prints(run, walk: dict[str, Any], suffix: str, w
         assert line.split()[4] == "exact"
         assert len(frame.joints) + sum(frame.rejected.values()) == 8192
         assert frame.pruned
-    assert lines[-1] == f"written: {target}"
+    assert lines[-5:-3] == [f"written: {target}", "look further:"]
+    assert run(*lines[-1].split()[1:]).code == 0  # what it says to type is right: it converts
     assert result.configuration_names == FIGURE.configuration_names
     truth = read_view(view).truth
     for frame, joints in zip(result.frames, truth, strict=True):
