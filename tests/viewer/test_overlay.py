@@ -37,7 +37,7 @@ from posekit.viewer.scene.compose import Style, compose
 from posekit.viewer.scene.drawn_subject import subject_of
 from posekit.viewer.scene.framing import view_eye
 from posekit.viewer.scene.world import upright_world
-from posekit.viewer.video import Video
+from posekit.viewer.video import Video, write_mp4
 from posekit.views import view_of
 
 SIZE = (480, 270)
@@ -246,6 +246,25 @@ def test_upright_as_its_exif_says(tmp_path: Path) -> None:
     picture.save(tmp_path / "phone.jpg", exif=exif)
     assert read_image(tmp_path / "phone.jpg").size == (20, 40)
     assert frame_pictures(tmp_path / "phone.jpg").size(0) == (20, 40)
+
+
+def test_a_video_stands_upright_as_its_camera_noted(tmp_path: Path) -> None:
+    corner = np.zeros((64, 128, 3), np.uint8)
+    corner[:20, :20] = 255
+    held = tmp_path / "held.mp4"
+    with held.open("w+b") as file:
+        assert write_mp4(file, [corner, corner], fps=10) == 2
+    content = bytearray(held.read_bytes())
+    matrix = content.index(b"tkhd") + 44  # of ISO/IEC 14496-12's track header: a quarter turn clockwise
+    one = 0x10000
+    content[matrix : matrix + 36] = struct.pack(">9i", 0, one, 0, -one, 0, 0, 64 * one, 0, 0x40000000)
+    held.write_bytes(content)
+    video = Video.opened(held)
+    assert video.size == (64, 128)
+    [upright] = video.pictures([0])
+    assert upright.shape == (128, 64, 3)
+    assert (upright[5, -5] > 200).all()
+    assert max(upright[5, 5].max(), upright[-5, 5].max(), upright[-5, -5].max()) < 50
 
 
 def bomb(path: Path) -> Path:
