@@ -110,11 +110,16 @@ def postures(name: str, n: int) -> None:
 
 
 def moving(lower: np.ndarray, upper: np.ndarray, n: int) -> np.ndarray:
-    """Return joint angles (n, len(lower)) that swing by a tenth of their ranges around zero, at 0.1 to 0.5 Hz."""
+    """Return joint angles (n, len(lower)) that swing by a tenth of their ranges around zero, at 0.1 to 0.5 Hz.
+
+    Where a range begins at zero they swing inside it: limbs that are straight to the last digit, for frames on end, are
+    of no recording.
+    """
     rng = np.random.default_rng(2)
     phase = np.arange(n)[:, None] / RATE * 2 * np.pi * rng.uniform(0.1, 0.5, len(lower))
-    swing = 0.1 * (upper - lower) * np.sin(phase + rng.uniform(0, 2 * np.pi, len(lower)))
-    return np.asarray(np.clip(swing, lower, upper))
+    swing = 0.1 * (upper - lower)
+    middle = np.clip(0.0, lower + swing, upper - swing)
+    return np.asarray(middle + swing * np.sin(phase + rng.uniform(0, 2 * np.pi, len(lower))))
 
 
 def motion(name: str, bodies: str, n: int) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.frames import hips_frame, torso_frame
-from posekit.compiled import limb_kernels
 from posekit.compiled import screen_kinds as kernels
 from posekit.compiled.compiling import compiled
 from posekit.geometry import Array, rotate_back, unit
@@ -113,6 +112,8 @@ class AnatomicalLimb(Check):
         """Judge whole limbs by a loop, but for those that it is not sure of; see `posekit.tree.Check`."""
         if len(self.limb) == 2:
             return self.judge(points)
+        from posekit.compiled import limb_kernels  # read by compiled loops alone
+
         R_parent, (start, middle, end) = self._parts(points)
         upper, lower = (rotate_back(R_parent, unit(b - a)) for a, b in ((start, middle), (middle, end)))
         value, low, high = np.empty((3, len(points), len(self.places)))

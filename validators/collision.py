@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from posekit.body import Figure
 from posekit.body.capsules import Capsule
 from posekit.body.pool import collides, make_pool
-from posekit.compiled import capsule_kernels
 from posekit.compiled import screen_kinds as kernels
 from posekit.compiled.compiling import compiled
 from posekit.geometry import Array, cross
@@ -96,6 +95,8 @@ class PairCollision(Check):
         """Measure the pairs by a loop; see `posekit.tree.Check`."""
         if not self.exact:
             return self.judge(points)
+        from posekit.compiled import capsule_kernels  # read by compiled loops alone
+
         distance = np.empty(len(points))
         loop = compiled(capsule_kernels).axis_distances
         loop(np.ascontiguousarray(points, dtype=np.float64), self.rule.numbers, distance)
