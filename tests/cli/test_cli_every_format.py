@@ -1,5 +1,6 @@
 """Every command takes every file that holds what it needs: one walk, in each format, judged and drawn alike."""
 
+import base64
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -63,16 +64,16 @@ def test_render_draws_a_page_of_every_format(
     done = command("render", walks[name], "-o", tmp_path / "page.html")
     assert done.code == 0, done.err
     text = (tmp_path / "page.html").read_text()
-    start = text.index("const DATA = ") + len("const DATA = ")
+    start = text.index('id="data">') + len('id="data">')
     data, _ = json.JSONDecoder().raw_decode(text[start:])
-    assert data["kind"] == "postures"
-    bodies = [body for frame in data["frames"] for body in frame["points"]]
+    assert data["kind"] == ("postures" if name == "postures" else "motion")
+    packed = data["packed"]["points"]
+    bodies = np.frombuffer(base64.b64decode(packed["base64"]), dtype=packed["type"]).reshape(-1, 19, 3)
     assert len(bodies) == FRAMES
     assert len(data["frames"]) == (1 if name == "postures" else FRAMES)
     # They stand: in the page's world z is up, and heads are above ankles.
     for body in bodies if name != "postures" else ():  # these lie as they lay in their file
-        neck, ankles = body[2], (body[3 * 12 + 2], body[3 * 13 + 2])
-        assert neck > max(ankles) + 8000
+        assert (body[0, 2] - body[12:14, 2].astype(float)).min() * data["step"] > 0.8
 
 
 def test_inspect_tells_a_robot_and_a_table_of_survivors(

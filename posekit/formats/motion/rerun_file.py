@@ -24,7 +24,7 @@ from posekit.skeleton import JOINTS, TREE_SEGMENTS
 if TYPE_CHECKING:
     from posekit.formats.own import View
 
-MAGIC: Final = b"RRF"
+RRD_MAGIC: Final = b"RRF"
 """How such a file begins."""
 MAX_OTHERS: Final = 60
 """Postures of a frame beside the likeliest: more cannot be told apart."""
@@ -209,6 +209,6 @@ RERUN_FORMAT: Final = MotionFormat(
     title="RRD, a recording for Rerun's viewer",
     suffixes=(".rrd",),
     write_points=write_rerun,
-    looks_like=lambda given: given.start.startswith(MAGIC),
+    looks_like=lambda given: given.start.startswith(RRD_MAGIC),
 )
 """Written, and not read: a recording is for eyes."""
