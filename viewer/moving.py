@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import BinaryIO
+from collections.abc import Iterable, Sequence
+from typing import BinaryIO, Final
 
 from PIL import Image
 
 from posekit.errors import ViewerError
 from posekit.viewer.browser.studio import Pixels
+
+DEFAULT_FPS: Final = 10.0
+"""Pictures a second where nothing says how many."""
 
 
 def write_gif(file: BinaryIO, pictures: Iterable[Pixels], *, fps: float) -> int:
@@ -35,6 +38,13 @@ def write_gif(file: BinaryIO, pictures: Iterable[Pixels], *, fps: float) -> int:
         disposal=2,
     )
     return len(frames)
+
+
+def real_time(times: Sequence[float]) -> float:
+    """Return the pictures a second that show frames as fast as they were, 0.5 to 100; 10 where nobody knows."""
+    span = times[-1] - times[0]
+    rate = (len(times) - 1) / span if span > 0 else DEFAULT_FPS  # NaN is not more than 0
+    return float(min(max(rate, 0.5), 100.0))
 
 
 def check_speed(fps: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -34,7 +35,6 @@ RENDER_EXAMPLES = examples(
 
 
 DEFAULT_SIZE = "1280x720"
-DEFAULT_FPS = 10.0
 
 
 class Layout(StrEnum):
@@ -164,7 +164,7 @@ def render(
         float | None,
         typer.Option(
             "--fps",
-            help="Pictures a second, where it moves. Default: 10; with --over as the frames' times say.",
+            help="Pictures a second, where it moves. Default: as the frames' times say, else 10.",
             show_default=False,
         ),
     ] = None,
@@ -203,6 +203,7 @@ def render(
     file, behind_file = given[0], seen[0] if seen else None
     import numpy as np
 
+    from posekit.viewer.moving import real_time
     from posekit.viewer.pictures import Shot, check_picture, write_picture
     from posekit.viewer.scene.compose import Style
     from posekit.viewer.scene.eye import Eye
@@ -222,7 +223,7 @@ def render(
         eye=pose,
         through_view=through_view,
         turntable=turntable,
-        fps=DEFAULT_FPS if fps is None else fps,
+        fps=Shot.fps if fps is None else fps,
         timeout=timeout,
     )
     moving = check_picture(output, shot)
@@ -250,6 +251,8 @@ def render(
         subject, frames = _shown(
             content, behind, frame, posture, rejected, moving=moving and not turntable, truth=true
         )
+    if fps is None and moving and not turntable:
+        shot = replace(shot, fps=real_time([one.time for one in frames]))
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
         count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
     pictures = f" ({count} pictures)" if moving else ""

@@ -17,6 +17,7 @@ from posekit.cli.chosen_postures import chosen_frames, chosen_postures
 from posekit.cli.main import main
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
+from posekit.viewer.moving import real_time
 from posekit.viewer.pictures import Shot, check_picture, write_picture
 from posekit.viewer.scene.beside_truth import BESIDE_METRES, beside_truth
 from posekit.viewer.scene.compose import Style
@@ -57,6 +58,13 @@ def test_sequence_becomes_a_gif_that_moves(subject: DrawnSubject, tmp_path: Path
             gif.seek(k)
             pictures.append(np.asarray(gif.convert("RGB")).astype(int))
     assert all((np.abs(a - b).max(axis=-1) > 30).sum() > 50 for a, b in itertools.pairwise(pictures))
+
+
+def test_what_moves_is_as_fast_as_it_was() -> None:
+    assert real_time([1.0, 1.2, 1.4]) == pytest.approx(5)
+    assert real_time([0.0, 1 / 240]) == 100  # no player shows more
+    for unknown in ([0.0], [2.0, 2.0], [float("nan")] * 3):
+        assert real_time(unknown) == 10
 
 
 def test_turntable_goes_around(subject: DrawnSubject, tmp_path: Path) -> None:

@@ -13,16 +13,13 @@ from PIL import Image
 from posekit.errors import InputError, ViewerError
 from posekit.safe_io.writing import check_target, make_folder, replacing
 from posekit.viewer.browser.studio import check_size
-from posekit.viewer.moving import check_speed, write_gif
+from posekit.viewer.moving import check_speed, real_time, write_gif
 from posekit.viewer.overlay.figure_painter import DrawnPerson, paint
 from posekit.viewer.overlay.frame_pictures import ImageFiles, VideoImages, matched
 from posekit.viewer.overlay.overlaid_person import OverlaidPerson
 from posekit.viewer.video import Pixels, video_library, write_mp4
 
 OVERLAY_SUFFIXES: Final = (".png", ".jpg", ".gif", ".mp4")
-DEFAULT_FPS: Final = 10.0
-"""Pictures a second where nothing says how many."""
-
 ASPECT_PIXELS: Final = 1.5
 """Pixels by which a picture's height may differ from that of the view's, scaled to its width."""
 
@@ -162,7 +159,8 @@ class _DrawnFilm:
         self.places = self._places(moving=moving)
         self.shots = self._shots(moving=moving)
         self.zooms = self._zooms()
-        self.fps = overlay.fps or self._rate()
+        times = [inside[0][0].frames[inside[0][1]].time for _, inside in self.shots]
+        self.fps = overlay.fps or real_time(times)
 
     def drawn(self, progress: Callable[[int], None] | None) -> Iterator[Image.Image]:
         """Draw them, one after another."""
@@ -247,12 +245,6 @@ class _DrawnFilm:
                 if zoom != 1.0:
                     self.said.append(f"pictures are the view's, {zoom:.3g} times as large")
         return zooms
-
-    def _rate(self) -> float:
-        times = [inside[0][0].frames[inside[0][1]].time for _, inside in self.shots]
-        span = times[-1] - times[0]
-        rate = (len(times) - 1) / span if np.isfinite(span) and span > 0 else DEFAULT_FPS
-        return float(min(max(rate, 0.5), 100.0))
 
     @staticmethod
     def _caption(inside: Sequence[tuple[OverlaidPerson, int]]) -> str:
