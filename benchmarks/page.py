@@ -34,7 +34,7 @@ FIRST_PICTURE = """new Promise((done) => {
   const look = () => (page.state.firstPicture ? done(page.state.firstPicture) : setTimeout(look, 5));
   look();
 })"""
-WINDOWS = ((1280, 800), (420, 800))
+WINDOW_SIZES = ((1280, 800), (420, 800))
 
 
 def main() -> None:
@@ -60,7 +60,7 @@ def main() -> None:
             seconds = time.process_time() - start
             print(f"{name}: {page.stat().st_size / 1e6:.2f} MB, written in {seconds:.1f} s of processor time")
             for webgl in (False, True):
-                for window in WINDOWS:
+                for window in WINDOW_SIZES:
                     measure(page, window, webgl=webgl)
 
 

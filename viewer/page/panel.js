@@ -33,9 +33,11 @@ const page = (() => {
     return scaled.toFixed(size !== 0 && size < 0.1 ? 3 : size < 100 ? 1 : 0);
   }
 
+  // Certain and impossible are said of nothing else.
   function percent(share) {
     if (share > 0 && share < 0.0005) return "< 0.1 %";
-    return `${(100 * share).toFixed(share > 0.0995 && share < 0.9995 ? 0 : 1)} %`;
+    if (share < 1 && share > 0.9995) return "> 99.9 %";
+    return `${(100 * share).toFixed((share > 0 && share < 0.0995) || (share > 0.99 && share < 1) ? 1 : 0)} %`;
   }
 
   // The survivor that is shown where nobody chose one: the path's, else the likeliest, which comes first.
@@ -86,7 +88,7 @@ const page = (() => {
   // While it plays, words and tables follow a few times a second.
   function refresh() {
     showTime();
-    if (state.playing && performance.now() - told < 400) return listeners.forEach((listener) => listener());
+    if (state.playing && performance.now() - told < 700) return listeners.forEach((listener) => listener());
     told = performance.now();
     showAnswer();
     showSurvivors();
@@ -141,7 +143,7 @@ const page = (() => {
     if (said) sure.append(element("strong", said[1], "sure"), ` sure of the likeliest posture${said[2]}`);
     else sure.textContent = first;
     // What the buttons say is not said twice.
-    const short = answer.representatives.length > 1 ? rest.map((line) => line.replace(/ \([^)]*\);.*$/, ":")) : rest;
+    const short = answer.representatives.length > 1 ? rest.map((line) => line.replace(/ \([^)]*\);.*$/, ", each with what is within 5 cm of it:")) : rest;
     box.replaceChildren(sure, ...short.map((line) => element("p", line)));
     if (answer.representatives.length > 1) {
       const list = element("div", undefined, "others");

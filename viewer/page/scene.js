@@ -179,7 +179,7 @@ const scene = (() => {
   // What a check finds is ringed, and has a mark: not by colour alone.
   function ring(place) {
     if (!place) return;
-    const radius = Math.max(9, 0.07 * place[3]);
+    const radius = Math.max(9, 0.045 * place[3]);
     pen.beginPath();
     pen.arc(place[0], place[1], radius, 0, 2 * Math.PI);
     pen.strokeStyle = css(DATA.colours.alarm);

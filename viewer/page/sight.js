@@ -43,7 +43,7 @@ const sight = (() => {
     state.look = name;
     state.moved = [0, 0, 0];
     const { width, height } = size();
-    state.distance = (0.62 * reach) / Math.tan(ANGLE / 2) / Math.min(1, width / height);
+    state.distance = (0.71 * reach) / Math.tan(ANGLE / 2) / Math.min(1, width / height);
     const turn = { free: 0.75, camera: 0, side: Math.PI / 2, above: 0 }[name];
     state.azimuth = toCamera + turn;
     state.elevation = { free: 0.26, camera: 0, side: 0.06, above: 1.5 }[name];
@@ -52,12 +52,12 @@ const sight = (() => {
 
   // The axes of the picture, for this frame.
   function prepare(index) {
-    const { width, height } = size(), centre = { x: width / 2, y: height / 2 };
+    const { width, height } = size(), centre = { x: width / 2, y: height / 2 + Math.min(0.06 * height, 34) }; // buttons are above
     if (state.look === "camera" && parallel && page.frame().family) return (shown = alongTheRays(width, height));
     if (state.look === "camera" && DATA.kind === "result" && !parallel) {
       const focal = 0.94 * Math.min(width / (2 * images.half[0]), height / (2 * images.half[1]));
       const shift = images.middle;
-      return (shown = { parallel: false, eye, right, up: down.map((value) => -value), forward, focal, x: centre.x - focal * shift[0], y: centre.y - focal * shift[1] });
+      return (shown = { parallel: false, eye, right, up: down.map((value) => -value), forward, focal, x: width / 2 - focal * shift[0], y: height / 2 - focal * shift[1] });
     }
     const target = along(along(middles[index], 1, state.moved), 1, [0, 0, 0]);
     const towards = [Math.cos(state.azimuth) * Math.cos(state.elevation), Math.sin(state.azimuth) * Math.cos(state.elevation), Math.sin(state.elevation)];
