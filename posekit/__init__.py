@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from posekit.body import Figure as Figure
     from posekit.body import load_figure as load_figure
+    from posekit.conversion.from_python import convert as convert
+    from posekit.conversion.from_python import render as render
     from posekit.errors import CameraError as CameraError
     from posekit.errors import FigureError as FigureError
     from posekit.errors import HeadError as HeadError
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
     from posekit.views.source import Source as Source
 
 _HOMES = {
+    "posekit.conversion.from_python": ("convert", "render"),
     "posekit.formats.cameras": ("read_cameras",),
     "posekit.errors": ("CameraError", "FigureError", "HeadError", "InputError", "PosekitError"),
     "posekit.body": ("Figure", "load_figure"),

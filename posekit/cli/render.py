@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.chosen_postures import chosen_frames, frame_numbers
-from posekit.cli.given import frame_count, read_given
 from posekit.cli.options import about, examples, numbers, option, options_given, progress
+from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
+from posekit.conversion.given import frame_count, read_given
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:

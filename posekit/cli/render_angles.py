@@ -7,10 +7,10 @@ from pathlib import Path
 
 import typer
 
-from posekit.cli.chosen_postures import chosen_frames, frame_numbers
-from posekit.cli.given import read_given
 from posekit.cli.options import about, distinct
 from posekit.cli.true_joints import true_joints
+from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
+from posekit.conversion.given import read_given
 from posekit.errors import InputError, ViewerError
 
 

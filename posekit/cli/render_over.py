@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from posekit.cli.chosen_postures import chosen_frames, frame_numbers
-from posekit.cli.given import read_given
 from posekit.cli.options import about, distinct, progress
+from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
+from posekit.conversion.given import read_given
 from posekit.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from posekit.cli.given import read_given
 from posekit.cli.options import about, examples, option
+from posekit.conversion.given import read_given
 from posekit.errors import InputError
 
 if TYPE_CHECKING:

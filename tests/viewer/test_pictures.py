@@ -13,8 +13,8 @@ from PIL import Image
 
 import posekit
 from posekit.answers.wording import percent
-from posekit.cli.chosen_postures import chosen_frames, chosen_postures
 from posekit.cli.main import main
+from posekit.conversion.chosen_postures import chosen_frames, chosen_postures
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
 from posekit.viewer.moving import real_time

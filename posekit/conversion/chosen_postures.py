@@ -1,11 +1,10 @@
-"""Which frames, and which postures of each, `posekit render` draws."""
+"""Which frames, and which postures of each, are drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from posekit.cli.options import split
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,7 +81,8 @@ def chosen_postures(shown: Shown, text: str, frame: int) -> Shown:
             raise InputError("--posture groups: the result has no groups; recover it with --group 5cm")
         groups = shown.groups.tolist()
         return shown.chosen([groups.index(group) for group in sorted(set(groups))])
-    rows = [number_of(word, len(shown), f"--posture: frame {frame}: {word!r}") for word in split(text)]
+    words = [word.strip() for word in text.split(",") if word.strip()]
+    rows = [number_of(word, len(shown), f"--posture: frame {frame}: {word!r}") for word in words]
     if not rows:
         raise InputError(f"--posture: {text!r}; expected {POSTURE_WORDS}")
     return shown.chosen(rows)

@@ -1,0 +1,80 @@
+"""`posekit.convert` and `posekit.render` do what the commands do, of files and of objects."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.errors import InputError
+
+
+@pytest.fixture(scope="module")
+def recovery() -> posekit.Recovery:
+    return posekit.recover(posekit.builtin_view("seq1"))
+
+
+@pytest.fixture
+def file(recovery: posekit.Recovery, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    recovery.save("found.npz")
+    return "found.npz"
+
+
+@pytest.mark.parametrize("options", [{}, {"posture": "3", "up": "+y"}])
+@pytest.mark.parametrize("suffix", ["bvh", "csv"])
+def test_a_file_is_converted_as_by_the_command(
+    file: str, command, suffix: str, options: dict[str, str]
+) -> None:
+    says = posekit.convert(file, f"mine.{suffix}", **options)
+    words = [word for name, value in options.items() for word in (f"--{name}", value)]
+    outcome = command("convert", file, f"theirs.{suffix}", *words)
+    assert outcome.code == 0 and outcome.out.splitlines()[:-1] == says
+    assert Path(f"mine.{suffix}").read_bytes() == Path(f"theirs.{suffix}").read_bytes()
+
+
+def test_objects_are_converted_as_their_files(file: str, recovery: posekit.Recovery) -> None:
+    expected = posekit.convert(file, "file.bvh")
+    for name, given in {
+        "recovery": recovery,
+        "result": posekit.open(file),
+        "postures": posekit.open(file, "postures"),
+    }.items():
+        says = posekit.convert(given, f"{name}.trc")
+        assert says, name
+    assert posekit.convert(recovery, "again.bvh") == expected
+    assert Path("again.bvh").read_bytes() == Path("file.bvh").read_bytes()
+    motion = posekit.open("recovery.trc", "motion")
+    posekit.convert(motion, "motion.csv")
+    np.testing.assert_allclose(posekit.open("motion.csv").points, motion.points, rtol=0, atol=1e-9)
+
+
+def test_a_page_is_the_commands(file: str, command) -> None:
+    assert posekit.render(file, "mine.html") == 1
+    assert command("render", file, "-o", "theirs.html").code == 0
+    assert Path("mine.html").read_bytes() == Path("theirs.html").read_bytes()
+
+
+def test_objects_are_drawn(file: str, recovery: posekit.Recovery) -> None:
+    for given in (recovery, posekit.open(file), posekit.open(file, "postures")):
+        posekit.render(given, "page.html", frame=0)
+        assert Path("page.html").stat().st_size > 100_000
+    posekit.render(recovery, "scene.html", frame=1, posture="likeliest")
+    assert Path("scene.html").read_text(encoding="utf-8").startswith("<!DOCTYPE html")
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: posekit.convert([1], "out.bvh"), "convert: got list; expected a path, a recovery"),
+        (lambda: posekit.convert("found.npz", "out.bvh", colour="red"), "convert: colour: is no option"),
+        (lambda: posekit.render(3, "out.html"), "render: got int; expected a path"),
+        (lambda: posekit.render("found.npz", "out.html", frame=99), "expected a number from 0 to 4"),
+        (lambda: posekit.render("none.npz", "out.html"), "none.npz"),
+    ],
+)
+def test_a_mistake_is_one_line(file: str, call, text: str) -> None:
+    with pytest.raises(InputError, match=text) as refused:
+        call()
+    assert "\n" not in str(refused.value)
+    assert not Path("out.html").exists() and not Path("out.bvh").exists()
