@@ -29,6 +29,9 @@ MAX_TERMINAL_CLIPS: Final = 5
 MARKUP_LETTERS: Final = "&<>|\\`[]*"
 """Letters that Markdown may take for more than themselves, also in the middle of a word."""
 
+MANY_QUIET_CHECKS: Final = 6
+"""So many checks that found nothing are named in one line in a terminal."""
+
 MAX_SETTING_CHARACTERS: Final = 200
 """Characters of a setting that are shown."""
 
@@ -41,12 +44,16 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
     columns : VerdictColumns
         The verdicts, one a posture.
     markdown : bool
-        Whether names are escaped for Markdown, or for a terminal.
+        Whether names are escaped for Markdown, or for a terminal, where many checks that found nothing share a line.
     """
     counts = ", ".join(f"{count} {verdict}" for verdict, count in columns.summary.items())
     lines = [f"{len(columns)} posture{'s' * (len(columns) != 1)}: {counts}", ""]
     head = ("check", "rejected", "undecided", "most often", "worst")
     total = max(len(columns), 1)
+    by_check = columns.by_check()
+    quiet = [check for check, count in by_check.items() if not count.rejected and not count.undecided]
+    if markdown or len(quiet) < MANY_QUIET_CHECKS:
+        quiet = []
     rows = [
         (
             check,
@@ -55,9 +62,11 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
             _most(check, count),
             _worst(count),
         )
-        for check, count in columns.by_check().items()
+        for check, count in by_check.items()
+        if check not in quiet
     ]
-    return lines + _table(head, rows, _no_markup if markdown else _cell)
+    table = _table(head, rows, _no_markup if markdown else _cell) if rows else []
+    return lines + table + ([f"nothing found by {', '.join(quiet)}"] if quiet else [])
 
 
 def markdown_lines(
