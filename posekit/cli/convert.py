@@ -51,10 +51,10 @@ def convert(
         option(
             "--posture",
             "WHICH",
-            "Of a result: first (the likeliest), path (through all frames, if they were followed), a number "
-            "from 0, or all (csv, npz, parquet, glb).",
+            "Of a result: likeliest, path (through all frames, if they were followed), a number from 0, or all, the "
+            "likeliest first (csv, npz, parquet, glb). Default: the path if there is one, else the likeliest.",
         ),
-    ] = "first",
+    ] = "",
     view: Annotated[
         Path | None,
         option("--view", "VIEW", "What a result was recovered from: puts it into its camera's world."),

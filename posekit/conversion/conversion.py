@@ -15,6 +15,7 @@ from posekit.conversion.motion_output import (
     write_moving,
     write_points,
 )
+from posekit.conversion.object_points import write_object_points
 from posekit.conversion.posture_sequence import one_clip, read_clips, read_sequence
 from posekit.conversion.rerun_recording import write_rerun_result
 from posekit.errors import InputError
@@ -50,6 +51,7 @@ CAMERA_AND_PERSON_OPTIONS: Final = (
 OPTIONS_OF: Final = {
     Content.MOTION: MOTION_OPTIONS,
     Content.RESULT: ("--posture", "--view", "--up", "--input-up", "--gaps"),
+    Content.OBJECTS: ("--posture", "--up", "--input-up"),
     Content.VIEW: ("--skeleton", "--up", "--input-up", "--gaps"),
     Content.POSTURES: ("--up", "--input-up"),
     Content.CONFIGURATIONS: ("--up", "--input-up"),
@@ -70,7 +72,8 @@ class Conversion:
     source : Source
         How a detector's file is to be read.
     posture : str
-        Of a result: ``first``, a number from 0, or ``all``.
+        Of a result: ``likeliest``, ``path``, a number from 0, or ``all``; if empty the path where the frames were
+        followed, else the likeliest.
     view : View, optional
         What a result was recovered from.
     up : str
@@ -93,7 +96,7 @@ class Conversion:
     output: Path
     to: str = ""
     source: Source
-    posture: str = "first"
+    posture: str = ""
     view: View | None = None
     up: str = ""
     input_up: str = ""
@@ -120,7 +123,7 @@ class Conversion:
         """Refuse options that say nothing about such a file: whoever gave them expects something of them."""
         given = {
             **self.source.given,
-            "--posture": self.posture != "first",
+            "--posture": bool(self.posture),
             "--view": self.view is not None,
             "--up": bool(self.up),
             "--input-up": bool(self.input_up),
@@ -161,6 +164,9 @@ def convert(job: Conversion) -> list[str]:
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
         return write_points(output, carried, job.source.skeleton)
+    if what.holds is Content.OBJECTS:
+        found_objects = files.read_object(job.given)
+        return write_object_points(output, found_objects, job.given, posture=job.posture, up=job.input_up)
     if what.holds is Content.RESULT and output.to == "rerun":
         return write_rerun_result(job.output, files.read_result(job.given), job.view)
     found = read_sequence(

@@ -194,7 +194,7 @@ def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
     if writer is None:
         raise InputError(
             f"--posture: all, but {output.to} carries one posture a frame; expected {', '.join(TABLE_FORMATS)} or glb; "
-            "choose one of them, or --posture first"
+            "choose one of them, or --posture likeliest"
         )
     return writer(output, found)
 

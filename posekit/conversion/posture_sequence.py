@@ -38,6 +38,9 @@ MOST_GAPS: Final = 4
 ASSUMED_RATE: Final = 30.0
 """Frames a second of postures without times."""
 
+LIKELIEST_WORDS: Final = ("", "likeliest", "first")
+"""Words for the survivor of a frame that has the greatest probability; the last one is what it was called."""
+
 CAMERA_UP: Final = "-y"
 """What is up in the camera frame of a camera that is held level."""
 
@@ -167,7 +170,7 @@ def read_sequence(
     path: Path,
     what: Recognised,
     *,
-    posture: str = "first",
+    posture: str = "",
     view: View | None = None,
     skeleton: str = "",
     clip: str = "",
@@ -183,7 +186,8 @@ def read_sequence(
     what : Recognised
         What the file is.
     posture : str
-        Of a result: ``first``, the number of a survivor from 0, ``path``, or ``all``.
+        Of a result: ``likeliest``, the number of a survivor from 0, ``path``, or ``all``; if empty the path where the
+        frames were followed, else the likeliest.
     view : View, optional
         What a result was recovered from: its camera's place in the world turns and moves the postures there.
     skeleton : str
@@ -221,7 +225,7 @@ def read_sequence(
 
 def _of_result(result: Result, posture: str, view: View | None, stated: str) -> PostureSequence:
     figure, _ = recovered_with(result)
-    if posture == "path":
+    if posture == "path" or (not posture and result.paths is not None):
         return _of_path(result, figure, view, stated)
     rows: list[tuple[int, int]] = []
     ranks: list[int] = []
@@ -233,16 +237,21 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
             lost[k] = result.frames[k].time
             continue
         if posture == "all":
-            chosen = list(range(len(order)))
+            chosen = order.tolist()
         else:
-            chosen = [int(order[0]) if posture == "first" else _number(posture, len(order), k)]
+            chosen = [int(order[0]) if posture in LIKELIEST_WORDS else _number(posture, len(order), k)]
         rows += [(k, row) for row in chosen]
         ranks += (np.argsort(order)[chosen] + 1).tolist()
     if not rows:
-        raise InputError("result: no frame has a posture; nothing to convert")
+        raise InputError("result: no frame has a posture, and nothing is to be converted; recover it again")
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
     says = [f"{len(lost)} of {len(result.frames)} frames without a posture are left out"] if lost else []
+    if posture in LIKELIEST_WORDS and max(map(len, probability)) > 1:
+        sure = float(np.median([probability[k][row] for k, row in rows]))
+        says.append(
+            f"the likeliest posture of each frame, with a probability of {sure:.2g} (median); all: --posture all"
+        )
     points, up = _placed(points, view, stated, says)
     values = {
         "probability": np.array([probability[k][row] for k, row in rows]),
@@ -255,7 +264,7 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
                 f"{column.flat_prefix}_{check}": np.array([of_frame[k][check][row] for k, row in rows])
                 for check in of_frame[0]
             }
-            values = {**margins, **values}
+            values |= margins
         elif of_frame:
             values[column.key] = np.array([of_frame[k][row] for k, row in rows])
     return PostureSequence(
@@ -288,7 +297,10 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     survivor[place] = paths.survivor[0, known]
     interpolated = np.full(len(time), float(len(JOINTS)))
     interpolated[place] = paths.interpolated[0, known].sum(axis=1)
-    says = [f"the likeliest path, {int((survivor < 0).sum())} of {len(time)} frames bridged"]
+    says = [
+        f"the likeliest path, with {paths.share[0]:.2g} of the probability of {len(paths.share)}, "
+        f"{int((survivor < 0).sum())} of {len(time)} frames bridged"
+    ]
     points, up = _placed(points, view, stated, says)
     codes = [""] * len(time)
     for row, k in zip(place.tolist(), known.tolist(), strict=True):
@@ -346,7 +358,7 @@ def _guessed(joints: Array, source: str) -> str:
 def _number(posture: str, count: int, frame: int) -> int:
     if not posture.isdecimal() or int(posture) >= count:
         raise InputError(
-            f"--posture: {posture!r}; expected first, path, all, or a number from 0 to {count - 1}, "
+            f"--posture: {posture!r}; expected likeliest, path, all, or a number from 0 to {count - 1}, "
             f"as frame {frame} has"
         )
     return int(posture)

@@ -114,6 +114,9 @@ def held_postures(
         return held_motion(recorded, layout=layout, unit=unit, up=up, rate=rate)
     if found.holds is Content.VIEW:
         return _of_truth(path, read_view(path))
+    if found.holds is Content.OBJECTS:
+        remedy = "what was recovered is within its robot's limits; convert its points to trc, c3d, csv, npz or parquet"
+        raise refusal(path, "", found.title, "postures of a person", remedy)
     known = ", ".join(format_names(*POSTURE_CONTENTS))
     raise refusal(path, "", found.title, f"postures, as they are in {known}", "give another file")
 

@@ -136,7 +136,7 @@ def from_file(there: Path, text: str) -> str:
         ("convert @result.npz OUT.trc --posture all", ["--posture: all", "one posture a frame", "csv, npz"]),
         ("convert @result.npz OUT.json --posture all", ["--posture: all", "one posture a frame", "csv, npz"]),
         ("convert @result.npz OUT.csv --posture -1", ["--posture", "'-1'", "a number from 0"]),
-        ("convert @result.npz OUT.csv --posture best", ["--posture", "first, path, all, or a number"]),
+        ("convert @result.npz OUT.csv --posture best", ["--posture", "likeliest, path, all, or a number"]),
         ("convert @result.npz OUT.csv --up up", ["--up", "+x, -x, +y, -y, +z, -z"]),
         ("convert @result.npz OUT.trc --up +z", ["--up", "every file of trc"]),
         ("convert @result.npz OUT.mot --up z", ["--up", "+x, -x, +y"]),

@@ -298,19 +298,20 @@ def test_all_survivors_in_a_table(
     assert done.code == 0, done.err
     assert f"{sum(recovered.counts)} survivors of {FRAMES} frames, -y up" in done.out
     result = files.read_result(recovered.folder / "result.npz")
-    expected = np.concatenate([frame.joints for frame in result.frames])
     if name == "npz":
         with np.load(out) as arrays:
             points, frame, rank = arrays["joints"], arrays["frame"], arrays["values/rank"]
+            survivor = arrays["survivor"]
     else:
         points, _ = read_table(out)
         table = pandas.read_csv(out) if name == "csv" else pandas.read_parquet(out)
-        frame, rank = table["frame"].to_numpy(), table["rank"].to_numpy()
+        frame, rank, survivor = (table[one].to_numpy() for one in ("frame", "rank", "survivor"))
         assert table["branches"].astype(str).str.len().max() <= 13
+    expected = [result.frames[k].joints[row] for k, row in zip(frame, survivor, strict=True)]
     np.testing.assert_allclose(points, expected, rtol=0, atol=1e-12)
     assert np.bincount(frame).tolist() == recovered.counts
     np.testing.assert_allclose(points[rank == 1], recovered.ranked, rtol=0, atol=1e-12)
-    assert all(sorted(rank[frame == k]) == list(range(1, n + 1)) for k, n in enumerate(recovered.counts))
+    assert all(rank[frame == k].tolist() == list(range(1, n + 1)) for k, n in enumerate(recovered.counts))
     described = command("inspect", out)
     assert described.code == 0, described.err
     assert "a table of survivors" in described.out
