@@ -10,8 +10,8 @@ import threading
 
 import pytest
 
-from posekit.cli import given as given_files
 from posekit.cli import view
+from posekit.conversion import given as given_files
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View, write_postures, write_result, write_view
 from posekit.recovery import recover
