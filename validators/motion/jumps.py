@@ -77,6 +77,7 @@ def jumps_of(joints: Array, step: float) -> Jumps:
     offset, misfit = _measured(joints, _ONE_FRAME, count)
     body = middle(offset)
     alone = norm(body) - JOINT_MISFITS * middle(misfit)
+    moved = alone > 0
     displaced = displaced_by(joints, step)
     if (alone > LEAST_JUMP).any():
         # Beside a body that goes aside, what is off from a curve is off from where it went.
@@ -86,7 +87,7 @@ def jumps_of(joints: Array, step: float) -> Jumps:
             displaced = displaced_by(np.where((alone > LEAST_JUMP)[:, None, None], np.nan, joints), step)
     joint = norm(offset) - JOINT_MISFITS * misfit
     beside = norm(offset - body[:, None]) - JOINT_MISFITS * misfit
-    joint = np.where((alone > 0)[:, None], np.minimum(beside, joint), joint)
+    joint = np.where(moved[:, None], np.minimum(beside, joint), joint)
     if count > 2 * SIDE_FRAMES:
         third = norm(filtered(joints, _THIRD_DIFFERENCE))
         joint[0] = third[0] - END_MISFITS * third[1:3].max(axis=0)
