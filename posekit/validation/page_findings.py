@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from posekit.errors import PosekitError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures
-from posekit.validators import Validator
+from posekit.validators import Report, Validator
 from posekit.viewer.page.findings_page import PageFinding, PageFindings
 
 MOST_JUDGED: Final = 5000
@@ -23,31 +24,42 @@ def page_findings(given: Any) -> PageFindings | None:
     Parameters
     ----------
     given : Postures, HeldPostures or Result
-        Frames of one person; of a result nothing is judged: all of its survivors passed.
+        Each recording is one person's; of a result nothing is judged: all of its survivors passed.
     """
     if not isinstance(given, Postures | HeldPostures):
         return None
     held = given if isinstance(given, Postures) else given.postures
-    joints = np.asarray(held.joints)
+    joints, head = np.asarray(held.joints), held.head
     if len(joints) > MOST_JUDGED or not np.isfinite(joints).any():
         return None
+    clip = given.clip if isinstance(given, HeldPostures) else np.zeros(len(joints), dtype=np.intp)
+    found: dict[int, list[PageFinding]] = defaultdict(list)
+    validator = Validator()
     try:
-        report = Validator().check(joints, held.head, configured=False)
+        for one in np.unique(clip).tolist():
+            rows = np.flatnonzero(clip == one)
+            report = validator.check(joints[rows], None if head is None else head[rows], configured=False)
+            for row, finding in _findings(report):
+                found[int(rows[row])].append(finding)
     except PosekitError:
         return None
-    found: dict[int, list[PageFinding]] = defaultdict(list)
+    return PageFindings(by_posture=dict(found))
+
+
+def _findings(report: Report) -> Iterator[tuple[int, PageFinding]]:
+    """List what was violated: the posture's row, and the finding."""
     for judgement in report.judgements:
         for row, k in np.argwhere(judgement.violated).tolist():
             value, lower, upper = (
                 float(each[row, k]) for each in (judgement.value, judgement.lower, judgement.upper)
             )
-            found[row].append(
+            yield (
+                row,
                 PageFinding(
                     check=judgement.check,
                     where=judgement.where[k],
                     unit=judgement.unit[k],
                     value=value,
                     bound=lower if value < lower else upper,
-                )
+                ),
             )
-    return PageFindings(by_posture=dict(found))

@@ -192,3 +192,36 @@ def test_a_reason_shows_a_branch_that_it_rejected(opened, walked, walk):
     assert said in reasons
     button.click()
     assert tab.evaluate("scene.layers().rejected") == 0
+
+
+def test_each_recording_of_a_file_is_one_persons_and_is_named(opened, motion):
+    joints = motion.postures.joints
+    both = dataclasses.replace(
+        motion,
+        postures=Postures(joints=np.concatenate([joints, 0.8 * joints])),
+        frame=np.arange(2 * FRAMES),
+        clip=np.repeat([0, 1], FRAMES),
+        clips=("tall", "small"),
+        time=np.tile(motion.time, 2),
+    )
+    findings = page_findings(both)
+    assert list(findings.by_posture) == [BENT, FRAMES + BENT]
+    tab = opened(both, findings=findings)
+    assert tab.inner_text("#caption") == "tall"
+    tab.keyboard.press("End")
+    assert tab.inner_text("#caption") == "small"
+
+
+def test_several_people_in_the_frames_of_a_file_are_all_seen(opened, motion):
+    joints = motion.postures.joints
+    both = dataclasses.replace(
+        motion,
+        postures=Postures(joints=np.concatenate([joints, joints + np.array([0.0, 1.0, 0.0])])),
+        frame=np.tile(motion.frame, 2),
+        clip=np.repeat([0, 1], FRAMES),
+        time=np.tile(motion.time, 2),
+    )
+    tab = opened(both)
+    assert tab.is_checked("[data-show=others]")
+    assert tab.evaluate("scene.layers().others") == 1
+    assert tab.locator("#survivors-body tr").count() == 2

@@ -112,6 +112,7 @@ def page_data(
         "judged": findings is not None,
         "findings": [] if findings is None else findings.described(),
         "left": len(_joints(given)) - len(_joints(shown)),
+        **_recordings(shown),
         "step": step,
         "packed": arrays,
         "frames": [
@@ -122,6 +123,7 @@ def page_data(
                 **starts[k],
                 **({} if isnan(picked[k].time) else {"time": picked[k].time}),
                 **_findings_of(numbers, rows),
+                **_recording_of(shown, rows),
             }
             for k, (index, count, rows) in enumerate(zip(chosen, counts, of_frame, strict=True))
         ],
@@ -317,6 +319,19 @@ def _frame(frame: ResultFrame, rows: NDArray[np.intp], reasons: Mapping[str, int
 def _findings_of(findings: Mapping[int, list[list[float]]], rows: NDArray[np.intp]) -> Json:
     found = {str(k): findings[row] for k, row in enumerate(rows.tolist()) if row in findings}
     return {"findings": found} if found else {}
+
+
+def _recordings(given: Postures | HeldPostures) -> Json:
+    """Return the names of a file's recordings, where it has several."""
+    if isinstance(given, HeldPostures) and len(given.clips) > 1:
+        return {"clips": list(given.clips)}
+    return {}
+
+
+def _recording_of(given: Postures | HeldPostures, rows: NDArray[np.intp]) -> Json:
+    if isinstance(given, Postures) or len(given.clips) < 2 or not len(rows):
+        return {}
+    return {"clip": int(given.clip[rows[0]])}
 
 
 def _joints(given: Postures | HeldPostures) -> Array:

@@ -128,7 +128,7 @@ const page = (() => {
       said = `path ${path} (${percent(DATA.paths.probability[path])})` + (bridged ? ", bridged in this frame" : `, posture ${pack.number(here, survivor)}`);
     } else if (here.held) {
       const share = pack.probability(here, survivor);
-      said = DATA.kind === "motion" ? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
+      said = DATA.kind === "motion" ? DATA.clips?.[here.clip] ?? "" : `posture ${pack.number(here, survivor)}` + (share === undefined ? "" : `, ${percent(share)}` + (survivor === 0 ? ": the likeliest" : ""));
     }
     if (state.example !== null) said += " – dashed: a rejected branch";
     byId("caption").textContent = said;
@@ -173,7 +173,7 @@ const page = (() => {
     const list = element("ul");
     for (const one of all) list.append(element("li", one.text));
     box.replaceChildren(line, list);
-    if (DATA.frames.length > 1) box.append(element("p", `${bad} of ${plural(DATA.frames.length, "frame has", "frames have")} findings: red marks above the time line.`, "soft"));
+    if (DATA.frames.length > 1) box.append(element("p", bad ? `${bad} of ${plural(DATA.frames.length, "frame has", "frames have")} findings: red marks above the time line.` : `Nor in any of ${plural(DATA.frames.length, "frame", "frames")}.`, "soft"));
   }
 
   // What the checks find in the posture that is drawn.

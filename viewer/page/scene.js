@@ -8,7 +8,10 @@ const scene = (() => {
   const { dot, minus, along, cross, unit } = sight.vectors;
   const IMAGE_DEPTH = 0.6, MOST_OTHERS = 400, FINGER = 16;
   const { position: eye, forward, right, down } = DATA.camera, axes = [right, down, forward];
-  const shownNow = { bodies: true, others: false, rays: false, truth: false };
+  // Several postures in the frames of a file are people: all are seen.
+  const people = DATA.kind === "postures" && DATA.frames.length > 1;
+  const shownNow = { bodies: true, others: people, rays: false, truth: false };
+  document.querySelector("[data-show=others]").checked = people;
   const css = (colour, alpha = 1) => `rgba(${colour >> 16},${(colour >> 8) & 255},${colour & 255},${alpha})`;
   const mixed = (colour, other, t) => [16, 8, 0].reduce((sum, bit) => sum | (Math.round(((colour >> bit) & 255) * (1 - t) + ((other >> bit) & 255) * t) << bit), 0);
   const shades = Object.fromEntries(Object.entries(DATA.colours).map(([side, colour]) => [side, { light: mixed(colour, 0xffffff, 0.5), plain: colour, dark: mixed(colour, 0x10202c, 0.42) }]));
@@ -69,7 +72,7 @@ const scene = (() => {
   // Where no head is known one is drawn, hollow: a figure without is hard to read.
   function withHead(all) {
     const [neck, pelvis] = [all[0], all[3]], head = all.slice(DATA.joints);
-    if (!neck || !pelvis || head.some((point) => point)) return { all, made: false };
+    if (!neck || !pelvis || head.every((point) => point)) return { all, made: false };
     const up = unit(minus(neck, pelvis)), whole = [...all];
     for (let k = DATA.joints; k < whole.length; k++) whole[k] = along(neck, 0.17, up);
     return { all: whole, made: true };
@@ -152,8 +155,11 @@ const scene = (() => {
   function drawBody(all) {
     const unseen = (joint) => page.unseen(joint), parts = capsulesOf(all, unseen);
     drawShadow(parts);
-    if (shownNow.bodies) parts.forEach(drawCapsule);
-    else for (const side of ["middle", "right", "left"]) {
+    if (shownNow.bodies) {
+      const thick = Math.max(2, 0.014 * (parts[0]?.from[3] ?? 0));
+      polyline(DATA.segments.flatMap(([a, b, side]) => (side === "middle" && all[a] && all[b] ? [[all[a], all[b]]] : [])), css(shades.middle.dark, 0.75), thick);
+      parts.forEach(drawCapsule);
+    } else for (const side of ["middle", "right", "left"]) {
       const of = DATA.segments.filter((one) => one[2] === side);
       for (const guessed of [false, true]) {
         const ends = of.flatMap(([a, b]) => (all[a] && all[b] && (unseen(a) || unseen(b)) === guessed ? [[all[a], all[b]]] : []));
