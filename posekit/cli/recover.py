@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -29,7 +30,7 @@ from posekit.errors import InputError
 
 if TYPE_CHECKING:
     from posekit.following.following import Following
-    from posekit.formats.own import View
+    from posekit.formats.own import Result, View
     from posekit.recovery.recovery import Recovery
     from posekit.recovery.scaled_sequences import ScaledFollowing
     from posekit.views.opened import Opened
@@ -178,7 +179,7 @@ def recover(
             recovery.figure.write(figure_path)
         following = _followed(recovery, scaled, view, paths)
         result = result_of(recovery, unit=one.view.unit, explain=explain, following=following)
-        files.write_result(path, result)
+        files.write_result(path, _with_pictures(result, one))
         summarize(recovery)
         _tell(recovery, scaled, following, None if truth is None else one.view)
         typer.echo(f"written: {path}")
@@ -186,6 +187,13 @@ def recover(
     if any(len(frame) for frame in found.frames):
         written = output if len(people) == 1 else of_person(output, first, alone=False)
         tell_further(written, None if first.says else view)
+
+
+def _with_pictures(result: Result, one: Opened) -> Result:
+    """Name the pictures that the frames were detected in, where a detector's file does."""
+    if not one.pictures:
+        return result
+    return replace(result, settings={**result.settings, "pictures": list(one.pictures)})
 
 
 def _check_urdf_path(path: Path | None) -> None:

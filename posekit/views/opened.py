@@ -20,11 +20,14 @@ class Opened:
         The person's view.
     says : tuple of str
         What it was made of, a line each: format, person, camera, lengths.
+    pictures : tuple of str
+        The pictures that the frames were detected in, by name; empty where nobody says.
     """
 
     person: int
     view: View
     says: tuple[str, ...]
+    pictures: tuple[str, ...] = ()
 
 
 def of_person(path: Path, one: Opened, *, alone: bool) -> Path:

@@ -75,13 +75,20 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             sighted.says,
             of_lengths,
         )
-        opened.append(Opened(person=number, view=view, says=says))
+        opened.append(Opened(person=number, view=view, says=says, pictures=_pictures(one, len(view))))
     if not opened:
         raise InputError(
             f"{path}: of none of its {len(people)} people both shoulders are seen; expected at least one; choose a "
             "smaller --min-confidence, or another file"
         )
     return opened
+
+
+def _pictures(one: KeyPoints, frames: int) -> tuple[str, ...]:
+    """Name the pictures of a view's frames: all of a sequence, or those in which the person is seen."""
+    if frames == len(one.pictures):
+        return tuple(one.pictures)
+    return tuple(one.pictures[k] for k in one.frame.tolist()) if frames == len(one) else ()
 
 
 def choose_person(found: KeyPoints, who: str) -> KeyPoints:

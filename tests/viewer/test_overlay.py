@@ -26,6 +26,7 @@ from posekit.viewer.overlay import (
     OverlaidPerson,
     Overlay,
     frame_pictures,
+    overlaid_person,
     paint,
     write_overlay,
     write_photographs,
@@ -39,6 +40,7 @@ from posekit.viewer.scene.framing import view_eye
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.video import Video, write_mp4
 from posekit.views import view_of
+from tests.detector_files import view_keypoints, write_keypoints
 
 SIZE = (480, 270)
 K = np.array([[375.0, 0.0, 239.5], [0.0, 375.0, 134.5], [0.0, 0.0, 1.0]])
@@ -208,6 +210,12 @@ def test_names_tell_which_picture_is_whose(folder: Path) -> None:
     source = frame_pictures(folder)
     times = np.zeros(2)
     assert matched(source, times, ["a/000002.jpg", "000001.png"]).pictures == (2, 1)
+    assert matched(source, times, ["a/000001", "000000.png"]).pictures == (1, 0)
+    assert matched(source, np.zeros(3), ["cam.000000", "cam.000001", "cam.000002"]).pictures == (
+        0,
+        1,
+        2,
+    )  # by order
     with pytest.raises(InputError, match=r"no file x\.jpg, which frame 1 was detected in"):
         matched(source, times, ["000001.png", "x.jpg"])
 
@@ -388,3 +396,31 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
     words = [result, "--view", tmp_path / "view.json", "--over", photographs, "-o"]
     assert command(monkeypatch, *words, photographs / "over.png", "--frame", 0) == 2
     assert "is in the folder of the photographs" in capsys.readouterr().err
+
+
+def test_a_result_says_which_pictures_a_detector_read(
+    view: View,
+    folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    keypoints = view_keypoints(view, "coco", "coco_17")
+    named = replace(keypoints, pictures=("000002.jpg", "000000.jpg", "000001.jpg"))
+    write_keypoints(tmp_path / "detected.json", named, "coco")
+    monkeypatch.setattr(
+        sys, "argv", ["posekit", "recover", str(tmp_path / "detected.json"), "-o", str(tmp_path / "r.npz")]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert not ended.value.code, capsys.readouterr().err
+    result = posekit.read_result(tmp_path / "r.npz")
+    assert result.settings["pictures"] == list(named.pictures)
+    assert tuple(overlaid_person(result).files) == named.pictures
+    shuffled = tmp_path / "shuffled"
+    shuffled.mkdir()
+    for name, frame in zip(named.pictures, range(3), strict=True):
+        read_image(folder / f"{frame:06}.png").save(shuffled / name)
+    assert command(monkeypatch, tmp_path / "r.npz", "--over", shuffled, "-o", tmp_path / "over") == 0
+    assert "by file names" in capsys.readouterr().out
+    assert sorted(file.name for file in (tmp_path / "over").iterdir()) == [f"00000{k}.png" for k in range(3)]

@@ -137,8 +137,8 @@ def matched(
         Where pictures are missing, or where it is not clear which is whose.
     """
     count = len(times)
-    if isinstance(source, ImageFiles) and source.path.is_dir() and names:
-        return _by_name(source, names)
+    if isinstance(source, ImageFiles) and source.path.is_dir() and (named := _by_name(source, names)):
+        return named
     if isinstance(source, ImageFiles) and source.count == 1 and (count == 1 or still):
         return Matched(pictures=(0,) * count, said="" if count == 1 else "one picture for all frames")
     if source.count == count:
@@ -157,20 +157,23 @@ def matched(
     raise refusal(source.path, "", got, f"{count}, one a frame", remedy)
 
 
-def _by_name(source: ImageFiles, names: Sequence[str]) -> Matched:
-    """Find files by the names that a detector gave; endings may differ."""
-    whole = {file.name: k for k, file in enumerate(source.files)}
-    stems = {file.stem: k for k, file in enumerate(source.files)}
+def _by_name(source: ImageFiles, names: Sequence[str]) -> Matched | None:
+    """Find files by the names that a detector gave, with an ending or without; None where it gave others to all."""
+    numbers = {file.stem: k for k, file in enumerate(source.files)}
+    numbers |= {file.name: k for k, file in enumerate(source.files)}
     pictures = []
-    for frame, name in enumerate(names):
+    for name in names:
         given = PurePath(name)
-        number = whole.get(given.name, stems.get(given.stem))
-        if number is None:
-            raise InputError(
-                f"{source.path}: no file {given.name}, which frame {frame} was detected in; expected one picture a "
-                "frame; give the folder that the detector read"
-            )
-        pictures.append(number)
+        stem = given.stem if given.suffix.lower() in IMAGE_SUFFIXES else given.name
+        pictures.append(numbers.get(given.name, numbers.get(stem, -1)))
+    if max(pictures, default=-1) < 0:
+        return None
+    if -1 in pictures:
+        frame = pictures.index(-1)
+        raise InputError(
+            f"{source.path}: no file {PurePath(names[frame]).name}, which frame {frame} was detected in; expected one "
+            "picture a frame; give the folder that the detector read"
+        )
     return Matched(pictures=tuple(pictures), said="pictures and frames are matched by file names")
 
 

@@ -43,7 +43,6 @@ def overlaid_person(
     *,
     name: str = "the result",
     frames: Sequence[Shown] | None = None,
-    files: Sequence[str] = (),
 ) -> OverlaidPerson:
     """Gather what is drawn of a result over its pictures.
 
@@ -57,8 +56,6 @@ def overlaid_person(
         What errors call it.
     frames : sequence of Shown, optional
         What is drawn of each frame; by default the likeliest posture and what else it can be, or the likeliest path.
-    files : sequence of str
-        The pictures that the frames were detected in, by name.
 
     Raises
     ------
@@ -82,4 +79,14 @@ def overlaid_person(
             "--view VIEW"
         )
     size = seen.camera.size if seen is not None and isinstance(seen.camera, OpenCVModel) else None
-    return OverlaidPerson(name=name, frames=frames, figure=subject.figure, size=size, files=files)
+    return OverlaidPerson(name=name, frames=frames, figure=subject.figure, size=size, files=_files(given))
+
+
+def _files(given: Result | View) -> tuple[str, ...]:
+    """Return the names of the pictures that a result's frames were detected in; none where it does not say."""
+    if not isinstance(given, Result):
+        return ()
+    names = given.settings.get("pictures")
+    if not isinstance(names, Sequence) or len(names) != len(given.frames):
+        return ()
+    return tuple(str(name) for name in names)

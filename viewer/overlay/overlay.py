@@ -165,7 +165,7 @@ class _DrawnFilm:
     def drawn(self, progress: Callable[[int], None] | None) -> Iterator[Image.Image]:
         """Draw them, one after another."""
         images = self.source.images([number for number, _ in self.shots])
-        for image, (_, inside) in zip(images, self.shots, strict=True):
+        for image, (number, inside) in zip(images, self.shots, strict=True):
             people = [
                 DrawnPerson(
                     shown=one.frames[k],
@@ -177,7 +177,7 @@ class _DrawnFilm:
                 if len(one.frames[k]) and one.frames[k].sight is not None
             ]
             _check_inside(self.source.path, people, image.size, inside[0][1])
-            caption = self._caption(inside) if self.overlay.captions else ""
+            caption = self._caption(number, inside) if self.overlay.captions else ""
             yield _fitted(paint(image, people, caption=caption), self.overlay.size)
             if progress is not None:
                 progress(1)
@@ -246,11 +246,13 @@ class _DrawnFilm:
                     self.said.append(f"pictures are the view's, {zoom:.3g} times as large")
         return zooms
 
-    @staticmethod
-    def _caption(inside: Sequence[tuple[OverlaidPerson, int]]) -> str:
-        first, k = inside[0]
-        # What is said of one of several people is not said of the picture.
-        return first.frames[k].caption.split("\n")[0] if len(inside) > 1 else first.frames[k].caption
+    def _caption(self, number: int, inside: Sequence[tuple[OverlaidPerson, int]]) -> str:
+        """Say what is said of one person; of several, which picture it is."""
+        if len(inside) == 1:
+            (one, k), *_ = inside
+            return one.frames[k].caption
+        files = self.source.files if isinstance(self.source, ImageFiles) else ()
+        return f"{files[number].name if files else f'picture {number}'}: {len(inside)} people"
 
 
 def _check_inside(path: Path, people: Sequence[DrawnPerson], size: tuple[int, int], frame: int) -> None:
