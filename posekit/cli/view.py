@@ -12,6 +12,7 @@ import typer
 from posekit.cli.options import about, examples, option
 from posekit.conversion.given import read_given
 from posekit.errors import InputError
+from posekit.safe_io import extra
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
@@ -55,6 +56,8 @@ def view(
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
     from posekit.viewer.showing import has_screen
 
+    if viser:
+        extra("viser", "viser", "posekit view --viser")
     content, behind = read_given(given, seen)
     chosen = _frames(frames)
     with about(given):

@@ -323,8 +323,16 @@ class FrameRecovery(Pictured):
         judged = [] if self.judged is None else [f"judged {self.judged}"]
         return [f"frame {self.number}", f"{self.time:g} s", found, *judged]
 
+    @property
+    def likeliest_first(self) -> Array:
+        """The survivors (N, 14, 3), the likeliest first, where the camera is level (`posekit.ranking.Up.level`)."""
+        if self.batch is None or not len(self):
+            return self.joints
+        ranking = ranked([self], self.batch.body.figure.lengths, [self.spread], Up.level())
+        return np.asarray(self.joints[np.argsort(-ranking.probability, kind="stable")])
+
     def _drawing(self) -> str:
-        return posture_drawing(self.joints[:MAX_DRAWN], CAMERA_UP)
+        return posture_drawing(self.likeliest_first[:MAX_DRAWN], CAMERA_UP)
 
     def show(self, path: str | Path | None = None) -> ShownPage:
         """Show the frame's survivors to be turned by hand: in the notebook, or in the browser.

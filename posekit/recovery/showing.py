@@ -34,7 +34,7 @@ def show_recovery(recovery: Recovery, view: View | None, path: str | Path | None
 
 
 def show_frame(frame: FrameRecovery, path: str | Path | None) -> ShownPage:
-    """Show the page of a frame's survivors, on the ground.
+    """Show the page of a frame's survivors, the likeliest first, on the ground.
 
     Parameters
     ----------
@@ -53,6 +53,6 @@ def show_frame(frame: FrameRecovery, path: str | Path | None) -> ShownPage:
         raise InputError(
             f"frame {frame.number}: no posture to show: {why}; expected survivors; choose another frame"
         )
-    placed = frame.joints @ WORLD_OF_CAMERA.T
+    placed = frame.likeliest_first @ WORLD_OF_CAMERA.T
     ground = np.array([0.0, 0.0, np.nanmin(placed[..., 2])])
     return show_page(page_html(Postures(joints=placed - ground), title=f"frame {frame.number}"), path)

@@ -118,3 +118,10 @@ def test_nothing_that_is_held_makes_a_line_long():
             ]
 
     assert len(repr(Holder())) <= MAX_REPR + len("Holder()")
+
+
+def test_a_frame_shows_the_likeliest_first(returned):
+    recovery = returned["recovery"]
+    for frame, p in zip(recovery.frames, recovery.probability, strict=True):
+        np.testing.assert_array_equal(frame.likeliest_first[0], frame.joints[p.argmax()])
+        assert len(frame.likeliest_first) == len(frame)
