@@ -72,8 +72,8 @@ def recovered(walking: View, tmp_path_factory: pytest.TempPathFactory) -> Recove
 
 
 def held_level(points: Array) -> Array:
-    """Turn a camera's frame about its line of sight, so that y points up."""
-    return np.asarray(points * [-1.0, -1.0, 1.0])
+    """Turn a camera's frame about x, so that y points up and z to the camera: as z would point up, then y."""
+    return np.asarray(points * [1.0, -1.0, -1.0])
 
 
 def depth_ahead(points: Array) -> Array:

@@ -11,15 +11,20 @@ from posekit.geometry import Array, cross, cross_matrix
 
 
 def up_rotation(start: str, end: str) -> Array:
-    """Return the rotation (3, 3), a quarter or half turn, that takes one axis into another: ``+z`` into ``+y``.
+    """Return the rotation (3, 3) that takes one axis into another: ``+z`` into ``+y``.
 
-    Its entries are 0, 1 and -1: coordinates change places and signs and nothing is rounded.
+    All go by +z, so that whoever turns in two steps faces where one step takes him: a body in TRC, BVH and C3D is the
+    same way round. Its entries are 0, 1 and -1: coordinates change places and signs and nothing is rounded.
     """
-    a, b = UP_DIRECTIONS[start], UP_DIRECTIONS[end]
-    axis = cross(a, b)
+    return _from_z(end) @ _from_z(start).T
+
+
+def _from_z(end: str) -> Array:
+    """Return the least rotation that takes +z into an axis; half a turn is about x."""
+    z, up = UP_DIRECTIONS["+z"], UP_DIRECTIONS[end]
+    axis = cross(z, up)
     if not axis.any():
-        across = np.roll(a, 1) ** 2  # half a turn about an axis square to both
-        return np.eye(3) if start == end else 2 * np.outer(across, across) - np.eye(3)
+        return np.diag([1.0, up[2], up[2]])
     K = cross_matrix(axis)
     return np.asarray(np.eye(3) + K + K @ K)
 
