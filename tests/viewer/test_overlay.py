@@ -39,7 +39,7 @@ from posekit.viewer.scene.drawn_subject import subject_of
 from posekit.viewer.scene.framing import view_eye
 from posekit.viewer.scene.world import upright_world
 from posekit.viewer.video import Video, write_mp4
-from posekit.views import view_of
+from posekit.views import forget_camera, view_of
 from tests.detector_files import view_keypoints, write_keypoints
 
 SIZE = (480, 270)
@@ -416,7 +416,10 @@ def test_a_result_says_which_pictures_a_detector_read(
     assert not ended.value.code, capsys.readouterr().err
     result = posekit.read_result(tmp_path / "r.npz")
     assert result.settings["pictures"] == list(named.pictures)
-    assert tuple(overlaid_person(result).files) == named.pictures
+    person = overlaid_person(result)
+    assert tuple(person.files) == named.pictures
+    assert not person.detected  # no view was given that has the points
+    assert overlaid_person(result, replace(forget_camera(view), time=view.time)).detected
     shuffled = tmp_path / "shuffled"
     shuffled.mkdir()
     for name, frame in zip(named.pictures, range(3), strict=True):

@@ -28,6 +28,8 @@ class OverlaidPerson:
         Of the view's pictures, pixels; None where it is not known.
     files : sequence of str
         The pictures that the frames were detected in, by name; empty where nobody says.
+    detected : bool
+        Whether the sights have the image points that were detected: without the view they are where survivors project.
     """
 
     name: str
@@ -35,6 +37,7 @@ class OverlaidPerson:
     figure: Figure
     size: tuple[int, int] | None = None
     files: Sequence[str] = ()
+    detected: bool = True
 
 
 def overlaid_person(
@@ -79,7 +82,14 @@ def overlaid_person(
             "--view VIEW"
         )
     size = seen.camera.size if seen is not None and isinstance(seen.camera, OpenCVModel) else None
-    return OverlaidPerson(name=name, frames=frames, figure=subject.figure, size=size, files=_files(given))
+    return OverlaidPerson(
+        name=name,
+        frames=frames,
+        figure=subject.figure,
+        size=size,
+        files=_files(given),
+        detected=seen is not None,
+    )
 
 
 def _files(given: Result | View) -> tuple[str, ...]:

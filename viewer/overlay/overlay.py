@@ -171,7 +171,7 @@ class _DrawnFilm:
                     shown=one.frames[k],
                     figure=one.figure,
                     zoom=self.zooms.get((id(one), image.size), 1.0),
-                    points=self.overlay.points,
+                    points=self.overlay.points and one.detected,
                 )
                 for one, k in inside
                 if len(one.frames[k]) and one.frames[k].sight is not None
