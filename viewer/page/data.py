@@ -48,7 +48,7 @@ ALIKE_TRUNKS: Final = 0.9
 LEVEL_COSINE: Final = 0.94
 """Trunks that lean by less than 20 degrees, on average, may do so by themselves."""
 
-STEEP_SINE: Final = 0.97
+STEEP_SINE: Final = 0.995
 """A camera that looks straight down does not see how tall anybody stands."""
 
 MARGIN_UNITS: Final = {

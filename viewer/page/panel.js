@@ -76,6 +76,7 @@ const page = (() => {
 
   // Draws the chosen posture at another scale; null is its own.
   function chooseScale(s) {
+    if (s !== null && state.path !== null && state.survivor >= 0) [state.left, state.path] = [state.path, null];
     state.scale = s;
     changed();
   }

@@ -27,7 +27,8 @@ const scale = (() => {
     return Math.min(LAST, Math.max(FARTHEST, ...marks));
   }
 
-  const recoveredScale = () => lift.scaleOf(page.frame().family, page.state.survivor);
+  const shownSurvivor = () => Math.max(page.state.survivor, 0); // a path may have none in a frame
+  const recoveredScale = () => lift.scaleOf(page.frame().family, shownSurvivor());
   const now = () => page.state.scale ?? recoveredScale();
   const elsewhere = () => page.state.scale !== null && Math.abs(page.state.scale / recoveredScale() - 1) > 1e-9;
 
@@ -104,7 +105,7 @@ const scale = (() => {
   }
 
   function describe(family) {
-    const s = now(), all = lift.posture(page.frame(), page.state.survivor, s), old = lift.recovered(page.frame(), page.state.survivor);
+    const s = now(), all = lift.posture(page.frame(), shownSurvivor(), s), old = lift.recovered(page.frame(), shownSurvivor());
     slider.value = angleOf(family, s);
     slider.setAttribute("aria-valuetext", pixels(s).replace("px/m", "pixels a metre"));
     byId("scale-text").textContent = `${pixels(s)}, ${(s / family.bound).toFixed(3)} × the bound`;

@@ -20,6 +20,9 @@ POSTURE_BYTES: Final = 200
 INFERRED_BYTES: Final = 140
 """Bytes of where a joint can be that was not seen."""
 
+FAMILY_BYTES: Final = 40
+"""Bytes of how a posture is lifted at other scales."""
+
 FRAME_BYTES: Final = 2600
 """Bytes of what is said of a frame."""
 
@@ -145,8 +148,9 @@ def _taken(values: Any, rows: NDArray[np.intp]) -> Any:
 def _most(frames: Sequence[ResultFrame]) -> int:
     hidden = max((len(one) for frame in frames for one in (frame.inferred or ())[:1]), default=0)
     margins = 6 * max(len(frames[0].margins) - 4, 0)
+    family = FAMILY_BYTES * any(frame.family is not None for frame in frames)
     room = PAGE_BYTES - FRAME_BYTES * len(frames)
-    return max(room, 0) // (POSTURE_BYTES + margins + INFERRED_BYTES * hidden)
+    return max(room, 0) // (POSTURE_BYTES + margins + family + INFERRED_BYTES * hidden)
 
 
 def _rows(frame: ResultFrame, most: int) -> NDArray[np.intp]:
