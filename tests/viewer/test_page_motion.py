@@ -225,3 +225,22 @@ def test_several_people_in_the_frames_of_a_file_are_all_seen(opened, motion):
     assert tab.is_checked("[data-show=others]")
     assert tab.evaluate("scene.layers().others") == 1
     assert tab.locator("#survivors-body tr").count() == 2
+
+
+def test_a_tilted_camera_that_says_nothing_is_told_by_the_trunks(walked):
+    tilt = np.radians(50.0)
+    turn = np.array([[1, 0, 0], [0, np.cos(tilt), -np.sin(tilt)], [0, np.sin(tilt), np.cos(tilt)]])
+    frames = []
+    for k in range(FRAMES):
+        frame = walked.frames[k % len(walked.frames)]
+        frames.append(dataclasses.replace(frame, joints=frame.joints @ turn.T, pruned=None))
+    level, tilted = page_data(walked), page_data(dataclasses.replace(walked, frames=frames))
+    assert (level["upright"], tilted["upright"]) == ("level", "trunks")
+    axes = [
+        np.array([data["camera"][name] for name in ("right", "down", "forward")]) for data in (level, tilted)
+    ]
+    up = [one @ [0.0, 0.0, 1.0] for one in axes]  # of the world, in camera axes
+    apart = np.degrees(np.arccos(up[1] @ turn @ up[0]))
+    assert apart < 8  # as far as a walker's trunk leans
+    np.testing.assert_allclose(axes[1] @ axes[1].T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes[1]) == pytest.approx(1.0)
