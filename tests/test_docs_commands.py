@@ -32,7 +32,7 @@ NOT_RUN = {
     r"posekit view ": "serves until somebody stops it",
     r"posekit demo ": "tests/cli runs it",
     r"posekit batch .*--cluster": "a cluster",
-    r"posekit render (?!.*--(over|angles)).*\.(png|gif|mp4)\b": "a browser draws it: tests/viewer do",
+    r"posekit render (?!.*(over\.png|--angles)).*(\.(png|gif|mp4)\b|--over)": "a browser draws it: one does here",
 }
 """Commands that are shown and not run here, with the reason."""
 
