@@ -10,6 +10,7 @@ import posekit
 from posekit.display.short_repr import MAX_REPR, ShortRepr, short
 from posekit.display.stick_drawing import body_axes, posture_drawing
 from posekit.formats.motion.motion import Motion
+from posekit.samples import write_samples
 from posekit.skeleton import JOINT, JOINTS
 
 MOST = 300
@@ -125,3 +126,21 @@ def test_a_frame_shows_the_likeliest_first(returned):
     for frame, p in zip(recovery.frames, recovery.probability, strict=True):
         np.testing.assert_array_equal(frame.likeliest_first[0], frame.joints[p.argmax()])
         assert len(frame.likeliest_first) == len(frame)
+
+
+def test_whatever_a_file_holds_prints_as_one_short_line(tmp_path):
+    """Every sample, and what is converted from it."""
+    write_samples(tmp_path)
+    for name, suffix in (("survivors", "csv"), ("walk", "bvh"), ("walk", "glb")):
+        given = (
+            posekit.recover(posekit.builtin_view("seq1")) if name == "survivors" else tmp_path / "walk.npz"
+        )
+        posekit.convert(
+            given, tmp_path / f"{name}.{suffix}", **({"posture": "all"} if name == "survivors" else {})
+        )
+    files = [path for path in sorted(tmp_path.iterdir()) if path.name != "gripper.json"]
+    assert len(files) > 8
+    for path in files:
+        held = posekit.open(path)
+        for one in held.values() if isinstance(held, dict) else [held]:
+            assert len(repr(one)) <= MOST and "\n" not in repr(one), path.name

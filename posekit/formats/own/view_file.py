@@ -36,7 +36,7 @@ def _refuse_objects(document: Any, path: str | Path) -> None:
     first = frames[0] if isinstance(frames, list) and frames else None
     image = first.get("image") if isinstance(first, dict) else None
     if isinstance(image, dict) and len(image) > 1 and not any(name in POINTS for name in image):
-        remedy = "where it is another articulated object, say which with --linkage"
+        remedy = "where it is another articulated object, recover it with --linkage"
         raise refusal(path, "frames[0].image", shown(image), "the joints of a person", remedy)
 
 
