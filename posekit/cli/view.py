@@ -12,7 +12,6 @@ import typer
 from posekit.cli.options import about, examples, option
 from posekit.conversion.given import read_given
 from posekit.errors import InputError
-from posekit.safe_io import extra
 
 if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
@@ -54,6 +53,7 @@ def view(
     ] = False,
 ) -> None:
     """Show survivors in 3D in the browser, on this machine only, until Ctrl-C."""
+    from posekit.safe_io import extra
     from posekit.viewer.showing import has_screen
 
     if viser:
