@@ -39,7 +39,11 @@ def write_object_points(
     if not carries_points(output.to):
         known = ", ".join(one.name for one in motion_formats().values() if one.write_points is not None)
         raise refusal(
-            source, "--to", f"{output.to}, of objects", f"a format of points: {known}", "it holds a person"
+            source,
+            "--to",
+            f"{output.to}, of objects",
+            f"a format of points: {known}",
+            "choose one of them: this one holds a person's body",
         )
     if posture not in LIKELIEST_WORDS and not posture.isdecimal():
         raise refusal(

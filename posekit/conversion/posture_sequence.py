@@ -297,9 +297,10 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     survivor[place] = paths.survivor[0, known]
     interpolated = np.full(len(time), float(len(JOINTS)))
     interpolated[place] = paths.interpolated[0, known].sum(axis=1)
+    count = int((survivor < 0).sum())
+    bridged = f", {count} of {len(time)} frames bridged" if count else ""
     says = [
-        f"the likeliest path, with {paths.share[0]:.2g} of the probability of {len(paths.share)}, "
-        f"{int((survivor < 0).sum())} of {len(time)} frames bridged"
+        f"the likeliest path, with {paths.share[0]:.2g} of the probability of {len(paths.share)}{bridged}"
     ]
     points, up = _placed(points, view, stated, says)
     codes = [""] * len(time)

@@ -115,7 +115,7 @@ def held_postures(
     if found.holds is Content.VIEW:
         return _of_truth(path, read_view(path))
     if found.holds is Content.OBJECTS:
-        remedy = "what was recovered is within its robot's limits; convert its points to trc, c3d, csv, npz or parquet"
+        remedy = "its limits were checked when it was recovered; convert its points to trc, c3d, csv, npz or parquet"
         raise refusal(path, "", found.title, "postures of a person", remedy)
     known = ", ".join(format_names(*POSTURE_CONTENTS))
     raise refusal(path, "", found.title, f"postures, as they are in {known}", "give another file")
