@@ -1,6 +1,7 @@
 """`posekit.convert` and `posekit.render` do what the commands do, of files and of objects."""
 
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def file(recovery: posekit.Recovery, tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.parametrize("options", [{}, {"posture": "3", "up": "+y"}])
 @pytest.mark.parametrize("suffix", ["bvh", "csv"])
 def test_a_file_is_converted_as_by_the_command(
-    file: str, command, suffix: str, options: dict[str, str]
+    file: str, command, suffix: str, options: dict[str, Any]
 ) -> None:
     says = posekit.convert(file, f"mine.{suffix}", **options)
     words = [word for name, value in options.items() for word in (f"--{name}", value)]
@@ -66,9 +67,12 @@ def test_objects_are_drawn(file: str, recovery: posekit.Recovery) -> None:
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: posekit.convert([1], "out.bvh"), "convert: got list; expected a path, a recovery"),
+        (
+            lambda: posekit.convert(cast("Any", [1]), "out.bvh"),
+            "convert: got list; expected a path, a recovery",
+        ),
         (lambda: posekit.convert("found.npz", "out.bvh", colour="red"), "convert: colour: is no option"),
-        (lambda: posekit.render(3, "out.html"), "render: got int; expected a path"),
+        (lambda: posekit.render(cast("Any", 3), "out.html"), "render: got int; expected a path"),
         (lambda: posekit.render("found.npz", "out.html", frame=99), "expected a number from 0 to 4"),
         (lambda: posekit.render("none.npz", "out.html"), "none.npz"),
     ],

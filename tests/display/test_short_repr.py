@@ -131,13 +131,10 @@ def test_a_frame_shows_the_likeliest_first(returned):
 def test_whatever_a_file_holds_prints_as_one_short_line(tmp_path):
     """Every sample, and what is converted from it."""
     write_samples(tmp_path)
-    for name, suffix in (("survivors", "csv"), ("walk", "bvh"), ("walk", "glb")):
-        given = (
-            posekit.recover(posekit.builtin_view("seq1")) if name == "survivors" else tmp_path / "walk.npz"
-        )
-        posekit.convert(
-            given, tmp_path / f"{name}.{suffix}", **({"posture": "all"} if name == "survivors" else {})
-        )
+    recovery = posekit.recover(posekit.builtin_view("seq1"))
+    posekit.convert(recovery, tmp_path / "survivors.csv", posture="all")
+    for suffix in ("bvh", "glb"):
+        posekit.convert(tmp_path / "walk.npz", tmp_path / f"walk.{suffix}")
     files = [path for path in sorted(tmp_path.iterdir()) if path.name != "gripper.json"]
     assert len(files) > 8
     for path in files:

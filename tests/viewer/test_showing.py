@@ -1,12 +1,13 @@
 """Pages shown from Python: in a notebook, in a browser, and where there is neither."""
 
+import sys
 import types
+import webbrowser
 
 import pytest
 
 import posekit
 from posekit.errors import InputError
-from posekit.viewer import showing
 
 
 @pytest.fixture(scope="module")
@@ -18,10 +19,15 @@ def recovery():
 def opened(monkeypatch):
     """Take the place of the browser."""
     asked: list[str] = []
-    monkeypatch.setattr(showing.webbrowser, "open", lambda url: asked.append(url) or True)
+
+    def open_page(url: str) -> bool:
+        asked.append(url)
+        return True
+
+    monkeypatch.setattr(webbrowser, "open", open_page)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     monkeypatch.delenv("DISPLAY", raising=False)
-    monkeypatch.setattr(showing.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     return asked
 
 
@@ -41,7 +47,7 @@ def test_with_a_screen_the_browser_opens_it(recovery, opened, monkeypatch, tmp_p
 def test_a_notebook_has_it_in_a_frame_and_opens_nothing(recovery, opened, monkeypatch):
     monkeypatch.setenv("DISPLAY", ":0")
     shell = types.SimpleNamespace(kernel=object())
-    monkeypatch.setitem(showing.sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
+    monkeypatch.setitem(sys.modules, "IPython", types.SimpleNamespace(get_ipython=lambda: shell))
     shown = recovery.show(posekit.builtin_view("seq1"))
     assert opened == []
     frame = shown._repr_html_()

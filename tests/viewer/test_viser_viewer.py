@@ -39,7 +39,7 @@ def drawn_at(subject, frame: int, row: int) -> np.ndarray:
     placed = pin.GeometryData(geometry)
     pin.updateGeometryPlacements(figure.model, data, geometry, placed, np.where(np.isnan(q), 0, q))
     index = next(k for k, one in enumerate(geometry.geometryObjects) if one.name.startswith("right_forearm"))
-    return placed.oMg[index].translation
+    return np.asarray(placed.oMg[index].translation)
 
 
 def test_it_is_served_to_this_machine_alone(viewer) -> None:
