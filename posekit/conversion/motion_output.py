@@ -32,6 +32,8 @@ from posekit.formats.own import Postures
 from posekit.formats.skeleton_maps import load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import refusal
+from posekit.safe_io.extras import extra
+from posekit.safe_io.writing import check_target
 
 CUSTOMARY_UP: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
 """The axis that points up in a format's files by custom; in others it stays as it is."""
@@ -44,6 +46,12 @@ EVENLY_TIMED: Final = ("bvh", "c3d")
 
 TABLE_FORMATS: Final = ("csv", "npz", "parquet")
 """Formats that carry all survivors of a frame, and motion in several clips."""
+
+PACKAGES_NEEDED: Final = {
+    "c3d": ("ezc3d", "c3d", "writing C3D"),
+    "parquet": ("pyarrow.parquet", "parquet", "writing Parquet"),
+}
+"""What a format is written by, its extra, and what for: they are asked for before the work begins."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +72,7 @@ class MotionOutput:
     Raises
     ------
     InputError
-        Where the format has an axis of its own.
+        Where the format has an axis of its own, or the file cannot be written: before anything is read.
     """
 
     path: Path
@@ -73,6 +81,10 @@ class MotionOutput:
     gaps: str = ""
 
     def __post_init__(self) -> None:
+        if self.path.suffix:
+            check_target(self.path)
+        if self.to in PACKAGES_NEEDED:
+            extra(*PACKAGES_NEEDED[self.to])
         if self.to in ALWAYS_Y_UP and self.up not in ("", "+y"):
             raise refusal("--up", "", self.up, f"+y, as in every file of {self.to}", "leave it out")
 

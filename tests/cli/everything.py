@@ -33,7 +33,7 @@ def make_results(folder: Path, command: Command) -> dict[str, Path]:
         done = command("recover", folder / what, *options)
         assert done.code == 0, (what, done.err)
 
-    def changed(name: str, change: Callable[[dict[str, Any]], None]) -> str:
+    def changed(name: str, change: Callable[[dict[str, Any]], object]) -> str:
         document = copy.deepcopy(seen)
         change(document["frames"][1]["image"])
         (folder / name).write_text(json.dumps(document))
