@@ -141,8 +141,9 @@ def validate(
     if repair is not None:
         from posekit.conversion.repaired_file import repair_files
 
-        for line in repair_files(files, asked, repair):
-            typer.echo(line)
+        for made in repair_files(files, asked, repair):
+            for line in made.lines:
+                typer.echo(line)
     if report.refused:
         raise typer.Exit(BAD_INPUT)
     if allowed.exceeded(report):

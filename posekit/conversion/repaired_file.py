@@ -4,36 +4,53 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from posekit.body import Figure, load_figure
 from posekit.body.measured import figure_of, measured_person
-from posekit.conversion.motion_output import TABLE_FORMATS, MotionOutput, by_suffix, write_moving
+from posekit.conversion.judged_again import as_read_again, judged_again, records_judged
+from posekit.conversion.motion_output import (
+    EVENLY_TIMED,
+    TABLE_FORMATS,
+    MotionOutput,
+    by_suffix,
+    carries_points,
+    write_moving,
+    write_points,
+)
 from posekit.conversion.posture_sequence import ASSUMED_RATE, PostureSequence
 from posekit.errors import InputError, PosekitError
 from posekit.formats import own as files
 from posekit.formats.held_postures import HeldPostures
-from posekit.formats.motion import Motion, write_motion
+from posekit.formats.motion import Motion
 from posekit.formats.own import Postures
 from posekit.formats.own.postures_q import NamedConfigurations, write_configurations
 from posekit.geometry import Array
 from posekit.remedy import Repaired, repair, repair_configurations
 from posekit.safe_io import refusal
 from posekit.safe_io.writing import check_target, make_folder, safe_stem
-from posekit.skeleton import POINTS
+from posekit.skeleton import FEET_POINTS, POINTS
 from posekit.validation.files import AskedValidation
 from posekit.validation.keep import names_below
 from posekit.validation.over_time import clip_of
-from posekit.validation.reading import read_postures_of
+from posekit.validation.reading import ReadPostures, read_postures_of
 from posekit.validators import Validator
+
+POSTURES_OF_A_ROBOT: Final = (
+    "--repair: postures are repaired as the stick figure's; expected configurations of the robot; "
+    "leave out --urdf"
+)
 
 MOST_TOLD: Final = 10
 """Clips of which it is said what was changed in them; of more how many there are."""
+
+MORE_ROUNDS: Final = 2
+"""How often what a fresh validation of the written file rejects is repaired once more."""
 
 FOLDER_FORMAT: Final = ".npz"
 """What clips of a folder are written as where their own format cannot be written."""
@@ -56,6 +73,22 @@ class RepairedClip:
     name: str
     held: HeldPostures
     repaired: Repaired
+
+
+@dataclass(frozen=True, kw_only=True)
+class RepairedFile:
+    """What was made of one file.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        What was changed, what is left and where it was written, for people.
+    records : sequence of dict
+        Of each clip, for the report.
+    """
+
+    lines: Sequence[str]
+    records: Sequence[dict[str, Any]]
 
 
 def check_repair_target(target: Path, clips: int) -> None:
@@ -115,7 +148,7 @@ def repair_targets(paths: Sequence[Path], target: Path) -> list[Path]:
     return into
 
 
-def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) -> Iterator[str]:
+def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) -> Iterator[RepairedFile]:
     """Repair what files hold, each with the validator that judges it; those that are broken are passed over.
 
     Parameters
@@ -139,19 +172,20 @@ def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) ->
             if len(paths) == 1:
                 raise
             continue
-        yield from repair_file(read.postures, asked.validator(read), into, path)
+        yield repair_file(read, asked, into, path)
 
 
-def repair_file(
-    given: HeldPostures | NamedConfigurations, validator: Validator, target: Path, source: Path
-) -> Iterator[str]:
-    """Repair what a file holds and write it, and say what was changed and what was not, a line each.
+def repair_file(read: ReadPostures, asked: AskedValidation, target: Path, source: Path) -> RepairedFile:
+    """Repair what a file holds, write it, and judge what was written as a fresh validation does.
+
+    What that still rejects is repaired once more, since lengths and noise are then measured anew; what is left after it
+    is said.
 
     Parameters
     ----------
-    given : HeldPostures or NamedConfigurations
+    read : ReadPostures
         What the file holds.
-    validator : Validator
+    asked : AskedValidation
         What must pass.
     target : Path
         A file, or without suffix a folder with a file a clip.
@@ -163,29 +197,74 @@ def repair_file(
     InputError
         Where a robot is given postures, or the target cannot be written.
     """
+    given, validator = read.postures, asked.validator(read)
     if isinstance(given, NamedConfigurations):
-        done = repair_configurations(given.in_order_of(validator.configuration_names), validator)
-        q = given.q if done.q is None else done.q
-        target = target if target.suffix else target / f"{source.stem}{FOLDER_FORMAT}"
-        make_folder(target.parent)
-        write_configurations(target, q, validator.configuration_names)
-        yield f"repaired: {target}: {done.told()}"
-        return
+        path = target if target.suffix else target / f"{source.stem}{FOLDER_FORMAT}"
+        done = _repaired_configurations(given, validator, path, asked)
+        said = (f"repaired: {path}: {done.told()}",)
+        return RepairedFile(lines=said, records=[_record(source, path, "", done)])
     if validator.robot is not None:
-        raise InputError(
-            "--repair: postures are repaired as the stick figure's; expected configurations of the robot; leave out "
-            "--urdf"
-        )
+        raise InputError(POSTURES_OF_A_ROBOT)
     clips = list(repaired_clips(given, validator, source))
     check_repair_target(target, len(clips))
-    for path, some in _targets(target, source, clips):
-        _write(path, some)
-    changed = [clip for clip in clips if clip.repaired.spans or clip.repaired.left]
-    for clip in changed[:MOST_TOLD]:
-        yield f"repaired: {clip.name}: {clip.repaired.told()}"
+    written = [(path, _settled(path, some, asked)) for path, some in _targets(target, source, clips)]
+    clips = [clip for _, some in written for clip in some]
+    changed = [clip for clip in clips if clip.repaired.spans or not clip.repaired.valid.all()]
+    lines = [f"repaired: {clip.name}: {clip.repaired.told()}" for clip in changed[:MOST_TOLD]]
     more = len(changed) - MOST_TOLD
     also = f"; {more} more changed" if more > 0 else ""
-    yield f"written: {target}, {len(changed)} of {len(clips)} clips changed{also}"
+    frames = sum(len(clip.repaired.valid) for clip in clips)
+    valid = sum(int(clip.repaired.valid.sum()) for clip in clips)
+    again = f"judged again, {valid} of {frames} frames are valid"
+    count = sum(bool(clip.repaired.spans) for clip in clips)
+    lines.append(f"written: {target}, {count} of {len(clips)} clips changed{also}; {again}")
+    records = [_record(source, path, clip.name, clip.repaired) for path, some in written for clip in some]
+    return RepairedFile(lines=lines, records=records)
+
+
+def _record(source: Path, path: Path, clip: str, done: Repaired) -> dict[str, Any]:
+    name = "" if clip == source.name else clip
+    return {"file": str(source), "written": str(path), "clip": name, **done.as_dict()}
+
+
+def _repaired_configurations(
+    given: NamedConfigurations, validator: Validator, path: Path, asked: AskedValidation
+) -> Repaired:
+    done = repair_configurations(given.in_order_of(validator.configuration_names), validator)
+    make_folder(path.parent)
+    q = given.q if done.q is None else done.q
+    write_configurations(path, q, validator.configuration_names, given.time)
+    return next(records_judged([done], judged_again(path, asked)))
+
+
+def _settled(path: Path, clips: list[RepairedClip], asked: AskedValidation) -> list[RepairedClip]:
+    """Write clips, repair once more what a fresh validation of the file rejects, and let records say what is left."""
+    _write(path, clips)
+    report = judged_again(path, asked)
+    for _ in range(MORE_ROUNDS):
+        if not report.summary["invalid"]:
+            break
+        read = read_postures_of(path, as_read_again(asked).stated)
+        if not isinstance(read.postures, HeldPostures):
+            break
+        validator = as_read_again(asked).validator(read)
+        more = list(repaired_clips(read.postures, validator, path))
+        if [len(clip.held) for clip in more] != [len(clip.held) for clip in clips]:
+            break
+        _write(path, more)
+        there = judged_again(path, asked)
+        if there.summary["invalid"] >= report.summary["invalid"]:
+            _write(path, clips)
+            break
+        clips, report = [_after(*both) for both in zip(clips, more, strict=True)], there
+    judged = records_judged([clip.repaired for clip in clips], report)
+    return [replace(clip, repaired=record) for clip, record in zip(clips, judged, strict=True)]
+
+
+def _after(first: RepairedClip, second: RepairedClip) -> RepairedClip:
+    """Return the second repair of a clip, with the record of both."""
+    spans = sorted((*first.repaired.spans, *second.repaired.spans), key=lambda span: -span.most)
+    return replace(second, name=first.name, repaired=replace(second.repaired, spans=tuple(spans)))
 
 
 def repaired_clips(given: HeldPostures, validator: Validator, source: Path) -> Iterator[RepairedClip]:
@@ -263,11 +342,14 @@ def _write(path: Path, clips: list[RepairedClip]) -> None:
     unknown = np.full((len(joints), len(POINTS) - joints.shape[1], 3), np.nan)
     points = np.concatenate([joints, unknown if head is None else head], axis=1)
     time = np.concatenate([_times(clip.held) for clip in clips])
-    if len(clips) > 1 or to in TABLE_FORMATS:
+    feet = _feet(clips)
+    if len(clips) > 1 or to in TABLE_FORMATS or (feet.size and carries_points(to) and to not in EVENLY_TIMED):
+        names = (*POINTS, *FEET_POINTS) if feet.size else POINTS
+        points = np.concatenate([points, feet], axis=1) if feet.size else points
         known = np.flatnonzero(np.isfinite(points[..., 0]).any(axis=0))
         steps = np.diff(_times(clips[0].held))
         motion = Motion(
-            names=tuple(POINTS[k] for k in known),
+            names=tuple(names[k] for k in known),
             points=points[:, known],
             time=time,
             rate=float(1 / np.median(steps)) if len(steps) else ASSUMED_RATE,
@@ -276,7 +358,7 @@ def _write(path: Path, clips: list[RepairedClip]) -> None:
             clip=np.repeat(np.arange(len(clips)), [len(clip.held) for clip in clips]),
             clips=tuple(clip.name for clip in clips),
         )
-        write_motion(path, motion, to)
+        write_points(MotionOutput(path=path, to=to), motion)
         return
     whole = np.isfinite(points[:, :14]).all(axis=(1, 2))
     write_moving(
@@ -290,6 +372,19 @@ def _write(path: Path, clips: list[RepairedClip]) -> None:
             figure=load_figure() if not whole.any() else _figure(points[:, :14]),
             values={},
         ),
+    )
+
+
+def _feet(clips: Sequence[RepairedClip]) -> Array:
+    """Return toes and heels of all clips (T, 4, 3); empty where none has them."""
+    if not any(clip.held.feet.size for clip in clips):
+        return np.empty(0)
+    none = (len(FEET_POINTS), 3)
+    return np.concatenate(
+        [
+            clip.held.feet if clip.held.feet.size else np.full((len(clip.held), *none), np.nan)
+            for clip in clips
+        ]
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -73,9 +74,8 @@ class UnrepairedFrame:
     unit: str
 
     def __str__(self) -> str:
-        return (
-            f"frame {self.frame}: {self.check} {self.place} is {self.left:.3g} {self.unit} beyond its bound"
-        )
+        unit = "" if self.unit == "1" else f" {self.unit}"
+        return f"frame {self.frame}: {self.check} {self.place} is {self.left:.3g}{unit} beyond its bound"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,7 +132,13 @@ class Repaired(ShortRepr):
         if len(self.spans) > most:
             parts.append(f"{len(self.spans) - most} more")
         if bad:
-            parts.append(f"{bad} not repaired: {self.left[0]}")
+            checks = Counter({one.check: 0 for one in self.left})
+            checks.update(check for _, check in {(one.frame, one.check) for one in self.left})
+            counts = ", ".join(f"{check} {count}" for check, count in checks.most_common())
+            parts.append(f"left: {bad} frames: {counts}; the first, {self.left[0]}")
+        undecided = int((~self.valid).sum()) - bad
+        if undecided > 0:
+            parts.append(f"{undecided} undecided")
         return "; ".join(parts)
 
     def as_dict(self) -> dict[str, Any]:

@@ -131,8 +131,12 @@ def read_configurations(path: str | Path) -> NamedConfigurations:
     return _checked(path, q, None if file.configuration_names is None else tuple(file.configuration_names))
 
 
-def write_configurations(path: str | Path, q: Array, names: Sequence[str]) -> None:
-    """Write configurations (N, K) with the names of their variables, whole or not at all, ``.json`` or ``.npz``."""
+def write_configurations(path: str | Path, q: Array, names: Sequence[str], time: Array | None = None) -> None:
+    """Write configurations (N, K) with the names of their variables, whole or not at all, ``.json`` or ``.npz``.
+
+    An NPZ has the times of frames (N,), seconds, where they are given.
+    """
+    timed = {} if time is None or not len(time) else {"time": time}
     if suffix(path, ".json", ".npz") == ".npz":
         with replacing(path) as file:
             write_npz(
@@ -141,6 +145,7 @@ def write_configurations(path: str | Path, q: Array, names: Sequence[str]) -> No
                     "schema": np.array(CONFIGURATIONS_SCHEMA),
                     "configuration_names": np.array(list(names)),
                     "q": q,
+                    **timed,
                 },
             )
         return

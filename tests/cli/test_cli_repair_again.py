@@ -1,0 +1,41 @@
+"""What a repair says of the file that it wrote is what a fresh validation of it says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import posekit
+from posekit.body import load_figure
+from posekit.formats.motion import Motion, write_motion
+from posekit.skeleton import JOINT, JOINTS
+
+FRAMES = 60
+
+
+def noisy_motion(drift: float) -> Motion:
+    """Return a standing body measured with noise, whose forearm lengthens by a share of itself in a third of it."""
+    rng = np.random.default_rng(3)
+    joints = np.repeat(load_figure().neutral_points[None, : len(JOINTS)], FRAMES, axis=0)
+    joints = joints + rng.normal(0, 0.002, joints.shape)
+    elbow, wrist = JOINT["left_elbow"], JOINT["left_wrist"]
+    joints[20:40, wrist] += drift * (joints[20:40, wrist] - joints[20:40, elbow])
+    return Motion(names=JOINTS, points=joints, time=np.arange(FRAMES) / 30, rate=30.0, up="+z")
+
+
+@pytest.mark.parametrize("suffix", ["npz", "bvh"])
+@pytest.mark.parametrize("drift", [0.3, 1.0])
+def test_what_is_said_of_the_written_file_is_what_a_fresh_validation_says(
+    run: Callable[..., Any], tmp_path: Path, suffix: str, drift: float
+) -> None:
+    """Lengths and noise are measured anew: no frame is called valid that the next validation rejects."""
+    given, out = tmp_path / "given.npz", tmp_path / f"out.{suffix}"
+    write_motion(given, noisy_motion(drift), "npz")
+    said = run("validate", given, "--repair", out).out
+    fresh = posekit.validate(out)
+    assert f"judged again, {fresh.summary['valid']} of {len(fresh)} frames are valid" in said
+    assert ("left: " in said) == bool(fresh.summary["invalid"])
