@@ -157,10 +157,12 @@ def _check_size(camera: CalibratedCamera, keypoints: KeyPoints) -> None:
     known = keypoints.size[np.isfinite(keypoints.size).all(axis=1)]
     if (known != camera.size).any():
         width, height = (int(side) for side in known[(known != camera.size).any(axis=1)][0])
-        raise InputError(
-            f"{calibrated}, and pictures of {keypoints.source} are {width}x{height}; give the calibration of these "
-            "pictures"
-        )
+        remedy = "give the calibration of these pictures"
+        if (height, width) == tuple(camera.size):
+            remedy = (
+                "width and height are exchanged: correct --size, or turn the pictures as the camera was held"
+            )
+        raise InputError(f"{calibrated}, and pictures of {keypoints.source} are {width}x{height}; {remedy}")
     if outside(keypoints, camera.size) > OUTSIDE_SHARE and not len(known):
         right, below = np.nanmax(keypoints.points, axis=(0, 1))
         raise InputError(

@@ -174,3 +174,21 @@ def test_several_clips_and_names_that_break_the_table_are_not_written(tmp_path):
             tmp_path / "b.trc", Motion(names=("a\tb",), points=np.ones((1, 1, 3)), time=np.zeros(1), rate=1)
         )
     assert not (tmp_path / "b.trc").exists()
+
+
+@pytest.mark.parametrize(("rate", "said"), [(30.000000000000004, "30"), (29.97, "29.97"), (5.0, "5")])
+def test_a_rate_is_written_as_a_person_would(tmp_path, rate, said):
+    write_trc(
+        tmp_path / "a.trc", Motion(names=("a",), points=np.zeros((1, 1, 3)), time=[0.0], rate=rate, up="+y")
+    )
+    assert (tmp_path / "a.trc").read_text().splitlines()[2].split("\t")[0] == said
+
+
+@pytest.mark.parametrize("start", ["+x", "-x", "+y", "-y", "+z", "-z"])
+@pytest.mark.parametrize("between", ["+x", "-y", "+z", "-z"])
+def test_turning_in_two_steps_faces_where_one_step_takes(start, between):
+    for end in ("+x", "-x", "+y", "-y", "+z", "-z"):
+        np.testing.assert_array_equal(
+            up_rotation(between, end) @ up_rotation(start, between), up_rotation(start, end)
+        )
+        np.testing.assert_allclose(np.linalg.det(up_rotation(start, end)), 1.0, rtol=0, atol=1e-15)

@@ -320,6 +320,9 @@ def test_a_size_makes_pixels_of_fractions(calibration: Path, command: Run, tmp_p
     other = command("convert", path, tmp_path / "o.json", "--camera", calibration, "--size", "1280x720")
     assert other.code == 2
     assert "is calibrated for 1920x1080 pixels" in other.err
+    turned = command("convert", path, tmp_path / "o.json", "--camera", calibration, "--size", "1080x1920")
+    assert turned.code == 2 and "width and height are exchanged" in turned.err
+    assert "exchanged" not in other.err
 
 
 def test_a_rate_gives_times(calibration: Path, command: Run, tmp_path: Path) -> None:

@@ -207,8 +207,13 @@ def _whole(path: str | Path, fields: dict[str, str], name: str, missing: int) ->
 
 
 def _number(value: float) -> str:
-    return str(int(value)) if value == int(value) else repr(value)
+    """Write 30 where times that are thirds of a tenth make it 30.000000000000004."""
+    whole = round(value)
+    return str(whole) if abs(value - whole) <= RATE_SHARE * value else repr(value)
 
+
+RATE_SHARE: Final = 1e-9
+"""By which share of it a rate may be off a whole number that is meant."""
 
 TRC_FORMAT: Final = MotionFormat(
     name="trc",
