@@ -91,8 +91,12 @@ def _remedy(place: ReportPlace, by: float, told: Mapping[str, Any]) -> str:
         used = "torso_tolerance" if "-pelvis" in place.where else "rigid_tolerance"
         return f"try --rigid-tolerance {math.ceil(_centimetres(told.get(used, '3cm')) + 100 * by)}cm"
     if place.check == "collision":
-        margin = math.floor(_centimetres(told.get("contact_margin", "0cm")) - 100 * by)
-        return f"try --contact-margin {margin}cm: bodies are capsules, and flesh gives"
+        allowed = _centimetres(told.get("contact_margin", "0cm"))
+        margin = math.floor(allowed - 100 * by)
+        if margin >= allowed:
+            return "they touch: --repair takes them apart"
+        why = ": bodies are capsules, and flesh gives" if ours else ", or --repair"
+        return f"try --contact-margin {margin}cm{why}"
     if place.check in ("walking", "balance"):
         return f"leave {place.check} out of --checks where it is not asked for"
     return (
