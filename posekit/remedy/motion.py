@@ -16,6 +16,7 @@ from posekit.remedy.between import interpolated, smoothed
 from posekit.remedy.exchange import CLIP_MARKS, exchanged
 from posekit.remedy.ground import grounded, held_feet
 from posekit.remedy.lengths import with_lengths
+from posekit.remedy.record import SHIFTED_BACK
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.validators import Judgement, Validator
 from posekit.validators.motion import MotionClip, judge_motion
@@ -27,6 +28,12 @@ MOTION_ROUNDS: Final = 3
 
 SMOOTHING_STRENGTHS: Final = (1.0, 10.0, 100.0, 1000.0)
 """Of smoothing, least first."""
+
+LASTING_SHARE: Final = 0.5
+"""Of the most by which a body goes aside, what is left of it after a step that lasts."""
+
+NEAR_END_FRAMES: Final = 4
+"""Frames from an end of a clip within which it is not told by its neighbours which of them is off."""
 
 USUAL_RATE: Final = 30.0
 """Frames a second of motion whose rate is not known."""
@@ -188,12 +195,6 @@ def _interpolate(clip: MotionClip, points: Array, found: Rejected, person: Measu
             some, own = points.copy(), np.concatenate([bad, np.zeros((len(bad), 9), dtype=bool)], axis=1)
             some[own] = whole[own]
             tried += [some, whole]
-        bad = np.asarray(jumps.any(axis=1))
-        # What goes aside over several frames stays there: between them there is nothing to interpolate.
-        tried.insert(
-            0 if max(stop - start for start, stop in runs(bad)) > 1 else len(tried),
-            _stepped_back(points, bad),
-        )
     return tried
 
 
@@ -203,16 +204,51 @@ def _whole(points: Array, bad: Bools) -> Array:
     return feet_along(points, out)
 
 
+def _step_back(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
+    """Take out steps of the whole body that last: between their frames there is nothing to interpolate."""
+    del clip, person
+    if found.frames("teleport") is None:
+        return []
+    one = found.judgements["teleport"]
+    body = [k for k, where in enumerate(one.where) if where not in JOINTS]
+    bad = np.asarray(one.violated[:, body].any(axis=1))
+    out = _stepped_back(points, bad)
+    return [] if out is points else [out]
+
+
 def _stepped_back(points: Array, bad: Bools) -> Array:
-    """Move a body that goes aside, and all that comes after, back to where it would have gone on."""
-    out = points.copy()
-    for start, stop in runs(bad):
-        if 1 < start and stop < len(points):
-            ways = np.nanmedian(np.diff(out[start - 2 : stop + 1, : len(JOINTS)], axis=0), axis=1)
-            aside = np.cumsum(ways[1:-1] - (ways[0] + ways[-1]) / 2, axis=0)
-            out[start:stop] -= aside[:, None]
-            out[stop:] -= aside[-1]
-    return out
+    """Move a body that goes aside for good so that it goes on where it went before; as many frames as may be stay.
+
+    At an end of the clip, where it is not known how the body went on one of the sides, the other side says it.
+    """
+    way = np.zeros((len(points), 3))
+    way[1:] = np.nan_to_num(np.nanmedian(np.diff(points[:, : len(JOINTS)], axis=0), axis=1))
+    aside = np.zeros_like(way)
+    for found in runs(bad):
+        start, stop = _jumped(way, *found)
+        known = [way[k] for k in (start - 1, stop) if 1 <= k < len(points)]
+        if not known:
+            continue
+        off = np.cumsum(way[start:stop] - np.mean(known, axis=0), axis=0)
+        if np.linalg.norm(off[-1]) < LASTING_SHARE * np.linalg.norm(off, axis=1).max():
+            continue
+        aside[start:stop] += off
+        aside[stop:] += off[-1]
+    if not aside.any():
+        return points
+    _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
+    return points - (aside - aside[where[np.argmax(count)]])[:, None]
+
+
+def _jumped(way: Array, start: int, stop: int) -> tuple[int, int]:
+    """Return the frames in which a body jumped: near an end of the clip its neighbours do not tell, its ways do."""
+    first = 1 if start <= NEAR_END_FRAMES else start
+    after = len(way) if stop >= len(way) - NEAR_END_FRAMES else stop
+    if (first, after) == (start, stop):
+        return start, stop
+    around = way[max(first - NEAR_END_FRAMES, 1) : after + NEAR_END_FRAMES]
+    frame = first + int(np.argmax(np.linalg.norm(way[first:after] - np.median(around, axis=0), axis=1)))
+    return frame, frame + 1
 
 
 def _lengthen(clip: MotionClip, points: Array, found: Rejected, person: MeasuredPerson) -> Sequence[Array]:
@@ -284,6 +320,7 @@ def feet_along(before: Array, after: Array) -> Array:
 MOTION_REMEDIES: Final[Sequence[tuple[str, Remedy]]] = (
     ("exchanged", _exchange),
     ("lengthened", _lengthen),
+    (SHIFTED_BACK, _step_back),
     ("interpolated", _interpolate),
     ("smoothed", _smooth),
     ("shifted", _shift),

@@ -15,6 +15,9 @@ from posekit.geometry import Array, runs
 from posekit.skeleton import JOINTS
 from posekit.validators.suite import Judgement
 
+SHIFTED_BACK: Final = "shifted back"
+"""What was done where the whole body was moved, as after a step that lasts."""
+
 SEEN_METRES: Final = 1e-9
 """Metres from which a joint counts as moved."""
 
@@ -26,10 +29,10 @@ class RepairedSpan:
     Parameters
     ----------
     remedy : str
-        What was done: ``turned``, ``shifted``, ``interpolated``, ``exchanged``, ``smoothed``, ``held``, ``lengthened``,
-        ``reordered``.
+        What was done: ``turned``, ``shifted``, ``shifted back``, ``interpolated``, ``exchanged``, ``smoothed``,
+        ``held``, ``lengthened``, ``reordered``.
     place : str
-        The joint, of a robot the joint of its URDF.
+        The joint, of a robot the joint of its URDF; ``body`` where all of it was shifted back.
     first, last : int
         The frames, both counted in.
     most : float
@@ -155,7 +158,9 @@ class Repaired(ShortRepr):
 def spans_of(
     remedy: str, moved: Array, places: Sequence[str] = JOINTS, unit: str = "m", least: float = SEEN_METRES
 ) -> list[RepairedSpan]:
-    """List the spans in which places moved (N, K), by how much."""
+    """List the spans in which places moved (N, K), by how much; of a body that is shifted back the body's."""
+    if remedy == SHIFTED_BACK:
+        moved, places = moved.max(axis=1, keepdims=True), ["body"]
     return [
         RepairedSpan(
             remedy=remedy,
