@@ -90,6 +90,15 @@ def test_panels_show_limits_bands_line_and_truth(tracks: list[AngleTrack]) -> No
     np.testing.assert_array_equal(np.asarray(line.get_ydata()), track.value)
 
 
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_the_key_stays_inside_the_picture(tracks: list[AngleTrack], count: int) -> None:
+    figure = plot_tracks(tracks[:count])
+    figure.canvas.draw()
+    (key,) = figure.legends
+    box = key.get_window_extent()
+    assert 0 <= box.x0 and box.x1 <= figure.bbox.width
+
+
 def test_a_result_is_plotted_with_what_it_was_judged_by_and_the_views_truth(
     walked: Result, walk: View
 ) -> None:

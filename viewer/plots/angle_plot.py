@@ -179,4 +179,6 @@ def _key(figure: Figure, tracks: Sequence[AngleTrack], line: str) -> None:
         handles.append(Line2D([], [], color="black", linewidth=0.9, linestyle=(0, (3, 2)), label="truth"))
     if any(track.limits is not None for track in tracks):
         handles.append(Patch(color="#E9E9E9", label="outside the limits"))
-    figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 2 + len(tracks)))
+    figure.legend(
+        handles=handles, fontsize="small", loc="outside upper center", ncols=min(len(handles), len(tracks), 4)
+    )
