@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -134,16 +135,19 @@ def validate(
     with progress("judging", len(files)) as done:
         wanted = WantedDetail(detail=outputs.detail, every=every, distances=distances)
         report = validate_files(files, asked, wanted=wanted, progress=done)
-    written = list(outputs.write(report))
-    _tell(report)
-    for line in written:
-        typer.echo(line)
+    said: list[str] = []
     if repair is not None:
         from posekit.conversion.repaired_file import repair_files
 
-        for made in repair_files(files, asked, repair):
-            for line in made.lines:
-                typer.echo(line)
+        with progress("repairing", len(files)) as done:
+            for made in repair_files(files, asked, repair):
+                said += made.lines
+                report = replace(report, repair=(*report.repair, *made.records))
+                done(1)
+    said = [*outputs.write(report), *said]
+    _tell(report)
+    for line in said:
+        typer.echo(line)
     if report.refused:
         raise typer.Exit(BAD_INPUT)
     if allowed.exceeded(report):

@@ -237,7 +237,7 @@ def _stepped_back(points: Array, bad: Bools) -> Array:
     if not aside.any():
         return points
     _, where, count = np.unique(aside.round(6), axis=0, return_index=True, return_counts=True)
-    return points - (aside - aside[where[np.argmax(count)]])[:, None]
+    return np.asarray(points - (aside - aside[where[np.argmax(count)]])[:, None])
 
 
 def _jumped(way: Array, start: int, stop: int) -> tuple[int, int]:

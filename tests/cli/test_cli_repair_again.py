@@ -12,6 +12,7 @@ import pytest
 import posekit
 from posekit.body import load_figure
 from posekit.formats.motion import Motion, write_motion
+from posekit.formats.own import read_report
 from posekit.skeleton import JOINT, JOINTS
 
 FRAMES = 60
@@ -39,3 +40,18 @@ def test_what_is_said_of_the_written_file_is_what_a_fresh_validation_says(
     fresh = posekit.validate(out)
     assert f"judged again, {fresh.summary['valid']} of {len(fresh)} frames are valid" in said
     assert ("left: " in said) == bool(fresh.summary["invalid"])
+
+
+@pytest.mark.parametrize("suffix", ["json", "md", "html"])
+def test_the_report_has_the_record(run: Callable[..., Any], tmp_path: Path, suffix: str) -> None:
+    """What was changed in the file is in the report of the same run, and JSON is read back as it was."""
+    given, out, report = tmp_path / "given.npz", tmp_path / "out.npz", tmp_path / f"report.{suffix}"
+    write_motion(given, noisy_motion(0.3), "npz")
+    assert run("validate", given, "--repair", out, "-o", report).code == 1
+    text = report.read_text()
+    assert "left_wrist" in text and "lengthened" in text and "valid" in text
+    if suffix == "json":
+        (record,) = read_report(report).repair
+        assert (record["file"], record["written"], record["frames"]) == (str(given), str(out), FRAMES)
+        assert record["valid"] == posekit.validate(out).summary["valid"]
+        assert "lengthened" in {span["remedy"] for span in record["spans"]}

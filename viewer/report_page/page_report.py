@@ -14,6 +14,7 @@ from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_clips import ClipVerdict, Span, Still
 from posekit.formats.own.report_columns import VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName
+from posekit.formats.own.report_repair import repair_rows
 from posekit.formats.own.report_table import worst_first
 from posekit.skeleton import HEAD_POINTS, JOINT, JOINTS, SEGMENTS
 from posekit.viewer.plots.stick import side
@@ -67,6 +68,7 @@ def page_report(report: ValidationReport, *, title: str) -> dict[str, Any]:
         "unnamed": max(len(bad) - MOST_DETAILED_CLIPS - MOST_NAMED_CLIPS, 0),
         "not_asked": _not_asked(report.settings),
         "refused": list(report.refused[:MOST_REFUSED]),
+        "repair": repair_rows(report.repair),
         "rows": [] if clips else _postures(columns),
         "settings": {name: str(value)[:MOST_SETTING_CHARACTERS] for name, value in report.settings.items()},
         "skeleton": {

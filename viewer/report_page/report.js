@@ -158,6 +158,9 @@ function showReport(data) {
   if (data.clip_counts) showClips(data);
   document.getElementById("refused-section").hidden = !data.refused.length;
   for (const line of data.refused) document.getElementById("refused").append(make("li", {}, line));
+  document.getElementById("repair-section").hidden = !data.repair.length;
+  for (const row of data.repair)
+    document.getElementById("repair").append(make("tr", {}, ...row.map(cell => make("td", {}, cell))));
   if (data.rows.length) {
     document.getElementById("postures-section").hidden = false;
     for (const row of data.rows)

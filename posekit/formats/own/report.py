@@ -122,6 +122,9 @@ class ValidationReport(Pictured):
         Of each clip, frames that can be drawn; not in the JSON file.
     refused : sequence of str
         Of several files those that could not be judged, each with why in a line.
+    repair : sequence of mapping
+        Of each clip that was repaired, what was changed and what is left: `posekit.remedy.Repaired.as_dict`, with its
+        ``file``, its ``clip`` and the file that was ``written``.
     """
 
     settings: Mapping[str, Any]
@@ -134,6 +137,7 @@ class ValidationReport(Pictured):
     clips: Sequence[ClipVerdict] | None = None
     stills: Sequence[Sequence[Still]] = field(default=(), compare=False, repr=False)
     refused: Sequence[str] = ()
+    repair: Sequence[Mapping[str, Any]] = ()
 
     def __len__(self) -> int:
         """Count the postures that were judged."""

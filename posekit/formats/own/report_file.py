@@ -13,7 +13,7 @@ from posekit.formats.own.report_clips import clip_document, clip_of_document
 from posekit.formats.own.report_columns import CheckCount, known_number
 from posekit.formats.own.report_rows import csv_lines, write_report_table
 from posekit.formats.own.report_schema import REPORT_SCHEMA, CheckFields, PostureFields, ReportFile
-from posekit.formats.own.report_table import markdown_lines
+from posekit.formats.own.report_table import markdown_lines, repair_lines
 from posekit.safe_io.json_file import read_json
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
 from posekit.tables.file_model import validated
@@ -50,9 +50,8 @@ def write_report(path: str | Path, report: ValidationReport) -> None:
     elif kind == ".csv":
         write_lines(path, csv_lines(columns, report.frames))
     else:
-        write_lines(
-            path, markdown_lines(columns, report.settings, report.frames, report.clips, report.refused)
-        )
+        lines = markdown_lines(columns, report.settings, report.frames, report.clips, report.refused)
+        write_lines(path, [*lines, *repair_lines(report.repair)])
 
 
 def read_report(path: str | Path) -> ValidationReport:
@@ -73,6 +72,7 @@ def read_report(path: str | Path) -> ValidationReport:
         refused=tuple(file.refused),
         verdicts=file.verdicts,
         clips=tuple(clip_of_document(clip) for clip in file.clips) or None,
+        repair=tuple(one.model_dump() for one in file.repair),
     )
 
 
@@ -99,6 +99,8 @@ def _head(report: ValidationReport) -> dict[str, Any]:
         head["refused"] = list(report.refused)
     if report.clips:
         head["clips"] = [clip_document(clip) for clip in report.clips]
+    if report.repair:
+        head["repair"] = [dict(one) for one in report.repair]
     return head
 
 

@@ -130,6 +130,40 @@ class CheckFields(FileModel):
     )
 
 
+class RepairSpanFields(FileModel):
+    """A joint, or the body, that was moved in neighbouring frames."""
+
+    remedy: str = Field(description="What was done: turned, interpolated, shifted back.")
+    place: str
+    first: Annotated[int, Field(ge=0)]
+    last: Annotated[int, Field(ge=0)] = Field(description="Its last frame, of the span too.")
+    most: float = Field(description="The most by which it was moved, in `unit`.")
+    unit: str
+
+
+class LeftFields(FileModel):
+    """What a fresh validation of the repaired file still rejects."""
+
+    frame: Annotated[int, Field(ge=0)]
+    check: str
+    place: str
+    left: float = Field(description="How far it is beyond its bound, in `unit`.")
+    unit: str
+
+
+class RepairFields(FileModel):
+    """What was changed in a clip, and what is left."""
+
+    file: str
+    written: str = Field(description="The repaired file.")
+    clip: str = Field(description="Its name in the file; empty where it has none.")
+    frames: Annotated[int, Field(ge=0)]
+    changed: Annotated[int, Field(ge=0)]
+    valid: Annotated[int, Field(ge=0)] = Field(description="Frames of the repaired file that are valid.")
+    spans: Annotated[list[RepairSpanFields], FailFast()]
+    left: Annotated[list[LeftFields], FailFast()]
+
+
 class ReportFile(FileModel):
     """The verdict on every posture of a file, with the findings behind it."""
 
@@ -146,5 +180,8 @@ class ReportFile(FileModel):
     )
     clips: Annotated[list[ClipFields], FailFast()] = Field(
         default=[], description="Of frames in time: the verdict on every clip."
+    )
+    repair: Annotated[list[RepairFields], FailFast()] = Field(
+        default=[], description="Of a repair, what was changed in each clip and what is left."
     )
     postures: Annotated[list[PostureFields], FailFast()]

@@ -12,6 +12,7 @@ import numpy as np
 from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName, ReportFrames
+from posekit.formats.own.report_repair import REPAIR_HEAD, repair_rows
 from posekit.formats.own.report_schema import VERDICT_NAMES
 
 MAX_NAMED_PLACES: Final = 3
@@ -117,6 +118,17 @@ def markdown_lines(
     ]
     where = () if frames is None else ("clip", "frame", "time, s")
     return lines + _table(("posture", *where, "verdict", "least margin", "why"), rows, _no_markup)
+
+
+def repair_lines(repair: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Write what a repair changed, and what is left, as a part of a Markdown file; nothing where nothing was repaired.
+
+    Parameters
+    ----------
+    repair : sequence of mapping
+        As `posekit.formats.own.ValidationReport` has them.
+    """
+    return ["", "## Repair", "", *_table(REPAIR_HEAD, repair_rows(repair), _no_markup)] if repair else []
 
 
 def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> list[str]:
