@@ -12,6 +12,7 @@ from posekit.body import with_head
 from posekit.body.measured import MeasuredPerson
 from posekit.errors import InputError
 from posekit.geometry import Array
+from posekit.remedy.given_clip import clip_given, joints_and_head
 from posekit.remedy.motion import clip_points, clip_with, feet_along, repair_over_time
 from posekit.remedy.postures import joint_weights, nearest_valid
 from posekit.remedy.record import Repaired, left_of, spans_of
@@ -31,6 +32,8 @@ def repair(
     head: ArrayLike | None = None,
     person: MeasuredPerson | None = None,
     weights: ArrayLike | None = None,
+    rate: float | None = None,
+    up: str = "",
 ) -> Repaired:
     r"""Find the nearest postures, or the nearest motion, that pass.
 
@@ -44,9 +47,9 @@ def repair(
 
     Parameters
     ----------
-    postures : array (N, 14, 3) or (14, 3), or MotionClip
-        Joints in tree order, metres; NaN where unknown. A posture without torso or hips stays as it is. Or the frames
-        of one motion.
+    postures : array (N, 14, 3), (N, 19, 3) or (14, 3), or MotionClip
+        Joints in tree order, with the head's points or without, metres; NaN where unknown. A posture without torso or
+        hips stays as it is. Or the frames of one motion.
     validator : Validator, optional
         What they must pass; that of the stick figure with its usual settings if not given.
     head : array (N, 5, 3), optional
@@ -55,6 +58,10 @@ def repair(
         As `Validator.check` takes it: whose recording the postures are a part of.
     weights : array (14,) or (N, 14), optional
         Of the joints.
+    rate : float, optional
+        Frames a second: an array is motion where it is given.
+    up : str
+        Of such motion the axis that points up, as ``+z``; without it nothing is known of the ground.
 
     Returns
     -------
@@ -63,7 +70,7 @@ def repair(
     Raises
     ------
     InputError
-        Where a shape is wrong, or the validator judges a robot, whose configurations
+        Where a shape, the rate or the axis is wrong, or the validator judges a robot, whose configurations
         `posekit.remedy.repair_configurations` takes.
 
     Examples
@@ -83,10 +90,13 @@ def repair(
             "figure; call posekit.remedy.repair_configurations(q, validator)"
         )
     clip = postures if isinstance(postures, MotionClip) else None
-    if clip is None:
-        given = np.asarray(postures, dtype=np.float64)
-        joints = given[None] if given.ndim == 2 else given
+    if clip is not None and (rate is not None or up):
+        raise InputError("repair: a clip has its own rate and its own up; expected neither; leave them out")
+    if not isinstance(postures, MotionClip):
+        joints, head = joints_and_head(np.asarray(postures, dtype=np.float64), head)
         judge.check(joints, head, person=person)  # refuses what is no posture
+        clip = clip_given(joints, head, rate, up, judge.settings)
+    if clip is None:
         points = with_head(joints)
         if head is not None:
             points[:, len(JOINTS) :] = head

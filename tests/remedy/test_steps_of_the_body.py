@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 import posekit
 from posekit.body import load_figure
+from posekit.errors import InputError
 from posekit.skeleton import JOINTS
 from posekit.validators import Validator
 from posekit.validators.motion import MotionClip, judge_motion
@@ -58,3 +61,20 @@ def test_a_step_there_and_back_is_interpolated() -> None:
     assert repaired.valid.all()
     assert {span.remedy for span in repaired.spans} == {"interpolated"}
     np.testing.assert_array_equal(repaired.joints[31:], clean.joints[31:])
+
+
+def test_an_array_of_known_rate_is_motion() -> None:
+    """What is repaired of a clip is repaired of its joints, and without a rate postures are not in time."""
+    given = stepped(30, 1)
+    of_array = posekit.repair(given.joints, rate=RATE)
+    np.testing.assert_array_equal(of_array.joints, posekit.repair(given).joints)
+    assert of_array.time is not None and not posekit.repair(given.joints).changed.any()
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"), [({"up": "+z"}, "rate"), ({"rate": 0.0}, "rate"), ({"rate": 30, "up": "sky"}, "up")]
+)
+def test_impossible_rates_and_axes_are_refused(asked: dict[str, Any], said: str) -> None:
+    """The error names what is wrong."""
+    with pytest.raises(InputError, match=said):
+        posekit.repair(walking().joints, **asked)
