@@ -179,7 +179,8 @@ def test_several_clips_and_names_that_break_the_table_are_not_written(tmp_path):
 @pytest.mark.parametrize(("rate", "said"), [(30.000000000000004, "30"), (29.97, "29.97"), (5.0, "5")])
 def test_a_rate_is_written_as_a_person_would(tmp_path, rate, said):
     write_trc(
-        tmp_path / "a.trc", Motion(names=("a",), points=np.zeros((1, 1, 3)), time=[0.0], rate=rate, up="+y")
+        tmp_path / "a.trc",
+        Motion(names=("a",), points=np.zeros((1, 1, 3)), time=np.zeros(1), rate=rate, up="+y"),
     )
     assert (tmp_path / "a.trc").read_text().splitlines()[2].split("\t")[0] == said
 

@@ -83,6 +83,7 @@ def motion():
 
 def test_a_motion_plays_and_says_what_checks_find(opened, motion):
     findings = page_findings(motion)
+    assert findings is not None
     assert list(findings.by_posture) == [BENT]
     tab = opened(motion, findings=findings)
     assert tab.inner_text("#answer").startswith("No check finds anything")
@@ -205,6 +206,7 @@ def test_each_recording_of_a_file_is_one_persons_and_is_named(opened, motion):
         time=np.tile(motion.time, 2),
     )
     findings = page_findings(both)
+    assert findings is not None
     assert list(findings.by_posture) == [BENT, FRAMES + BENT]
     tab = opened(both, findings=findings)
     assert tab.inner_text("#caption") == "tall"
