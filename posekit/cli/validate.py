@@ -119,19 +119,22 @@ def validate(
             raise InputError(
                 f"-o {output}: a folder has verdicts alone; expected no --page, --timeline, --keep or --repair"
             )
+        _refuse_ignored("verdicts", every=every, distances=distances, urdf=body.urdf)
         files = files_of(given, output)
         _validate_archive(files, output, asked_of(body, stated, judged), jobs, parse_fail_over(fail_over))
         return
     outputs = ValidateOutput(report=output, page=page, timeline=timeline, keep=keep, keep_spans=keep_spans)
     outputs.check()
+    _refuse_ignored(outputs.detail, every=every, distances=distances, urdf=body.urdf, jobs=jobs)
     allowed = parse_fail_over(fail_over)
     asked = asked_of(body, stated, judged)
     files = files_of(given, output)
     distinct(*files, output, page, timeline, keep, repair)
     if repair is not None:
-        from posekit.conversion.repaired_file import repair_targets
+        from posekit.conversion.repaired_file import check_repairable, repair_targets
 
         repair_targets(files, repair)
+        check_repairable(files, asked)
     with progress("judging", len(files)) as done:
         wanted = WantedDetail(detail=outputs.detail, every=every, distances=distances)
         report = validate_files(files, asked, wanted=wanted, progress=done)
@@ -152,6 +155,23 @@ def validate(
         raise typer.Exit(BAD_INPUT)
     if allowed.exceeded(report):
         raise typer.Exit(SOME_INVALID)
+
+
+def _refuse_ignored(
+    detail: str, *, every: bool, distances: bool | None, urdf: str, jobs: int | None = None
+) -> None:
+    """Refuse options that would do nothing, before the work."""
+    if jobs is not None:
+        raise InputError("--jobs: processes are of a folder of verdicts; expected -o DIR; leave --jobs out")
+    if every and detail != "findings":
+        raise InputError(
+            "--all: only a report in JSON lists findings; expected -o REPORT.json; or leave --all out"
+        )
+    if distances is not None and (detail == "verdicts" or urdf in ("", "stick_figure")):
+        raise InputError(
+            "--distances: only a report of a robot in JSON, CSV or Parquet has them; expected --urdf and -o; or leave "
+            "it out"
+        )
 
 
 def _validate_archive(

@@ -26,16 +26,18 @@ from posekit.conversion.motion_output import (
 from posekit.conversion.posture_sequence import ASSUMED_RATE, PostureSequence
 from posekit.errors import InputError, PosekitError
 from posekit.formats import own as files
-from posekit.formats.held_postures import HeldPostures
+from posekit.formats.format import Content
+from posekit.formats.held_postures import POSTURE_CONTENTS, HeldPostures
 from posekit.formats.motion import Motion
 from posekit.formats.own import Postures
 from posekit.formats.own.postures_q import NamedConfigurations, write_configurations
+from posekit.formats.recognising import recognise
 from posekit.geometry import Array
 from posekit.remedy import Repaired, repair, repair_configurations
 from posekit.safe_io import refusal
 from posekit.safe_io.writing import check_target, make_folder, safe_stem
 from posekit.skeleton import FEET_POINTS, POINTS
-from posekit.validation.files import AskedValidation
+from posekit.validation.files import STICK_FIGURE_NAME, AskedValidation
 from posekit.validation.keep import names_below
 from posekit.validation.over_time import clip_of
 from posekit.validation.reading import ReadPostures, read_postures_of
@@ -146,6 +148,32 @@ def repair_targets(paths: Sequence[Path], target: Path) -> list[Path]:
         if place.resolve() in given:
             raise refusal(place, "--repair", "where a file is that is read", "another name", "choose one")
     return into
+
+
+def check_repairable(paths: Sequence[Path], asked: AskedValidation) -> None:
+    """Refuse postures that are to be judged as a robot's, before the work is done.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        The files.
+    asked : AskedValidation
+        By what they are judged.
+
+    Raises
+    ------
+    InputError
+        Where a file holds postures, and the body is a robot.
+    """
+    if asked.urdf in ("", STICK_FIGURE_NAME):
+        return
+    for path in paths:
+        try:
+            holds = recognise(path).holds
+        except PosekitError:  # it is said to be broken when it is read
+            continue
+        if holds in POSTURE_CONTENTS and holds is not Content.CONFIGURATIONS:
+            raise InputError(f"{path}: {POSTURES_OF_A_ROBOT}")
 
 
 def repair_files(paths: Sequence[Path], asked: AskedValidation, target: Path) -> Iterator[RepairedFile]:

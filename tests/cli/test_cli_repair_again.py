@@ -55,3 +55,29 @@ def test_the_report_has_the_record(run: Callable[..., Any], tmp_path: Path, suff
         assert (record["file"], record["written"], record["frames"]) == (str(given), str(out), FRAMES)
         assert record["valid"] == posekit.validate(out).summary["valid"]
         assert "lengthened" in {span["remedy"] for span in record["spans"]}
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [
+        ("--urdf", "human", "--repair", "out.npz"),
+        ("--jobs", "1"),
+        ("--all",),
+        ("--all", "-o", "report.csv"),
+        ("--distances", "-o", "report.json"),
+        ("--urdf", "human", "--no-distances"),
+        ("--all", "-o", "verdicts"),
+    ],
+    ids=" ".join,
+)
+def test_what_would_do_nothing_is_refused_before_the_work(
+    run: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, asked: tuple[str, ...]
+) -> None:
+    """The error is a line that names the option, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    write_motion("given.npz", noisy_motion(0.3), "npz")
+    done = run("validate", "given.npz", *asked)
+    assert done.code == 2 and done.err.count("\n") == 1
+    named = "--distances" if "--no-distances" in asked else "--repair" if "--repair" in asked else asked[0]
+    assert named in done.err
+    assert [path.name for path in tmp_path.iterdir()] == ["given.npz"]
