@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,9 @@ import pytest
 
 import posekit
 from posekit.body import load_figure
-from posekit.formats.motion import Motion, write_motion
+from posekit.formats.motion import Motion, read_motion, write_motion
 from posekit.formats.own import read_report
-from posekit.skeleton import JOINT, JOINTS
+from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS
 
 FRAMES = 60
 
@@ -81,3 +82,27 @@ def test_what_would_do_nothing_is_refused_before_the_work(
     named = "--distances" if "--no-distances" in asked else "--repair" if "--repair" in asked else asked[0]
     assert named in done.err
     assert [path.name for path in tmp_path.iterdir()] == ["given.npz"]
+
+
+@pytest.mark.parametrize("suffix", ["npz", "csv", "trc"])
+def test_all_points_are_kept(run: Callable[..., Any], tmp_path: Path, suffix: str) -> None:
+    """A repaired file has the head, toes and heels of the file, where they were on the body."""
+    given, out = tmp_path / f"given.{suffix}", tmp_path / f"out.{suffix}"
+    motion = noisy_motion(0.3)
+    head = load_figure().neutral_points[None, len(JOINTS) :] + np.zeros((FRAMES, 1, 1))
+    foot_ankles = [JOINT[f"{name.split('_')[0]}_ankle"] for name in FEET_POINTS]
+    feet = (
+        motion.points[:, foot_ankles]
+        + np.where(["toe" in name for name in FEET_POINTS], 0.15, -0.05)[:, None] * np.eye(3)[0]
+    )
+    marks = (*POINTS, *FEET_POINTS)
+    points = np.concatenate([motion.points, head, feet], axis=1)
+    write_motion(given, replace(motion, names=marks, points=points), suffix)
+    stated = ("--up", "+z") if suffix == "trc" else ()
+    run("validate", given, "--repair", out, *stated)
+    written = read_motion(out)
+    assert set(written.names) == set(marks)
+    repaired = written.points[:, [written.names.index(name) for name in marks]]
+    assert np.isfinite(repaired).all()
+    apart = [np.linalg.norm(one[:, 19:] - one[:, foot_ankles], axis=-1) for one in (points, repaired)]
+    np.testing.assert_allclose(apart[1], apart[0], rtol=0, atol=1e-3)
