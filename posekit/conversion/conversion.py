@@ -89,7 +89,7 @@ class Conversion:
     Raises
     ------
     InputError
-        Where the format to write or an axis is none.
+        Where the format to write or an axis is none, or the output is the file that is read.
     """
 
     given: Path
@@ -105,6 +105,8 @@ class Conversion:
     gaps: str = ""
 
     def __post_init__(self) -> None:
+        if self.output.exists() and self.given.exists() and self.output.samefile(self.given):
+            raise refusal(self.output, "", "the file that is read", "another name", "choose one")
         written = (*OWN_TARGETS, *(one.name for one in motion_formats().values() if one.writes))
         if self.to and is_format(self.to):
             got = f"{self.to}, which detectors write and posekit reads"

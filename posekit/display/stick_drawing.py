@@ -5,6 +5,7 @@ Right limbs are orange and left ones blue, which the colour-blind tell apart, to
 
 from __future__ import annotations
 
+import html
 from collections.abc import Sequence
 from typing import Final
 
@@ -40,7 +41,7 @@ def posture_drawing(postures: Array, up: Array) -> str:
     str
         SVG that loads nothing; empty where no joint is known.
     """
-    if not len(postures) or not np.isfinite(postures[0]).any():
+    if not len(postures):
         return ""
     right, forward, upward = body_axes(postures[0], up)
     front = np.stack([postures @ -right, -(postures @ upward)], axis=-1)
@@ -56,7 +57,7 @@ def image_drawing(points: Array) -> str:
     points : array (14, 2)
         Joints in tree order, x to the right, y down; NaN where not seen.
     """
-    return _svg([(points[None], "image")]) if np.isfinite(points).any() else ""
+    return _svg([(points[None], "image")])
 
 
 def points_drawing(points: Array, up: Array) -> str:
@@ -69,8 +70,6 @@ def points_drawing(points: Array, up: Array) -> str:
     up : array (3,)
         The direction that is drawn upward.
     """
-    if not np.isfinite(points).any():
-        return ""
     first, second, upward = level_axes(up)
     panels = [np.stack([points @ axis, -(points @ upward)], axis=-1)[None] for axis in (first, second)]
     return _svg([(panels[0], "from one side"), (panels[1], "from another")], dots=True)
@@ -88,7 +87,7 @@ def shares_drawing(shares: Sequence[tuple[str, int, str]]) -> str:
     width, start, parts = 2 * PANEL_PIXELS, 0.0, []
     for name, count, colour in shares:
         long = width * count / max(total, 1)
-        title = f"<title>{name}: {count}</title>"
+        title = f"<title>{html.escape(name)}: {count}</title>"
         parts.append(f'<rect x="{start:.1f}" width="{long:.1f}" height="14" fill="{colour}">{title}</rect>')
         start += long
     return _document(width, 14, parts) if total else ""
@@ -130,7 +129,9 @@ def level_axes(up: Array) -> tuple[Array, Array, Array]:
 
 
 def _svg(panels: Sequence[tuple[Array, str]], *, dots: bool = False) -> str:
-    """Draw panels of postures (K, P, 2) beside each other, all on one scale."""
+    """Draw panels of postures (K, P, 2) beside each other, all on one scale; nothing where no point is known."""
+    if not all(len(_known(points)) for points, _ in panels):
+        return ""
     size = max(float(np.nanmax(np.ptp(_known(points), axis=0))) for points, _ in panels)
     scale = (PANEL_PIXELS - 2 * EDGE_PIXELS) / max(size, _LEAST)
     parts = []

@@ -82,3 +82,13 @@ def test_a_mistake_is_one_line(file: str, call, text: str) -> None:
         call()
     assert "\n" not in str(refused.value)
     assert not Path("out.html").exists() and not Path("out.bvh").exists()
+
+
+def test_a_file_is_not_converted_to_itself(file: str) -> None:
+    posekit.convert(file, "motion.npz", to="npz")
+    before = Path("motion.npz").read_bytes()
+    Path("link.npz").symlink_to("motion.npz")
+    for output in ("motion.npz", "./motion.npz", "link.npz"):
+        with pytest.raises(InputError, match="the file that is read"):
+            posekit.convert("motion.npz", output, up="+z")
+    assert Path("motion.npz").read_bytes() == before

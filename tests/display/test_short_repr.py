@@ -8,7 +8,7 @@ import pytest
 
 import posekit
 from posekit.display.short_repr import MAX_REPR, ShortRepr, short
-from posekit.display.stick_drawing import body_axes, posture_drawing
+from posekit.display.stick_drawing import body_axes, image_drawing, points_drawing, posture_drawing
 from posekit.formats.motion.motion import Motion
 from posekit.samples import write_samples
 from posekit.skeleton import JOINT, JOINTS
@@ -106,6 +106,17 @@ def test_a_joint_that_is_not_known_costs_its_segments_alone():
     standing[JOINT["left_wrist"]] = np.nan
     assert posture_drawing(standing[None], UP).count("<line") == whole - 2
     assert posture_drawing(np.full((1, 14, 3), np.nan), UP) == ""
+
+
+def test_points_that_are_known_in_part_are_not_drawn():
+    for shape, draw in (
+        ((1, 14, 3), lambda points: posture_drawing(points, UP)),
+        ((14, 3), lambda points: points_drawing(points, UP)),
+        ((14, 2), image_drawing),
+    ):
+        points = np.full(shape, np.nan)
+        points[..., 3, 0] = 1.0
+        assert draw(points) == ""
 
 
 def test_nothing_that_is_held_makes_a_line_long():
