@@ -20,6 +20,7 @@ from posekit.remedy.record import SHIFTED_BACK
 from posekit.skeleton import FEET_POINTS, JOINT, JOINTS, POINTS, SEGMENT_NAMES
 from posekit.validators import Judgement, Validator
 from posekit.validators.motion import MotionClip, judge_motion
+from posekit.validators.motion.displaced_body import middle
 
 Bools = NDArray[np.bool_]
 
@@ -222,7 +223,7 @@ def _stepped_back(points: Array, bad: Bools) -> Array:
     At an end of the clip, where it is not known how the body went on one of the sides, the other side says it.
     """
     way = np.zeros((len(points), 3))
-    way[1:] = np.nan_to_num(np.nanmedian(np.diff(points[:, : len(JOINTS)], axis=0), axis=1))
+    way[1:] = np.nan_to_num(middle(np.diff(points[:, : len(JOINTS)], axis=0)))
     aside = np.zeros_like(way)
     for found in runs(bad):
         start, stop = _jumped(way, *found)
@@ -243,7 +244,7 @@ def _stepped_back(points: Array, bad: Bools) -> Array:
 def _jumped(way: Array, start: int, stop: int) -> tuple[int, int]:
     """Return the frames in which a body jumped: near an end of the clip its neighbours do not tell, its ways do."""
     first = 1 if start <= NEAR_END_FRAMES else start
-    after = len(way) if stop >= len(way) - NEAR_END_FRAMES else stop
+    after = len(way) if stop >= len(way) - NEAR_END_FRAMES else max(stop, first + 1)
     if (first, after) == (start, stop):
         return start, stop
     around = way[max(first - NEAR_END_FRAMES, 1) : after + NEAR_END_FRAMES]

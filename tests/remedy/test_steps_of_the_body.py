@@ -10,6 +10,7 @@ import pytest
 import posekit
 from posekit.body import load_figure
 from posekit.errors import InputError
+from posekit.remedy.motion import _stepped_back
 from posekit.skeleton import JOINTS
 from posekit.validators import Validator
 from posekit.validators.motion import MotionClip, judge_motion
@@ -78,3 +79,21 @@ def test_impossible_rates_and_axes_are_refused(asked: dict[str, Any], said: str)
     """The error names what is wrong."""
     with pytest.raises(InputError, match=said):
         posekit.repair(walking().joints, **asked)
+
+
+def test_a_frame_without_any_joint_beside_a_step_stays_so() -> None:
+    """What is shifted back around it is as without it."""
+    given = stepped(30, 1)
+    joints = given.joints.copy()
+    joints[45] = np.nan
+    repaired = posekit.repair(MotionClip(joints=joints, time=given.time, rate=RATE))
+    assert np.isnan(repaired.joints[45]).all()
+    off = np.delete(repaired.joints - walking().joints, 45, axis=0)
+    assert np.abs(off - off[0]).max() < 0.01
+
+
+def test_a_step_that_is_found_in_the_first_frame_alone_is_taken_out() -> None:
+    given = stepped(1, 1).joints
+    out = _stepped_back(given, np.arange(FRAMES) == 0)
+    off = out - walking().joints
+    assert np.abs(off - off[0]).max() < 0.01
