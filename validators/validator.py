@@ -268,12 +268,13 @@ class Validator(ShortRepr):
 
     def _check_configurations(self, q: ArrayLike) -> Report:
         """Judge configurations; of those with NaN nothing is decided, and Pinocchio sees a neutral one instead."""
-        unknown = (
-            np.isnan(q) if isinstance(q, np.ndarray) and q.ndim == 2 and q.dtype.kind == "f" else np.empty(0)
-        )
-        if not unknown.any():
+        try:
+            given = np.array(q)
+        except ValueError:  # rows of different lengths: refused with what was expected
             return self._check_known(q)
-        given, rows = np.array(q), np.asarray(unknown.any(axis=1))
+        if given.ndim != 2 or given.dtype.kind != "f" or not np.isnan(given).any():
+            return self._check_known(q)
+        rows = np.asarray(np.isnan(given).any(axis=1))
         neutral = pin.neutral(self.configured[0].model)
         if given.shape[1] == len(neutral):
             given[rows] = neutral

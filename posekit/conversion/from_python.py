@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -103,7 +104,8 @@ def render(
     style : Style, optional
         How postures are composed (`posekit.viewer.Style`).
     shot : Shot, optional
-        The size of the picture, and from where it is taken (`posekit.viewer.Shot`).
+        The size of the picture, and from where it is taken (`posekit.viewer.Shot`). Without one, films are as fast as
+        the frames' times say.
 
     Returns
     -------
@@ -122,11 +124,13 @@ def render(
     >>> posekit.render(recovery, "page.html")  # doctest: +SKIP
     1
     """
+    from posekit.viewer.moving import real_time
     from posekit.viewer.page.page import write_page
     from posekit.viewer.pictures import Shot, check_picture, write_picture
     from posekit.viewer.scene.compose import Style
 
     output = Path(output)
+    timed = shot is None
     shot = shot or Shot()
     moving = check_picture(output, shot) and not shot.turntable
     content, behind, title = _drawable(given, view)
@@ -143,6 +147,8 @@ def render(
     if chosen is None:
         chosen = [k for k, shown in enumerate(subject.frames) if len(shown)]
     drawn = chosen_frames(subject, content, str(posture), chosen if moving else chosen[:1], moving=moving)
+    if moving and timed and drawn:
+        shot = replace(shot, fps=real_time([one.time for one in drawn]))
     style = style or Style(layout="superposed" if moving else "side-by-side")
     return write_picture(output, subject, drawn, style=style, shot=shot, title=title)
 

@@ -23,7 +23,8 @@ def fill_gaps(found: PostureSequence, how: str) -> PostureSequence:
         One posture a frame.
     how : {"interpolate", "hold", "leave-out"}
         Limbs turn evenly from the frame before to the frame after (`posekit.following.bridge`), or a frame is as the
-        nearest that has a posture; or nothing is put in. Before the first and after the last posture both hold.
+        nearest that has a posture; or nothing is put in. Before the first and after the last posture both hold. Joints
+        that were not seen are interpolated either way.
 
     Returns
     -------
@@ -50,9 +51,9 @@ def fill_gaps(found: PostureSequence, how: str) -> PostureSequence:
         order
     ]
     put_in = rows < 0
-    says = [f"{put_in.sum()} of {len(time)} frames had no posture"] if put_in.any() else []
-    says += [f"{int(unseen.sum())} joints were not seen"] if unseen.any() else []
-    done = "interpolated" if how == "interpolate" else "as in the nearest frame"
+    held = "as in the nearest frame" if how == "hold" else "interpolated"
+    says = [f"{put_in.sum()} of {len(time)} frames had no posture: {held}"] if put_in.any() else []
+    says += [f"{int(unseen.sum())} joints were not seen: interpolated"] if unseen.any() else []
     return replace(
         found,
         points=points,
@@ -63,9 +64,6 @@ def fill_gaps(found: PostureSequence, how: str) -> PostureSequence:
         branches=tuple("" if row < 0 else found.branches[row] for row in rows.tolist())
         if found.branches
         else (),
-        says=(
-            *(line for line in found.says if not line.endswith("are left out")),
-            f"{', '.join(says)}: {done}",
-        ),
+        says=(*(line for line in found.says if not line.endswith("are left out")), *says),
         lost={},
     )

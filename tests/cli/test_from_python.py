@@ -8,6 +8,7 @@ import pytest
 
 import posekit
 from posekit.errors import InputError
+from posekit.viewer.pictures import Shot
 
 
 @pytest.fixture(scope="module")
@@ -92,3 +93,18 @@ def test_a_file_is_not_converted_to_itself(file: str) -> None:
         with pytest.raises(InputError, match="the file that is read"):
             posekit.convert("motion.npz", output, up="+z")
     assert Path("motion.npz").read_bytes() == before
+
+
+def test_films_are_as_fast_as_the_frames(
+    recovery: posekit.Recovery, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shots: list[Shot] = []
+
+    def keep(*_: object, shot: Shot, **__: object) -> int:
+        shots.append(shot)
+        return 1
+
+    monkeypatch.setattr("posekit.viewer.pictures.write_picture", keep)
+    posekit.render(recovery, tmp_path / "walk.gif")  # 0.2 s from frame to frame
+    posekit.render(recovery, tmp_path / "slow.gif", shot=Shot(fps=2.0))
+    assert [shot.fps for shot in shots] == [pytest.approx(5.0), 2.0]

@@ -100,6 +100,8 @@ def test_nothing_is_decided_of_a_configuration_with_nan_and_the_others_are_judge
     assert [report.verdicts[k] for k in (0, 2, 3)] == alone.verdicts and "invalid" in alone.verdicts
     assert report.verdicts[1] == "undecided" and np.isnan(report.q[1]).all()
     assert not (report.contacts(nearest=True).posture == 1).any()
+    listed = Validator(HUMAN if subject == "human" else None, checks=LIMITS).check(q=q.tolist())
+    assert listed.verdicts == report.verdicts
 
 
 @pytest.mark.parametrize(
