@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from posekit.formats.own import Family, Inferred, Result, ResultFrame, ScaledOrt
 from posekit.geometry import Array
 from posekit.skeleton import JOINT, JOINTS, TREE_SEGMENTS
 from posekit.synthesis import random_postures
+from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.browser.studio import Studio
 from posekit.viewer.scene.branch import lift_branch
 from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
@@ -31,6 +34,21 @@ def studio() -> Iterator[Studio]:
         pytest.fail(f"these tests draw with a real browser: {error}", pytrace=False)
     with started:
         yield started
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """Start a browser for pages; without one these tests fail, they are not skipped."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    try:
+        program = find_browser()
+    except ViewerError as error:
+        pytest.fail(f"these tests look at a page with a real browser: {error}", pytrace=False)
+    flags = ["--disable-gpu", "--disable-dev-shm-usage"] + (["--no-sandbox"] if os.geteuid() == 0 else [])
+    with sync_api.sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=program, args=flags)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import numpy as np
 import pytest
 
 import posekit
-from posekit.cli.main import main
 from posekit.errors import ViewerError
 from posekit.formats.own import Result, View
 from posekit.skeleton import DOFS
@@ -18,6 +16,7 @@ from posekit.viewer.plots.angle_plot import plot_angles, plot_tracks
 from posekit.viewer.plots.angle_tracks import AngleTrack, angle_names, angle_tracks, chosen_angles
 from posekit.viewer.scene.drawn_subject import DrawnSubject
 from posekit.viewer.scene.likeliest import likeliest_first
+from tests.viewer.driving import render
 
 
 @pytest.fixture(scope="module")
@@ -120,13 +119,6 @@ def test_angles_are_chosen_by_joint_side_or_name() -> None:
         chosen_angles("ankle")
 
 
-def command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["posekit", "render", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 def test_command_draws_angles_of_results_and_motion(
     walk_files: tuple[Path, Path],
     tmp_path: Path,
@@ -134,21 +126,21 @@ def test_command_draws_angles_of_results_and_motion(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     result, view = walk_files
-    assert command(monkeypatch, result, "--view", view, "--angles", "knee", "-o", tmp_path / "a.svg") == 0
+    assert render(monkeypatch, result, "--view", view, "--angles", "knee", "-o", tmp_path / "a.svg") == 0
     assert "limits: as the result was judged" in capsys.readouterr().out
     assert "right knee, flexion" in (tmp_path / "a.svg").read_text()
     joints = posekit.read_view(view).truth
     posekit.write_postures(tmp_path / "p.json", joints)
     words = ("--angles", "all", "-o", tmp_path / "b.png")
-    assert command(monkeypatch, result, *words, "--truth", view, "--frame", "1-3") == 0
-    assert command(monkeypatch, tmp_path / "p.json", *words) == 0
+    assert render(monkeypatch, result, *words, "--truth", view, "--frame", "1-3") == 0
+    assert render(monkeypatch, tmp_path / "p.json", *words) == 0
     for more, said in (
         (("-o", tmp_path / "c.mp4", "--angles", "knee"), "the format is .mp4; --angles expected one of .png"),
         ((*words, "--fov", 20), "--fov: means nothing beside --angles"),
         ((*words, "--truth", tmp_path / "p.json"), "expected 5"),
     ):
         capsys.readouterr()
-        assert command(monkeypatch, result, *more) == 2
+        assert render(monkeypatch, result, *more) == 2
         error = capsys.readouterr().err
         assert said in error
         assert error.count("\n") == 1

@@ -41,6 +41,7 @@ from posekit.viewer.scene.world import upright_world
 from posekit.viewer.video import Video, write_mp4
 from posekit.views import forget_camera, view_of
 from tests.detector_files import view_keypoints, write_keypoints
+from tests.viewer.driving import render
 
 SIZE = (480, 270)
 K = np.array([[375.0, 0.0, 239.5], [0.0, 375.0, 134.5], [0.0, 0.0, 1.0]])
@@ -355,13 +356,6 @@ def test_uncalibrated_survivors_of_any_scale_meet_the_image(random_view: View, t
         np.testing.assert_allclose(drawn.seen(row)[: len(JOINTS)], image[0], atol=0.5)
 
 
-def command(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["posekit", "render", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
-
-
 def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
     view: View,
     film: Path,
@@ -373,9 +367,9 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
     result = tmp_path / "result.npz"
     posekit.write_result(result, posekit.result_of(posekit.recover(view)))
     words = [result, "--view", tmp_path / "view.json", "--over", film]
-    assert command(monkeypatch, *words, "-o", tmp_path / "over.gif") == 0
+    assert render(monkeypatch, *words, "-o", tmp_path / "over.gif") == 0
     assert capsys.readouterr().out.endswith("over.gif (3 pictures)\n")
-    assert command(monkeypatch, *words, "-o", tmp_path / "over.png", "--frame", "1", "--posture", "all") == 0
+    assert render(monkeypatch, *words, "-o", tmp_path / "over.png", "--frame", "1", "--posture", "all") == 0
     for more, said in (
         (["--azimuth", "3"], "--azimuth: means nothing beside --over"),
         (["--posture", "path"], "the result has no path"),
@@ -383,18 +377,18 @@ def test_command_draws_a_view_over_its_film_and_refuses_what_means_nothing(
         (["--size", "99999x99999"], "99999x99999"),
     ):
         capsys.readouterr()
-        assert command(monkeypatch, *words, "-o", tmp_path / "no.png", *more) == 2
+        assert render(monkeypatch, *words, "-o", tmp_path / "no.png", *more) == 2
         error = capsys.readouterr().err
         assert said in error
         assert error.count("\n") == 1
-    assert command(monkeypatch, result, "--over", film, "-o", tmp_path / "no.png") == 2
+    assert render(monkeypatch, result, "--over", film, "-o", tmp_path / "no.png") == 2
     assert "--view VIEW" in capsys.readouterr().err
     assert not (tmp_path / "no.png").exists()
     posekit.write_view(tmp_path / "view.json", view)
     photographs = tmp_path / "photographs"
     write_photographs(photographs, view)
     words = [result, "--view", tmp_path / "view.json", "--over", photographs, "-o"]
-    assert command(monkeypatch, *words, photographs / "over.png", "--frame", 0) == 2
+    assert render(monkeypatch, *words, photographs / "over.png", "--frame", 0) == 2
     assert "is in the folder of the photographs" in capsys.readouterr().err
 
 
@@ -424,6 +418,6 @@ def test_a_result_says_which_pictures_a_detector_read(
     shuffled.mkdir()
     for name, frame in zip(named.pictures, range(3), strict=True):
         read_image(folder / f"{frame:06}.png").save(shuffled / name)
-    assert command(monkeypatch, tmp_path / "r.npz", "--over", shuffled, "-o", tmp_path / "over") == 0
+    assert render(monkeypatch, tmp_path / "r.npz", "--over", shuffled, "-o", tmp_path / "over") == 0
     assert "by file names" in capsys.readouterr().out
     assert sorted(file.name for file in (tmp_path / "over").iterdir()) == [f"00000{k}.png" for k in range(3)]

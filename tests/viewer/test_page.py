@@ -4,9 +4,7 @@ import base64
 import dataclasses
 import functools
 import json
-import os
 import re
-import time
 
 import numpy as np
 import pytest
@@ -20,15 +18,14 @@ from posekit.formats.own.frame_answer import FrameAnswer
 from posekit.recovery import recover
 from posekit.recovery.result import result_of
 from posekit.skeleton import JOINTS
-from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.packed import UNKNOWN_STEP, origins, steps
 from posekit.viewer.page.page import page_html, write_page
 from posekit.viewer.page.shown_survivors import most_of_each, survivors_shown
 from posekit.viewer.scene.world import World
 from posekit.views.builtin import builtin_view
+from tests.viewer.driving import wait_until
 
-FLAGS = ["--disable-gpu", "--disable-dev-shm-usage"]
 HOSTILE = (
     "</script><script>window.hacked=1</script><img src=x onerror=window.hacked=1>\u2028${window.hacked=1}"
 )
@@ -72,28 +69,6 @@ def page_points(data, name="points"):
     frame = np.repeat(np.arange(len(data["frames"])), [one["held"] for one in data["frames"]])
     origin = np.array([one["origin"] for one in data["frames"]])
     return steps * data["step"] + (origin[frame] if name == "points" else origin)[:, None], frame
-
-
-def wait_until(tab, condition):
-    """Poll from outside: the page's policy forbids it to evaluate text itself."""
-    deadline = time.monotonic() + 10
-    while not tab.evaluate(condition):
-        assert time.monotonic() < deadline, condition
-        tab.wait_for_timeout(20)
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    try:
-        program = find_browser()
-    except ViewerError as error:
-        pytest.fail(f"these tests look at a page with a real browser: {error}", pytrace=False)
-    flags = FLAGS + (["--no-sandbox"] if os.geteuid() == 0 else [])
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=flags)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

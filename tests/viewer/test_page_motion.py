@@ -1,38 +1,21 @@
 """The page of what moves: motion of a file with what checks find in it, and the paths of a result that was followed."""
 
 import dataclasses
-import os
-import time
 
 import numpy as np
 import pytest
 
 import posekit
-from posekit.errors import ViewerError
 from posekit.formats.held import HeldPostures
 from posekit.formats.own import Postures
 from posekit.formats.own.paths import FollowedPaths
 from posekit.skeleton import JOINT, JOINTS
 from posekit.validation.page_findings import page_findings
-from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.page import write_page
+from tests.viewer.driving import wait_until
 
 FRAMES, BENT = 12, 4
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    try:
-        program = find_browser()
-    except ViewerError as error:
-        pytest.fail(f"these tests look at a page with a real browser: {error}", pytrace=False)
-    flags = ["--disable-gpu", "--disable-dev-shm-usage"] + (["--no-sandbox"] if os.geteuid() == 0 else [])
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=flags)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture
@@ -55,13 +38,6 @@ def opened(chromium, tmp_path):
     for tab in tabs:
         tab.close()
     assert wrong == []
-
-
-def wait_until(tab, condition):
-    deadline = time.monotonic() + 10
-    while not tab.evaluate(condition):
-        assert time.monotonic() < deadline, condition
-        tab.wait_for_timeout(20)
 
 
 @pytest.fixture(scope="module")

@@ -1,7 +1,6 @@
 """The slider over the scale of an uncalibrated picture: the laws of the family it moves through, in a real Chromium."""
 
 import dataclasses
-import os
 import time
 
 import numpy as np
@@ -9,9 +8,7 @@ import pytest
 
 import posekit
 from posekit.cameras import ScaledOrthographicCamera
-from posekit.errors import ViewerError
 from posekit.skeleton import JOINT, JOINTS, POINTS, TREE_SEGMENTS, segment_name
-from posekit.viewer.browser.find_browser import find_browser
 from posekit.viewer.page.data import page_data
 from posekit.viewer.page.family_page import walk
 from posekit.viewer.page.page import write_page
@@ -19,22 +16,7 @@ from posekit.viewer.scene.branch import lift_branch
 from posekit.viewer.scene.drawn_subject import subject_of
 from posekit.viewer.scene.world import World
 
-FLAGS = ["--disable-gpu", "--disable-dev-shm-usage"]
 TENTH_OF_MM = 1e-4
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    sync_api = pytest.importorskip("playwright.sync_api")
-    try:
-        program = find_browser()
-    except ViewerError as error:
-        pytest.fail(f"these tests look at a page with a real browser: {error}", pytrace=False)
-    flags = FLAGS + (["--no-sandbox"] if os.geteuid() == 0 else [])
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=program, args=flags)
-        yield browser
-        browser.close()
 
 
 def open_page(chromium, folder, given, view, wrong):

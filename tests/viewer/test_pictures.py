@@ -13,7 +13,6 @@ from PIL import Image
 
 import posekit
 from posekit.answers.wording import percent
-from posekit.cli.main import main
 from posekit.conversion.chosen_postures import chosen_frames, chosen_postures
 from posekit.errors import InputError, ViewerError
 from posekit.formats.own import Postures, Result, View
@@ -24,15 +23,9 @@ from posekit.viewer.scene.compose import Style
 from posekit.viewer.scene.drawn_subject import DrawnSubject, subject_of
 from posekit.viewer.scene.likeliest import MAX_BESIDE, likeliest_first
 from posekit.viewer.video import Video
+from tests.viewer.driving import render
 
 SMALL = Shot(size=(200, 150), supersample=1)
-
-
-def render(monkeypatch: pytest.MonkeyPatch, *words: object) -> int:
-    monkeypatch.setattr(sys, "argv", ["posekit", "render", *map(str, words)])
-    with pytest.raises(SystemExit) as ended:
-        main()
-    return int(ended.value.code or 0)
 
 
 def refused(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *words: object) -> str:
