@@ -26,7 +26,7 @@ from posekit.formats.keypoints import is_format
 from posekit.formats.motion import UP_DIRECTIONS, motion_formats
 from posekit.formats.own import View
 from posekit.formats.recognising import recognise
-from posekit.safe_io import extra, nearest, refusal, shown
+from posekit.safe_io import nearest, refusal, shown
 from posekit.views.opened import of_person
 from posekit.views.opening import open_views
 from posekit.views.source import Source
@@ -162,8 +162,6 @@ def convert(job: Conversion) -> list[str]:
             job.given, "--to", f"view, of {what.holds.value}", "key points", "convert to postures or motion"
         )
     output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up, gaps=job.gaps)
-    if output.to == "rerun":
-        extra("rerun", "rerun", "writing .rrd")  # before anything is read
     if what.holds is Content.MOTION and carries_points(output.to):
         motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
         carried = motion if output.to in TABLE_FORMATS else one_clip(motion)

@@ -47,12 +47,6 @@ EVENLY_TIMED: Final = ("bvh", "c3d")
 TABLE_FORMATS: Final = ("csv", "npz", "parquet")
 """Formats that carry all survivors of a frame, and motion in several clips."""
 
-PACKAGES_NEEDED: Final = {
-    "c3d": ("ezc3d", "c3d", "writing C3D"),
-    "parquet": ("pyarrow.parquet", "parquet", "writing Parquet"),
-}
-"""What a format is written by, its extra, and what for: they are asked for before the work begins."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class MotionOutput:
@@ -83,8 +77,8 @@ class MotionOutput:
     def __post_init__(self) -> None:
         if self.path.suffix:
             check_target(self.path)
-        if self.to in PACKAGES_NEEDED:
-            extra(*PACKAGES_NEEDED[self.to])
+        if self.to != "postures" and (needed := motion_format(self.to).written_by):
+            extra(*needed)
         if self.to in ALWAYS_Y_UP and self.up not in ("", "+y"):
             raise refusal("--up", "", self.up, f"+y, as in every file of {self.to}", "leave it out")
 

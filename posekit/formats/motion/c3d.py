@@ -26,6 +26,7 @@ from posekit.formats.motion.motion_checks import the_one_clip
 from posekit.formats.motion.motion_format import METRES_IN_UNIT, MotionFormat
 from posekit.safe_io import cut, extra, one_line, read_bytes, refusal, replacing, shown
 
+WRITTEN_BY_EZC3D: Final = ("ezc3d", "c3d", "writing C3D")
 MAX_BYTES: Final = 500_000_000
 MAX_FRAMES = 65_534
 """Frames, and points, that are written: ezc3d cuts what is longer where it reads it again."""
@@ -77,7 +78,7 @@ def write_c3d(path: str | Path, motion: Motion) -> None:
         Where ezc3d is not installed, the motion has several clips, frames that are not evenly spaced or too many of
         them, a name that C3D cannot hold, or the file cannot be written.
     """
-    ezc3d = extra("ezc3d", "c3d", "writing C3D")
+    ezc3d = extra(*WRITTEN_BY_EZC3D)
     motion = the_one_clip(path, motion, "C3D")
     _check_writable(path, motion)
     content = ezc3d.c3d()
@@ -192,5 +193,6 @@ C3D_FORMAT: Final = MotionFormat(
     read=read_c3d,
     read_recorded=partial(read_c3d, as_recorded=True),
     write_points=write_c3d,
+    written_by=WRITTEN_BY_EZC3D,
     looks_like=_looks_like,
 )

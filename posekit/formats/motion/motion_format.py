@@ -39,6 +39,9 @@ class MotionFormat(Format):
     write_configurations : callable, optional
         ``write_configurations(path, figure, q, time)`` writes joint angles: q (T, nq) in Pinocchio's order, free-flyer
         first, metres and radians, and the frames' times (T,), seconds; whole or not at all.
+    written_by : tuple of str
+        The optional package that writes it, as `posekit.safe_io.extras.extra` takes it; empty where none is needed. It
+        is asked for before anything is read.
     """
 
     holds: Content = Content.MOTION
@@ -46,6 +49,7 @@ class MotionFormat(Format):
     read_recorded: ReadMotion | None = None
     write_points: WritePoints | None = None
     write_configurations: WriteConfigurations | None = None
+    written_by: tuple[str, str, str] | tuple[()] = ()
 
     @property
     def reads(self) -> bool:

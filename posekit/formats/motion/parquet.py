@@ -220,5 +220,6 @@ PARQUET_FORMAT: Final = MotionFormat(
     read=read_parquet,
     read_recorded=partial(read_parquet, as_recorded=True),
     write_points=write_parquet,
+    written_by=("pyarrow.parquet", "parquet", "writing Parquet"),
     looks_like=lambda given: given.start.startswith(b"PAR1"),
 )

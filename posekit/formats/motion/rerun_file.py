@@ -24,6 +24,7 @@ from posekit.skeleton import JOINTS, TREE_SEGMENTS
 if TYPE_CHECKING:
     from posekit.formats.own import View
 
+WRITTEN_BY_RERUN: Final = ("rerun", "rerun", "writing .rrd")
 RRD_MAGIC: Final = b"RRF"
 """How such a file begins."""
 MAX_OTHERS: Final = 60
@@ -139,7 +140,7 @@ def write_rerun_recording(
 
 
 def _begin() -> tuple[Any, Any]:
-    rr = extra("rerun", "rerun", "writing .rrd")
+    rr = extra(*WRITTEN_BY_RERUN)
     recording = rr.RecordingStream("posekit")
     rr.set_log_time_enabled(False, recording=recording)
     return rr, recording
@@ -209,6 +210,7 @@ RERUN_FORMAT: Final = MotionFormat(
     title="RRD, a recording for Rerun's viewer",
     suffixes=(".rrd",),
     write_points=write_rerun,
+    written_by=WRITTEN_BY_RERUN,
     looks_like=lambda given: given.start.startswith(RRD_MAGIC),
 )
 """Written, and not read: a recording is for eyes."""
