@@ -17,9 +17,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any, Final, cast
 
+import numpy as np
+
 from posekit.body import Figure
-from posekit.body.measured import LIMB_NAMES, MeasuredPerson, hips_outward
+from posekit.body.measured import LIMB_NAMES, MeasuredPerson, hips_outward, noise_by_limb, usual_noise
 from posekit.body.torso_bending import bending_gives
+from posekit.geometry import Array
 from posekit.settings import ALLOWED_DEVIATIONS, MEASURED_TOLERANCE, RigidTolerance, ValidateSettings
 from posekit.skeleton import JOINT, RIGID_SEGMENTS, SEGMENT_NAMES, SEGMENTS, segment_name
 from posekit.tree import Check, Loosening
@@ -135,3 +138,18 @@ class Allowance:
             "torso_tolerance": f"{100 * rigid.sides:.3g}cm",
             "contact_margin": f"{round(100 * self.contact_margin, 3) + 0.0:g}cm",
         }
+
+
+def recorded_noise(joints: Array, settings: ValidateSettings) -> float:
+    """Return the noise that checks over time allow for, metres: what is stated, else what limbs tell, else 0.
+
+    Parameters
+    ----------
+    joints : array (T, 14, 3)
+        Frames of one recording, metres; NaN where unknown.
+    settings : ValidateSettings
+        Where it is stated; strict ones allow for none.
+    """
+    if settings.noise is not None or settings.strict:
+        return settings.noise or 0.0
+    return float(np.nan_to_num(usual_noise(noise_by_limb(joints))))

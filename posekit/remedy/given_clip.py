@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from posekit.body.measured import noise_by_limb, usual_noise
 from posekit.errors import InputError
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.geometry import Array
 from posekit.settings import ValidateSettings
 from posekit.skeleton import JOINTS, POINTS
+from posekit.validators.measured import recorded_noise
 from posekit.validators.motion import MotionClip
 
 
@@ -57,7 +57,6 @@ def clip_given(
         return None
     if not 0 < rate < np.inf:
         raise InputError(f"repair: rate is {rate:g}; expected frames a second, as 30; give it so")
-    measured = not settings.strict and settings.noise is None
     others: dict[str, Any] = {} if head is None else {"head": head}
     return MotionClip(
         joints=joints,
@@ -65,6 +64,6 @@ def clip_given(
         rate=rate,
         up=UP_DIRECTIONS[axis] if up else None,
         ground=settings.ground,
-        noise=float(np.nan_to_num(usual_noise(noise_by_limb(joints)))) if measured else settings.noise or 0.0,
+        noise=recorded_noise(joints, settings),
         **others,
     )

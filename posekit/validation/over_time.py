@@ -9,15 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.body.measured import noise_by_limb, usual_noise
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.motion import UP_DIRECTIONS
 from posekit.formats.motion.motion_table import recorded_rate
 from posekit.formats.own.report_frames import ClipName, ReportFrames
-from posekit.settings import ValidateSettings
 from posekit.validation.people import Recording
 from posekit.validation.robot_motion import moves_of
 from posekit.validators import Judgement, Validator
+from posekit.validators.measured import recorded_noise
 from posekit.validators.motion import MotionClip, judge_motion
 
 
@@ -47,7 +46,7 @@ def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) ->
         # Where each frame has its own origin there is no ground, and nothing goes anywhere.
         up=UP_DIRECTIONS[held.up] if held.up and held.in_world else None,
         ground=settings.ground,
-        noise=_noise_of(joints, settings),
+        noise=recorded_noise(joints, settings),
         **moves,
     )
 
@@ -120,10 +119,3 @@ def frames_of(held: HeldPostures, file: str) -> ReportFrames | None:
         rows = frames.rows(k)
         frames.frame[rows] = np.arange(len(rows))
     return frames
-
-
-def _noise_of(joints: NDArray[np.float64], settings: ValidateSettings) -> float:
-    """Return the measuring noise of a clip, metres; 0 where none is known."""
-    if settings.noise is not None or settings.strict:
-        return settings.noise or 0.0
-    return float(np.nan_to_num(usual_noise(noise_by_limb(joints))))
