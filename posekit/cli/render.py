@@ -178,17 +178,12 @@ def render(
     POSEKIT_BROWSER or on PATH, without a window, a server or an open port; pages (.html) need none.
     """
     if over is not None:
-        _over(
-            options_given(ctx),
-            given,
-            seen or [],
-            over,
-            output,
-            frame=frame,
-            posture=posture,
-            size=size,
-            fps=fps,
-        )
+        from posekit.cli.render_over import render_over
+        from posekit.viewer.overlay import Overlay
+
+        _refuse_others(options_given(ctx), "--over", OVER_OPTIONS)
+        overlay = Overlay(size=_size(size) if size else None, fps=fps)
+        render_over(given, seen or [], over, output, frame=frame, posture=posture, overlay=overlay)
         return
     if angles:
         from posekit.cli.render_angles import render_angles
@@ -269,31 +264,6 @@ def _refuse_others(options: Sequence[str], beside: str, heeded: Sequence[str]) -
     for name in options:
         if name not in heeded:
             raise InputError(f"{name}: means nothing beside {beside}; expected some of {', '.join(heeded)}")
-
-
-def _over(
-    options: Sequence[str],
-    given: Sequence[Path],
-    seen: Sequence[Path],
-    over: Path,
-    output: Path,
-    *,
-    frame: str,
-    posture: str,
-    size: str,
-    fps: float | None,
-) -> None:
-    """Draw over pictures."""
-    from posekit.cli.render_over import render_over
-    from posekit.viewer.overlay import Overlay
-
-    for name in options:
-        if name not in OVER_OPTIONS:
-            raise InputError(
-                f"{name}: means nothing beside --over; expected some of {', '.join(OVER_OPTIONS)}"
-            )
-    overlay = Overlay(size=_size(size) if size else None, fps=fps)
-    render_over(given, seen, over, output, frame=frame, posture=posture, overlay=overlay)
 
 
 def _write_page(

@@ -76,6 +76,7 @@ def render_angles(
         frames=rows,
         limits=limits or load_ranges("anatomical").limits,
         truth=true,
+        subject=subject,
     )
     save(plot, output)
     typer.echo(f"written: {output} ({count} angles, {len(rows)} frames)")

@@ -81,10 +81,10 @@ def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:
         raise InputError(
             f"{path}: got motion or postures; --over expected a result: nothing says which camera saw it"
         )
-    frames = None
+    frames = subject = None
     if posture:
         with about(path):
             subject = subject_of(content, view)
             every = range(len(subject.frames))
             frames = numbered(chosen_frames(subject, content, posture, every, moving=True, over=True), every)
-    return overlaid_person(content, view, name=str(path), frames=frames)
+    return overlaid_person(content, view, name=str(path), frames=frames, subject=subject)

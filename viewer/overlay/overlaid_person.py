@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from posekit.body import Figure
 from posekit.errors import InputError
 from posekit.formats.own import LeeChenModel, OpenCVModel, Result, View
-from posekit.viewer.scene.drawn_subject import Shown, subject_of
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.likeliest import numbered, opening_frames
 
 
@@ -46,6 +46,7 @@ def overlaid_person(
     *,
     name: str = "the result",
     frames: Sequence[Shown] | None = None,
+    subject: DrawnSubject | None = None,
 ) -> OverlaidPerson:
     """Gather what is drawn of a result over its pictures.
 
@@ -59,6 +60,8 @@ def overlaid_person(
         What errors call it.
     frames : sequence of Shown, optional
         What is drawn of each frame; by default the likeliest posture and what else it can be, or the likeliest path.
+    subject : DrawnSubject, optional
+        What `subject_of` gathers of the two, where that is done.
 
     Raises
     ------
@@ -72,7 +75,7 @@ def overlaid_person(
             f"{name}: its camera is Lee & Chen's, whose image is in metres; expected one in pixels; without --over the "
             "image is drawn beside the postures"
         )
-    subject = subject_of(given, view)
+    subject = subject or subject_of(given, view)
     if frames is None:
         every = range(len(subject.frames))
         frames = numbered(opening_frames(subject, given, every, moving=True, most=None), every)

@@ -13,7 +13,7 @@ from posekit.geometry import Array
 from posekit.viewer.plots.angle_tracks import AngleTrack, angle_tracks, chosen_angles
 from posekit.viewer.plots.panels import panels
 from posekit.viewer.plots.plot_file import LEFT_COLOUR, MUTED_COLOUR, RIGHT_COLOUR, TRUNK_COLOUR, drawing
-from posekit.viewer.scene.drawn_subject import Shown, subject_of
+from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown, subject_of
 from posekit.viewer.scene.likeliest import opening_frames
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ def plot_angles(
     frames: Sequence[int] | None = None,
     limits: Mapping[str, tuple[float, float]] | None = None,
     truth: Array | None = None,
+    subject: DrawnSubject | None = None,
 ) -> Figure:
     """Draw joint angles over time.
 
@@ -58,6 +59,8 @@ def plot_angles(
         Degrees, by angle; by default those that a result was judged by.
     truth : array (F, 14, 3), optional
         The true joints of all frames, in any frame, metres; by default the view's.
+    subject : DrawnSubject, optional
+        What `subject_of` gathers of the two, where that is done.
 
     Returns
     -------
@@ -69,7 +72,7 @@ def plot_angles(
         Where matplotlib is missing, or there is nothing to draw.
     """
     names = chosen_angles(angles)
-    subject = subject_of(given, view)
+    subject = subject or subject_of(given, view)
     rows = list(range(len(subject.frames)) if frames is None else frames)
     every = [subject.frames[k] for k in rows]
     if drawn is None:
