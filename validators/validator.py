@@ -269,7 +269,7 @@ class Validator(ShortRepr):
     def _check_configurations(self, q: ArrayLike) -> Report:
         """Judge configurations; of those with NaN nothing is decided, and Pinocchio sees a neutral one instead."""
         try:
-            given = np.array(q)
+            given = np.asarray(q)
         except ValueError:  # rows of different lengths: refused with what was expected
             return self._check_known(q)
         if given.ndim != 2 or given.dtype.kind != "f" or not np.isnan(given).any():
@@ -277,7 +277,7 @@ class Validator(ShortRepr):
         rows = np.asarray(np.isnan(given).any(axis=1))
         neutral = pin.neutral(self.configured[0].model)
         if given.shape[1] == len(neutral):
-            given[rows] = neutral
+            given = np.where(rows[:, None], neutral, given)
         return self._check_known(given).without(rows)
 
     def _check_known(self, q: ArrayLike) -> Report:

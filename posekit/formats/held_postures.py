@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,6 @@ from posekit.formats.skeleton_maps import SkeletonMap
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 from posekit.skeleton import JOINTS, POINTS
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = [
     "POSTURE_CONTENTS",

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from posekit.errors import InputError
+from posekit.formats.motion.motion_axes import up_rotation
 from posekit.formats.own import Postures, View
 from posekit.recovery.recovery import FrameRecovery, Recovery
 from posekit.recovery.result import result_of
 from posekit.viewer.page.page import page_html
 from posekit.viewer.showing import ShownPage, show_page
-
-WORLD_OF_CAMERA: Final = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-"""Turns the frame of a level camera (x right, y down, z away) into a world whose z is up."""
 
 
 def show_recovery(recovery: Recovery, view: View | None, path: str | Path | None) -> ShownPage:
@@ -53,6 +50,6 @@ def show_frame(frame: FrameRecovery, path: str | Path | None) -> ShownPage:
         raise InputError(
             f"frame {frame.number}: no posture to show: {why}; expected survivors; choose another frame"
         )
-    placed = frame.likeliest_first @ WORLD_OF_CAMERA.T
+    placed = frame.likeliest_first @ up_rotation("-y", "+z").T  # of a camera that is held level
     ground = np.array([0.0, 0.0, np.nanmin(placed[..., 2])])
     return show_page(page_html(Postures(joints=placed - ground), title=f"frame {frame.number}"), path)

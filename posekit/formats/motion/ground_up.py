@@ -52,10 +52,7 @@ def find_up(joints: Array, clip: NDArray[np.intp], up: str, source: str, *, told
     InputError
         Where the file's own word is another than how bodies stand, and the ground is against it too.
     """
-    try:
-        stands = guess_up(joints, source)
-    except InputError:
-        stands = ""
+    stands = _stands_along(joints)
     if stands and stands == up:
         return FoundUp(up)
     flat = {name: ground_spread(joints, clip, name) for name in UP_DIRECTIONS}
@@ -92,14 +89,21 @@ def against_stated_up(joints: Array, clip: NDArray[np.intp], up: str) -> tuple[s
     up : str
         One of `UP_DIRECTIONS`.
     """
-    try:
-        stands = guess_up(joints)
-    except InputError:
+    stands = _stands_along(joints)
+    if not stands:
         return ()
     level = (
         ground_spread(joints, clip, up) < FLAT_METRES and ground_spread(joints, clip, stands) > STEEP_METRES
     )
     return () if stands == up or level else (f"{up} is up as was stated, though bodies stand along {stands}",)
+
+
+def _stands_along(joints: Array) -> str:
+    """Return the axis along which bodies stand (T, 14, 3); empty where they tell none."""
+    try:
+        return guess_up(joints)
+    except InputError:
+        return ""
 
 
 def _level(flat: Mapping[str, float]) -> str:
