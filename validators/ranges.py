@@ -76,12 +76,12 @@ class Ranges:
 
 URDF_RANGES = Ranges(name="urdf", kind="configuration")
 
-NAMED_TABLES = ("table1", "anatomical")
+NAMED_TABLES = ("table1", "table1-printed", "anatomical")
 """Tables that come with the package."""
 
 
 def load_ranges(name: str) -> Ranges:
-    """Load ranges by name (`urdf`, `table1`, `anatomical`) or from a TOML file.
+    """Load ranges by name (`urdf`, `table1`, `table1-printed`, `anatomical`) or from a TOML file.
 
     Raises
     ------
@@ -108,6 +108,8 @@ def load_ranges(name: str) -> Ranges:
 
 @cache
 def _named(name: str) -> Ranges:
+    if name == "table1-printed":
+        return replace(_named("table1"), name=name, kind="projected")
     return _ranges(built_in_document("ranges", name), name)
 
 

@@ -27,7 +27,10 @@ class Judging:
         str, option("--checks", "LIST", "Some of rigid-parts, joint-range, collision, walking, by commas.")
     ] = PHYSICAL_CHECKS_TEXT
     ranges: Annotated[
-        str, option("--ranges", "NAME|FILE", "Joint ranges: anatomical, urdf, table1, or a TOML file.")
+        str,
+        option(
+            "--ranges", "NAME|FILE", "Joint ranges: anatomical, urdf, table1, table1-printed, or a TOML file."
+        ),
     ] = "anatomical"
     rules: Rules = "1,2"
     walkers: Annotated[

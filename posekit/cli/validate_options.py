@@ -159,7 +159,7 @@ class JudgedOptions:
         option(
             "--ranges",
             "NAME|FILE",
-            "Joint ranges: anatomical, urdf, table1, or a TOML file. Default: a result's own, else anatomical; "
+            "Joint ranges: anatomical, urdf, table1, table1-printed, or a TOML file. Default: a result's own, else anatomical; "
             "a robot's own limits.",
         ),
     ] = ""

@@ -149,7 +149,7 @@ def _recover(scene: SyntheticScene, rules: tuple[int, ...]) -> Recovery:
     return recover(
         view,
         checks=PAPER_CHECKS,
-        ranges="table1",
+        ranges="table1-printed",
         rules=rules,
         tolerance=PAPER_TOLERANCE,
         group=GROUPING_METRES,

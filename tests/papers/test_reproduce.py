@@ -161,7 +161,7 @@ def test_the_built_in_view_gives_the_same_counts(name: str) -> None:
     recovery = recover(
         view_of(SCENES[name]()),
         checks=ALL_CHECKS,
-        ranges="table1",
+        ranges="table1-printed",
         rules=(1, 2),
         tolerance=PAPER_TOLERANCE,
         group=GROUPING_METRES,
