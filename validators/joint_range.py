@@ -1,6 +1,6 @@
 """Joint ranges: some configuration inside the limits must give the posture.
 
-Two kinds: the URDF's own angles (this file), or the paper's projected angles (`projected_angles`).
+Two kinds: the URDF's own angles (this file), or those of the paper's Table 1 (`table1_angles`).
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ def joint_range(
     With ranges of kind ``configuration`` they judge the configuration: torso and hips are the figure's own,
     laid onto the posture, and the limbs' directions are the posture's. Shoulder and hip are judged when
     elbow and knee are known, with the axial rotation free, and again, with it, when wrist and ankle are.
-    With ``projected`` they judge the posture itself. Anatomical ranges are of kind ``configuration`` with couplings:
-    the limbs are judged by `AnatomicalLimb`.
+    With ``rotation`` and ``projected``, tables of the paper's angles, they judge the posture itself. Anatomical ranges
+    are of kind ``configuration`` with couplings: the limbs are judged by `AnatomicalLimb`.
 
     Parameters
     ----------
@@ -56,10 +56,10 @@ def joint_range(
     directions : bool
         Whether the same follows for the first angles of shoulder and hip: see `LimbRange`.
     """
-    if ranges.kind == "projected":
-        from posekit.validators.projected_angles import projected_angles
+    if ranges.kind != "configuration":
+        from posekit.validators.table1_angles import table1_angles
 
-        return projected_angles(figure, ranges, tolerance=tolerance)
+        return table1_angles(figure, ranges, tolerance=tolerance)
     ranges = ranges.of(figure)
     ik, anatomy = figure.ik, ranges.anatomy
     if anatomy is not None:

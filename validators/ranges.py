@@ -34,21 +34,22 @@ class Ranges:
     ----------
     name : str
         What results call them.
-    kind : {"configuration", "projected"}
-        Ranges of the URDF's own angles, or of the projected angles of Lee & Chen 1985, §3.2.A.
+    kind : {"configuration", "rotation", "projected"}
+        Ranges of the URDF's own angles, or of those of Lee & Chen 1985, §3.2.A: as rotations from standing
+        (`posekit.validators.rotation_angles`), or as printed (`posekit.validators.projected_angles`).
     limits : mapping
-        ``"shoulder.flexion"`` (projected; both sides) or ``"right_shoulder.flexion"`` (configuration; angles
+        ``"shoulder.flexion"`` (the paper's; both sides) or ``"right_shoulder.flexion"`` (configuration; angles
         that are not listed keep the URDF's limits) to (lower, upper), degrees.
     shortest_projection : float
-        Fraction of a segment below which its projection has no direction to measure.
+        Fraction of a segment below which its projection has no direction to measure (of kind projected).
     knee_flexed : float
-        Degrees of knee flexion above which the hip's wider range applies.
+        Degrees of knee flexion from which on the hip's wider range applies.
     anatomy : Anatomy, optional
         Ranges with a mean and a spread for each end, and couplings (of kind configuration): `limits` are its own.
     """
 
     name: str
-    kind: Literal["configuration", "projected"]
+    kind: Literal["configuration", "rotation", "projected"]
     limits: Mapping[str, Range] = field(default_factory=dict)
     shortest_projection: float = 0.1
     knee_flexed: float = 5.0

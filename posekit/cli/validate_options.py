@@ -159,8 +159,8 @@ class JudgedOptions:
         option(
             "--ranges",
             "NAME|FILE",
-            "Joint ranges: anatomical, urdf, table1, table1-printed, or a TOML file. Default: a result's own, else anatomical; "
-            "a robot's own limits.",
+            "Joint ranges: anatomical, urdf, table1, table1-printed, or a TOML file. Default: a result's own, else "
+            "anatomical; a robot's own limits.",
         ),
     ] = ""
     rules: Rules = "1,2"

@@ -18,15 +18,18 @@ from posekit.compiled import (
     angle_kernels,
     capsule_kernels,
     noise_kernels,
+    plane_kernels,
     projected_kernels,
     rigid_kernels,
+    turned_kernels,
 )
 from posekit.compiled.anatomical_kernels import anatomical
 from posekit.compiled.angle_kernels import limb, neck, pelvis
 from posekit.compiled.capsule_kernels import least_apart, mean
 from posekit.compiled.frame_kernels import PRESUMED_AT
 from posekit.compiled.noise_kernels import AT_COUNT, AT_PAIRS, PAIR_NUMBERS, allow, forget
-from posekit.compiled.projected_kernels import head_plane, hip_plane, projected_ball, projected_hinge
+from posekit.compiled.plane_kernels import head_plane, hip_plane
+from posekit.compiled.projected_kernels import projected_ball, projected_hinge
 from posekit.compiled.rigid_kernels import (
     distance,
     hips,  # noqa: F401 - to be compiled
@@ -52,7 +55,10 @@ from posekit.compiled.screen_kinds import (
     OF_PROJECTED_BALL,
     OF_PROJECTED_HINGE,
     OF_SIDE,
+    OF_TURNED_BALL,
+    OF_TURNED_HINGE,
 )
+from posekit.compiled.turned_kernels import turned_ball, turned_hinge
 from posekit.compiled.verdicts import NO_VIOLATION, NOT_CLEAR
 from posekit.geometry import Array
 
@@ -147,6 +153,10 @@ def screen(kind: int, w: Array, at: int) -> Any:  # noqa: PLR0912 - a branch a k
         return projected_ball(w, at)
     if kind == OF_PROJECTED_HINGE:
         return projected_hinge(w, at)
+    if kind == OF_TURNED_BALL:
+        return turned_ball(w, at)
+    if kind == OF_TURNED_HINGE:
+        return turned_hinge(w, at)
     if kind == OF_HIP_PLANE:
         return hip_plane(w, at)
     if kind == OF_HEAD_PLANE:
@@ -165,6 +175,8 @@ KERNEL_PARTS = (
     angle_kernels,
     anatomical_kernels,
     projected_kernels,
+    turned_kernels,
+    plane_kernels,
 )
 """Other modules whose kernels are compiled with these."""
 

@@ -17,6 +17,8 @@ OF_HIP_PLANE: Final = 9
 OF_HEAD_PLANE: Final = 10
 OF_SIDE: Final = 11
 OF_NOISY: Final = 12
+OF_TURNED_BALL: Final = 13
+OF_TURNED_HINGE: Final = 14
 """Kinds of screens."""
 
 CAPSULE_NUMBERS: Final = 14

@@ -98,8 +98,8 @@ class NoisyRange(Check):
 
     @property
     def _beside_abduction(self) -> bool:
-        """Whether the second place is an abduction."""
-        return len(self.places) > 1 and self.places[1].angle == "abduction"
+        """Whether the second place is an abduction, beside which the check itself allows no more."""
+        return len(self.places) > 1 and self.places[1].angle == "abduction" and not self.inner.scaled
 
     def judge(self, points: Array) -> Findings:
         """Judge postures; see `posekit.tree.Check`."""

@@ -7,7 +7,7 @@ from typing import Final
 
 from posekit.skeleton import DOFS
 
-PROJECTED_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
+TABLE1_ANGLES: Final[Mapping[str, tuple[str, ...]]] = {
     "shoulder": ("flexion", "abduction"),
     "elbow": ("flexion",),
     "hip": ("flexion", "flexion_with_straight_knee", "abduction"),

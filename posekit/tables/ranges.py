@@ -1,4 +1,4 @@
-"""``posekit.ranges/1``: joint ranges of the figure, of Lee & Chen's projected angles, or of a robot's own joints."""
+"""``posekit.ranges/1``: joint ranges of the figure, of Lee & Chen's angles, or of a robot's own joints."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from posekit.safe_io.refusal import cut, nearest, shown
 from posekit.skeleton import DOFS
-from posekit.tables.angles import PROJECTED_ANGLES
+from posekit.tables.angles import TABLE1_ANGLES
 from posekit.tables.fields import Bounds
 from posekit.tables.file_model import FileModel, refuse
 
@@ -46,14 +46,15 @@ def check_angles(given: Mapping[str, Any], known: tuple[str, ...], *, every: boo
 
 
 class RangesTable(FileModel):
-    """Ranges of the figure's own angles, or of the projected ones, degrees."""
+    """Ranges of the figure's own angles, or of those of Lee & Chen's Table 1, degrees."""
 
     tags: ClassVar[frozenset[str]] = frozenset({"joints"})
 
     schema_: Literal["posekit.ranges/1"] = Field(alias="schema")
-    kind: Literal["configuration", "projected"]
+    kind: Literal["configuration", "rotation", "projected"]
     shortest_projection: Annotated[float, Field(ge=0, lt=1)] = Field(
-        default=0.1, description="Fraction of a segment below which its projection has no direction."
+        default=0.1,
+        description="Kind projected: part of a segment below which its projection has no direction.",
     )
     knee_flexed: float = Field(default=5.0, description="From here on the hip's wider range holds, degrees.")
     joints: dict[str, Bounds] = Field(default={}, description="By angle: in the file a table for each joint.")
@@ -65,14 +66,9 @@ class RangesTable(FileModel):
 
     @model_validator(mode="after")
     def _known_angles(self) -> Self:
-        projected = tuple(
-            f"{joint}.{angle}" for joint, angles in PROJECTED_ANGLES.items() for angle in angles
-        )
-        check_angles(
-            self.joints,
-            DOFS if self.kind == "configuration" else projected,
-            every=self.kind == "projected",
-        )
+        own = self.kind == "configuration"
+        table1 = tuple(f"{joint}.{angle}" for joint, angles in TABLE1_ANGLES.items() for angle in angles)
+        check_angles(self.joints, DOFS if own else table1, every=not own)
         return self
 
 

@@ -196,6 +196,11 @@ class Check:
             ...
 
         @property
+        def scaled(self) -> bool:
+            """Whether its own tolerances grow where its angles turn faster than the segments that they are of."""
+            ...
+
+        @property
         def slow(self) -> bool:
             """Whether it costs more than a little arithmetic a posture: it is then asked last, of what is left."""
             ...
@@ -214,7 +219,7 @@ class Check:
         scope = Scope.POSTURE
         noise = Loosening.TOLERANCE
         rule = None
-        rigid = pulls = slow = of_configuration = needs_head = False
+        rigid = pulls = scaled = slow = of_configuration = needs_head = False
 
     @cached_property
     def where(self) -> tuple[str, ...]:

@@ -11,10 +11,11 @@ from posekit.body import load_figure
 from posekit.skeleton import DOFS, HEAD, JOINT, POINTS
 from posekit.tree import Check
 from posekit.validators import Ranges, joint_range, load_ranges
-from posekit.validators.projected_angles import angle_in_plane, paper_axes
+from posekit.validators.projected_angles import angle_in_plane
+from posekit.validators.table1_angles import paper_axes
 
 FIGURE = load_figure()
-TABLE1 = load_ranges("table1")
+TABLE1 = load_ranges("table1-printed")
 CHECKS = joint_range(FIGURE, TABLE1)
 # The neutral figure: x forward, y left, z up, in metres.
 FORWARD, LEFT, UP = np.eye(3)

@@ -7,7 +7,7 @@ import pytest
 
 from posekit.errors import InputError
 from posekit.skeleton import DOFS
-from posekit.tables.angles import PROJECTED_ANGLES
+from posekit.tables.angles import TABLE1_ANGLES
 from posekit.validators import Ranges, load_ranges
 from posekit.validators.ranges import RANGES_SCHEMA, URDF_RANGES
 
@@ -32,7 +32,9 @@ def test_the_default_leaves_every_limit_to_the_figure() -> None:
 
 def test_table1_is_the_papers() -> None:
     table = load_ranges("table1")
-    assert (table.name, table.kind) == ("table1", "projected")
+    printed = load_ranges("table1-printed")
+    assert (table.name, table.kind) == ("table1", "rotation")
+    assert (printed.name, printed.kind, printed.limits) == ("table1-printed", "projected", table.limits)
     assert dict(table.limits) == {
         "shoulder.flexion": (-50, 180),
         "shoulder.abduction": (-50, 180),
@@ -71,7 +73,7 @@ def test_a_file_may_name_all_of_them_or_none(tmp_path: Path) -> None:
 def test_a_projected_file_lists_every_angle_and_its_thresholds(tmp_path: Path) -> None:
     body = "".join(
         f"[{joint}]\n" + "".join(f"{angle} = [-10, 10]\n" for angle in angles)
-        for joint, angles in PROJECTED_ANGLES.items()
+        for joint, angles in TABLE1_ANGLES.items()
     )
     table = load(tmp_path, PROJECTED + "shortest_projection = 0.25\nknee_flexed = 12\n" + body)
     assert len(table.limits) == 13
@@ -92,7 +94,7 @@ WRONG = {
     "no kind": (f'schema = "{RANGES_SCHEMA}"', "kind: got nothing; expected this field"),
     "another kind": (
         f'schema = "{RANGES_SCHEMA}"\nkind = "euler"',
-        "kind: got \"euler\"; expected 'configuration' or 'projected'",
+        "kind: got \"euler\"; expected 'configuration', 'rotation' or 'projected'",
     ),
     "no TOML": (HEAD + "[neck\n", "not TOML"),
     "a key twice": (HEAD + "[neck]\nflexion = [0, 1]\nflexion = [0, 1]\n", "not TOML"),

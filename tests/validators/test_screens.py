@@ -26,11 +26,15 @@ MIDDLE = FIGURE.scaled({"pelvis-right_hip": 0.161, "pelvis-left_hip": 0.161})
 def suite(tolerance: float) -> list[Check]:
     rigid = rigid_parts(FIGURE, tolerance=tolerance / 100)
     side = rigid_parts(FIGURE, tolerance=tolerance / 100, mode="side")[-1:]
-    projected = joint_range(FIGURE, load_ranges("table1"), tolerance=tolerance)
+    projected = [
+        check
+        for name in ("table1", "table1-printed")
+        for check in joint_range(FIGURE, load_ranges(name), tolerance=tolerance)
+    ]
     anatomical = load_ranges("anatomical")
     middle = [
         check
-        for ranges in (load_ranges("urdf"), load_ranges("table1"), anatomical)
+        for ranges in (load_ranges("urdf"), load_ranges("table1"), load_ranges("table1-printed"), anatomical)
         for check in joint_range(MIDDLE, ranges, tolerance=tolerance)
         if check.where[0].startswith(("pelvis", "right_hip"))
     ]

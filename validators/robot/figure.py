@@ -101,7 +101,7 @@ class FigureConfigurations:
     @property
     def _of_postures(self) -> bool:
         """Whether ranges are of postures, and not only limits of single angles."""
-        return self.ranges.kind == "projected" or self.ranges.anatomy is not None
+        return self.ranges.kind != "configuration" or self.ranges.anatomy is not None
 
     @staticmethod
     def _under_its_names(judgement: Judgement) -> Judgement:
