@@ -70,11 +70,6 @@ def path_words(probability: Sequence[float]) -> str:
     return f"{said} the next that is 5 cm elsewhere; {len(probability)} of them hold 95 % ({each}{more})"
 
 
-def plural(count: int, thing: str) -> str:
-    """Count things: ``1 frame``, ``2 frames``."""
-    return f"{count:,} {thing}{'' if count == 1 else 's'}"
-
-
 def percent(probability: float) -> str:
     """Write a probability for a reader, who takes 100 % for certain: it is not said of less."""
     if 0.99 < probability < 1.0 - 1e-6:

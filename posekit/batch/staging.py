@@ -29,6 +29,7 @@ from posekit.batch.view_table import (
     read_rows,
     write_rows,
 )
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.keypoints import KeyPoints, swap
@@ -243,7 +244,8 @@ def _of_rows(job: Staging, base: Path, pieces: Iterator[ImageRows]) -> StagedTab
     table = _laid_down(job, base, 0, "", _as_views(job, pieces, seen))
     if not seen:
         raise InputError(
-            f"{job.path}: both shoulders, between which the neck is, are seen in none of {table.frames} frames; "
+            f"{job.path}: both shoulders, between which the neck is, are seen in none of "
+            f"{plural(table.frames, 'frame')}; "
             "expected at least one; choose a smaller --min-confidence"
         )
     derived = tuple(dict.fromkeys(name for view in seen for name in view.derived))

@@ -18,6 +18,7 @@ from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
 from posekit.cli.noise_options import UncertainAsRecover
 from posekit.cli.options import ContactMargin, examples, option, signed_length
+from posekit.display.plural import plural
 
 if TYPE_CHECKING:
     from posekit.batch import Progress, Summary
@@ -137,8 +138,9 @@ def _report(summary: Summary, output: Path) -> None:
     """Print what is there, and what failed."""
     there = f", {summary.skipped} of them from before" if summary.skipped else ""
     typer.echo(
-        f"{summary.frames:,} frames of {summary.inputs:,} inputs in {summary.shards:,} shards{there}: "
-        f"{summary.survivors:,} survivors, {summary.empty:,} frames without any"
+        f"{plural(summary.frames, 'frame')} of {plural(summary.inputs, 'input')} in "
+        f"{plural(summary.shards, 'shard')}{there}: "
+        f"{plural(summary.survivors, 'survivor')}, {plural(summary.empty, 'frame')} without any"
     )
     for failure in summary.failures[:5]:
         what = failure.shard or failure.input
@@ -146,7 +148,8 @@ def _report(summary: Summary, output: Path) -> None:
     if summary.failures:
         missing = summary.planned - summary.frames
         typer.echo(
-            f"posekit: warning: {len(summary.failures)} failed, {missing:,} frames are missing; all are named in "
+            f"posekit: warning: {len(summary.failures)} failed, {plural(missing, 'frame')} are missing; all "
+            "are named in "
             f"{output / 'manifest.json'}; run it again to try them again",
             err=True,
         )

@@ -26,6 +26,7 @@ from posekit.cli.options import (
     signed_length,
 )
 from posekit.cli.recover_object import recover_object, refuse_options_of_persons
+from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -269,7 +270,8 @@ def summarize(recovery: Recovery) -> None:
         )
         which = f"frame{'s' if len(frames) > 1 else ''} {named}"
         typer.echo(
-            f"posekit: warning: {len(frames)} of {total} frames not recovered: {reason} ({which})", err=True
+            f"posekit: warning: {len(frames)} of {plural(total, 'frame')} not recovered: {reason} ({which})",
+            err=True,
         )
     others = sum(len(frames) for _, frames in reasons[REASONS_SHOWN:])
     if others:
@@ -285,7 +287,8 @@ def summarize(recovery: Recovery) -> None:
         noise = "their noise said (--deviation PX), or more tolerance" if calibrated else "more tolerance"
         head = "" if recovery.frames[0].family else ", and a noisy head a given root"
         typer.echo(
-            f"posekit: warning: {empty} of {total} frames have no posture; the table says what rejected most; noisy "
+            f"posekit: warning: {empty} of {plural(total, 'frame')} have no posture; the table says what "
+            "rejected most; noisy "
             f"points need {noise} (--rigid-tolerance, --angle-tolerance, --tangent-tolerance){head}",
             err=True,
         )

@@ -13,6 +13,7 @@ import typer
 from posekit.cli.options import about, examples, numbers, option, options_given, progress
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import frame_count, read_given
+from posekit.display.plural import plural
 from posekit.errors import InputError, ViewerError
 
 if TYPE_CHECKING:
@@ -250,7 +251,7 @@ def render(
         shot = replace(shot, fps=real_time([one.time for one in frames]))
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
         count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
-    pictures = f" ({count} pictures)" if moving else ""
+    pictures = f" ({plural(count, 'picture')})" if moving else ""
     typer.echo(f"written: {output}{pictures}")
 
 

@@ -11,6 +11,7 @@ from posekit.cli.options import about, distinct
 from posekit.cli.true_joints import true_joints
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import read_given
+from posekit.display.plural import plural
 from posekit.errors import InputError, ViewerError
 
 
@@ -79,4 +80,4 @@ def render_angles(
         subject=subject,
     )
     save(plot, output)
-    typer.echo(f"written: {output} ({count} angles, {len(rows)} frames)")
+    typer.echo(f"written: {output} ({plural(count, 'angle')}, {plural(len(rows), 'frame')})")

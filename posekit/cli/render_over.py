@@ -12,6 +12,7 @@ import typer
 from posekit.cli.options import about, distinct, progress
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import read_given
+from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def render_over(
         count, said = write_overlay(output, people, source, replace(overlay, frames=frames), progress=done)
     for line in said:
         typer.echo(line)
-    typer.echo(f"written: {output} ({count} picture{'s' * (count != 1)})")
+    typer.echo(f"written: {output} ({plural(count, 'picture')})")
 
 
 def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:

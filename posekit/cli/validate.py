@@ -14,6 +14,7 @@ from posekit.cli.main import BAD_INPUT
 from posekit.cli.options import distinct, examples, option, progress
 from posekit.cli.validate_options import BodyOptions, JudgedOptions, StatedOptions, asked_of
 from posekit.cli.validate_output import FailOver, ValidateOutput, parse_fail_over
+from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,6 +110,8 @@ def validate(
 ) -> None:
     """Judge postures and motion: exit 0 if all are valid, 1 if some are not or are undecided, 2 on bad input.
 
+    With --repair the exit code, and --fail-over, are of what was written.
+
     Of several files those that are broken are named, the others judged and reported; then it is 2, too.
     """
     from posekit.validation import WantedDetail, files_of, validate_files
@@ -153,7 +156,7 @@ def validate(
         typer.echo(line)
     if report.refused:
         raise typer.Exit(BAD_INPUT)
-    if allowed.exceeded(report):
+    if allowed.exceeded(report) if repair is None else allowed.exceeded_by_records(report.repair):
         raise typer.Exit(SOME_INVALID)
 
 
@@ -189,8 +192,8 @@ def _validate_archive(
         told = ", ".join(f"{counts[verdict]:,} {verdict}" for verdict in ("valid", "invalid", "undecided"))
         typer.echo(f"{counts.total():,} {name}: {told}")
     for check, count in totals.rejected.most_common():
-        typer.echo(f"  {check}: {count:,} frames rejected")
-    typer.echo(f"written: {output}, {totals.parts} parts, {totals.skipped} of them from before")
+        typer.echo(f"  {check}: {plural(count, 'frame')} rejected")
+    typer.echo(f"written: {output}, {plural(totals.parts, 'part')}, {totals.skipped} of them from before")
     if totals.refused:
         raise typer.Exit(BAD_INPUT)
     counts = totals.clips if allowed.clips else totals.frames

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class ValidateOutput:
             from posekit.viewer.plots.timeline_plot import write_timelines
 
             count = write_timelines(self.timeline, clips)
-            yield f"written: {self.timeline}, {count} of {len(clips)} clips"
+            yield f"written: {self.timeline}, {count} of {plural(len(clips), 'clip')}"
         if self.keep is not None and report.frames is not None:
             from posekit.validation.keep import keep_clips
 
@@ -142,6 +143,13 @@ class FailOver:
             verdicts = [clip.verdict for clip in clips_of_report(report, "--fail-over")]
             return self.exceeded_by(sum(verdict != "valid" for verdict in verdicts), len(verdicts))
         return self.exceeded_by(len(report) - report.summary["valid"], len(report))
+
+    def exceeded_by_records(self, records: Sequence[Mapping[str, Any]]) -> bool:
+        """Whether what a repair wrote has more than that: of each clip a record, with its frames and the valid ones."""
+        bad = [int(record["frames"]) - int(record["valid"]) for record in records]
+        if self.clips:
+            return self.exceeded_by(sum(map(bool, bad)), len(bad))
+        return self.exceeded_by(sum(bad), sum(int(record["frames"]) for record in records))
 
     def exceeded_by(self, bad: int, total: int) -> bool:
         """Whether so many that are not valid are more than that, of so many in all."""

@@ -18,6 +18,7 @@ from posekit.conversion.motion_output import (
 from posekit.conversion.object_points import write_object_points
 from posekit.conversion.posture_sequence import one_clip, read_clips, read_sequence
 from posekit.conversion.rerun_recording import write_rerun_result
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
@@ -205,7 +206,7 @@ def _key_points(job: Conversion) -> list[str]:
     for each in people:
         path = of_person(job.output, each, alone=len(people) == 1)
         files.write_view(path, each.view)
-        says.append(f"{path}: {len(each.view)} frame{'s' * (len(each.view) != 1)}")
+        says.append(f"{path}: {plural(len(each.view), 'frame')}")
     return says
 
 
@@ -216,4 +217,4 @@ def _cameras(job: Conversion) -> list[str]:
         )
     cameras = read_cameras(job.given)
     write_cameras(job.output, cameras)
-    return [f"{len(cameras)} cameras: {', '.join(cameras)}"]
+    return [f"{plural(len(cameras), 'camera')}: {', '.join(cameras)}"]

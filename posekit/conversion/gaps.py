@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from posekit.conversion.posture_sequence import PostureSequence
+from posekit.display.plural import plural
 from posekit.following import bridge
 from posekit.skeleton import JOINTS
 
@@ -52,8 +53,8 @@ def fill_gaps(found: PostureSequence, how: str) -> PostureSequence:
     ]
     put_in = rows < 0
     held = "as in the nearest frame" if how == "hold" else "interpolated"
-    says = [f"{put_in.sum()} of {len(time)} frames had no posture: {held}"] if put_in.any() else []
-    says += [f"{int(unseen.sum())} joints were not seen: interpolated"] if unseen.any() else []
+    says = [f"{put_in.sum()} of {plural(len(time), 'frame')} had no posture: {held}"] if put_in.any() else []
+    says += [f"{plural(int(unseen.sum()), 'unseen joint')} interpolated"] if unseen.any() else []
     return replace(
         found,
         points=points,

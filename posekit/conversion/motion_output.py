@@ -12,6 +12,7 @@ import numpy as np
 from posekit.body import Figure
 from posekit.conversion.gaps import fill_gaps
 from posekit.conversion.posture_sequence import PostureSequence
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.motion import (
@@ -34,6 +35,9 @@ from posekit.geometry import Array
 from posekit.safe_io import refusal
 from posekit.safe_io.extras import extra
 from posekit.safe_io.writing import check_target
+
+SAID_OFF_METRES: Final = 1e-3
+"""A joint of the figure that is further from its posture's is named."""
 
 CUSTOMARY_UP: Final = {"trc": "+y", "c3d": "+z", "mot": "+z", "urdf": "+z", "bvh": "+y", "glb": "+y"}
 """The axis that points up in a format's files by custom; in others it stays as it is."""
@@ -136,10 +140,10 @@ def write_points(output: MotionOutput, motion: Motion, skeleton: str = "") -> li
     turned = with_up(motion, up) if up else motion
     write_motion(output.path, turned, output.to)
     axis = f"{turned.up} up" if turned.up else "which way is up is not known, and axes stay as they are"
-    clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
+    clips = f" in {plural(len(motion.clips), 'clip')}" if len(motion.clips) > 1 else ""
     return [
         *says,
-        f"{len(motion)} frame{'s' * (len(motion) != 1)}{clips} of {len(motion.names)} points, {axis}",
+        f"{plural(len(motion), 'frame')}{clips} of {plural(len(motion.names), 'point')}, {axis}",
     ]
 
 
@@ -160,7 +164,9 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
         return [*found.says, *write_points(output, found.motion(str(output.path)))]
     # In BVH and GLB the writers turn z to y.
     up = "+z" if output.to in ALWAYS_Y_UP else output.up_of(found.up)
-    q, off = found.configurations(up)
+    q = found.configurations(up)
+    off, joint, frame = found.furthest(q, up)
+    where = f" (furthest: {joint}, frame {frame})" if off > SAID_OFF_METRES else ""
     q, says = _without_gaps(output, found.figure, q)
     if output.to == "urdf":
         write_urdf_folder(output.path, found.figure, q, found.time, up=up)
@@ -169,8 +175,8 @@ def write_moving(output: MotionOutput, found: PostureSequence, *, every: bool = 
     return [
         *found.says,
         *says,
-        f"{len(q)} frame{'s' * (len(q) != 1)} of joint angles, {output.up_of(up)} up; the figure's joints are "
-        f"within {off * 100:.2g} cm of the postures'",
+        f"{plural(len(q), 'frame')} of joint angles, {output.up_of(up)} up; the figure's joints are "
+        f"within {off * 100:.2g} cm of the postures'{where}",
     ]
 
 
@@ -182,7 +188,10 @@ def _without_gaps(output: MotionOutput, figure: Figure, q: Array) -> tuple[Array
         return q, []
     q = q.copy()
     q[:, :7] = q[placed[nearest_known(placed, len(q))], :7]
-    said = f"what is not known in {lacking.sum()} of {len(q)} frames is held as in the nearest frame that knows it"
+    said = (
+        f"what is not known in {lacking.sum()} of {plural(len(q), 'frame')} is held as in the nearest frame that "
+        "knows it"
+    )
     return filled(output.path, figure, q, "hold"), [said]
 
 
@@ -190,7 +199,7 @@ def _write_postures(output: MotionOutput, found: PostureSequence) -> list[str]:
     points = found.turned(output.up) if output.up else found.points
     head = points[:, 14:] if np.isfinite(points[:, 14:]).any() else None
     files.write_postures(output.path, Postures(joints=points[:, :14], head=head))
-    return [*found.says, f"{len(points)} postures, {output.up or found.up} up"]
+    return [*found.says, f"{plural(len(points), 'posture')}, {output.up or found.up} up"]
 
 
 def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
@@ -208,20 +217,23 @@ def _write_every(output: MotionOutput, found: PostureSequence) -> list[str]:
 def _write_table(output: MotionOutput, found: PostureSequence) -> list[str]:
     up = output.up or found.up
     write_survivors(output.path, replace(found, points=found.turned(up)).table())
-    return [*found.says, f"{len(found)} survivors of {len(np.unique(found.frame))} frames, {up} up"]
+    return [
+        *found.says,
+        f"{plural(len(found), 'survivor')} of {plural(len(np.unique(found.frame)), 'frame')}, {up} up",
+    ]
 
 
 def _write_bodies(output: MotionOutput, found: PostureSequence) -> list[str]:
     """Write the survivors of the first frame that has any, the best where they are too many."""
     first = np.flatnonzero(found.frame == found.frame[0])
     kept = first[np.sort(np.argsort(found.values["rank"][first], kind="stable")[:MAX_BODIES])]
-    q, _ = found.take(kept).configurations()
+    q = found.take(kept).configurations()
     names = [f"survivor_{k}" for k in found.survivor[kept].tolist()]
     write_postures_glb(output.path, found.figure, q, names=names)
     some = (
-        f"the {len(kept)} of {len(first)} survivors"
+        f"the {len(kept)} of {plural(len(first), 'survivor')}"
         if len(kept) < len(first)
-        else f"the {len(first)} survivors"
+        else f"the {plural(len(first), 'survivor')}"
     )
     whose = " whose lengths fit best" if len(kept) < len(first) else ""
     return [*found.says, f"{some}{whose}, of frame {int(found.frame[0])}, the first that has any; +y up"]

@@ -8,6 +8,7 @@ import numpy as np
 
 from posekit.conversion.motion_output import MotionOutput, carries_points, write_points
 from posekit.conversion.posture_sequence import ASSUMED_RATE, CAMERA_UP, LIKELIEST_WORDS
+from posekit.display.plural import plural
 from posekit.formats.motion import Motion, motion_formats
 from posekit.formats.own import ObjectResult
 from posekit.safe_io import refusal, shown
@@ -71,7 +72,7 @@ def write_object_points(
         source=str(output.path),
     )
     lost = len(result.frames) - len(rows)
-    says = [f"{lost} of {len(result.frames)} frames without a posture are left out"] if lost else []
+    says = [f"{lost} of {plural(len(result.frames), 'frame')} without a posture are left out"] if lost else []
     if not posture:
         many = np.median([len(result.frames[k]) for k in rows])
         says.append(

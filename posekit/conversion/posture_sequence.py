@@ -10,8 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.answers.wording import percent
 from posekit.body import Figure, load_figure
 from posekit.body.anthropometry import lengths_from_postures
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.following import bridge
 from posekit.formats import own as files
@@ -121,10 +123,19 @@ class PostureSequence:
         steps = np.diff(np.unique(self.time))
         return float(1 / np.median(steps)) if len(steps) else ASSUMED_RATE
 
-    def configurations(self, up: str = "+z") -> tuple[Array, float]:
-        """Return the figure's configurations (N, nq), `up` up, and how far their joints are from the points at most."""
-        found = self.figure.configurations(self.turned(up))
-        return found.q, float(np.nanmax(found.distance, initial=0.0))
+    def configurations(self, up: str = "+z") -> Array:
+        """Return the figure's configurations (N, nq), `up` up."""
+        return self.figure.configurations(self.turned(up)).q
+
+    def furthest(self, q: Array, up: str) -> tuple[float, str, int]:
+        """Return how far a joint of configurations is from its point at most, metres; which joint, in which frame."""
+        placed = np.flatnonzero(np.isfinite(q[:, :7]).all(axis=1))
+        if not len(placed):
+            return 0.0, JOINTS[0], 0
+        joints = self.figure.forward_kinematics(q[placed])[:, : len(JOINTS)]
+        gap = np.nan_to_num(np.linalg.norm(joints - self.turned(up)[placed, : len(JOINTS)], axis=-1))
+        row, joint = np.unravel_index(gap.argmax(), gap.shape)
+        return float(gap.max()), JOINTS[joint], int(self.frame[placed[row]])
 
     def table(self) -> SurvivorTable:
         """Return all rows as a table of survivors."""
@@ -246,7 +257,11 @@ def _of_result(result: Result, posture: str, view: View | None, stated: str) -> 
         raise InputError("result: no frame has a posture, and nothing is to be converted; recover it again")
     joints = np.stack([result.frames[k].joints[row] for k, row in rows])
     points = np.concatenate([joints, np.full((len(joints), 5, 3), np.nan)], axis=1)
-    says = [f"{len(lost)} of {len(result.frames)} frames without a posture are left out"] if lost else []
+    says = (
+        [f"{len(lost)} of {plural(len(result.frames), 'frame')} without a posture are left out"]
+        if lost
+        else []
+    )
     if posture in LIKELIEST_WORDS and max(map(len, probability)) > 1:
         sure = float(np.median([probability[k][row] for k, row in rows]))
         says.append(
@@ -298,10 +313,14 @@ def _of_path(result: Result, figure: Figure, view: View | None, stated: str) -> 
     interpolated = np.full(len(time), float(len(JOINTS)))
     interpolated[place] = paths.interpolated[0, known].sum(axis=1)
     count = int((survivor < 0).sum())
-    bridged = f", {count} of {len(time)} frames bridged" if count else ""
-    says = [
-        f"the likeliest path, with {paths.share[0]:.2g} of the probability of {len(paths.share)}{bridged}"
-    ]
+    bridged = f", {count} of {plural(len(time), 'frame')} bridged" if count else ""
+    others = len(paths.share) - 1
+    sure = (
+        f"with {percent(paths.share[0])} of the probability of {plural(others + 1, 'path')}"
+        if others
+        else "how sure is not asked (--follow 2)"
+    )
+    says = [f"the likeliest path, {sure}{bridged}"]
     points, up = _placed(points, view, stated, says)
     codes = [""] * len(time)
     for row, k in zip(place.tolist(), known.tolist(), strict=True):

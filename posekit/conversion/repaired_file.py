@@ -24,6 +24,7 @@ from posekit.conversion.motion_output import (
     write_points,
 )
 from posekit.conversion.posture_sequence import ASSUMED_RATE, PostureSequence
+from posekit.display.plural import plural
 from posekit.errors import InputError, PosekitError
 from posekit.formats import own as files
 from posekit.formats.format import Content
@@ -245,7 +246,7 @@ def repair_file(read: ReadPostures, asked: AskedValidation, target: Path, source
     valid = sum(int(clip.repaired.valid.sum()) for clip in clips)
     again = f"judged again, {valid} of {frames} frames are valid"
     count = sum(bool(clip.repaired.spans) for clip in clips)
-    lines.append(f"written: {target}, {count} of {len(clips)} clips changed{also}; {again}")
+    lines.append(f"written: {target}, {count} of {plural(len(clips), 'clip')} changed{also}; {again}")
     records = [_record(source, path, clip.name, clip.repaired) for path, some in written for clip in some]
     return RepairedFile(lines=lines, records=records)
 

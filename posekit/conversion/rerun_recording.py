@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.motion.rerun_file import RecordedFrame, write_rerun_recording
 from posekit.formats.own import Result, ResultFrame, View
 
@@ -34,9 +35,7 @@ def write_rerun_result(path: Path, result: Result, view: View | None) -> list[st
     write_rerun_recording(path, frames, view=view)
     count = sum(len(frame.postures) for frame in frames)
     seen = "" if view is None else ", with the camera and what it saw"
-    return [
-        f"{len(frames)} frame{'s' * (len(frames) != 1)}, {count} postures{seen}; look at them: rerun {path}"
-    ]
+    return [f"{plural(len(frames), 'frame')}, {plural(count, 'posture')}{seen}; look at them: rerun {path}"]
 
 
 def _recorded(k: int, frame: ResultFrame) -> RecordedFrame:
@@ -49,5 +48,5 @@ def _recorded(k: int, frame: ResultFrame) -> RecordedFrame:
         time=frame.time,
         postures=frame.joints[order],
         probability=np.empty(0) if p is None else np.asarray(p)[order],
-        says=f"frame {k}: {len(frame.joints)} postures; rejected by {why or 'nothing'}",
+        says=f"frame {k}: {plural(len(frame.joints), 'posture')}; rejected by {why or 'nothing'}",
     )

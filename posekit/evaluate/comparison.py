@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.markdown import table_lines
 from posekit.geometry import Array
 from posekit.measures import mpjpe, pa_mpjpe
@@ -52,7 +53,8 @@ class Comparison:
         counts = self.survivors[known]
         heading = ["mean joint error, mm", "best of N", "first-ranked", "median of N"]
         return [
-            f"against the truth, {int(known.sum())} of {len(known)} frames (median / 95 %); N survivors: median "
+            f"against the truth, {int(known.sum())} of {plural(len(known), 'frame')} (median / 95 %); N "
+            "survivors: median "
             f"{np.median(counts):g}, 95 % {np.quantile(counts, 0.95):g}",
             *table_lines(heading, rows),
         ]

@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
 
+from posekit.display.plural import plural
 from posekit.evaluate.condition import curves, lost_to, numbers
 from posekit.evaluate.evaluated_frames import CONDITION_KEYS
 from posekit.evaluate.evaluation import Evaluation
@@ -93,13 +94,20 @@ def summary(evaluation: Evaluation) -> list[str]:
     frames, material = evaluation.frames, evaluation.material
     every = numbers(frames, next(iter(frames.conditions(()))).rows)
     cameras = evaluation.settings.get("yaws")
-    seen = f", {len(cameras)} yaws x {len(evaluation.settings['heights'])} heights" if cameras else ""
+    seen = (
+        f", {plural(len(cameras), 'yaw')} x {plural(len(evaluation.settings['heights']), 'height')}"
+        if cameras
+        else ""
+    )
     lines = [
-        f"{len(frames)} views of {evaluation.settings['source']}{seen}, ranges {evaluation.settings['ranges']}"
+        f"{plural(len(frames), 'view')} of {evaluation.settings['source']}{seen}, ranges "
+        f"{evaluation.settings['ranges']}"
     ]
     lines += [f"left out: {line}" for line in material.left_out]
     if material.out_of_picture:
-        lines.append(f"left out: {material.out_of_picture} views in which the person leaves the picture")
+        lines.append(
+            f"left out: {plural(material.out_of_picture, 'view')} in which the person leaves the picture"
+        )
     lines += ["", "By added noise (errors: means over frames with survivors, mm)", ""]
     by_noise = [
         (f"{key['noise']:g} px", numbers(frames, rows)) for key, rows in frames.conditions(("noise",))
@@ -121,7 +129,8 @@ def summary(evaluation: Evaluation) -> list[str]:
         lines.append(f"what pruned the true branch, at {least:g} px of added noise: {told}")
     broken = every["violations"]
     lines.append(
-        f"{broken['certified']} survivors certified: {broken['lengths']} break lengths, {broken['ranges']} ranges"
+        f"{plural(broken['certified'], 'survivor')} certified: {broken['lengths']} break lengths, "
+        f"{broken['ranges']} ranges"
     )
     return lines
 

@@ -12,10 +12,10 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.answers.wording import plural
 from posekit.batch.reading import FRAME_COLUMNS, shard_paths
 from posekit.batch.run_folder import ASKED_FILE, MANIFEST_FILE, MANIFEST_SCHEMA, RunFolder
 from posekit.batch.shard import METADATA_KEY, SHARDS_FOLDER
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.given_file import first_bytes
 from posekit.formats.motion.parquet import opened
@@ -56,7 +56,11 @@ def run_lines(folder: Path) -> list[str]:
         found.add(shard)
     failed = manifest.get("failed", [])
     planned = manifest.get("shards")
-    done = f"{len(shards):,} of {planned:,} shards" if isinstance(planned, int) else f"{len(shards):,} shards"
+    done = (
+        f"{len(shards):,} of {plural(planned, 'shard')}"
+        if isinstance(planned, int)
+        else plural(len(shards), "shard")
+    )
     of = f" of {manifest['planned']:,}" if isinstance(manifest.get("planned"), int) else ""
     ended = "" if manifest else "; it has not come to its first note"
     lines = [
@@ -160,7 +164,7 @@ class Tally:
         if judged:
             lines.append(judged_line(Counter(judged).elements()))
         if self.inferred:
-            lines.append(f"joints inferred in {self.inferred:,} frames")
+            lines.append(f"joints inferred in {plural(self.inferred, 'frame')}")
         return lines
 
 

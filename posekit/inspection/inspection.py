@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from posekit.cameras.calibrated import CalibratedCamera
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras
@@ -59,7 +60,7 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
         return lines + _postures(files.read_postures(path).joints)
     if what.holds is Content.SURVIVORS:
         table = read_survivors(path)
-        return [*lines, f"{len(np.unique(table.frame))} frames", *_postures(table.joints)]
+        return [*lines, plural(len(np.unique(table.frame)), "frame"), *_postures(table.joints)]
     if what.holds is Content.ROBOT:
         from posekit.robots import load_robot
 
@@ -67,12 +68,13 @@ def inspect(path: Path, source: Source, *, unit: str = "") -> list[str]:
         bodies = 0 if robot.geometry is None else robot.geometry.ngeoms
         return [
             *lines,
-            f"{robot.model.njoints - 1} joints, {robot.model.nq} numbers in a configuration, {bodies} collision bodies",
+            f"{plural(robot.model.njoints - 1, 'joint')}, {robot.model.nq} numbers in a configuration, "
+            f"{bodies} collision bodies",
         ]
     if what.holds is Content.CONFIGURATIONS:
         found = configurations_of(path, what)
         variables = f" of {_listed(found.names)}" if found.names else ""
-        return [*lines, f"{len(found)} configurations{variables}", *found.said]
+        return [*lines, f"{plural(len(found), 'configuration')}{variables}", *found.said]
     return lines
 
 
@@ -88,8 +90,8 @@ def _key_points(found: KeyPoints) -> list[str]:
     )
     fewest, most = (int(counts.min()), int(counts.max())) if pictures else (0, 0)
     lines = [
-        f"{pictures} pictures {size}, {len(found)} detections, {fewest} to {most} a "
-        f"picture; {len(found.layout.points)} points: {found.layout.name}"
+        f"{plural(pictures, 'picture')} {size}, {plural(len(found), 'detection')}, {fewest} to {most} a "
+        f"picture; {plural(len(found.layout.points), 'point')}: {found.layout.name}"
     ]
     if found.normalised:
         lines.append("points are fractions of the picture: --size WIDTHxHEIGHT makes them pixels")
@@ -134,11 +136,11 @@ def _seen(landmarks: Array, sure: Array) -> list[str]:
 def _motion(motion: Motion, skeleton: str) -> list[str]:
     spans = [np.ptp(motion.time[motion.clip == k]) for k in np.unique(motion.clip)]
     seconds = float(sum(spans))
-    clips = f" in {len(motion.clips)} clips" if len(motion.clips) > 1 else ""
+    clips = f" in {plural(len(motion.clips), 'clip')}" if len(motion.clips) > 1 else ""
     up = f"{motion.up} up" if motion.up else "which way is up is not said"
     rate = f"{motion.rate:g} a second ({seconds:.2f} s)" if np.isfinite(seconds) else "no rate that is known"
     lines = [
-        f"{len(motion)} frames{clips} at {rate}, {len(motion.names)} points, {up}",
+        f"{plural(len(motion), 'frame')}{clips} at {rate}, {plural(len(motion.names), 'point')}, {up}",
         *motion.said,
         f"points: {_listed(motion.names)}",
     ]
@@ -161,7 +163,7 @@ def _postures(joints: Array) -> list[str]:
     absent = [
         f"{name} ({share * 100:.0f} %)" for name, share in zip(JOINTS, missing, strict=True) if share > 0
     ]
-    return [f"{len(joints)} postures; missing joints: {', '.join(absent) or 'none'}"]
+    return [f"{plural(len(joints), 'posture')}; missing joints: {', '.join(absent) or 'none'}"]
 
 
 def _camera(camera: CalibratedCamera) -> str:
@@ -169,7 +171,7 @@ def _camera(camera: CalibratedCamera) -> str:
     lens = (
         "fisheye"
         if camera.fisheye
-        else f"{int(np.count_nonzero(camera.distortion))} coefficients of distortion"
+        else f"{plural(int(np.count_nonzero(camera.distortion)), 'coefficient')} of distortion"
     )
     place = "placed in a world" if camera.t is not None else "in no world"
     f = f"f {camera.K[0, 0]:.1f} x {camera.K[1, 1]:.1f} px"
@@ -193,7 +195,7 @@ def _view(view: View) -> list[str]:
     ]
     more = ", ".join(f"{name} in {count}" for name, count in known.items())
     return [
-        f"{len(view)} frames, camera {kind}; {more}",
+        f"{plural(len(view), 'frame')}, camera {kind}; {more}",
         f"never seen: {', '.join(missing) or 'nothing'}; derived: {', '.join(view.derived) or 'nothing'}",
         "",
         *table_lines(("point", "seen"), rows),

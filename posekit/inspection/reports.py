@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Final
 
+from posekit.display.plural import plural
 from posekit.formats.own.report import ValidationReport, columns_of
 from posekit.formats.own.report_table import clip_lines, summary_table
 from posekit.inspection.telling import cut_long, settings_line
@@ -21,7 +22,7 @@ def report_lines(report: ValidationReport) -> list[str]:
         return [*summary_table(columns_of(report)), *clips, settings_line(report.settings)]
     counts = ", ".join(f"{count} {verdict}" for verdict, count in report.summary.items())
     return [
-        f"{len(report)} postures: {counts}; listed are {report.listed}",
+        f"{plural(len(report), 'posture')}: {counts}; listed are {report.listed}",
         *(
             f"{check}: {one.rejected} rejected, {one.undecided} undecided"
             for check, one in report.checks.items()
@@ -41,12 +42,12 @@ def evaluation_lines(path: Path, document: Any) -> list[str]:
     """
     try:
         settings, noises = dict(document["settings"]), list(document["by_noise"])
-        lines = [f"{_count(document['frames']):,} views of {cut_long(str(settings['source']))}"]
+        lines = [f"{plural(_count(document['frames']), 'view')} of {cut_long(str(settings['source']))}"]
         lines += [f"left out: {cut_long(str(one))}" for one in list(document["left_out"])[:3]]
         for one in noises:
             survivors, errors = one["survivors"], one["error_mm"]["mpjpe"]
             told = (
-                f"{_count(one['frames']):,} views",
+                plural(_count(one["frames"]), "view"),
                 f"truth within 10 mm in {_share(one['retained_within_10mm'])}",
                 f"its branch in {_share(one['retained_branch'])}",
                 f"survivors median {_number(survivors['median'])}, 95 % {_number(survivors['p95'])}",

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from posekit.answers.paths import distinct_paths
-from posekit.answers.wording import answer_lines, path_words, plural
+from posekit.answers.wording import answer_lines, path_words
+from posekit.display.plural import plural
 from posekit.formats.own import Result
 from posekit.formats.own.paths import FollowedPaths
 from posekit.inspection.telling import (
@@ -111,5 +112,5 @@ def _paths(paths: FollowedPaths) -> str:
     certain = "certain to be" if paths.exact else "not certain to be"
     return (
         f"{plural(count, 'path')}: {lead}the first is {certain} the likeliest, "
-        f"{int((paths.survivor[0] < 0).sum())} of {frames} frames bridged"
+        f"{int((paths.survivor[0] < 0).sum())} of {plural(frames, 'frame')} bridged"
     )

@@ -9,8 +9,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from posekit.answers.wording import plural
 from posekit.batch import digests
+from posekit.display.plural import plural
 from posekit.safe_io import cut
 
 OF_FRAMES: Final = ("judged", "unrecovered", "noisy", "refined")

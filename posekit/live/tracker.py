@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from posekit.body import load_figure
 from posekit.compiled.compiling import PAYS_FROM, expect
+from posekit.display.plural import plural
 from posekit.display.short_repr import ShortRepr
 from posekit.errors import InputError, PosekitError
 from posekit.following import Follower
@@ -105,7 +106,7 @@ class Tracker(ShortRepr):
         Follower(lag=0).push(ranked_frames(standing)[0])
 
     def _facts(self) -> list[str]:
-        return [f"{len(self.names)} points", f"{self._frame} pictures so far"]
+        return [plural(len(self.names), "point"), f"{plural(self._frame, 'picture')} so far"]
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections import Counter
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.own.object_result import ObjectFrame, ObjectResult
 
 MAX_SHOWN = 4
@@ -20,20 +21,27 @@ def object_lines(result: ObjectResult) -> list[str]:
     for k, frame in enumerate(frames):
         if cut > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
             if k == MAX_SHOWN:
-                lines.append(f"{'…':>5} {cut} frames between")
+                lines.append(f"{'…':>5} {plural(cut, 'frame')} between")
             continue
         lines.append(_frame_line(k, frame))
     counts = [len(frame) for frame in frames]
     lines.append(
-        f"{sum(counts)} postures of {result.linkage} in {len(counts)} frames: median {np.median(counts):g}, most "
-        f"{max(counts)}, none in {counts.count(0)}"
+        f"{plural(sum(counts), 'posture')} of {result.linkage} in {plural(len(counts), 'frame')}: median "
+        f"{np.median(counts):g}, most {max(counts)}, none in {counts.count(0)}"
     )
     undecided = sum(verdict is False for frame in frames for verdict in frame.certified)
     if undecided:
         lines.append(
-            f"{undecided} postures are undecided: nothing excludes them, but no configuration within limits was found"
+            f"{plural(undecided, 'posture')} are undecided: nothing excludes them, but no configuration "
+            f"within limits was found{_other_scale(result)}"
         )
     return lines + _scale_lines(result)
+
+
+def _other_scale(result: ObjectResult) -> str:
+    """Say what to try where the scale is only the least that the image allows."""
+    least = any(frame.family is not None and frame.family.how == "min" for frame in result.frames)
+    return "; the scale is the least that the image allows, try --scale closure" if least else ""
 
 
 def _frame_line(k: int, frame: ObjectFrame) -> str:
@@ -53,7 +61,7 @@ def _scale_lines(result: ObjectResult) -> list[str]:
     mirrored = sum(family.mirrored > 0 for family in families)
     return [
         f"scale by {families[0].how}: {s.min():.6g} to {s.max():.6g} pixels a {per}; the bound is set by {segment} in "
-        f"{count} of {len(families)} frames",
-        f"mirror images told apart in {len(families) - mirrored} of {len(families)} frames"
+        f"{count} of {plural(len(families), 'frame')}",
+        f"mirror images told apart in {len(families) - mirrored} of {plural(len(families), 'frame')}"
         + (f"; in {mirrored} a posture and its mirror image both survive" if mirrored else ""),
     ]

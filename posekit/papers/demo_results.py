@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from posekit.body import load_figure
+from posekit.display.plural import plural
 from posekit.formats.markdown import table_lines
 from posekit.formats.own import (
     Postures,
@@ -61,7 +62,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
         if pictures:
             yield from illustrate(folder, name, result, view)
         rows.append((name, *_row(view, recovery)))
-        yield f"{name}: {rows[-1][3]} postures in {rows[-1][1]} frames"
+        yield f"{name}: {plural(rows[-1][3], 'posture')} in {plural(rows[-1][1], 'frame')}"
     head = (
         "view",
         "frames",
@@ -77,7 +78,7 @@ def demo(folder: Path, *, pictures: bool = True) -> Iterator[str]:
     write_report(folder / "seq1.report.json", report)
     write_postures(folder / "seq1.postures.json", Postures(joints=given.joints))
     table += [
-        f"Validated again from the file: {report.summary['valid']} of {len(report.postures)} postures valid.",
+        f"Validated again from the file: {report.summary['valid']} of {plural(len(report.postures), 'posture')} valid.",
         "",
     ]
     write_lines(folder / "demo.md", table)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.markdown import table_lines
 from posekit.papers import lee_chen_printed as printed
 from posekit.papers.lee_chen_table2 import CameraEstimate, camera_estimates, exact_tables
@@ -177,7 +178,7 @@ def _frame1_lines(found: Sequence[Sequence1985]) -> list[str]:
                 sequence.name.upper(),
                 f"{rules_12} / {sequence.motion[0, -1]}",
                 f"{grouped} / {sequence.groups_after_rules_1_2}",
-                f"{final} / {sequence.final[1]} ({sequence.final[0]} survivors)",
+                f"{final} / {sequence.final[1]} ({plural(sequence.final[0], 'survivor')})",
                 "yes" if sequence.truth_survives else "no",
             )
         )

@@ -122,7 +122,8 @@ def changed_lengths(
     lines = []
     if not sized:
         lines.append(
-            "how large the body is was not told: its depth and its size look alike, and both are as given"
+            "the pictures do not tell how large the body is, as it looks the same larger and further away: its size is "
+            "the one that was given, and its depth goes with it"
         )
     elif abs(size) > max(2 * known.common, FACTOR_NAMED):
         lines.append(

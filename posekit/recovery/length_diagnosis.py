@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from posekit.cameras import PinholeCamera
 from posekit.cameras.neck import NeckPlacement, place
+from posekit.display.plural import plural
 from posekit.errors import PosekitError
 from posekit.formats.own import OpenCVModel
 from posekit.geometry import Array
@@ -117,7 +118,8 @@ def _said(doubt: LengthDoubt) -> str:
     """Say a doubt in a line."""
     if doubt.needed == doubt.least and doubt.needed > doubt.stated:
         return (
-            f"{doubt.segment} is stated as {doubt.stated:.3f} m, but {doubt.unexplained} of {doubt.frames} frames need "
+            f"{doubt.segment} is stated as {doubt.stated:.3f} m, but {doubt.unexplained} of "
+            f"{plural(doubt.frames, 'frame')} need "
             f"{doubt.needed:.3f} m of it or more"
         )
     return str(doubt)

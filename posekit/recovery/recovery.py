@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.answers.wording import plural
 from posekit.body import Figure
 from posekit.display.pictured import Pictured
+from posekit.display.plural import plural
 from posekit.display.stick_drawing import posture_drawing
 from posekit.formats.own import Family, Inferred, Root
 from posekit.formats.own.posture_set import PostureSet

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from posekit.answers.paths import distinct_paths
-from posekit.answers.wording import answer_lines, path_words, percent, plural
+from posekit.answers.wording import answer_lines, path_words, percent
+from posekit.display.plural import plural
 from posekit.recovery.recovery import FrameRecovery, Recovery
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ def summary_lines(recovery: Recovery) -> list[str]:
     for k, frame in frames:
         if cut > 1 and MAX_SHOWN <= k < len(frames) - MAX_SHOWN:
             if k == MAX_SHOWN:
-                lines.append(f"{'…':>5} {cut} frames between")
+                lines.append(f"{'…':>5} {plural(cut, 'frame')} between")
             continue
         lines.append(_frame_line(k, frame))
     return lines + _scale_lines(recovery)
@@ -54,7 +55,9 @@ def _count_line(recovery: Recovery) -> str:
     if len(counts) == 1:
         return f"{total} in 1 frame{_unlisted(recovery)}"
     middle = f"median {np.median(counts):g}, most {max(counts)}"
-    return f"{total} in {len(counts)} frames: {middle}, none in {counts.count(0)}{_unlisted(recovery)}"
+    return (
+        f"{total} in {plural(len(counts), 'frame')}: {middle}, none in {counts.count(0)}{_unlisted(recovery)}"
+    )
 
 
 def _unlisted(recovery: Recovery) -> str:
@@ -77,8 +80,8 @@ def _scale_lines(recovery: Recovery) -> list[str]:
     mirrored = sum(frame.mirrored > 0 for frame in recovery.frames)
     return [
         f"scale by {families[0].how}: {s.min():.6g} to {s.max():.6g} pixels a metre; the bound is set by {segment} in "
-        f"{count} of {len(families)} frames",
-        f"mirror images told apart in {found - mirrored} of {found} frames with postures"
+        f"{count} of {plural(len(families), 'frame')}",
+        f"mirror images told apart in {found - mirrored} of {plural(found, 'frame')} with postures"
         + (f"; in {mirrored} a posture and its mirror image both survive" if mirrored else ""),
     ]
 
@@ -104,6 +107,6 @@ def following_line(following: Following) -> str:
         _, probability = distinct_paths(following.joints, following.share)
         sure = path_words(probability.tolist())
     return (
-        f"{plural(len(following), 'likeliest path')}: {sure}; {bridged} of {len(following.time)} frames "
+        f"{plural(len(following), 'likeliest path')}: {sure}; {bridged} of {plural(len(following.time), 'frame')} "
         f"bridged, {guessed} a guess, {plural(len(following.switches()), 'change')} between near and far"
     )

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.cameras import Camera, PinholeCamera, ScaledOrthographicCamera
+from posekit.display.plural import plural
 from posekit.errors import InputError, PosekitError
 from posekit.refinement.descent import CHI2_PRECISION
 from posekit.refinement.figure_numbers import LIMB_ENDS, LIMB_MIDDLES, LIMB_STARTS, TRUNK_SEGMENTS
@@ -100,8 +101,10 @@ class LengthDoubt:
         """Say it in one line."""
         stated = f"{self.segment} is stated as {self.stated:.3f} m, but"
         if self.needed == self.least and self.needed < self.stated:
-            return f"{stated} none of {self.frames} frames shows more than {self.needed:.3f} m of it"
-        need = f"{stated} {self.unexplained} of {self.frames} frames need {self.needed:.3f} m"
+            return (
+                f"{stated} none of {plural(self.frames, 'frame')} shows more than {self.needed:.3f} m of it"
+            )
+        need = f"{stated} {self.unexplained} of {plural(self.frames, 'frame')} need {self.needed:.3f} m"
         if self.needed == self.least and self.most > self.needed:
             return f"{need} of it or more"
         return f"{need} or the like ({self.least:.3f} to {self.most:.3f} m)"

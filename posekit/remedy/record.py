@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.plural import plural
 from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array, runs
 from posekit.skeleton import JOINTS
@@ -130,7 +131,7 @@ class Repaired(ShortRepr):
     def told(self, most: int = 3) -> str:
         """Say in a sentence what was changed and what was not."""
         changed, bad = int(self.changed.sum()), len({one.frame for one in self.left})
-        parts = [f"{changed} of {len(self.valid)} frames changed"]
+        parts = [f"{changed} of {plural(len(self.valid), 'frame')} changed"]
         parts += map(str, self.spans[:most])
         if len(self.spans) > most:
             parts.append(f"{len(self.spans) - most} more")
@@ -138,7 +139,7 @@ class Repaired(ShortRepr):
             checks = Counter({one.check: 0 for one in self.left})
             checks.update(check for _, check in {(one.frame, one.check) for one in self.left})
             counts = ", ".join(f"{check} {count}" for check, count in checks.most_common())
-            parts.append(f"left: {bad} frames: {counts}; the first, {self.left[0]}")
+            parts.append(f"left: {plural(bad, 'frame')}: {counts}; the first, {self.left[0]}")
         undecided = int((~self.valid).sum()) - bad
         if undecided > 0:
             parts.append(f"{undecided} undecided")

@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.own import ValidationReport
 from posekit.formats.own.report_columns import ReportPlace, VerdictColumns
 from posekit.settings import DEFAULT_RANGES, EXACT_TOLERANCE
@@ -61,10 +62,13 @@ def why_most_fail(columns: VerdictColumns, told: Mapping[str, Any]) -> str:
     mine, place = columns.place == most, columns.places[most]
     count, beyond = len(np.unique(columns.posture[mine])), -columns.margin[mine]
     if place.check == "swap":
-        return f"{count} of {len(columns)} postures have left and right exchanged: put them right by --repair FILE"
+        return (
+            f"{count} of {plural(len(columns), 'posture')} have left and right exchanged: put them right by "
+            "--repair FILE"
+        )
     check = place.check.replace("_", "-")
     return (
-        f"{count} of {len(columns)} postures fail by {place.where} ({check}), by "
+        f"{count} of {plural(len(columns), 'posture')} fail by {place.where} ({check}), by "
         f"{_amount(float(np.median(beyond)), place.unit)} in the median: "
         f"{_remedy(place, float(np.quantile(beyond, MOST_OF_THEM)), told)}"
     )

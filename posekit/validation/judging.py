@@ -11,6 +11,7 @@ from typing import Any, Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.plural import plural
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import NamedConfigurations, Postures, ValidationReport
 from posekit.formats.own.report import PostureReport
@@ -309,7 +310,11 @@ class ReportBuilder:
     def _recognised(self) -> Iterator[str]:
         """Say what was recognised, each sentence once, with how many files it is of."""
         for sentence, count in self._said.most_common(MAX_SAID):
-            yield sentence if len(self._frames) == 1 else f"{count} of {len(self._frames)} files: {sentence}"
+            yield (
+                sentence
+                if len(self._frames) == 1
+                else f"{count} of {plural(len(self._frames), 'file')}: {sentence}"
+            )
 
     def _all_frames(self) -> tuple[ReportFrames | None, bool]:
         """Say which frame each posture is, and whether there are verdicts on clips: of one file where it has some."""

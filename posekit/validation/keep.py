@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.motion.cutting import cut_motion, cut_name
 from posekit.formats.own.report_clips import ClipVerdict
@@ -62,7 +63,7 @@ class Kept:
         kept = [clip for clip in self.clips if clip.written]
         spans = sum(clip.verdict != "valid" for clip in kept)
         cut_down = f", {spans} of them cut to their longest good span" if spans else ""
-        return f"{len(kept)} of {len(self.clips)} clips kept{cut_down}"
+        return f"{len(kept)} of {plural(len(self.clips), 'clip')} kept{cut_down}"
 
 
 def check_keep_folder(folder: Path) -> None:

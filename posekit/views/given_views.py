@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.format import Content
 from posekit.formats.own import read_view
@@ -91,7 +92,8 @@ def _with_truth(one: Opened, truth: Path) -> Opened:
     joints[:, [JOINT[name] for name in found.derived]] = np.nan
     view, told = with_truth(one.view, joints, motion.time)
     says = (
-        f"truth {motion.source}: {told.frames} of {len(view)} frames; its axes {told.turn} are the camera's world; it "
+        f"truth {motion.source}: {told.frames} of {plural(len(view), 'frame')}; its axes {told.turn} are the "
+        "camera's world; it "
         f"misses the key points by {told.error:.1f} px (median)"
     )
     return replace(one, view=view, says=(*one.says, says))

@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints, check_sides, choose, list_people, read_keypoints, swap
 from posekit.formats.keypoints.persons import PERSON_RULES
@@ -41,7 +42,8 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
     found = read_detections(path, source)
     if not len(found):
         raise InputError(
-            f"{path}: nobody was detected in {len(found.pictures)} pictures; expected a person; give another file"
+            f"{path}: nobody was detected in {plural(len(found.pictures), 'picture')}; expected a person; "
+            "give another file"
         )
     sighted = sighting(found, source)
     people = list_people(sighted.keypoints)
@@ -70,8 +72,9 @@ def open_views(path: str | Path, source: Source) -> list[Opened]:
             continue
         _warn_of_sides(one, source)
         says = (
-            f"{found.source}: {found.format}, {found.layout.name}, {len(found.pictures)} pictures",
-            f"{_who(one, source.person or 'largest', len(people))}: in {len(one)} pictures{_mean_confidence(one)}",
+            f"{found.source}: {found.format}, {found.layout.name}, {plural(len(found.pictures), 'picture')}",
+            f"{_who(one, source.person or 'largest', len(people))}: in "
+            f"{plural(len(one), 'picture')}{_mean_confidence(one)}",
             sighted.says,
             of_lengths,
         )

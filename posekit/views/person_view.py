@@ -8,6 +8,7 @@ import numpy as np
 
 from posekit.body import Figure
 from posekit.body.lengths import hips_points, torso_points
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.keypoints import KeyPoints
 from posekit.formats.own import CameraModel, ScaledOrthographicModel, Unit, View
@@ -94,7 +95,8 @@ def person_view(
     if not (seen[:, JOINT["neck"]] if needs_neck else seen).any():
         needed = "both shoulders, between which the neck is, are" if needs_neck else "joints are"
         raise InputError(
-            f"{keypoints.source}: {needed} seen in none of {count} pictures; expected at least one; choose another "
+            f"{keypoints.source}: {needed} seen in none of {plural(count, 'picture')}; expected at least one; "
+            "choose another "
             "--person, or a smaller --min-confidence"
         )
     kept = seen.any(axis=1) | keypoints.sequence

@@ -54,7 +54,7 @@ def test_reports_and_charts_are_written(run) -> None:
     save("walk.npz")
     outcome = run("walk.npz", "-o", "report.json", "-o", "report.csv", *QUICK, "--plots")
     assert (outcome.code, outcome.err) == (0, "")
-    assert "18 views of walk.npz, 3 yaws x 1 heights, ranges anatomical" in outcome.out
+    assert "18 views of walk.npz, 3 yaws x 1 height, ranges anatomical" in outcome.out
     assert "| walking | 9 " in outcome.out
     report = json.loads(Path("report.json").read_text())
     assert report["schema"] == "posekit.evaluation/1"

@@ -284,4 +284,4 @@ def test_reports_and_objects_are_told(command: Run, tmp_path: Path) -> None:
     assert " valid, 0 invalid, 0 undecided" in text
     assert command("synth", "object", "panda", "-o", view, "--frames", "1").code == 0
     assert command("recover", view, "-o", result, "--linkage", "panda").code == 0
-    assert "postures of panda in 1 frames" in told(command, result)
+    assert "postures of panda in 1 frame" in told(command, result)

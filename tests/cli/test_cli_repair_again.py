@@ -48,7 +48,8 @@ def test_the_report_has_the_record(run: Callable[..., Any], tmp_path: Path, suff
     """What was changed in the file is in the report of the same run, and JSON is read back as it was."""
     given, out, report = tmp_path / "given.npz", tmp_path / "out.npz", tmp_path / f"report.{suffix}"
     write_motion(given, noisy_motion(0.3), "npz")
-    assert run("validate", given, "--repair", out, "-o", report).code == 1
+    code = run("validate", given, "--repair", out, "-o", report).code
+    assert code == int(posekit.validate(out).summary["valid"] < FRAMES)
     text = report.read_text()
     assert "left_wrist" in text and "lengthened" in text and "valid" in text
     if suffix == "json":

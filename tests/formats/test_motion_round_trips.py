@@ -444,7 +444,7 @@ def test_formats_with_one_time_from_frame_to_frame_have_every_frame(
     done = command("convert", broken, tmp_path / f"out.{name}")
     assert done.code == 0, done.err
     assert f"1 of {FRAMES} frames had no posture: interpolated" in done.out
-    assert "1 joints were not seen: interpolated" in done.out
+    assert "1 unseen joint interpolated" in done.out
     written = read_motion(tmp_path / f"out.{name}")
     np.testing.assert_allclose(written.time, np.arange(FRAMES) / RATE, rtol=0, atol=1e-6)
     assert np.isfinite(written.points).all()

@@ -264,7 +264,10 @@ def test_batches_are_counted_through():
     counts = columns.by_check()
     assert (counts["joint_range"].rejected, counts["joint_range"].undecided) == (2, 1)
     assert counts["collision"].rejected == 1
-    assert counts["joint_range"].worst == (1, places[0], -3.0)
+    worst = counts["joint_range"].worst
+    assert worst is not None
+    posture, judged = worst
+    assert (posture, judged.place, judged.margin) == (1, places[0], -3.0)
     table = "\n".join(summary_table(columns))
     assert table.startswith("5 postures: 2 valid, 2 invalid, 1 undecided")
     assert "joint_range/knee 2" in table

@@ -99,7 +99,7 @@ def test_a_size_that_nothing_tells_stays_and_is_said() -> None:
     change = [np.log(said["lengths"][name] / said["start"][name]) for name in SEGMENT_NAMES]
     assert abs(np.mean(change)) < 0.03
     assert said["size_deviation"] == recovery.settings["noise"]["size"] > 0
-    assert "how large the body is was not told" in " ".join(advice_lines(recovery))
+    assert "its size is the one that was given" in " ".join(advice_lines(recovery))
 
 
 def test_exact_lengths_stay() -> None:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.display.plural import plural
 from posekit.display.short_repr import ShortRepr
 from posekit.geometry import Array
 from posekit.validators.robot.collision import SelfCollision
@@ -52,7 +53,7 @@ class Report(ShortRepr):
 
     def _facts(self) -> list[str]:
         found = [(int(getattr(self, word).sum()), word) for word in VERDICT_WORDS]
-        return [f"{len(self.complete)} postures", *[f"{count} {word}" for count, word in found]]
+        return [plural(len(self.complete), "posture"), *[f"{count} {word}" for count, word in found]]
 
     @cached_property
     def invalid(self) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from typing import Final
 import numpy as np
 from PIL import Image
 
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.geometry import Array
 from posekit.safe_io import refusal
@@ -153,7 +154,7 @@ def matched(
     remedy = "give the pictures that the key points were detected in, all of them and no others"
     if source.count == 1:
         remedy = "choose one with --frame"
-    got = f"{source.count} picture{'s' * (source.count != 1)}"
+    got = plural(source.count, "picture")
     raise refusal(source.path, "", got, f"{count}, one a frame", remedy)
 
 

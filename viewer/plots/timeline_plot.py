@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from posekit.display.plural import plural
 from posekit.errors import ViewerError
 from posekit.formats.own.report_clips import ClipVerdict
 from posekit.formats.own.report_frames import ClipName
@@ -135,7 +136,7 @@ def _draw(panel: Axes, clip: ClipVerdict) -> None:
     panel.grid(axis="x", color=FAINT_COLOUR)
     name = one_line(ClipName(clip.file, clip.clip).name)
     shown = f"…{name[-59:]}" if len(name) > 60 else name
-    said = f"{clip.verdict}, {clip.invalid + clip.undecided} of {clip.frames} frames not valid"
+    said = f"{clip.verdict}, {clip.invalid + clip.undecided} of {plural(clip.frames, 'frame')} not valid"
     # A dollar sign would begin a formula.
     panel.set_title(f"{shown.replace('$', chr(92) + '$')}: {said}", loc="left")
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from posekit.answers.wording import percent
 from posekit.body import with_head
+from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
 from posekit.formats.own import Postures, Result, View
@@ -48,7 +49,9 @@ def likeliest_first(shown: Shown, most: int | None = None) -> Shown:
         said += f"; then {', '.join(told[1:])}" + (", …" if len(rows) > MAX_TOLD else "")
     rows = rows[:most]
     chosen = shown.chosen(rows.tolist())
-    return replace(chosen, caption=f"{said}{apart} ({len(shown)} postures)", probability=share[: len(rows)])
+    return replace(
+        chosen, caption=f"{said}{apart} ({plural(len(shown), 'posture')})", probability=share[: len(rows)]
+    )
 
 
 def opening_frames(
@@ -88,7 +91,7 @@ def by_probability(shown: Shown) -> Shown:
     if shown.probability is None:
         return shown
     rows = np.argsort(-shown.probability, kind="stable").tolist()
-    return replace(shown.chosen(rows), caption=f"{len(shown)} postures")
+    return replace(shown.chosen(rows), caption=plural(len(shown), "posture"))
 
 
 def along_path(subject: DrawnSubject, content: Result | Postures | HeldPostures | View) -> list[Shown]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.display.pictured import Pictured
+from posekit.display.plural import plural
 from posekit.display.short_repr import short
 from posekit.display.stick_drawing import points_drawing, posture_drawing
 from posekit.errors import InputError
@@ -121,10 +122,10 @@ class Motion(Pictured):
         several = [f"{len(self.clips)} clips"] if len(self.clips) > 1 else []
         up = [f"up={self.up!r}"] if self.up else []
         return [
-            f"{len(self)} frames",
+            plural(len(self), "frame"),
             *several,
             f"{self.rate:g} a second",
-            f"{len(self.names)} points",
+            plural(len(self.names), "point"),
             *up,
             f"source={short(self.source)}",
         ]
@@ -169,7 +170,7 @@ class Motion(Pictured):
         count = len(self.clips)
         if count == 0 or len(set(self.clips)) != count or (self.actions and len(self.actions) != count):
             expected = "each named once, one action a clip"
-            raise refusal(self.source, "clips", f"{count} clips", expected, "correct the names")
+            raise refusal(self.source, "clips", plural(count, "clip"), expected, "correct the names")
         if clip.size and (clip.min() < 0 or clip.max() >= count):
             first, last = int(clip.min()), int(clip.max())
             raise refusal(

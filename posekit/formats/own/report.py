@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.display.pictured import Pictured
+from posekit.display.plural import plural
 from posekit.display.short_repr import ShortRepr
 from posekit.display.stick_drawing import shares_drawing
 from posekit.formats.own.report_clips import ClipVerdict, Still
@@ -152,10 +153,10 @@ class ValidationReport(Pictured):
         return {verdict: counts[verdict] for verdict in VERDICT_NAMES}
 
     def _facts(self) -> list[str]:
-        clips = [f"{len(self.clips)} clips"] if self.clips else []
-        refused = [f"{len(self.refused)} files refused"] if self.refused else []
+        clips = [plural(len(self.clips), "clip")] if self.clips else []
+        refused = [f"{plural(len(self.refused), 'file')} refused"] if self.refused else []
         counts = [f"{count} {verdict}" for verdict, count in self.summary.items()]
-        return [f"{len(self)} postures", *counts, *clips, *refused]
+        return [plural(len(self), "posture"), *counts, *clips, *refused]
 
     def _drawing(self) -> str:
         return shares_drawing([(name, count, VERDICT_COLOURS[name]) for name, count in self.summary.items()])

@@ -71,12 +71,12 @@ class VerdictRow(NamedTuple):
 
 
 class CheckCount(NamedTuple):
-    """What one check said about a file: postures rejected and undecided, violations by place, and the worst."""
+    """What one check said about a file: postures rejected, undecided, violations by place, the worst and where."""
 
     rejected: int
     undecided: int
     places: dict[str, int]
-    worst: tuple[int, ReportPlace, float] | None
+    worst: tuple[int, PlaceValue] | None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,7 +173,8 @@ class VerdictColumns:
             if len(mine):
                 units = np.array([PER_DEGREE.get(place.unit, 1.0) for place in self.places])
                 at = int(mine[np.argmin(self.margin[mine] / units[self.place[mine]])])
-                worst = int(self.posture[at]), self.places[int(self.place[at])], float(self.margin[at])
+                found = (float(numbers[at]) for numbers in (self.value, self.bound, self.margin))
+                worst = int(self.posture[at]), PlaceValue(self.places[int(self.place[at])], *found)
             counts[check] = CheckCount(
                 rejected=len(np.unique(self.posture[mine])),
                 undecided=int(np.count_nonzero(self.silent >> (k + 1) & 1)),

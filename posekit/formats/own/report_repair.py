@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from posekit.display.plural import plural
+
 REPAIR_HEAD: Final = ("written", "clip", "what was done", "by up to", "frames")
 """The columns of `repair_rows`."""
 
@@ -29,7 +31,10 @@ def repair_rows(repair: Sequence[Mapping[str, Any]]) -> list[tuple[str, ...]]:
 def _rows(repair: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, ...]]:
     for record in repair:
         clip = (str(record["written"]), str(record["clip"]))
-        told = f"{record['changed']} of {record['frames']} frames changed, {record['valid']} valid in the written file"
+        told = (
+            f"{record['changed']} of {plural(record['frames'], 'frame')} changed, {record['valid']} valid in the "
+            "written file"
+        )
         yield (*clip, told, "", "")
         for span in record["spans"]:
             first, last = span["first"], span["last"]

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.display.plural import plural
 from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName, ReportFrames
@@ -48,7 +49,7 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
         Whether names are escaped for Markdown, or for a terminal, where many checks that found nothing share a line.
     """
     counts = ", ".join(f"{count} {verdict}" for verdict, count in columns.summary.items())
-    lines = [f"{len(columns)} posture{'s' * (len(columns) != 1)}: {counts}", ""]
+    lines = [f"{plural(len(columns), 'posture')}: {counts}", ""]
     head = ("check", "rejected", "undecided", "most often", "worst")
     total = max(len(columns), 1)
     by_check = columns.by_check()
@@ -117,7 +118,7 @@ def markdown_lines(
         for row in columns.rows(bad[:MAX_SHOWN_POSTURES].tolist())
     ]
     where = () if frames is None else ("clip", "frame", "time, s")
-    return lines + _table(("posture", *where, "verdict", "least margin", "why"), rows, _no_markup)
+    return lines + _table(("posture", *where, "verdict", "worst", "why"), rows, _no_markup)
 
 
 def repair_lines(repair: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -143,7 +144,7 @@ def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> lis
     """
     counts = Counter(clip.verdict for clip in clips)
     told = ", ".join(f"{counts[name]} {name}" for name in VERDICT_NAMES)
-    lines = [f"{len(clips)} clip{'s' * (len(clips) != 1)}: {told}", ""]
+    lines = [f"{plural(len(clips), 'clip')}: {told}", ""]
     bad = worst_first(clips)
     if not bad:
         return lines[:1]
@@ -216,13 +217,19 @@ def _most(check: str, count: CheckCount) -> str:
 def _worst(count: CheckCount) -> str:
     if count.worst is None:
         return ""
-    index, place, margin = count.worst
-    return f"posture {index}: {place.where} {measured(margin, place.unit, 3)}"
+    index, judged = count.worst
+    return f"posture {index}: {_found(judged.place.where, judged)}"
 
 
 def _at(judged: PlaceValue) -> str:
     """Word what was found: ``speed/right_wrist 21.3 m/s (bound 15)``."""
-    return f"{judged.place.name} {measured(judged.value, judged.place.unit)} (bound {judged.bound:.4g})"
+    return _found(judged.place.name, judged)
+
+
+def _found(name: str, judged: PlaceValue) -> str:
+    if math.isnan(judged.value):
+        return f"{name} {measured(-judged.margin, judged.place.unit, 3)} beyond its bound"
+    return f"{name} {measured(judged.value, judged.place.unit)} (bound {judged.bound:.4g})"
 
 
 def _shown(value: object) -> str:

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from posekit.display.pictured import Pictured
+from posekit.display.plural import plural
 from posekit.display.stick_drawing import posture_drawing
 from posekit.formats.own.digits import Precision
 from posekit.formats.own.family import Family
@@ -149,8 +150,13 @@ class Result(Pictured):
 
     def _facts(self) -> list[str]:
         count = sum(len(frame.joints) for frame in self.frames)
-        paths = [] if self.paths is None else [f"{len(self.paths.joints)} paths"]
-        return [f"{len(self.frames)} frames", f"{count} postures", *paths, f"unit={self.unit!r}"]
+        paths = [] if self.paths is None else [plural(len(self.paths.joints), "path")]
+        return [
+            plural(len(self.frames), "frame"),
+            plural(count, "posture"),
+            *paths,
+            f"unit={self.unit!r}",
+        ]
 
     def _drawing(self) -> str:
         frame = next((one for one in self.frames if len(one.joints)), None)

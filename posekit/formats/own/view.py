@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.display.pictured import Pictured
+from posekit.display.plural import plural
 from posekit.display.short_repr import short
 from posekit.display.stick_drawing import image_drawing
 from posekit.formats.own.camera_model import CameraModel, ScaledOrthographicModel
@@ -133,7 +134,7 @@ class View(Pictured):
         known = [name for name in ("root", "truth") if np.isfinite(getattr(self, name)).any()]
         seen = np.isfinite(self.image).all(axis=2)
         return [
-            f"{len(self)} frame{'s' * (len(self) != 1)}",
+            plural(len(self), "frame"),
             f"{self.time[0]:g} to {self.time[-1]:g} s",
             f"camera={type(self.camera).__name__}",
             f"{seen.mean():.0%} of joints seen",

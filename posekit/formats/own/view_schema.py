@@ -7,6 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import ConfigDict, FailFast, Field, model_validator
 
+from posekit.display.plural import plural
 from posekit.formats.own.camera_model import check_intrinsics, check_rotation
 from posekit.formats.own.units import Unit
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
@@ -172,6 +173,6 @@ class ViewFile(FileModel):
                 "the neck in one frame at least: the tree grows from it",
                 "add it",
                 at="frames[0].image.neck",
-                got=f"nothing, in none of {len(self.frames)} frames",
+                got=f"nothing, in none of {plural(len(self.frames), 'frame')}",
             )
         return self
