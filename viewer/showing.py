@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import html
 import os
+import stat
 import sys
 import tempfile
+import time
 import webbrowser
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from posekit.safe_io.writing import write_text
+
+MOST_PAGES: Final = 20
+"""Pages that are kept."""
 
 FRAME_PIXELS: Final = 560
 """Height of a page in a notebook."""
@@ -54,7 +60,7 @@ def show_page(page: str, path: str | Path | None = None) -> ShownPage:
     page : str
         HTML.
     path : path, optional
-        Where it is to be written; a new temporary file if not given.
+        Where it is to be written; a new file in `shown_folder` if not given.
 
     Raises
     ------
@@ -62,11 +68,37 @@ def show_page(page: str, path: str | Path | None = None) -> ShownPage:
         Where it cannot be written.
     """
     if path is None:
-        path = Path(tempfile.mkdtemp(prefix="posekit-")) / "page.html"
+        path = _page_in(shown_folder())
     file = Path(path).absolute()
     write_text(file, [page])
     opened = not in_notebook() and has_screen() and webbrowser.open(file.as_uri())
     return ShownPage(path=file, opened=opened)
+
+
+def shown_folder() -> Path:
+    """Return the one temporary folder of this user's pages, which holds the last `MOST_PAGES`.
+
+    They outlive the process: a browser may open them later.
+    """
+    user = os.getuid() if hasattr(os, "getuid") else 0
+    folder = Path(tempfile.gettempdir()) / f"posekit-shown-{user}"
+    with suppress(OSError):
+        folder.mkdir(mode=0o700)
+    try:
+        found = folder.lstat()
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="posekit-"))
+    if not stat.S_ISDIR(found.st_mode) or (hasattr(os, "getuid") and found.st_uid != user):
+        return Path(tempfile.mkdtemp(prefix="posekit-"))  # somebody else has the name
+    return folder
+
+
+def _page_in(folder: Path) -> Path:
+    """Name a new page, and leave out the oldest where there are too many."""
+    older = sorted(folder.glob("page-*.html"), key=lambda page: page.name)
+    for page in older[: max(len(older) - MOST_PAGES + 1, 0)]:
+        page.unlink(missing_ok=True)
+    return folder / f"page-{time.time_ns():020d}.html"
 
 
 def has_screen() -> bool:

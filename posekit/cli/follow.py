@@ -44,6 +44,8 @@ def follow(
 
     A line is {"time": seconds, "points": [[x, y], …]} or {"time": …, "points": {"left_wrist": [x, y, confidence], …}}.
     The first may be a header instead: camera, size, lengths, stature, deviation, layout; options come before it.
+    Of a recording, all frames at once: posekit recover --follow. From Python live: posekit.Tracker; of a recovery:
+    posekit.follow.
     """
     if not stdin:
         raise InputError("posekit follow: nothing says what to follow; expected JSON lines; give --stdin")

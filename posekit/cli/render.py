@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.options import about, examples, numbers, option, options_given, progress
-from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
-from posekit.conversion.given import frame_count, read_given
+from posekit.conversion.composed import DrawnChoice, write_whole_page
+from posekit.conversion.given import read_given
 from posekit.display.plural import plural
 from posekit.errors import InputError, ViewerError
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from posekit.formats.held_postures import HeldPostures
     from posekit.formats.own import Postures, Result, View
     from posekit.geometry import Array
-    from posekit.viewer.scene.drawn_subject import DrawnSubject, Shown
 
 RENDER_EXAMPLES = examples(
     "posekit render postures.json -o survivors.png --posture groups",
@@ -223,11 +222,6 @@ def render(
         timeout=timeout,
     )
     moving = check_picture(output, shot)
-    together = through_view or truth is not None or (moving and not turntable)
-    arranged = layout or (Layout.SUPERPOSED if together else Layout.SIDE_BY_SIDE)
-    style = Style(
-        layout=arranged.value, background=background, camera=camera and truth is None, ground=ground
-    )
     content, behind = read_given(file, behind_file, explain=rejected)
     if (
         output.suffix.lower() == ".html"
@@ -238,15 +232,22 @@ def render(
         and truth is None
     ):
         with about(file):
-            _write_page(output, content, behind, frame, title=file.name)
+            write_whole_page(output, content, behind, frame=frame, title=file.name)
+        typer.echo(f"written: {output}")
         return
     with about(file):
         true = None
         if truth is not None:
             true = _truth_of(truth, content, behind, behind_file, rejected)
-        subject, frames = _shown(
-            content, behind, frame, posture, rejected, moving=moving and not turntable, truth=true
-        )
+        asked = DrawnChoice(frame=frame, posture=posture, rejected=rejected, truth=true)
+        subject, frames = asked.of(content, behind, moving=moving and not turntable)
+    arranged = asked.layout(moving=moving and not turntable, through_view=through_view)
+    style = Style(
+        layout=layout.value if layout else arranged,
+        background=background,
+        camera=camera and truth is None,
+        ground=ground,
+    )
     if fps is None and moving and not turntable:
         shot = replace(shot, fps=real_time([one.time for one in frames]))
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
@@ -265,55 +266,6 @@ def _refuse_others(options: Sequence[str], beside: str, heeded: Sequence[str]) -
     for name in options:
         if name not in heeded:
             raise InputError(f"{name}: means nothing beside {beside}; expected some of {', '.join(heeded)}")
-
-
-def _write_page(
-    output: Path, content: Result | Postures | HeldPostures, view: View | None, frame: str, *, title: str
-) -> None:
-    from posekit.validation.page_findings import page_findings
-    from posekit.viewer.page.page import write_page
-
-    frames = frame_numbers(frame, frame_count(content))
-    write_page(output, content, view, title=title, frames=frames, findings=page_findings(content))
-    typer.echo(f"written: {output}")
-
-
-def _shown(
-    content: Result | Postures | HeldPostures,
-    view: View | None,
-    frame: str,
-    posture: str,
-    rejected: bool,
-    *,
-    moving: bool,
-    truth: Array | None = None,
-) -> tuple[DrawnSubject, list[Shown]]:
-    """Choose what is drawn of a file."""
-    from posekit.formats.own import Result
-    from posekit.viewer.scene.beside_truth import beside_truth
-    from posekit.viewer.scene.branch import one_a_reason, rejected_of
-    from posekit.viewer.scene.drawn_subject import subject_of
-    from posekit.viewer.scene.likeliest import numbered
-
-    subject = subject_of(content, view)
-    numbers_of_frames = frame_numbers(frame, len(subject.frames))
-    if numbers_of_frames is None:
-        # A path bridges frames without a survivor.
-        path = posture in ("", "path") and isinstance(content, Result) and content.paths is not None
-        filled = [k for k, shown in enumerate(subject.frames) if len(shown) or (path and moving)]
-        numbers_of_frames = filled if moving else filled[:1]
-    if not moving:
-        numbers_of_frames = numbers_of_frames[:1]
-    if rejected:
-        if not isinstance(content, Result):
-            raise InputError("--rejected: postures have no pruned branches; expected a result or a view")
-        return subject, [one_a_reason(rejected_of(content, subject, k)) for k in numbers_of_frames]
-    chosen = chosen_frames(subject, content, posture, numbers_of_frames, moving=moving or truth is not None)
-    if truth is not None:
-        chosen = [beside_truth(one, truth[k]) for one, k in zip(chosen, numbers_of_frames, strict=True)]
-    if isinstance(content, Result):
-        chosen = numbered(chosen, numbers_of_frames)
-    return subject, chosen
 
 
 def _truth_of(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from posekit.conversion.gaps import GAP_FILLINGS
+from posekit.conversion.held import Held, content_of, read_held
 from posekit.conversion.motion_output import (
     TABLE_FORMATS,
     MotionOutput,
@@ -16,7 +17,7 @@ from posekit.conversion.motion_output import (
     write_points,
 )
 from posekit.conversion.object_points import write_object_points
-from posekit.conversion.posture_sequence import one_clip, read_clips, read_sequence
+from posekit.conversion.posture_sequence import one_clip, sequence_of
 from posekit.conversion.rerun_recording import write_rerun_result
 from posekit.display.plural import plural
 from posekit.errors import InputError
@@ -24,8 +25,8 @@ from posekit.formats import own as files
 from posekit.formats.cameras import read_cameras, write_cameras
 from posekit.formats.format import Content
 from posekit.formats.keypoints import is_format
-from posekit.formats.motion import UP_DIRECTIONS, motion_formats
-from posekit.formats.own import View
+from posekit.formats.motion import UP_DIRECTIONS, Motion, motion_formats
+from posekit.formats.own import ObjectResult, Result, View
 from posekit.formats.recognising import recognise
 from posekit.safe_io import nearest, refusal, shown
 from posekit.views.opened import of_person
@@ -66,8 +67,10 @@ class Conversion:
 
     Parameters
     ----------
-    given, output : Path
-        The file that is read, and the one that is written.
+    given : Path, Result, View, Motion, Postures or ObjectResult
+        The file that is read, or what one would hold.
+    output : Path
+        The file that is written.
     to : str
         The format to write: ``view``, ``postures``, or one of motion; by the output's name if empty.
     source : Source
@@ -93,7 +96,7 @@ class Conversion:
         Where the format to write or an axis is none, or the output is the file that is read.
     """
 
-    given: Path
+    given: Path | Held
     output: Path
     to: str = ""
     source: Source
@@ -106,7 +109,13 @@ class Conversion:
     gaps: str = ""
 
     def __post_init__(self) -> None:
-        if self.output.exists() and self.given.exists() and self.output.samefile(self.given):
+        given = self.given
+        if (
+            isinstance(given, Path)
+            and self.output.exists()
+            and given.exists()
+            and self.output.samefile(given)
+        ):
             raise refusal(self.output, "", "the file that is read", "another name", "choose one")
         written = (*OWN_TARGETS, *(one.name for one in motion_formats().values() if one.writes))
         if self.to and is_format(self.to):
@@ -121,6 +130,11 @@ class Conversion:
         for option, axis in (("--up", self.up), ("--input-up", self.input_up)):
             if axis not in ("", *UP_DIRECTIONS):
                 raise refusal(option, "", shown(axis), ", ".join(UP_DIRECTIONS), "name an axis")
+
+    @property
+    def named(self) -> str:
+        """How errors call what is converted: by its file, or by what it is."""
+        return str(self.given) if isinstance(self.given, Path) else content_of(self.given).value
 
     def check_options(self, kind: Content, telling: tuple[str, ...]) -> None:
         """Refuse options that say nothing about such a file: whoever gave them expects something of them."""
@@ -145,50 +159,44 @@ class Conversion:
 
 
 def convert(job: Conversion) -> list[str]:
-    """Convert a file, and return what was done, a line each.
+    """Convert a file or an object, and return what was done, a line each.
 
     Raises
     ------
     InputError
         Where one of the two formats is not known, or cannot carry what the other has.
     """
-    what = recognise(job.given, job.source.format)
-    if what.holds is Content.KEY_POINTS:
+    what = recognise(job.given, job.source.format) if isinstance(job.given, Path) else None
+    holds = content_of(job.given) if what is None else what.holds
+    if holds is Content.KEY_POINTS:
         return _key_points(job)
-    job.check_options(what.holds, OPTIONS_OF.get(what.holds, ()))
-    if what.holds is Content.CAMERAS:
+    job.check_options(holds, OPTIONS_OF.get(holds, ()))
+    if holds is Content.CAMERAS:
         return _cameras(job)
     if job.to == "view":
         raise refusal(
-            job.given, "--to", f"view, of {what.holds.value}", "key points", "convert to postures or motion"
+            job.named, "--to", f"view, of {holds.value}", "key points", "convert to postures or motion"
         )
     output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up, gaps=job.gaps)
-    if what.holds is Content.MOTION and carries_points(output.to):
-        motion = read_clips(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
-        carried = motion if output.to in TABLE_FORMATS else one_clip(motion)
+    held = read_held(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
+    if isinstance(held, Motion) and carries_points(output.to):
+        carried = held if output.to in TABLE_FORMATS else one_clip(held)
         return write_points(output, carried, job.source.skeleton)
-    if what.holds is Content.OBJECTS:
-        found_objects = files.read_object(job.given)
-        return write_object_points(output, found_objects, job.given, posture=job.posture, up=job.input_up)
-    if what.holds is Content.RESULT and output.to == "rerun":
-        return write_rerun_result(job.output, files.read_result(job.given), job.view)
-    found = read_sequence(
-        job.given,
-        what,
-        posture=job.posture,
-        view=job.view,
-        skeleton=job.source.skeleton,
-        clip=job.clip,
-        unit=job.unit,
-        up=job.input_up,
+    if isinstance(held, ObjectResult):
+        return write_object_points(output, held, job.named, posture=job.posture, up=job.input_up)
+    if isinstance(held, Result) and output.to == "rerun":
+        return write_rerun_result(job.output, held, job.view)
+    found = sequence_of(
+        held, job.named, posture=job.posture, view=job.view, skeleton=job.source.skeleton, up=job.input_up
     )
     return write_moving(output, found, every=job.posture == "all")
 
 
 def _key_points(job: Conversion) -> list[str]:
     """Write the views of the people in key points: a file of one, or one a person."""
+    given = Path(job.named)
     to = job.to or ("view" if job.output.suffix.lower() == ".json" else "")
-    if job.given.is_dir() and job.output.resolve().parent == job.given.resolve():
+    if given.is_dir() and job.output.resolve().parent == given.resolve():
         raise refusal(
             job.output, "", "a place among the files that are read", "another folder", "name one beside it"
         )
@@ -201,7 +209,7 @@ def _key_points(job: Conversion) -> list[str]:
             "--to view (.json): key points are of a picture, and not yet in space",
             "recover the view, and convert the result",
         )
-    people = open_views(job.given, job.source)
+    people = open_views(given, job.source)
     says = list(dict.fromkeys(line for each in people for line in each.says))
     for each in people:
         path = of_person(job.output, each, alone=len(people) == 1)
@@ -213,8 +221,8 @@ def _key_points(job: Conversion) -> list[str]:
 def _cameras(job: Conversion) -> list[str]:
     if job.to:
         raise refusal(
-            job.given, "--to", f"{job.to}, of cameras", "a name that ends in .toml or .yml", "leave it out"
+            job.named, "--to", f"{job.to}, of cameras", "a name that ends in .toml or .yml", "leave it out"
         )
-    cameras = read_cameras(job.given)
+    cameras = read_cameras(job.named)
     write_cameras(job.output, cameras)
     return [f"{plural(len(cameras), 'camera')}: {', '.join(cameras)}"]

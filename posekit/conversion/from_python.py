@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
-from posekit.conversion.given import frame_count, read_given
+from posekit.conversion.composed import DrawnChoice, write_whole_page
+from posekit.conversion.given import read_given
+from posekit.conversion.held import Held, content_of
 from posekit.errors import InputError
 from posekit.formats.held_postures import HeldPostures
-from posekit.formats.motion.motion import Motion
-from posekit.formats.own import Postures, Result, View, read_view, write_postures, write_result, write_view
+from posekit.formats.own import Postures, Result, View, read_view
 from posekit.recovery.recovery import Recovery
 from posekit.recovery.result import result_of
 
@@ -23,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def convert(
-    given: str | Path | Recovery | Result | View | Postures | Motion,
+    given: str | Path | Recovery | Held,
     output: str | Path,
     *,
     view: str | Path | View | None = None,
@@ -34,8 +31,8 @@ def convert(
 
     Parameters
     ----------
-    given : path, Recovery, Result, View, Postures or Motion
-        What is converted.
+    given : path, Recovery, Result, View, Postures, Motion or ObjectResult
+        What is converted; nothing is written but the output.
     output : path
         The end of its name says the format, unless `to` does; a name without an end is a folder with the URDF.
     view : path or View, optional
@@ -71,9 +68,15 @@ def convert(
         if name not in allowed:
             raise InputError(f"convert: {name}: is no option; expected some of {', '.join(sorted(allowed))}")
     behind = read_view(view) if isinstance(view, str | Path) else view
-    with _as_file(given) as path:
-        job = Conversion(given=path, output=Path(output), view=behind, source=source or AsItIs(), **options)
-        return run(job)
+    if isinstance(given, str | Path):
+        given = Path(given)
+    elif isinstance(given, Recovery):
+        given = result_of(given)
+    else:
+        content_of(given)
+    return run(
+        Conversion(given=given, output=Path(output), view=behind, source=source or AsItIs(), **options)
+    )
 
 
 def render(
@@ -125,7 +128,6 @@ def render(
     1
     """
     from posekit.viewer.moving import real_time
-    from posekit.viewer.page.page import write_page
     from posekit.viewer.pictures import Shot, check_picture, write_picture
     from posekit.viewer.scene.compose import Style
 
@@ -135,21 +137,13 @@ def render(
     moving = check_picture(output, shot) and not shot.turntable
     content, behind, title = _drawable(given, view)
     if output.suffix.lower() == ".html" and posture in ("", "all") and style is None:
-        from posekit.validation.page_findings import page_findings
-
-        frames = frame_numbers(str(frame), frame_count(content))
-        write_page(output, content, behind, title=title, frames=frames, findings=page_findings(content))
+        write_whole_page(output, content, behind, frame=str(frame), title=title)
         return 1
-    from posekit.viewer.scene.drawn_subject import subject_of
-
-    subject = subject_of(content, behind)
-    chosen = frame_numbers(str(frame), len(subject.frames))
-    if chosen is None:
-        chosen = [k for k, shown in enumerate(subject.frames) if len(shown)]
-    drawn = chosen_frames(subject, content, str(posture), chosen if moving else chosen[:1], moving=moving)
+    asked = DrawnChoice(frame=str(frame), posture=str(posture))
+    subject, drawn = asked.of(content, behind, moving=moving)
     if moving and timed and drawn:
         shot = replace(shot, fps=real_time([one.time for one in drawn]))
-    style = style or Style(layout="superposed" if moving else "side-by-side")
+    style = style or Style(layout=asked.layout(moving=moving, through_view=shot.through_view))
     return write_picture(output, subject, drawn, style=style, shot=shot, title=title)
 
 
@@ -173,32 +167,3 @@ def _drawable(
     raise InputError(
         f"render: got {type(given).__name__}; expected a path, a recovery, a result, a view or postures"
     )
-
-
-@contextmanager
-def _as_file(given: Any) -> Iterator[Path]:
-    """Give the path of a file; an object is written to one that is there meanwhile."""
-    if isinstance(given, str | Path):
-        yield Path(given)
-        return
-    with tempfile.TemporaryDirectory(prefix="posekit-") as folder:
-        if isinstance(given, Recovery | Result):
-            path = Path(folder) / "result.npz"
-            write_result(path, result_of(given) if isinstance(given, Recovery) else given)
-        elif isinstance(given, View):
-            path = Path(folder) / "view.json"
-            write_view(path, given)
-        elif isinstance(given, Postures):
-            path = Path(folder) / "postures.json"
-            write_postures(path, given)
-        elif isinstance(given, Motion):
-            from posekit.formats.motion import write_motion
-
-            path = Path(folder) / "motion.npz"
-            write_motion(path, given, "npz")
-        else:
-            raise InputError(
-                f"convert: got {type(given).__name__}; expected a path, a recovery, a result, a view, postures or "
-                "motion"
-            )
-        yield path

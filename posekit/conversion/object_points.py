@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from posekit.conversion.motion_output import MotionOutput, carries_points, write_points
@@ -15,7 +13,7 @@ from posekit.safe_io import refusal, shown
 
 
 def write_object_points(
-    output: MotionOutput, result: ObjectResult, source: Path, *, posture: str = "", up: str = ""
+    output: MotionOutput, result: ObjectResult, source: str, *, posture: str = "", up: str = ""
 ) -> list[str]:
     """Write one posture of each frame of recovered objects, and say what was written.
 
@@ -25,8 +23,8 @@ def write_object_points(
         What is to be written.
     result : ObjectResult
         What was recovered.
-    source : Path
-        Its file: it names it in errors.
+    source : str
+        How errors call it.
     posture : str
         Which: a number from 0; if empty the first that the object's robot is known to reach, else the first.
     up : str

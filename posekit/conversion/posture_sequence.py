@@ -1,10 +1,9 @@
-"""What moves in a file: postures over time in a world with an up, and the figure's angles where they are asked for."""
+"""What moves: postures over time in a world with an up, and the figure's angles where they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -16,14 +15,11 @@ from posekit.body.anthropometry import lengths_from_postures
 from posekit.display.plural import plural
 from posekit.errors import InputError
 from posekit.following import bridge
-from posekit.formats import own as files
-from posekit.formats.format import Content
-from posekit.formats.held_postures import held_postures
-from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of, read_motion
+from posekit.formats.held_postures import HeldPostures
+from posekit.formats.motion import Motion, SurvivorTable, guess_up, postures_of
 from posekit.formats.motion.motion_axes import up_rotation
-from posekit.formats.own import OpenCVModel, Result, View
+from posekit.formats.own import OpenCVModel, Postures, Result, View
 from posekit.formats.own.survivor_columns import SURVIVOR_COLUMNS
-from posekit.formats.recognising import Recognised
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.recovery.ranked import probabilities
@@ -149,18 +145,6 @@ class PostureSequence:
         )
 
 
-def read_clips(path: Path, what: Recognised, *, clip: str = "", unit: str = "", up: str = "") -> Motion:
-    """Read motion: all of its clips, or the one that is named.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be read, or there is no such clip.
-    """
-    motion = read_motion(path, what.names[0] if what.names else None, unit=unit or None, up=up or None)
-    return motion.of_clip(clip) if clip else motion
-
-
 def one_clip(motion: Motion) -> Motion:
     """Refuse several clips, where one is needed.
 
@@ -177,25 +161,23 @@ def one_clip(motion: Motion) -> Motion:
     return motion
 
 
-def read_sequence(
-    path: Path,
-    what: Recognised,
+def sequence_of(
+    held: Result | View | Motion | Postures | HeldPostures,
+    source: str,
     *,
     posture: str = "",
     view: View | None = None,
     skeleton: str = "",
-    clip: str = "",
-    unit: str = "",
     up: str = "",
 ) -> PostureSequence:
-    """Read what moves in a file.
+    """Make a sequence of what moves: of a result, the truth of a view, motion, or postures one after another.
 
     Parameters
     ----------
-    path : path
-        The file that is read.
-    what : Recognised
-        What the file is.
+    held : Result, View, Motion, Postures or HeldPostures
+        What moves.
+    source : str
+        How errors call it.
     posture : str
         Of a result: ``likeliest``, the number of a survivor from 0, ``path``, or ``all``; if empty the path where the
         frames were followed, else the likeliest.
@@ -203,35 +185,26 @@ def read_sequence(
         What a result was recovered from: its camera's place in the world turns and moves the postures there.
     skeleton : str
         Of motion capture: a skeleton map by name or file.
-    clip, unit : str
-        Of motion capture: one of its clips, and the unit of lengths where the file's is to be overruled.
     up : str
-        The axis that points up, where the file does not say it or is wrong; of a result, that of the camera's frame,
-        or of its world where there is a view.
+        The axis that points up, where it is not known or is wrong; of a result, that of the camera's frame, or of its
+        world where there is a view. Motion says it itself.
 
     Raises
     ------
     InputError
-        Where nothing in it moves, or it cannot be read.
+        Where nothing in it moves.
     """
-    if what.holds is Content.RESULT:
-        return _of_result(files.read_result(path), posture, view, up)
-    if what.holds is Content.VIEW:
-        return _of_truth(files.read_view(path), str(path), up)
-    if what.holds is Content.MOTION:
-        layout = load_skeleton_map(skeleton) if skeleton else None
-        return _of_motion(one_clip(read_clips(path, what, clip=clip, unit=unit, up=up)), layout)
-    if what.holds in (Content.POSTURES, Content.CONFIGURATIONS):
-        held = held_postures(path, what)
-        given = held.postures
-        head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
-        points = np.concatenate([given.joints, head], axis=1)
-        up = up or held.up or _guessed(given.joints, str(path))
-        return _recorded(points, np.arange(len(points)) / ASSUMED_RATE, up)
-    remedy = "; convert the result that it is of" if what.holds is Content.SURVIVORS else ""
-    raise InputError(
-        f"{path}: {what.holds.value}, in which nothing moves; expected a result, postures or motion{remedy}"
-    )
+    if isinstance(held, Result):
+        return _of_result(held, posture, view, up)
+    if isinstance(held, View):
+        return _of_truth(held, source, up)
+    if isinstance(held, Motion):
+        return _of_motion(one_clip(held), load_skeleton_map(skeleton) if skeleton else None)
+    known, given = ("", held) if isinstance(held, Postures) else (held.up, held.postures)
+    head = np.full((len(given.joints), 5, 3), np.nan) if given.head is None else given.head
+    points = np.concatenate([given.joints, head], axis=1)
+    up = up or known or _guessed(given.joints, source)
+    return _recorded(points, np.arange(len(points)) / ASSUMED_RATE, up)
 
 
 def _of_result(result: Result, posture: str, view: View | None, stated: str) -> PostureSequence:

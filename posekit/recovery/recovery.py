@@ -340,7 +340,7 @@ class FrameRecovery(Pictured):
         Parameters
         ----------
         path : path, optional
-            Where the page is written; a new temporary file if not given.
+            Where the page is written; one of the temporary files that are kept if not given (`posekit.viewer.showing`).
 
         Raises
         ------
@@ -447,7 +447,7 @@ class Recovery(Pictured):
         view : View, optional
             What was recovered: the page then shows the image, too.
         path : path, optional
-            Where the page is written; a new temporary file if not given.
+            Where the page is written; one of the temporary files that are kept if not given (`posekit.viewer.showing`).
 
         Raises
         ------

@@ -47,6 +47,9 @@ def follow(
 ) -> Following:
     """Follow the person through the frames of a recovery, whose survivors cost what they are ranked.
 
+    All frames are known: it is what `posekit recover --follow K` does. The command `posekit follow` is live, a picture
+    at a time: that is `posekit.Tracker`.
+
     Parameters
     ----------
     recovery : Recovery

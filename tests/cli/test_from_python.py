@@ -1,5 +1,8 @@
 """`posekit.convert` and `posekit.render` do what the commands do, of files and of objects."""
 
+import tempfile
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -9,6 +12,7 @@ import pytest
 import posekit
 from posekit.errors import InputError
 from posekit.viewer.pictures import Shot
+from posekit.viewer.scene.drawn_subject import Shown
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +39,11 @@ def test_a_file_is_converted_as_by_the_command(
     assert Path(f"mine.{suffix}").read_bytes() == Path(f"theirs.{suffix}").read_bytes()
 
 
-def test_objects_are_converted_as_their_files(file: str, recovery: posekit.Recovery) -> None:
+def test_objects_are_converted_as_their_files(
+    file: str, recovery: posekit.Recovery, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing is written beside the output: no temporary file, either."""
+    monkeypatch.setattr(tempfile, "mkdtemp", lambda *_, **__: pytest.fail("a temporary folder is made"))
     expected = posekit.convert(file, "file.bvh")
     for name, given in {
         "recovery": recovery,
@@ -49,6 +57,8 @@ def test_objects_are_converted_as_their_files(file: str, recovery: posekit.Recov
     motion = posekit.open("recovery.trc", "motion")
     posekit.convert(motion, "motion.csv")
     np.testing.assert_allclose(posekit.open("motion.csv").points, motion.points, rtol=0, atol=1e-9)
+    with pytest.raises(InputError, match="metres, as objects have"):
+        posekit.convert(motion, "motion.csv", unit="mm")
 
 
 def test_a_page_is_the_commands(file: str, command) -> None:
@@ -108,3 +118,25 @@ def test_films_are_as_fast_as_the_frames(
     posekit.render(recovery, tmp_path / "walk.gif")  # 0.2 s from frame to frame
     posekit.render(recovery, tmp_path / "slow.gif", shot=Shot(fps=2.0))
     assert [shot.fps for shot in shots] == [pytest.approx(5.0), 2.0]
+
+
+def test_a_film_is_the_commands(command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """Frames that a path bridges are drawn, and captions have the frames' numbers."""
+    view = posekit.builtin_view("seq1")
+    image = view.image.copy()
+    image[2] = np.nan
+    recovery = posekit.recover(replace(view, image=image))
+    found = posekit.result_of(recovery, following=posekit.follow(recovery, k=1))
+    posekit.write_result(tmp_path / "found.npz", found)
+    films: list[list[str]] = []
+
+    def keep(path: Path, subject: object, frames: Sequence[Shown], **_: object) -> int:
+        films.append([shown.caption for shown in frames])
+        return len(frames)
+
+    monkeypatch.setattr("posekit.viewer.pictures.write_picture", keep)
+    posekit.render(found, tmp_path / "mine.gif")
+    assert command("render", tmp_path / "found.npz", "-o", tmp_path / "theirs.gif").code == 0
+    mine, theirs = films
+    assert mine == theirs and len(mine) == len(view)
+    assert mine[2].startswith("frame 2") and "bridged" in mine[2]

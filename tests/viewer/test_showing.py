@@ -1,6 +1,7 @@
 """Pages shown from Python: in a notebook, in a browser, and where there is neither."""
 
 import sys
+import tempfile
 import types
 import webbrowser
 
@@ -8,6 +9,7 @@ import pytest
 
 import posekit
 from posekit.errors import InputError
+from posekit.viewer.showing import show_page, shown_folder
 
 
 @pytest.fixture(scope="module")
@@ -16,8 +18,9 @@ def recovery():
 
 
 @pytest.fixture
-def opened(monkeypatch):
-    """Take the place of the browser."""
+def opened(monkeypatch, tmp_path):
+    """Take the place of the browser, and of the system's temporary folder."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     asked: list[str] = []
 
     def open_page(url: str) -> bool:
@@ -53,6 +56,23 @@ def test_a_notebook_has_it_in_a_frame_and_opens_nothing(recovery, opened, monkey
     frame = shown._repr_html_()
     assert frame.startswith('<iframe srcdoc="&lt;!DOCTYPE html') and 'sandbox="allow-scripts"' in frame
     assert frame.count('"') == 2 * 5
+
+
+def test_all_pages_share_one_folder_that_does_not_grow(opened, monkeypatch, tmp_path):
+    monkeypatch.setattr("posekit.viewer.showing.MOST_PAGES", 3)
+    shown = [show_page(f"<p>{k}</p>") for k in range(5)]
+    (folder,) = tmp_path.iterdir()
+    assert sorted(folder.iterdir()) == [page.path for page in shown[2:]]
+    assert folder.stat().st_mode & 0o077 == 0
+
+
+def test_a_folder_of_somebody_else_is_not_written_to(opened, tmp_path):
+    (tmp_path / "elsewhere").mkdir()
+    folder = shown_folder()
+    folder.rmdir()
+    folder.symlink_to(tmp_path / "elsewhere")
+    assert show_page("<p></p>").path.parent not in (folder, tmp_path / "elsewhere")
+    assert not list((tmp_path / "elsewhere").iterdir())
 
 
 def test_a_frame_without_postures_says_why(recovery):
