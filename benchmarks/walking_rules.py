@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from ranges import Clip, clips_of  # type: ignore[import-not-found]  # the scripts beside this one
-from real_motion import CHECKS, true_code  # type: ignore[import-not-found]
+from real_motion import CHECK_NAMES, true_code  # type: ignore[import-not-found]
 
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
@@ -115,7 +115,7 @@ def on_views(scenes: Sequence[SyntheticScene]) -> None:
     ranges = load_ranges("anatomical")
     tallies: dict[tuple[str, tuple[int, ...]], list[tuple[bool, int]]] = {}
     for scene in scenes:
-        recovery = recover(view_of(scene), checks=CHECKS, ranges=ranges, tolerance=MEASURED_TOLERANCE)
+        recovery = recover(view_of(scene), checks=CHECK_NAMES, ranges=ranges, tolerance=MEASURED_TOLERANCE)
         for frame, truth in zip(recovery.frames, scene.joints_cam, strict=True):
             joints = frame.joints
             mine = np.array([code == true_code(frame, truth) for code in frame.branches], dtype=bool)

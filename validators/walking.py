@@ -1,19 +1,24 @@
 """The walking model of Lee & Chen 1985, §3.3: Rules 1-5, each on its own switch.
 
-The body plane holds the line from neck to pelvis and is normal to the head's facing direction (to the torso's
-where the head was not seen); the facing direction is the moving direction. The *swing* of a joint is its
-displacement out of that plane, less the one it has when the figure stands at neutral. A swing that is not
-clearly other than zero is no evidence: rules about it are undecided.
+The body plane holds the line from neck to pelvis and is normal to the moving direction. That is where the trunk faces,
+midway between shoulders and hips; in a sequence it is the way that the neck goes (`posekit.recovery.heading`). The
+paper takes the head's facing direction: who stands and turns the head by 15 degrees then swings arm and leg of one side
+together, and breaks Rule 2. So the rules are with `WalkingThresholds.printed`. Of motion in space the rules are judged
+over strides instead (`posekit.validators.motion.walking_phases`).
+
+The *swing* of a joint is its displacement out of the body plane, less the one it has when the figure stands at neutral.
+A swing that is not clearly other than zero is no evidence: rules about it are undecided.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from posekit.body import Figure
 from posekit.body.frames import torso_frame
@@ -48,6 +53,8 @@ class WalkingThresholds:
         Rule 5: degrees above which a knee counts as flexed.
     vertical : float
         Rule 5: degrees that the other leg may lean from the body axis.
+    printed : bool
+        Whether the head tells the moving direction, of each frame by itself, as the paper has it (§3.3).
     """
 
     elbow_swing: float = 0.02
@@ -56,6 +63,7 @@ class WalkingThresholds:
     out_of_plane: float = 10.0
     flexed_knee: float = 15.0
     vertical: float = 30.0
+    printed: bool = False
 
 
 PEOPLE_THRESHOLDS = WalkingThresholds(
@@ -65,7 +73,11 @@ PEOPLE_THRESHOLDS = WalkingThresholds(
 outward leave the moving plane, and while one leg passes the other both knees are in front, and bent."""
 
 THRESHOLDS_BY_WALKERS: Final[Mapping[str, WalkingThresholds]] = MappingProxyType(
-    {"paper": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
+    {
+        "paper": WalkingThresholds(),
+        "people": PEOPLE_THRESHOLDS,
+        "paper-printed": WalkingThresholds(printed=True),
+    }
 )
 """Thresholds by the name that `--walkers` takes."""
 
@@ -79,7 +91,7 @@ def thresholds_of(walkers: str) -> WalkingThresholds:
         Where the name is none of `THRESHOLDS_BY_WALKERS`.
     """
     if walkers not in THRESHOLDS_BY_WALKERS:
-        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(THRESHOLDS_BY_WALKERS)}")
+        raise InputError(f"--walkers: {walkers!r}; expected one of {', '.join(THRESHOLDS_BY_WALKERS)}")
     return THRESHOLDS_BY_WALKERS[walkers]
 
 
@@ -109,29 +121,49 @@ class WalkingAxes(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WalkingRule(Check):
-    """What the rules share: the body's axes and the swings of joints."""
+    """What the rules share: the body's axes and the swings of joints.
+
+    Of frames in a sequence `heading` (F, 3) is the way that the body goes, as `posekit.tree.Check.moving` has it.
+    """
 
     figure: Figure
     thresholds: WalkingThresholds
     places: tuple[Place, ...]
     joints: tuple[int, ...]
+    heading: Array | None = None
     name: str = "walking"
     unit: str = "m"
     scope = Scope.MOTION
 
     @property
     def points(self) -> tuple[int, ...]:
-        """The torso, the head, then the rule's own joints."""
-        return (*(JOINT[name] for name in TORSO), *HEAD, *self.joints)
+        """The torso, the head, then the rule's own joints; last the hips, where these say where the trunk faces."""
+        hips = () if self.thresholds.printed else _indices("right_hip", "left_hip")
+        return (*(JOINT[name] for name in TORSO), *HEAD, *self.joints, *hips)
 
     def body(self, points: Array) -> WalkingAxes:
         """Find the axes of the body plane."""
         R_torso = torso_frame(*np.moveaxis(points[:, :4], 1, 0))
-        R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:9])
-        down = -R_torso[:, :, 2]
-        facing = np.where(np.isnan(R_head[:, :, 0]), R_torso[:, :, 0], R_head[:, :, 0])
+        down, facing = -R_torso[:, :, 2], R_torso[:, :, 0]
+        if self.thresholds.printed:
+            R_head = self.figure.ik.head_frame(points[:, 0], points[:, 4:9])
+            facing = np.where(np.isnan(R_head[:, :, 0]), facing, R_head[:, :, 0])
+        else:
+            hips = unit(cross(down, points[:, -1] - points[:, -2]))
+            facing = facing + np.where(np.isnan(hips), 0.0, hips)
+            if self.heading is not None:
+                facing = np.where(np.isnan(self.heading), facing, self.heading)
         forward = unit(facing - np.einsum("ni,ni->n", facing, down)[:, None] * down)
         return WalkingAxes(forward, cross(forward, down), down)
+
+    def moving(self, heading: Array) -> WalkingRule:
+        """Judge frames by the way that the body goes; see `posekit.tree.Check`."""
+        return self if self.thresholds.printed else replace(self, heading=heading)
+
+    def judge_frames(self, points: Array, frame: NDArray[np.integer]) -> Findings:
+        """Judge postures of some frames; see `posekit.tree.Check`."""
+        one = self if self.heading is None else replace(self, heading=self.heading[frame])
+        return one.judge(points)
 
     def joint(self, points: Array, k: int) -> Array:
         """Return the k-th of the rule's own joints (N, 3)."""

@@ -37,8 +37,8 @@ class Judging:
         str,
         option(
             "--walkers",
-            "paper|people",
-            "Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them.",
+            "paper|people|paper-printed",
+            "Thresholds of those rules: by Lee & Chen's word, as real walkers keep them, or as printed.",
         ),
     ] = "paper"
 

@@ -168,8 +168,8 @@ class JudgedOptions:
         str,
         option(
             "--walkers",
-            "paper|people",
-            "Thresholds of those rules: by Lee & Chen's word, or as real walkers keep them. Default: paper; a "
+            "paper|people|paper-printed",
+            "Thresholds of those rules: by Lee & Chen's word, as real walkers keep them, or as printed. Default: paper; a "
             "result's own.",
         ),
     ] = ""

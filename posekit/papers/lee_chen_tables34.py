@@ -150,6 +150,7 @@ def _recover(scene: SyntheticScene, rules: tuple[int, ...]) -> Recovery:
         view,
         checks=PAPER_CHECKS,
         ranges="table1-printed",
+        walkers="paper-printed",
         rules=rules,
         tolerance=PAPER_TOLERANCE,
         group=GROUPING_METRES,

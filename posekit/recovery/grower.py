@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from posekit.cameras import Camera
+from posekit.cameras import Camera, ScaledOrthographicCamera
 from posekit.display.short_repr import ShortRepr
 from posekit.formats.own import View
 from posekit.geometry import Array
 from posekit.recovery.body import FigureBody, LiftedBody, suite_of
 from posekit.recovery.fit_camera import CameraFit
+from posekit.recovery.heading import headings
 from posekit.recovery.trees import Batch
 from posekit.settings import EXACT_TOLERANCE, Judged, RecoverSettings, Tolerance
 from posekit.skeleton import HIPS, JOINT, RIGID_SEGMENTS, TORSO
@@ -67,6 +68,17 @@ class Grower(ShortRepr):
     settings: RecoverSettings
     nearer: NearerEnds | None = None
 
+    @cached_property
+    def _headings(self) -> Array:
+        """Where the body goes in each hypothesis; nothing is known where depths are not."""
+        if isinstance(self.fit.camera, ScaledOrthographicCamera):
+            return np.full(self.fit.root.shape, np.nan)
+        return headings(self.view.time, self.fit.frame, self.fit.root)
+
+    def in_motion(self, checks: Sequence[Check], hypotheses: NDArray[np.intp]) -> list[Check]:
+        """Tell checks of motion where the body goes in some hypotheses, the frames that they are asked about."""
+        return [check.moving(self._headings[hypotheses]) for check in checks]
+
     def grow(self, chosen: NDArray[np.intp], tolerance: Tolerance, judged: Judged = "given") -> Batch:
         """Grow the trees of some hypotheses: physical checks on the way, the motion model on the leaves."""
         suite, measured = self.suites_of(tolerance)
@@ -95,7 +107,7 @@ class Grower(ShortRepr):
         if self.nearer is not None:
             leaves = self.nearer.prune(leaves, self.fit.frame[chosen])
         physical = leaves.counts() if motion else None  # a joint without a position is no matter of motion
-        leaves = tree.prune(leaves, motion)
+        leaves = tree.prune(leaves, self.in_motion(motion, chosen))
         wanted = told if self.settings.infer else told & ~exact & (judged == "exact")
         left, completion = self.complete(
             leaves, camera, image, suite, tolerance, self.fit.frame[chosen], wanted

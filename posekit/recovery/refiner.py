@@ -224,9 +224,8 @@ class Refiner:
         suite = [
             check for check in self.grower.suites_of(tolerance)[0] if check.noise is not Loosening.REFINED
         ]
-        leaves = self.grower.body.tree.prune(
-            leaves, [check for check in suite if check.scope is Scope.MOTION]
-        )
+        motion = [check for check in suite if check.scope is Scope.MOTION]
+        leaves = self.grower.body.tree.prune(leaves, self.grower.in_motion(motion, own))
         return Lifted(
             chosen=chosen,
             frame=frame.reshape(-1),

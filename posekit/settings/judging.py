@@ -18,7 +18,7 @@ DEFAULT_RANGES: Final = "anatomical"
 """The table of joint ranges by which people are judged unless told otherwise (docs, "Anatomical ranges")."""
 
 WALKING_RULES: Final = (1, 2, 3, 4, 5)
-WALKERS_NAMES: Final = ("paper", "people")
+WALKERS_NAMES: Final = ("paper", "people", "paper-printed")
 
 
 class RangeTable(Protocol):
@@ -47,8 +47,9 @@ class JudgingSettings:
         Joint ranges: ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges.
     rules : sequence of int
         Rules of walking, 1 to 5, used where ``walking`` is among the checks. By default 1 and 2.
-    walkers : {"paper", "people"}
-        Whose thresholds those have: by the paper's word (the default), or as real walkers keep them.
+    walkers : {"paper", "people", "paper-printed"}
+        Whose thresholds those have: by the paper's word (the default), as real walkers keep them, or by its word with
+        the head for the body's direction, which a turned head breaks.
     contact_margin : float
         Metres that bodies must keep from each other; negative allows penetration. By default 0.
 
@@ -130,7 +131,7 @@ def _plain(value: Any) -> Any:
 def check_walkers(walkers: str) -> None:
     """Refuse a name that is none of walkers'."""
     if walkers not in WALKERS_NAMES:
-        raise InputError(f"--walkers: {walkers!r}; expected {' or '.join(WALKERS_NAMES)}")
+        raise InputError(f"--walkers: {walkers!r}; expected one of {', '.join(WALKERS_NAMES)}")
 
 
 def checked_rules(rules: Iterable[int]) -> tuple[int, ...]:

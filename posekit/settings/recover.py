@@ -38,8 +38,8 @@ class RecoverSettings(JudgingSettings, ShortRepr):
         Joint ranges: ``anatomical`` (the default), ``urdf``, ``table1``, the path of a TOML table, or loaded ranges.
     rules : sequence of int
         Rules of walking, 1 to 5, used where ``walking`` is among the checks. By default 1 and 2.
-    walkers : {"paper", "people"}
-        Whose thresholds those have: by the paper's word (the default), or as real walkers keep them.
+    walkers : {"paper", "people", "paper-printed"}
+        Whose thresholds those have: by the paper's word (the default), as real walkers keep them, or as printed.
     tolerance : Tolerance or PartialTolerance, optional
         What may be off. By default each frame is judged as exact where distances inside torso or hips show that it is,
         else as measured, or as a photograph where the view is uncalibrated.

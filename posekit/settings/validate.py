@@ -36,8 +36,8 @@ class ValidateSettings(JudgingSettings, ShortRepr):
         own limits unless the path of a table is given.
     rules : sequence of int
         Rules of walking, 1 to 5. By default 1 and 2.
-    walkers : {"paper", "people"}
-        Whose thresholds those have: by the paper's word, or as real walkers keep them.
+    walkers : {"paper", "people", "paper-printed"}
+        Whose thresholds those have: by the paper's word, as real walkers keep them, or as printed.
     rigid_tolerance : float, optional
         Metres by which distances inside rigid parts, the lengths of the limbs, and the fit of a robot may be off. By
         default 0.03, of a figure more where a spine bends and where noise was measured (docs, "Validate").

@@ -230,6 +230,11 @@ class Check:
         """Judge postures given as the check's own points, (N, len(self.points), 3), metres."""
         raise NotImplementedError
 
+    def judge_frames(self, points: Array, frame: NDArray[np.integer]) -> Findings:
+        """Judge postures of which it is known which frame each is of (N,): all alike unless told otherwise."""
+        del frame
+        return self.judge(points)
+
     def judge_looped(self, points: Array) -> Findings:
         """Judge many postures by compiled loops, to rounding as `judge` does; by that, where there are none."""
         return self.judge(points)
@@ -261,6 +266,17 @@ class Check:
     def oriented(self, up: Array) -> Check:
         """Return the check for postures of whose frame it is known which way is up (3,): for those of scope `VIEW`."""
         del up
+        return self
+
+    def moving(self, heading: Array) -> Check:
+        """Return the check for frames of which it is known where the body goes: for those of scope `MOTION`.
+
+        Parameters
+        ----------
+        heading : array (F, 3)
+            Unit vectors; NaN where that is not known.
+        """
+        del heading
         return self
 
 

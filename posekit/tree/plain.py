@@ -65,7 +65,7 @@ def apply(leaves: Leaves, check: Check) -> Leaves:
     if not len(leaves.code):
         return leaves
     nodes, row = choices(leaves, check)
-    findings = check.judge(leaves.positions(check.points, nodes))
+    findings = check.judge_frames(leaves.positions(check.points, nodes), leaves.frame[nodes])
     violated = findings.violated
     rejected: NDArray[np.bool_] = np.logical_or.reduce(violated, axis=1)
     if not rejected.any():

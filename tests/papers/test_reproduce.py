@@ -162,6 +162,7 @@ def test_the_built_in_view_gives_the_same_counts(name: str) -> None:
         view_of(SCENES[name]()),
         checks=ALL_CHECKS,
         ranges="table1-printed",
+        walkers="paper-printed",
         rules=(1, 2),
         tolerance=PAPER_TOLERANCE,
         group=GROUPING_METRES,

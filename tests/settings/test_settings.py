@@ -121,7 +121,7 @@ def test_nothing_given_is_no_tolerance() -> None:
     ("changes", "says"),
     [
         ({"rules": (9,)}, "--rules: 9 is not a rule"),
-        ({"walkers": "x"}, "--walkers: 'x'; expected paper or people"),
+        ({"walkers": "x"}, "--walkers: 'x'; expected one of paper, people, paper-printed"),
         ({"group": -1.0}, "--group: -1.0 m"),
         ({"contact_margin": float("nan")}, "the contact margin is nan m"),
         ({"scale": "big"}, "--scale"),

@@ -64,9 +64,13 @@ def has_truth(recovery: Any, view: View) -> bool:
 
 
 def test_names_stand_for_thresholds() -> None:
-    assert dict(THRESHOLDS_BY_WALKERS) == {"paper": WalkingThresholds(), "people": PEOPLE_THRESHOLDS}
+    assert dict(THRESHOLDS_BY_WALKERS) == {
+        "paper": WalkingThresholds(),
+        "people": PEOPLE_THRESHOLDS,
+        "paper-printed": WalkingThresholds(printed=True),
+    }
     assert thresholds_of("people") is PEOPLE_THRESHOLDS
-    with pytest.raises(InputError, match="--walkers: 'giants'; expected paper or people"):
+    with pytest.raises(InputError, match="--walkers: 'giants'; expected one of paper, people, paper-printed"):
         thresholds_of("giants")
 
 
@@ -113,7 +117,7 @@ def test_every_way_to_ask_means_the_same(view: View) -> None:
     ],
 )
 def test_other_names_are_refused_at_once(made: Callable[[], object]) -> None:
-    with pytest.raises(InputError, match="--walkers: 'x'; expected paper or people"):
+    with pytest.raises(InputError, match="--walkers: 'x'; expected one of paper, people, paper-printed"):
         made()
 
 
@@ -140,7 +144,7 @@ def test_the_command_line_takes_them(
     ):
         refused = command(*words, "--walkers", "giants")
         assert refused.code == 2
-        assert "--walkers: 'giants'; expected paper or people" in refused.err
+        assert "--walkers: 'giants'; expected one of paper, people, paper-printed" in refused.err
     assert command("evaluate", "view.json", "-o", "e.json", *walking, "--walkers", "people").code == 0
     assert json.loads(Path("e.json").read_text(encoding="utf-8"))["all"]["retained_within_35mm"] == 1.0
 
