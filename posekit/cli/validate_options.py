@@ -169,8 +169,8 @@ class JudgedOptions:
         option(
             "--walkers",
             "paper|people|paper-printed",
-            "Thresholds of those rules: by Lee & Chen's word, as real walkers keep them, or as printed. Default: paper; "
-            "a result's own.",
+            "Thresholds of those rules: by Lee & Chen's word, as real walkers keep them, or as printed. Default: "
+            "paper; a result's own.",
         ),
     ] = ""
     rigid_tolerance: Annotated[
