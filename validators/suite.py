@@ -58,8 +58,8 @@ class Judgement:
         return np.asarray(np.fmin.reduce(self.margin, axis=1))
 
     def without(self, rows: NDArray[np.bool_]) -> Judgement:
-        """Return it with nothing decided of some postures (N,)."""
-        column = rows[:, None]
+        """Return it with nothing decided of some postures (N,), or at some of their places (N, K)."""
+        column = rows if rows.ndim == 2 else rows[:, None]
         return replace(
             self,
             value=np.where(column, np.nan, self.value),

@@ -26,7 +26,7 @@ from posekit.validation.batches import (
     postures_given,
     recordings_given,
 )
-from posekit.validation.over_time import frames_of, judged_over_time
+from posekit.validation.over_time import frames_of, judged_over_time, left_to_strides
 from posekit.validation.people import PeopleTold
 from posekit.validation.spans import clip_verdicts
 from posekit.validation.stills import MOST_DRAWN_CLIPS, stills_of, worst_stills
@@ -178,7 +178,8 @@ class ReportBuilder:
             mine = found[id(judged.job)]
             over_time = judged.job.over_time
             judgements = over_time[judged.recording] if over_time else ()
-            verdicts = judged.verdicts.joined([one.of(judged.part) for one in judgements])
+            later = [one.of(judged.part) for one in judgements]
+            verdicts = left_to_strides(judged.verdicts, later).joined(later)
             columns, shown = self._judged(verdicts, MAX_LISTED - len(self._listed) - len(mine.listed))
             mine.listed.extend((int(judged.rows[k]), one) for k, one in shown)
             mine.parts.append(columns)

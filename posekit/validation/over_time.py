@@ -16,8 +16,10 @@ from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.validation.people import Recording
 from posekit.validation.robot_motion import moves_of
 from posekit.validators import Judgement, Validator
+from posekit.validators import Report as Verdicts
 from posekit.validators.measured import recorded_noise
 from posekit.validators.motion import MotionClip, judge_motion
+from posekit.validators.motion.walking_phases import RULES_OVER_STRIDES, WalkingPhases
 
 
 def clip_of(held: HeldPostures, rows: NDArray[np.intp], validator: Validator) -> MotionClip:
@@ -83,6 +85,35 @@ def judged_over_time(
             not_asked += list(verdict.not_asked.items())
         judgements.append(found)
     return judgements, not_asked
+
+
+def left_to_strides(verdicts: Verdicts, over_time: Sequence[Judgement]) -> Verdicts:
+    """Leave rules of walking that speak of motion to `WalkingPhases`, in the clips that it was asked about.
+
+    Parameters
+    ----------
+    verdicts : Report
+        What the checks of postures say, each frame by itself.
+    over_time : sequence of Judgement
+        What checks over time say of the same postures.
+    """
+    name = WalkingPhases.name.replace("-", "_")
+    asked = next(
+        (np.asarray(~np.isnan(one.upper).any(axis=1)) for one in over_time if one.check == name), None
+    )
+    if asked is None or not asked.any():
+        return verdicts
+    rules = tuple(f"rule{rule}." for rule in RULES_OVER_STRIDES)
+    left = [
+        replace(
+            one.without(asked[:, None] & np.array([where.startswith(rules) for where in one.where])),
+            over_time=bool(asked.all()),
+        )
+        if one.check == "walking"
+        else one
+        for one in verdicts.judgements
+    ]
+    return replace(verdicts, judgements=left)
 
 
 def _spread(judgement: Judgement, at: NDArray[np.intp], count: int) -> Judgement:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -14,6 +14,7 @@ from posekit.settings import ValidateSettings
 from posekit.tables.built_in import built_in_document
 from posekit.validators.motion.motion_check import MotionCheck
 from posekit.validators.motion.registry import MOTION_CHECKS
+from posekit.validators.motion.walking_phases import RULES_OVER_STRIDES, WalkingPhases
 
 BUILT_IN_PROFILES: Final = ("posekit", "phuma")
 """Profiles that come with the package."""
@@ -109,6 +110,8 @@ class ProfiledSettings(NamedTuple):
 def with_profile(asked: ValidateSettings) -> ProfiledSettings:
     """Take the checks over time out of what is asked: all of the profile's where no check is named.
 
+    Rules of walking that speak of motion are judged over strides, too, unless they are asked for as printed.
+
     Parameters
     ----------
     asked : ValidateSettings
@@ -118,7 +121,11 @@ def with_profile(asked: ValidateSettings) -> ProfiledSettings:
     if asked.checks is None:
         return ProfiledSettings(asked, profile)
     over_time = [check for check in asked.checks if check.name in MOTION_CHECKS]
+    chosen = profile.only(check.name for check in over_time)
+    names = {check.name for check in asked.checks}
+    rules = ",".join(str(rule) for rule in asked.rules if rule in RULES_OVER_STRIDES)
+    if "walking" in names and WalkingPhases.name not in names and asked.walkers != "paper-printed" and rules:
+        chosen = replace(chosen, checks=(*chosen.checks, WalkingPhases(rules=rules)))
     return ProfiledSettings(
-        asked.changed(checks=[check for check in asked.checks if check not in over_time]),
-        profile.only(check.name for check in over_time),
+        asked.changed(checks=[check for check in asked.checks if check not in over_time]), chosen
     )

@@ -23,6 +23,7 @@ from posekit.validators.motion.support import Support
 from posekit.validators.motion.swap import Swap
 from posekit.validators.motion.teleport import Teleport
 from posekit.validators.motion.timing import Timing
+from posekit.validators.motion.walking_phases import WalkingPhases
 
 MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
     check.name: check
@@ -50,6 +51,7 @@ MOTION_CHECKS: Final[Mapping[str, type[MotionCheck]]] = {
         ContactShare,
         RootHeight,
         SupportDistance,
+        WalkingPhases,
     )
 }
 """In the order in which they are reported."""
