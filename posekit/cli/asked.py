@@ -7,11 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
 from posekit.cli.judging_options import Judging, Tolerances
 from posekit.cli.noise_options import Uncertain
 from posekit.cli.options import about, progress_so_far
+from posekit.cli.terminal import say
 from posekit.errors import InputError, PosekitError
 
 if TYPE_CHECKING:
@@ -62,7 +61,7 @@ def leaving_out(one: Opened, people: Sequence[Opened], recovered: Sequence[objec
     except PosekitError as error:
         if len(people) == 1 or (one is people[-1] and not recovered):
             raise
-        typer.echo(f"posekit: warning: person {one.person} is left out: {error}", err=True)
+        say(f"posekit: warning: person {one.person} is left out: {error}", err=True)
 
 
 def refuse_unrecovered(recovery: Recovery, path: Path) -> None:
@@ -115,7 +114,7 @@ def check_noise(seen: View, deviation: float | None) -> None:
     refuse_deviation(seen, deviation)
     camera = noiseless_camera(seen)
     if camera and seen.deviation is not None:
-        typer.echo(
+        say(
             f"posekit: warning: the view's deviation of {seen.deviation:g} px has no effect: its camera is "
             f"{camera}, whose noise is not allowed for",
             err=True,

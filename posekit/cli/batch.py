@@ -18,6 +18,7 @@ from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
 from posekit.cli.noise_options import UncertainAsRecover
 from posekit.cli.options import ContactMargin, examples, option, signed_length
+from posekit.cli.terminal import say
 from posekit.display.plural import plural
 
 if TYPE_CHECKING:
@@ -127,7 +128,7 @@ def batch(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        typer.echo(f"posekit: error: interrupted; run it again to go on in {output}", err=True)
+        say(f"posekit: error: interrupted; run it again to go on in {output}", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None
     _report(summary, output)
     if summary.failures:
@@ -137,24 +138,24 @@ def batch(
 def _report(summary: Summary, output: Path) -> None:
     """Print what is there, and what failed."""
     there = f", {summary.skipped} of them from before" if summary.skipped else ""
-    typer.echo(
+    say(
         f"{plural(summary.frames, 'frame')} of {plural(summary.inputs, 'input')} in "
         f"{plural(summary.shards, 'shard')}{there}: "
         f"{plural(summary.survivors, 'survivor')}, {plural(summary.empty, 'frame')} without any"
     )
     for failure in summary.failures[:5]:
         what = failure.shard or failure.input
-        typer.echo(f"posekit: warning: {what} failed: {failure.error}", err=True)
+        say(f"posekit: warning: {what} failed: {failure.error}", err=True)
     if summary.failures:
         missing = summary.planned - summary.frames
-        typer.echo(
+        say(
             f"posekit: warning: {len(summary.failures)} failed, {plural(missing, 'frame')} are missing; all "
             "are named in "
             f"{output / 'manifest.json'}; run it again to try them again",
             err=True,
         )
     peak = f", at most {summary.peak / 2**20:.0f} MiB a process" if summary.peak else ""
-    typer.echo(f"{summary.seconds:.1f} s{peak}; written: {output}")
+    say(f"{summary.seconds:.1f} s{peak}; written: {output}")
 
 
 @contextmanager

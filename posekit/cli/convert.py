@@ -13,6 +13,7 @@ from posekit.cli.detector_options import Deviation, Proportions, Reading, Unit, 
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
 from posekit.cli.options import distinct, examples, option
+from posekit.cli.terminal import say
 from posekit.errors import PosekitError
 
 CONVERT_EXAMPLES = examples(
@@ -112,8 +113,8 @@ def convert(
     with _naming(given, output):
         lines = run(job)
     for line in lines:
-        typer.echo(line)
-    typer.echo(f"written: {output}")
+        say(line)
+    say(f"written: {output}")
 
 
 @contextmanager

@@ -7,9 +7,8 @@ import sys
 from pathlib import Path
 from typing import Annotated, Final
 
-import typer
-
 from posekit.cli.options import Pictures, examples, option
+from posekit.cli.terminal import say
 
 DEMO_EXAMPLES = examples("posekit demo -o demo-results")
 
@@ -31,10 +30,10 @@ def demo(
 
     make_folder(output)
     for line in papers.demo(output, pictures=pictures):
-        typer.echo(line)
-    typer.echo("\ntry next, and open postures.html in a browser:")
+        say(line)
+    say("\ntry next, and open postures.html in a browser:")
     for command in TRY_NEXT:
-        typer.echo(f"  {program()} {command}")
+        say(f"  {program()} {command}")
 
 
 def program() -> str:

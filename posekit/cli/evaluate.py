@@ -14,6 +14,7 @@ from posekit.cli.detector_source import pixels
 from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
 from posekit.cli.options import Seed, as_recover, distinct, examples, option, options_given, progress, split
+from posekit.cli.terminal import say
 from posekit.errors import InputError
 
 if TYPE_CHECKING:
@@ -183,8 +184,8 @@ def evaluate(
         evaluation.write_evaluation(path, found)
     written = [*output, *(write_plots(output[0], found) if plots else ())]
     for line in summary(found):
-        typer.echo(line)
-    typer.echo(f"written: {', '.join(map(str, written))}")
+        say(line)
+    say(f"written: {', '.join(map(str, written))}")
 
 
 def _read(path: Path, *, format: str, skeleton: str, unit: str, up: str) -> Capture | View:

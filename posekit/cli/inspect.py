@@ -10,6 +10,7 @@ import typer
 from posekit.cli.detector_options import Format, Reading, Size, Skeleton, SwapSides, Unit, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.options import examples
+from posekit.cli.terminal import say
 
 INSPECT_EXAMPLES = examples(
     "posekit inspect keypoints/",
@@ -35,4 +36,4 @@ def inspect(
 
     source = source_of(Reading(format=format, skeleton=skeleton, size=size, swap_sides=swap_sides), Who())
     for line in describe(file, source, unit=unit):
-        typer.echo(line)
+        say(line)

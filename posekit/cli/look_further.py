@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-import typer
+from posekit.cli.terminal import say
 
 
 def further_lines(result: Path, view: Path | None, program: str = "posekit") -> list[str]:
@@ -54,4 +54,4 @@ def tell_further(result: Path, view: Path | None = None) -> None:
     from posekit.cli.demo import program
 
     for line in further_lines(result, view, program()):
-        typer.echo(line)
+        say(line)

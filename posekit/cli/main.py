@@ -13,7 +13,9 @@ from typing import Annotated, Any, Final, TextIO
 import typer
 
 from posekit.cli.options import examples
+from posekit.cli.terminal import say
 from posekit.errors import PosekitError
+from posekit.safe_io import bounded
 
 BAD_INPUT = 2
 
@@ -46,7 +48,7 @@ def _print_version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        typer.echo(f"posekit {version('posekit')}")
+        say(f"posekit {version('posekit')}")
         raise typer.Exit
 
 
@@ -116,7 +118,7 @@ def main() -> None:
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:
-    typer.echo(f"posekit: error: {' '.join(message.split())}", err=True)
+    say(f"posekit: error: {bounded(' '.join(message.split()))}", err=True)
     return code
 
 
@@ -131,4 +133,4 @@ def _warn(
     """Print a warning to the user as one line, without the place in the code; others are for developers."""
     if not issubclass(category, UserWarning):
         return
-    typer.echo(f"posekit: warning: {' '.join(str(message).split())}", err=True)
+    say(f"posekit: warning: {bounded(' '.join(str(message).split()))}", err=True)

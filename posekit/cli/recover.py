@@ -26,6 +26,7 @@ from posekit.cli.options import (
     signed_length,
 )
 from posekit.cli.recover_object import recover_object, refuse_options_of_persons
+from posekit.cli.terminal import say
 from posekit.display.plural import plural
 from posekit.errors import InputError
 
@@ -171,7 +172,7 @@ def recover(
             recovered.append((one, recovery, scaled))
     for one, recovery, scaled in recovered:
         for line in one.says:
-            typer.echo(line)
+            say(line)
         path, figure_path = output, write_urdf
         if len(people) > 1:
             path = of_person(output, one, alone=False)
@@ -183,7 +184,7 @@ def recover(
         files.write_result(path, _with_pictures(result, one))
         summarize(recovery)
         _tell(recovery, scaled, following, None if truth is None else one.view)
-        typer.echo(f"written: {path}")
+        say(f"written: {path}")
     first, found, _ = recovered[0]
     if any(len(frame) for frame in found.frames):
         written = output if len(people) == 1 else of_person(output, first, alone=False)
@@ -210,19 +211,19 @@ def _tell(
 ) -> None:
     """Print the scale that was found, the paths, and how far the survivors are from the truth of a view."""
     if scaled is not None:
-        typer.echo(_scale_line(scaled))
+        say(_scale_line(scaled))
     if following is not None:
         from posekit.recovery.summary import following_line
         from posekit.recovery.swapped_labels import swapped_line
 
         if line := swapped_line(recovery):
-            typer.echo(line)
-        typer.echo(following_line(following))
+            say(line)
+        say(following_line(following))
     if truth is not None:
         from posekit.evaluate.comparison import compare
 
         for line in compare(recovery, truth.truth).lines:
-            typer.echo(line)
+            say(line)
 
 
 def _followed(recovery: Recovery, scaled: ScaledFollowing | None, view: Path, paths: int) -> Following | None:
@@ -258,10 +259,10 @@ def summarize(recovery: Recovery) -> None:
     from posekit.recovery.summary import summary_lines
 
     for line in [*summary_lines(recovery), *advice_lines(recovery)]:
-        typer.echo(line)
+        say(line)
     changed = closing_line(recovery.figure.moved_lengths)
     if changed:
-        typer.echo(f"posekit: warning: {changed}", err=True)
+        say(f"posekit: warning: {changed}", err=True)
     total = len(recovery.frames)
     reasons = sorted(recovery.unrecovered.items(), key=lambda pair: -len(pair[1]))
     for reason, frames in reasons[:REASONS_SHOWN]:
@@ -269,13 +270,13 @@ def summarize(recovery: Recovery) -> None:
             ", …" if len(frames) > FRAMES_NAMED_IN_WARNINGS else ""
         )
         which = f"frame{'s' if len(frames) > 1 else ''} {named}"
-        typer.echo(
+        say(
             f"posekit: warning: {len(frames)} of {plural(total, 'frame')} not recovered: {reason} ({which})",
             err=True,
         )
     others = sum(len(frames) for _, frames in reasons[REASONS_SHOWN:])
     if others:
-        typer.echo(
+        say(
             f"posekit: warning: {others} more not recovered, each with its reason in the result's "
             "settings.unrecovered",
             err=True,
@@ -286,7 +287,7 @@ def summarize(recovery: Recovery) -> None:
         calibrated = recovery.grower is not None and isinstance(recovery.grower.view.camera, OpenCVModel)
         noise = "their noise said (--deviation PX), or more tolerance" if calibrated else "more tolerance"
         head = "" if recovery.frames[0].family else ", and a noisy head a given root"
-        typer.echo(
+        say(
             f"posekit: warning: {empty} of {plural(total, 'frame')} have no posture; the table says what "
             "rejected most; noisy "
             f"points need {noise} (--rigid-tolerance, --angle-tolerance, --tangent-tolerance){head}",

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
-import typer
-
 from posekit.cli.judging_options import Tolerances
 from posekit.cli.options import about, progress
+from posekit.cli.terminal import say
 from posekit.errors import InputError
 
 OPTIONS_OF_OBJECTS: Final = (
@@ -59,5 +58,5 @@ def recover_object(
         )
     files.write_object(output, result)
     for line in objects.object_lines(result):
-        typer.echo(line)
-    typer.echo(f"written: {output}")
+        say(line)
+    say(f"written: {output}")

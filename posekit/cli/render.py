@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.options import about, examples, numbers, option, options_given, progress
+from posekit.cli.terminal import say
 from posekit.conversion.composed import DrawnChoice, write_whole_page
 from posekit.conversion.given import read_given
 from posekit.display.plural import plural
@@ -233,7 +234,7 @@ def render(
     ):
         with about(file):
             write_whole_page(output, content, behind, frame=frame, title=file.name)
-        typer.echo(f"written: {output}")
+        say(f"written: {output}")
         return
     with about(file):
         true = None
@@ -253,7 +254,7 @@ def render(
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
         count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
     pictures = f" ({plural(count, 'picture')})" if moving else ""
-    typer.echo(f"written: {output}{pictures}")
+    say(f"written: {output}{pictures}")
 
 
 OVER_OPTIONS = ("--output", "--view", "--over", "--frame", "--posture", "--size", "--fps")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-import typer
-
 from posekit.cli.options import about, distinct
+from posekit.cli.terminal import say
 from posekit.cli.true_joints import true_joints
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import read_given
@@ -68,7 +67,7 @@ def render_angles(
         times = np.array([one.time for one in subject.frames])
         true = true_joints(truth, view, seen[0] if seen else None, times)[0]
     limits = judged_limits(content)
-    typer.echo(f"limits: {'as the result was judged' if limits else 'anatomical, the usual ones'}")
+    say(f"limits: {'as the result was judged' if limits else 'anatomical, the usual ones'}")
     plot = plot_angles(
         content,
         view,
@@ -80,4 +79,4 @@ def render_angles(
         subject=subject,
     )
     save(plot, output)
-    typer.echo(f"written: {output} ({plural(count, 'angle')}, {plural(len(rows), 'frame')})")
+    say(f"written: {output} ({plural(count, 'angle')}, {plural(len(rows), 'frame')})")

@@ -7,9 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from posekit.cli.options import about, distinct, progress
+from posekit.cli.terminal import say
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import read_given
 from posekit.display.plural import plural
@@ -67,8 +66,8 @@ def render_over(
     with progress("drawing", len(frames or people[0].frames)) as done:
         count, said = write_overlay(output, people, source, replace(overlay, frames=frames), progress=done)
     for line in said:
-        typer.echo(line)
-    typer.echo(f"written: {output} ({plural(count, 'picture')})")
+        say(line)
+    say(f"written: {output} ({plural(count, 'picture')})")
 
 
 def _person(path: Path, seen: Path | None, posture: str) -> OverlaidPerson:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from posekit.cli.options import Pictures, examples, option
+from posekit.cli.terminal import say
 from posekit.errors import InputError
 
 PAPER_NAMES = ("lee-chen", "taylor")
@@ -30,5 +31,5 @@ def reproduce(
     make_folder(output)
     make = papers.reproduce_lee_chen if paper == "lee-chen" else papers.reproduce_taylor
     for line in make(output, pictures=pictures):
-        typer.echo(line)
-    typer.echo(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")
+        say(line)
+    say(f"written: {output / f'{paper}.md'}, {output / f'{paper}.json'}")

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from posekit.cli.options import examples
+from posekit.cli.terminal import say
 
 SAMPLES_EXAMPLES = examples(
     "posekit samples samples",
@@ -26,5 +27,5 @@ def samples(
     contents = write_samples(folder)
     width = max(map(len, contents))
     for name, what in contents.items():
-        typer.echo(f"{name:{width}}  {what}")
-    typer.echo(f"written: {folder}")
+        say(f"{name:{width}}  {what}")
+    say(f"written: {folder}")

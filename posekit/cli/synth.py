@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.options import Noise, OutputView, Seed, examples, numbers, option
+from posekit.cli.terminal import say
 from posekit.display.plural import plural
 from posekit.errors import InputError
 
@@ -143,7 +144,7 @@ def mocap(
         if len(scene.joints_cam) == frames:
             break
     else:
-        typer.echo(
+        say(
             f"{len(scene.joints_cam)} of {plural(frames, 'frame')}: the clip has no more; name another --clip or --dt"
         )
     _write(output, scene, noise, seed, uncalibrated=uncalibrated, pictures=pictures)
@@ -172,7 +173,7 @@ def articulated(
     thing = objects.load_object(robot)
     view = objects.draw_view(thing, frames, np.random.default_rng(seed), noise=noise, scale_known=False)
     files.write_object_view(output, view)
-    typer.echo(f"written: {output} ({plural(frames, 'frame')} of {', '.join(thing.linkage.points)})")
+    say(f"written: {output} ({plural(frames, 'frame')} of {', '.join(thing.linkage.points)})")
 
 
 def _check_name(output: Path) -> None:
@@ -208,6 +209,6 @@ def _write(
     if pictures is not None:
         from posekit.viewer.overlay import write_photographs
 
-        typer.echo(f"written: {pictures} ({plural(write_photographs(pictures, view), 'picture')})")
+        say(f"written: {pictures} ({plural(write_photographs(pictures, view), 'picture')})")
     files.write_view(output, views.forget_camera(view) if uncalibrated else view)
-    typer.echo(f"written: {output} ({plural(len(scene), 'frame')})")
+    say(f"written: {output} ({plural(len(scene), 'frame')})")

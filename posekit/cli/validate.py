@@ -12,6 +12,7 @@ import typer
 from posekit.cli.groups import with_groups
 from posekit.cli.main import BAD_INPUT
 from posekit.cli.options import distinct, examples, option, progress
+from posekit.cli.terminal import say
 from posekit.cli.validate_options import BodyOptions, JudgedOptions, StatedOptions, asked_of
 from posekit.cli.validate_output import FailOver, ValidateOutput, parse_fail_over
 from posekit.display.plural import plural
@@ -153,7 +154,7 @@ def validate(
     said = [*outputs.write(report), *said]
     _tell(report)
     for line in said:
-        typer.echo(line)
+        say(line)
     if report.refused:
         raise typer.Exit(BAD_INPUT)
     if allowed.exceeded(report) if repair is None else allowed.exceeded_by_records(report.repair):
@@ -187,13 +188,13 @@ def _validate_archive(
     with progress("judging", len(files)) as done:
         totals = validate_archive(files, output, asked, Workers(jobs=jobs), progress=done)
     for line in _bounded(totals.refused, MAX_REFUSED, "files that could not be judged"):
-        typer.echo(f"posekit: error: {line}", err=True)
+        say(f"posekit: error: {line}", err=True)
     for name, counts in (("frames", totals.frames), ("clips", totals.clips)):
         told = ", ".join(f"{counts[verdict]:,} {verdict}" for verdict in ("valid", "invalid", "undecided"))
-        typer.echo(f"{counts.total():,} {name}: {told}")
+        say(f"{counts.total():,} {name}: {told}")
     for check, count in totals.rejected.most_common():
-        typer.echo(f"  {check}: {plural(count, 'frame')} rejected")
-    typer.echo(f"written: {output}, {plural(totals.parts, 'part')}, {totals.skipped} of them from before")
+        say(f"  {check}: {plural(count, 'frame')} rejected")
+    say(f"written: {output}, {plural(totals.parts, 'part')}, {totals.skipped} of them from before")
     if totals.refused:
         raise typer.Exit(BAD_INPUT)
     counts = totals.clips if allowed.clips else totals.frames
@@ -209,28 +210,28 @@ def _tell(report: ValidationReport) -> None:
     from posekit.validation import said_of
 
     for line in _bounded(report.refused, MAX_REFUSED, "files that could not be judged"):
-        typer.echo(f"posekit: error: {line}", err=True)
+        say(f"posekit: error: {line}", err=True)
     left_out = report.settings.get("left_out", ())
     if left_out:
         more = f" and {len(left_out) - 1} more" if len(left_out) > 1 else ""
-        typer.echo(f"posekit: warning: left out, as they hold no postures: {left_out[0]}{more}", err=True)
+        say(f"posekit: warning: left out, as they hold no postures: {left_out[0]}{more}", err=True)
     changed = closing_line(report.settings.get("moved_lengths", {}))
     if changed:
-        typer.echo(f"posekit: warning: {changed}", err=True)
+        say(f"posekit: warning: {changed}", err=True)
     for line in _bounded(
         report.settings.get("recognised", ()), MAX_RECOGNISED, "such sentences in the report"
     ):
-        typer.echo(line)
+        say(line)
     for line in summary_table(columns_of(report)):
-        typer.echo(line)
+        say(line)
     for line in (*(clip_lines(report.clips) if report.clips else ()), *said_of(report)):
-        typer.echo(line)
+        say(line)
     reasons: dict[str, list[str]] = {}
     for check, why in report.settings.get("not_asked", {}).items():
         for reason in why:
             reasons.setdefault(reason, []).append(check)
     for reason, checks in reasons.items():
-        typer.echo(f"not asked: {', '.join(checks)}: {reason}")
+        say(f"not asked: {', '.join(checks)}: {reason}")
 
 
 def _bounded(lines: Sequence[str], most: int, what: str) -> Iterator[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from posekit.cli.options import about, examples, option
+from posekit.cli.terminal import say
 from posekit.conversion.given import read_given
 from posekit.errors import InputError
 
@@ -68,12 +69,12 @@ def view(
         )
     with served as server:
         try:
-            typer.echo(f"{server.url}  (this machine only; Ctrl-C ends)")
+            say(f"{server.url}  (this machine only; Ctrl-C ends)")
             if open_ and has_screen():
                 webbrowser.open(server.url)
             server.serve_forever()
         except KeyboardInterrupt:
-            typer.echo("stopped")
+            say("stopped")
 
 
 def _as_page(

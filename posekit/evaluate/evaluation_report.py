@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Final
@@ -13,8 +13,9 @@ from posekit.display.plural import plural
 from posekit.evaluate.condition import curves, lost_to, numbers
 from posekit.evaluate.evaluated_frames import CONDITION_KEYS
 from posekit.evaluate.evaluation import Evaluation
-from posekit.formats.markdown import table_lines
+from posekit.formats.markdown import no_markup, table_lines
 from posekit.formats.own.npz import suffix
+from posekit.safe_io import one_line
 from posekit.safe_io.writing import check_target, json_pieces, write_lines, write_text
 
 EVALUATION_SCHEMA: Final = "posekit.evaluation/1"
@@ -52,7 +53,7 @@ def write_evaluation(path: str | Path, evaluation: Evaluation) -> None:
         head, conditions = document(evaluation)
         write_text(path, json_pieces(head, "conditions", conditions))
     else:
-        write_lines(path, csv_lines(evaluation) if kind == ".csv" else summary(evaluation))
+        write_lines(path, csv_lines(evaluation) if kind == ".csv" else summary(evaluation, markdown=True))
 
 
 def document(evaluation: Evaluation) -> tuple[dict[str, Any], Iterator[dict[str, Any]]]:
@@ -89,8 +90,17 @@ def csv_lines(evaluation: Evaluation) -> Iterator[str]:
         yield _line(row.get(name) for name in head)
 
 
-def summary(evaluation: Evaluation) -> list[str]:
-    """Return the tables: by noise, by action at the least noise, what killed the truth, and violations."""
+def summary(evaluation: Evaluation, *, markdown: bool = False) -> list[str]:
+    """Return the tables: by noise, by action at the least noise, what killed the truth, and violations.
+
+    Parameters
+    ----------
+    evaluation : Evaluation
+        What was found.
+    markdown : bool
+        Whether names are escaped for a file that is rendered; else for a terminal.
+    """
+    spelled = no_markup if markdown else one_line
     frames, material = evaluation.frames, evaluation.material
     every = numbers(frames, next(iter(frames.conditions(()))).rows)
     cameras = evaluation.settings.get("yaws")
@@ -100,10 +110,10 @@ def summary(evaluation: Evaluation) -> list[str]:
         else ""
     )
     lines = [
-        f"{plural(len(frames), 'view')} of {evaluation.settings['source']}{seen}, ranges "
+        f"{plural(len(frames), 'view')} of {spelled(str(evaluation.settings['source']))}{seen}, ranges "
         f"{evaluation.settings['ranges']}"
     ]
-    lines += [f"left out: {line}" for line in material.left_out]
+    lines += [f"left out: {spelled(line)}" for line in material.left_out]
     if material.out_of_picture:
         lines.append(
             f"left out: {plural(material.out_of_picture, 'view')} in which the person leaves the picture"
@@ -112,7 +122,7 @@ def summary(evaluation: Evaluation) -> list[str]:
     by_noise = [
         (f"{key['noise']:g} px", numbers(frames, rows)) for key, rows in frames.conditions(("noise",))
     ]
-    lines += _table("added noise", by_noise)
+    lines += _table("added noise", by_noise, spelled)
     least = min(frames.keys["noise"])
     lines += [f"By action, at {least:g} px of added noise", ""]
     lines += _table(
@@ -122,10 +132,11 @@ def summary(evaluation: Evaluation) -> list[str]:
             for key, rows in frames.conditions(("action", "noise"))
             if key["noise"] == least
         ],
+        spelled,
     )
     lost = next(lost_to(frames, rows) for key, rows in frames.conditions(("noise",)) if key["noise"] == least)
     if lost:
-        told = ", ".join(f"{name} {count}" for name, count in list(lost.items())[:8])
+        told = ", ".join(f"{spelled(name)} {count}" for name, count in list(lost.items())[:8])
         lines.append(f"what pruned the true branch, at {least:g} px of added noise: {told}")
     broken = every["violations"]
     lines.append(
@@ -135,7 +146,7 @@ def summary(evaluation: Evaluation) -> list[str]:
     return lines
 
 
-def _table(name: str, told: list[tuple[str, dict[str, Any]]]) -> list[str]:
+def _table(name: str, told: list[tuple[str, dict[str, Any]]], spelled: Callable[[str], str]) -> list[str]:
     head = [
         name,
         "views",
@@ -171,7 +182,7 @@ def _table(name: str, told: list[tuple[str, dict[str, Any]]]) -> list[str]:
                 *(_followed(one) if path else ()),
             ]
         )
-    return table_lines([*head, *(FOLLOWED_COLUMNS if path else ())], rows)
+    return table_lines([*head, *(FOLLOWED_COLUMNS if path else ())], rows, spelled=spelled)
 
 
 def _followed(one: Mapping[str, Any]) -> list[str]:

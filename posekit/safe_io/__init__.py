@@ -12,6 +12,7 @@ from posekit.safe_io.mesh_file import check_mesh as check_mesh
 from posekit.safe_io.npz_file import Archive as Archive
 from posekit.safe_io.npz_file import open_npz as open_npz
 from posekit.safe_io.npz_file import read_npy as read_npy
+from posekit.safe_io.refusal import bounded as bounded
 from posekit.safe_io.refusal import cut as cut
 from posekit.safe_io.refusal import nearest as nearest
 from posekit.safe_io.refusal import one_line as one_line

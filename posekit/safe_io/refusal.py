@@ -13,6 +13,9 @@ from posekit.errors import InputError
 MAX_SHOWN_CHARACTERS = 60
 """Characters of a value, a name or a list of names that are shown before it is cut."""
 
+MAX_LINE_CHARACTERS = 500
+"""Characters of a line that refuses something."""
+
 
 def refusal(
     source: str | PathLike[str], field: str, got: str, expected: str, remedy: str = "correct it"
@@ -30,12 +33,18 @@ def refusal(
         nothing more can be said.
     """
     places = [str(place) for place in (source, field) if str(place)]
-    return InputError(one_line(": ".join([*places, f"got {got}; expected {expected}; {remedy}"])))
+    return InputError(bounded(one_line(": ".join([*places, f"got {got}; expected {expected}; {remedy}"]))))
 
 
 def one_line(text: str) -> str:
     """Escape what does not print: names in a damaged file may hold anything, line ends included."""
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+
+
+def bounded(text: str) -> str:
+    """Cut a line that is too long to read in its middle: it begins with what is wrong, and ends with what to do."""
+    half = MAX_LINE_CHARACTERS // 2
+    return text if len(text) <= MAX_LINE_CHARACTERS else f"{text[:half]} … {text[3 - half :]}"
 
 
 def shown(value: object) -> str:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
 from posekit.display.plural import plural
+from posekit.formats.markdown import no_markup, table_lines
 from posekit.formats.own.report_clips import ClipVerdict, Span
 from posekit.formats.own.report_columns import CheckCount, PlaceValue, VerdictColumns, measured
 from posekit.formats.own.report_frames import ClipName, ReportFrames
 from posekit.formats.own.report_repair import REPAIR_HEAD, repair_rows
 from posekit.formats.own.report_schema import VERDICT_NAMES
+from posekit.safe_io import one_line
 
 MAX_NAMED_PLACES: Final = 3
 """Places of a check that the table names."""
@@ -27,9 +29,6 @@ MAX_SHOWN_CLIPS: Final = 100
 
 MAX_TERMINAL_CLIPS: Final = 5
 """Clips that are not valid, on the terminal."""
-
-MARKUP_LETTERS: Final = "&<>|\\`[]*"
-"""Letters that Markdown may take for more than themselves, also in the middle of a word."""
 
 MANY_QUIET_CHECKS: Final = 6
 """So many checks that found nothing are named in one line in a terminal."""
@@ -67,7 +66,7 @@ def summary_table(columns: VerdictColumns, *, markdown: bool = False) -> list[st
         for check, count in by_check.items()
         if check not in quiet
     ]
-    table = _table(head, rows, _no_markup if markdown else _cell) if rows else []
+    table = _table(head, rows, markdown) if rows else []
     return lines + table + ([f"nothing found by {', '.join(quiet)}"] if quiet else [])
 
 
@@ -96,11 +95,11 @@ def markdown_lines(
     lines = ["# Validation", "", *summary_table(columns, markdown=True)]
     if refused:
         lines += ["", "## Files that could not be judged", ""]
-        lines += [f"- {_no_markup(line)}" for line in refused[:MAX_SHOWN_CLIPS]]
+        lines += [f"- {no_markup(line)}" for line in refused[:MAX_SHOWN_CLIPS]]
     if clips:
         lines += ["", "## Clips", "", *clip_table(clips)]
     lines += ["", "## Settings", ""]
-    lines += [f"- {_no_markup(name)}: {_no_markup(_shown(value))}" for name, value in settings.items()]
+    lines += [f"- {no_markup(name)}: {no_markup(_shown(value))}" for name, value in settings.items()]
     lines += ["", "## Postures that are not valid", ""]
     bad = np.flatnonzero(columns.verdict)
     if not len(bad):
@@ -118,7 +117,7 @@ def markdown_lines(
         for row in columns.rows(bad[:MAX_SHOWN_POSTURES].tolist())
     ]
     where = () if frames is None else ("clip", "frame", "time, s")
-    return lines + _table(("posture", *where, "verdict", "worst", "why"), rows, _no_markup)
+    return lines + _table(("posture", *where, "verdict", "worst", "why"), rows)
 
 
 def repair_lines(repair: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -129,7 +128,7 @@ def repair_lines(repair: Sequence[Mapping[str, Any]]) -> list[str]:
     repair : sequence of mapping
         As `posekit.formats.own.ValidationReport` has them.
     """
-    return ["", "## Repair", "", *_table(REPAIR_HEAD, repair_rows(repair), _no_markup)] if repair else []
+    return ["", "## Repair", "", *_table(REPAIR_HEAD, repair_rows(repair))] if repair else []
 
 
 def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> list[str]:
@@ -151,7 +150,7 @@ def clip_table(clips: Sequence[ClipVerdict], most: int = MAX_SHOWN_CLIPS) -> lis
     if len(bad) > most:
         lines += [f"The worst {most} of {len(bad)} that are not valid.", ""]
     head = ("clip", "verdict", "not valid", "first", "worst", "longest good span")
-    return lines + _table(head, [_of_clip(clip) for clip in bad[:most]], _no_markup)
+    return lines + _table(head, [_of_clip(clip) for clip in bad[:most]])
 
 
 def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> list[str]:
@@ -168,7 +167,7 @@ def clip_lines(clips: Sequence[ClipVerdict], most: int = MAX_TERMINAL_CLIPS) -> 
     lines = clip_table(clips)[:1]
     for clip in bad[:most]:
         name, verdict, share, *_, worst, good = map(str, _of_clip(clip))
-        lines.append(_printable(f"  {name}: {verdict}, {share} not valid; {worst}; longest good span {good}"))
+        lines.append(one_line(f"  {name}: {verdict}, {share} not valid; {worst}; longest good span {good}"))
     return [*lines, f"  and {len(bad) - most} more"] if len(bad) > most else lines
 
 
@@ -237,26 +236,6 @@ def _shown(value: object) -> str:
     return text if len(text) <= MAX_SETTING_CHARACTERS else f"{text[: MAX_SETTING_CHARACTERS - 1]}…"
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[object]], escaped: Callable[[str], str]) -> list[str]:
-    cells = [[escaped(str(cell)) for cell in row] for row in rows]
-    widths = [max(len(row[k]) for row in [list(head), *cells]) for k in range(len(head))]
-
-    def line(row: Sequence[str]) -> str:
-        return f"| {' | '.join(cell.ljust(width) for cell, width in zip(row, widths, strict=True))} |"
-
-    return [line(head), f"|{'|'.join('-' * (width + 2) for width in widths)}|", *map(line, cells)]
-
-
-def _cell(text: str) -> str:
-    """Keep a name from a file inside its cell."""
-    return _printable(text).replace("|", "\\|")
-
-
-def _no_markup(text: str) -> str:
-    """Keep a name from a file from being taken for Markdown or HTML."""
-    return "".join(f"&#{ord(letter)};" if letter in MARKUP_LETTERS else letter for letter in _printable(text))
-
-
-def _printable(text: str) -> str:
-    """Spell out what would steer a terminal or end a line."""
-    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+def _table(head: Sequence[str], rows: Iterable[Sequence[object]], markdown: bool = True) -> list[str]:
+    """Lay out a table for a file that is rendered, or for a terminal, without the empty line after it."""
+    return (table_lines(head, rows, spelled=no_markup) if markdown else table_lines(head, rows))[:-1]
