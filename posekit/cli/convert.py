@@ -69,6 +69,14 @@ def convert(
             "in bvh and c3d, which have no place for it; else leave-out.",
         ),
     ] = "",
+    over: Annotated[
+        Path | None,
+        option(
+            "--over",
+            "IMAGE|FOLDER|VIDEO",
+            "Of a result that becomes .rrd: the pictures that it came from, recorded behind its points.",
+        ),
+    ] = None,
     up: Annotated[
         str, option("--up", "AXIS", "The axis that shall point up, as +z. Default: by custom.")
     ] = "",
@@ -95,7 +103,7 @@ def convert(
     from posekit.views.camera import split_camera
 
     calibration = split_camera(reading.camera)[0] if reading.camera else None
-    for read in (given, view, who.lengths, who.calibrate, calibration):
+    for read in (given, view, over, who.lengths, who.calibrate, calibration):
         distinct(read, output)
     job = Conversion(
         given=given,
@@ -103,6 +111,7 @@ def convert(
         to=to,
         posture=posture,
         gaps=gaps,
+        over=over,
         view=None if view is None else files.read_view(view),
         up=up,
         input_up=input_up,

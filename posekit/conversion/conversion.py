@@ -52,7 +52,7 @@ CAMERA_AND_PERSON_OPTIONS: Final = (
 )
 OPTIONS_OF: Final = {
     Content.MOTION: MOTION_OPTIONS,
-    Content.RESULT: ("--posture", "--view", "--up", "--input-up", "--gaps"),
+    Content.RESULT: ("--posture", "--view", "--up", "--input-up", "--gaps", "--over"),
     Content.OBJECTS: ("--posture", "--up", "--input-up"),
     Content.VIEW: ("--skeleton", "--up", "--input-up", "--gaps"),
     Content.POSTURES: ("--up", "--input-up"),
@@ -89,6 +89,8 @@ class Conversion:
     gaps : str
         How frames without a posture and unseen joints are filled: ``interpolate``, ``hold``, or ``leave-out``; by what
         the format can hold if empty.
+    over : Path, optional
+        Of a result that becomes a recording for Rerun: the photograph, folder or video that it came from.
 
     Raises
     ------
@@ -107,6 +109,7 @@ class Conversion:
     clip: str = ""
     unit: str = ""
     gaps: str = ""
+    over: Path | None = None
 
     def __post_init__(self) -> None:
         given = self.given
@@ -147,6 +150,7 @@ class Conversion:
             "--clip": bool(self.clip),
             "--unit": bool(self.unit),
             "--gaps": bool(self.gaps),
+            "--over": self.over is not None,
         }
         for name, is_given in given.items():
             if is_given and name not in telling:
@@ -178,6 +182,10 @@ def convert(job: Conversion) -> list[str]:
             job.named, "--to", f"view, of {holds.value}", "key points", "convert to postures or motion"
         )
     output = MotionOutput(path=job.output, to=job.to or by_suffix(job.output), up=job.up, gaps=job.gaps)
+    if job.over is not None and output.to != "rerun":
+        raise InputError(
+            f"--over: {output.to} holds no pictures; expected .rrd; or draw them: posekit render --over"
+        )
     held = read_held(job.given, what, clip=job.clip, unit=job.unit, up=job.input_up)
     if isinstance(held, Motion) and carries_points(output.to):
         carried = held if output.to in TABLE_FORMATS else one_clip(held)
@@ -185,7 +193,7 @@ def convert(job: Conversion) -> list[str]:
     if isinstance(held, ObjectResult):
         return write_object_points(output, held, job.named, posture=job.posture, up=job.input_up)
     if isinstance(held, Result) and output.to == "rerun":
-        return write_rerun_result(job.output, held, job.view)
+        return write_rerun_result(job.output, held, job.view, job.over)
     found = sequence_of(
         held, job.named, posture=job.posture, view=job.view, skeleton=job.source.skeleton, up=job.input_up
     )

@@ -41,7 +41,7 @@ def convert(
         How a detector's file is to be read.
     **options
         Others of `posekit.conversion.Conversion`, as the command has them: ``to``, ``posture``, ``up``, ``input_up``,
-        ``clip``, ``unit``, ``gaps``.
+        ``clip``, ``unit``, ``gaps``, ``over``.
 
     Returns
     -------

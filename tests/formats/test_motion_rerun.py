@@ -1,11 +1,13 @@
 """Recordings for Rerun, read back by Rerun's own reader: entities, timelines, colours, and what is said."""
 
+import io
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from rerun.chunk import RrdReader
 
 import posekit
@@ -128,3 +130,30 @@ def test_a_missing_extra_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(InputError, match=r"writing .rrd needs rerun.*pip install 'posekit\[rerun\]'"):
         write_rerun_recording(tmp_path / "out.rrd", [])
+
+
+def test_the_photographs_are_behind_the_points(command, tmp_path: Path) -> None:
+    """Each frame has its own, in the camera's size; formats without pictures refuse them."""
+    view = posekit.builtin_view("seq1")
+    seen = posekit.View(
+        camera=OpenCVModel(K=K, size=(1280, 720)),
+        time=view.time,
+        image=(points := view.truth @ K.T)[..., :2] / points[..., 2:],
+        truth=view.truth,
+    )
+    posekit.write_view(tmp_path / "view.json", seen)
+    posekit.recover(seen).save(tmp_path / "found.npz")
+    (tmp_path / "photographs").mkdir()
+    for k in range(len(seen)):
+        Image.new("RGB", (640, 360), (40 * k, 0, 0)).save(tmp_path / "photographs" / f"{k}.png")
+    words = ("--view", tmp_path / "view.json", "--over", tmp_path / "photographs")
+    done = command("convert", tmp_path / "found.npz", tmp_path / "out.rrd", *words)
+    assert done.code == 0 and "and the pictures" in done.out, done.err
+    blobs = column(entities(tmp_path / "out.rrd")["/world/camera/picture"], "blob")
+    pictures = [Image.open(io.BytesIO(bytes(np.ravel(blob).astype(np.uint8)))) for blob in blobs]
+    assert [picture.size for picture in pictures] == [(1280, 720)] * 5
+    assert np.allclose(
+        [np.asarray(picture)[9, 9, 0] for picture in pictures], 40 * np.arange(5), rtol=0, atol=3
+    )
+    refused = command("convert", tmp_path / "found.npz", tmp_path / "out.trc", *words)
+    assert refused.code == 2 and "trc holds no pictures" in refused.err

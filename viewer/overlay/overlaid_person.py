@@ -90,12 +90,12 @@ def overlaid_person(
         frames=frames,
         figure=subject.figure,
         size=size,
-        files=_files(given),
+        files=picture_names(given),
         detected=seen is not None,
     )
 
 
-def _files(given: Result | View) -> tuple[str, ...]:
+def picture_names(given: Result | View) -> tuple[str, ...]:
     """Return the names of the pictures that a result's frames were detected in; none where it does not say."""
     if not isinstance(given, Result):
         return ()

@@ -1,8 +1,8 @@
 """RRD: recordings for Rerun's viewer (rerun.io), with a timeline in frames and one in seconds.
 
 Entities: ``world/NAME`` with the points or the likeliest posture as a skeleton, ``world/NAME/others`` with what else it
-can be, the fainter the less likely, ``world/camera`` with its intrinsics and what it saw, ``findings`` as text. Right
-limbs are orange and left ones blue. Written by the extra ``rerun``; the viewer is the command ``rerun FILE``.
+can be, the fainter the less likely, ``world/camera`` with its intrinsics, what it saw and the picture, ``findings`` as text.
+Right limbs are orange and left ones blue. Written by the extra ``rerun``; the viewer is the command ``rerun FILE``.
 """
 
 from __future__ import annotations
@@ -51,12 +51,15 @@ class RecordedFrame:
         Of each; all the same if empty.
     says : str
         What is said of the frame.
+    picture : bytes
+        The photograph that it came from, JPEG; none if empty.
     """
 
     time: float
     postures: Array
     probability: Array = field(default_factory=lambda: np.empty(0))
     says: str = ""
+    picture: bytes = b""
 
 
 def write_rerun(path: str | Path, motion: Motion) -> None:
@@ -122,6 +125,9 @@ def write_rerun_recording(
     for k, frame in enumerate(frames):
         _at(recording, k, frame.time)
         recording.log("findings", rr.TextLog(frame.says))
+        if frame.picture:
+            photograph = rr.EncodedImage(contents=frame.picture, media_type="image/jpeg")
+            recording.log(f"{camera or 'world/camera'}/picture", photograph)
         if not len(frame.postures):
             recording.log(f"world/{name}", rr.Clear(recursive=True))
             continue
