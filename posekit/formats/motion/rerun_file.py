@@ -1,7 +1,7 @@
 """RRD: recordings for Rerun's viewer (rerun.io), with a timeline in frames and one in seconds.
 
 Entities: ``world/NAME`` with the points or the likeliest posture as a skeleton, ``world/NAME/others`` with what else it
-can be, the fainter the less likely, ``world/camera`` with its intrinsics, what it saw and the picture, ``findings`` as text.
+can be, the fainter the less likely, ``world/camera`` with its intrinsics, what it saw and the picture, ``findings``.
 Right limbs are orange and left ones blue. Written by the extra ``rerun``; the viewer is the command ``rerun FILE``.
 """
 
