@@ -2,7 +2,7 @@
 
     python benchmarks/walking_rules.py CAPTURE.npz [--views 360] [--seed 1]
 
-The capture is an NPZ as `posekit synth mocap` reads it. First the true joint positions of every frame are judged, rule
+The capture is what `benchmarks/people.py` reads. Clips are judged over strides; then the true joint positions of every frame are judged, rule
 by rule, with the default thresholds and with those for people: a frame is lost to a rule that any of its findings
 violates; undecided is a frame where none of them says anything. Then thresholds are chosen on all walkers but one, as
 the least that keep all their frames, and reported on that one. Last, walkers are seen by virtual cameras, each frame by
@@ -18,15 +18,19 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from people import people  # type: ignore[import-not-found]
 from ranges import Clip, clips_of  # type: ignore[import-not-found]  # the scripts beside this one
 from real_motion import CHECK_NAMES, true_code  # type: ignore[import-not-found]
 
 from posekit.formats.markdown import table_lines
 from posekit.recovery import recover
 from posekit.settings import MEASURED_TOLERANCE
-from posekit.synthesis import SyntheticScene, mocap_scenes, read_capture
+from posekit.skeleton import JOINTS
+from posekit.synthesis import Capture, SyntheticScene, mocap_scenes
 from posekit.tree import Findings
 from posekit.validators import load_ranges, walking
+from posekit.validators.motion import MotionClip
+from posekit.validators.motion.walking_phases import RULES_OVER_STRIDES, WalkingPhases
 from posekit.validators.walking import DEFAULT_RULES, PEOPLE_THRESHOLDS, RULE_NUMBERS, WalkingThresholds
 from posekit.views.builtin import view_of
 
@@ -157,6 +161,22 @@ def on_views(scenes: Sequence[SyntheticScene]) -> None:
     print("\n".join(table_lines(head, unique)))
 
 
+def over_strides(capture: Capture) -> None:
+    """Judge each clip's true joints over strides: which part of its frames each rule rejects."""
+    check, rows = WalkingPhases(), []
+    for index, name in enumerate(capture.names):
+        joints = capture.points[capture.frames_of(index, complete=True), : len(JOINTS)]
+        rate = float(capture.fps[index])
+        clip = MotionClip(joints=joints, time=np.arange(len(joints)) / rate, rate=rate)
+        violated = check.judge(clip).violated
+        rules = np.array([int(place[len("rule")]) for place in check.places(clip)])
+        shares = (violated[:, rules == rule].any(axis=1).mean() for rule in RULES_OVER_STRIDES)
+        rows.append([name, capture.actions[index], str(len(joints)), *(f"{share:.1%}" for share in shares)])
+    print("\nOver strides\n")
+    head = ["clip", "action", "frames", *(f"rule {rule}" for rule in RULES_OVER_STRIDES)]
+    print("\n".join(table_lines(head, rows)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("capture", type=Path, nargs="?")
@@ -166,8 +186,9 @@ def main() -> None:
     if given.capture is None:
         print("no capture given: python benchmarks/walking_rules.py CAPTURE.npz")
         return
-    capture = read_capture(given.capture)
+    capture = people(given.capture)
     clips = clips_of(capture)
+    over_strides(capture)
     on_true_joints(clips)
     cross_validation([clip for clip in clips if clip.action == WALKING_ACTION])
     walkers = sum(action == WALKING_ACTION for action in capture.actions)
