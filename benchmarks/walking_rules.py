@@ -2,9 +2,9 @@
 
     python benchmarks/walking_rules.py CAPTURE.npz [--views 360] [--seed 1]
 
-The capture is what `benchmarks/people.py` reads. Clips are judged over strides; then the true joint positions of every frame are judged, rule
-by rule, with the default thresholds and with those for people: a frame is lost to a rule that any of its findings
-violates; undecided is a frame where none of them says anything. Then thresholds are chosen on all walkers but one, as
+The capture is what `benchmarks/people.py` reads. Clips are judged over strides; then the true joint positions of every
+frame are judged, rule by rule, with the default thresholds and with those for people: a frame is lost to a rule that
+any of its findings violates; undecided is a frame where none of them says anything. Then thresholds are chosen on all walkers but one, as
 the least that keep all their frames, and reported on that one. Last, walkers are seen by virtual cameras, each frame by
 one of its own, as in `benchmarks/real_motion.py`: whether the truth is among the survivors, and how many those are.
 Prints Markdown tables.
@@ -15,6 +15,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +102,7 @@ def cross_validation(walkers: Sequence[Clip]) -> None:
     rows = []
     for k, clip in enumerate(walkers):
         others = [other for other in walkers if other is not clip]
-        chosen = {
+        chosen: dict[str, Any] = {
             name: float(max(0.0, *(np.nanquantile(reach(other, *need), 0.99) for other in others)))
             for name, need in needs.items()
         }
