@@ -4,7 +4,8 @@
 
 The capture is what `benchmarks/people.py` reads. Clips are judged over strides; then the true joint positions of every
 frame are judged, rule by rule, with the default thresholds and with those for people: a frame is lost to a rule that
-any of its findings violates; undecided is a frame where none of them says anything. Then thresholds are chosen on all walkers but one, as
+any of its findings violates; undecided is a frame where none of them says anything.
+Then thresholds are chosen on all walkers but one, as
 the least that keep all their frames, and reported on that one. Last, walkers are seen by virtual cameras, each frame by
 one of its own, as in `benchmarks/real_motion.py`: whether the truth is among the survivors, and how many those are.
 Prints Markdown tables.

@@ -49,7 +49,7 @@ def _read(name: str, model: pin.Model) -> dict[str, tuple[float, float]]:
     except (OSError, ValueError):
         exists = False
     if not name or not exists:
-        extra = " (table1 is for the stick figure)" if name == "table1" else ""
+        extra = f" ({name} is for the stick figure)" if name in ("table1", "table1-printed") else ""
         raise InputError(
             one_line(
                 f"--ranges {cut(name)}: no such table or file{extra}; expected urdf or the path of a TOML file"
