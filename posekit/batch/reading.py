@@ -8,6 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from posekit.batch.intact import check_shard, known_digests
 from posekit.batch.shard import SHARDS_FOLDER
 from posekit.formats.motion.parquet import opened
 from posekit.safe_io import extra, refusal
@@ -50,7 +51,9 @@ def read_shards(folder: str | Path, columns: Sequence[str] | None = None) -> Ite
     InputError
         Where the folder is none of a run, or a file is damaged.
     """
+    known = known_digests(Path(folder))
     for path in shard_paths(folder):
+        check_shard(path, known)
         with opened(path) as file:
             for group in range(file.metadata.num_row_groups):
                 wanted = None if columns is None else list(columns)

@@ -127,6 +127,8 @@ def run_batch(
             run.plan()
             if overwrite:
                 folder.remove_others({shard.name for shard in run.shards})
+            elif before is None:
+                folder.check_others({shard.name for shard in run.shards})
             folder.write_asked(Asked(hash=hash, settings=settings, inputs=contents, root=listing.root))
             run.recover(work)
         run.note()

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.batch.durable import PARTS_FOLDER, clear, write_document, writing
+from posekit.batch.intact import MANIFEST_FILE
 from posekit.batch.shard import SHARDS_FOLDER
 from posekit.batch.staging import STAGED_FOLDER
 from posekit.errors import InputError
@@ -21,7 +22,6 @@ from posekit.safe_io.writing import make_folder
 RUN_SCHEMA: Final = "posekit.batch/1"
 MANIFEST_SCHEMA: Final = "posekit.batch_manifest/1"
 ASKED_FILE: Final = "batch.json"
-MANIFEST_FILE: Final = "manifest.json"
 LOCK_FILE: Final = ".lock"
 OWN_ENTRIES: Final = (ASKED_FILE, MANIFEST_FILE, LOCK_FILE, PARTS_FOLDER, STAGED_FOLDER, SHARDS_FOLDER)
 
@@ -135,12 +135,15 @@ class RunFolder:
             file, "", "a damaged note", f'"{RUN_SCHEMA}"', "choose another folder, or give --overwrite"
         )
 
-    def write_manifest(self, totals: Mapping[str, Any], failures: Sequence[Failure]) -> None:
-        """Note how far the run is, and what failed."""
+    def write_manifest(
+        self, totals: Mapping[str, Any], failures: Sequence[Failure], digests: Mapping[str, str]
+    ) -> None:
+        """Note how far the run is, what failed, and the SHA-256 of each shard."""
         document = {
             "schema": MANIFEST_SCHEMA,
             **totals,
             "failed": [one.document() for one in failures],
+            "digests": dict(digests),
         }
         write_document(self.path / MANIFEST_FILE, document, self.parts)
 
@@ -151,6 +154,24 @@ class RunFolder:
             with writing(one):
                 one.unlink()
         return len(others)
+
+    def check_others(self, names: set[str]) -> None:
+        """Refuse results of another run, of which nothing else is known: its frames would stand beside this one's.
+
+        Raises
+        ------
+        InputError
+            Where a shard has not one of these names.
+        """
+        others = sorted(one.name for one in (self.path / SHARDS_FOLDER).iterdir() if one.name not in names)
+        if others:
+            raise refusal(
+                self.path,
+                "",
+                f"{len(others)} shards of another run, without its {ASKED_FILE}",
+                "a run's own results",
+                "choose another folder, or give --overwrite",
+            )
 
     def remove_staged(self) -> None:
         """Remove the tables of image points; what they held is done."""

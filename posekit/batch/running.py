@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from posekit.batch.inputs import Input
+from posekit.batch.intact import known_digests
 from posekit.batch.pool import Outcome, Pool
 from posekit.batch.recipe import Recipe
 from posekit.batch.run_folder import Failure, RunFolder
@@ -110,11 +111,12 @@ class Run:
         ]
         self._stage(jobs)
         # Tables are removed when a run is done. One that goes on needs those of inputs with shards that are missing.
-        again = []
+        again, known = [], known_digests(self.folder.path)
         for k, one in enumerate(self.staged):
             lacking = any(not Path(table.path).is_file() for table in one.tables)
             if lacking and any(
-                finished(shard) is None for shard in shards_of(one, self.recipe, self.hash, self.folder.path)
+                finished(shard, known) is None
+                for shard in shards_of(one, self.recipe, self.hash, self.folder.path)
             ):
                 again.append(k)
         if again:
@@ -150,8 +152,9 @@ class Run:
         """Cut the inputs into shards, and find those whose files are there."""
         for one in self.staged:
             self.shards.extend(shards_of(one, self.recipe, self.hash, self.folder.path))
+        known = known_digests(self.folder.path)
         for shard in self.shards:
-            there = finished(shard)
+            there = finished(shard, known)
             if there is None:
                 self.missing.append(shard)
             else:
@@ -182,7 +185,8 @@ class Run:
 
     def note(self) -> None:
         """Write the manifest."""
-        self.folder.write_manifest(self.totals(), self.failures)
+        digests = {one.name: one.digest for one in self.done}
+        self.folder.write_manifest(self.totals(), self.failures, digests)
 
     def totals(self) -> dict[str, int]:
         """Count what is there."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,6 +25,7 @@ from posekit.batch.columns import (
 )
 from posekit.batch.durable import PARTS_FOLDER, whole, writing
 from posekit.batch.image_rows import ImageRows, read_head
+from posekit.batch.intact import is_intact
 from posekit.batch.recipe import Recipe
 from posekit.batch.staging import Staged, StagedTable, stem_of
 from posekit.batch.view_table import read_rows
@@ -117,12 +118,16 @@ class Finished:
         Frames, survivors, and frames without any.
     warnings : tuple of str
         What was warned of, each once.
+    name, digest : str
+        The file's name, and the SHA-256 of its content.
     """
 
     frames: int
     survivors: int
     empty: int
     warnings: tuple[str, ...] = ()
+    name: str = ""
+    digest: str = ""
 
 
 def shards_of(staged: Staged, recipe: Recipe, settings: str, folder: Path) -> Iterator[Shard]:
@@ -162,7 +167,13 @@ def run_shard(shard: Shard) -> Finished:
         warnings.simplefilter("always")
         with whole(shard.path, shard.folder / PARTS_FOLDER) as file:
             with writing(shard.path):
-                writer = pq.ParquetWriter(file, schema, compression="zstd", use_dictionary=list(TEXT_COLUMNS))
+                writer = pq.ParquetWriter(
+                    file,
+                    schema,
+                    compression="zstd",
+                    use_dictionary=list(TEXT_COLUMNS),
+                    write_page_checksum=True,
+                )
             try:
                 for piece in _pieces(shard, head):
                     table = table_of(piece, shard.input, shard.table.person, schema)
@@ -179,13 +190,26 @@ def run_shard(shard: Shard) -> Finished:
                     writer.close()
     says = [str(one.message) for one in caught if issubclass(one.category, UserWarning)]
     return Finished(
-        frames=frames, survivors=survivors, empty=empty, warnings=tuple(dict.fromkeys(says))[:MAX_WARNINGS]
+        frames=frames,
+        survivors=survivors,
+        empty=empty,
+        warnings=tuple(dict.fromkeys(says))[:MAX_WARNINGS],
+        name=shard.name,
+        digest=digests.of_file(shard.path),
     )
 
 
-def finished(shard: Shard) -> Finished | None:
-    """Return what a shard's file holds; None where it is not there, or not what it should be."""
-    if not shard.path.is_file():
+def finished(shard: Shard, known: Mapping[str, str]) -> Finished | None:
+    """Return what a shard's file holds; None where it is not there, damaged, or not what it should be.
+
+    Parameters
+    ----------
+    shard : Shard
+        The frames.
+    known : mapping of str to str
+        The SHA-256 of shards that the run has noted (`posekit.batch.intact.known_digests`).
+    """
+    if not shard.path.is_file() or not is_intact(shard.path, known):
         return None
     pq = extra("pyarrow.parquet", "parquet", "reading Parquet")
     pa = extra("pyarrow", "parquet", "reading Parquet")
@@ -195,7 +219,13 @@ def finished(shard: Shard) -> Finished | None:
         return None
     if said.get("frames") != len(shard) or any(said.get(name) != value for name, value in shard.says.items()):
         return None
-    return Finished(frames=said["frames"], survivors=said["survivors"], empty=said["empty"])
+    return Finished(
+        frames=said["frames"],
+        survivors=said["survivors"],
+        empty=said["empty"],
+        name=shard.name,
+        digest=known.get(shard.name) or digests.of_file(shard.path),
+    )
 
 
 def _pieces(shard: Shard, head: View) -> Iterator[ShardFrames]:

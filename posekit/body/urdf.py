@@ -18,6 +18,7 @@ from posekit.body.lengths import hips_points, torso_points
 from posekit.errors import FigureError, InputError
 from posekit.geometry import Array
 from posekit.robots.urdf import check_urdf, read_urdf
+from posekit.safe_io import write_text
 from posekit.skeleton import HEAD_POINTS, SIDES
 
 LIMB_SEGMENTS = (
@@ -38,15 +39,8 @@ def read_text(path: Path) -> str:
 def write_texts(path: Path, urdf: str, srdf: str) -> None:
     """Write a URDF, and its SRDF beside it: each whole or not at all."""
     for target, text in ((path.with_suffix(".srdf"), srdf), (path, urdf)):
-        beside = target.with_name(f".{target.name}.part")
-        try:
-            beside.write_text(text, encoding="utf-8")
-            beside.replace(target)
-        except OSError as error:
-            beside.unlink(missing_ok=True)
-            raise FigureError(
-                f"{target}: cannot be written: {error.strerror}; choose another name"
-            ) from error
+        with as_figure_error():
+            write_text(target, [text])
 
 
 def parse(text: str, source: str) -> ElementTree.Element:

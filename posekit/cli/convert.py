@@ -12,7 +12,7 @@ import typer
 from posekit.cli.detector_options import Deviation, Proportions, Reading, Unit, Who
 from posekit.cli.detector_source import source_of
 from posekit.cli.groups import with_groups
-from posekit.cli.options import distinct, examples, option
+from posekit.cli.options import examples, option
 from posekit.cli.terminal import say
 from posekit.errors import PosekitError
 
@@ -100,11 +100,7 @@ def convert(
     from posekit.conversion.conversion import Conversion
     from posekit.conversion.conversion import convert as run
     from posekit.formats import own as files
-    from posekit.views.camera import split_camera
 
-    calibration = split_camera(reading.camera)[0] if reading.camera else None
-    for read in (given, view, over, who.lengths, who.calibrate, calibration):
-        distinct(read, output)
     job = Conversion(
         given=given,
         output=output,

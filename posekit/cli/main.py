@@ -5,19 +5,23 @@ from __future__ import annotations
 import atexit
 import gc
 import os
+import signal
 import sys
 import warnings
 from importlib import import_module
+from types import FrameType
 from typing import Annotated, Any, Final, TextIO
 
 import typer
 
+from posekit.cli.guarded_command import GuardedCommand
 from posekit.cli.options import examples
-from posekit.cli.terminal import say
+from posekit.cli.terminal import INTERRUPTED_CODE, TERMINATED_CODE, Ended, say
 from posekit.errors import PosekitError
-from posekit.safe_io import bounded
 
 BAD_INPUT = 2
+
+MAIN_PROCESS: Final = os.getpid()
 
 NEW_OBJECTS_PER_COLLECTION = 100_000
 """Containers made between two collections of garbage, in a process of the command."""
@@ -81,7 +85,7 @@ def application(first: str) -> typer.Typer:
             app.add_typer(module.app, name=name)
         else:
             examples_of = getattr(module, f"{name.upper()}_EXAMPLES")
-            app.command(name, epilog=examples_of)(getattr(module, name))
+            app.command(name, epilog=examples_of, cls=GuardedCommand)(getattr(module, name))
     return app
 
 
@@ -94,6 +98,7 @@ def main() -> None:
     atexit.register(gc.freeze)
     # Models of files have no plugins: looking for some reads the metadata of all that is installed.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    signal.signal(signal.SIGTERM, _terminate)
     try:
         arguments = sys.argv[1:] or ["--help"]
         code = application(arguments[0])(arguments, standalone_mode=False)
@@ -109,15 +114,30 @@ def main() -> None:
     except ClickError as error:
         code = _fail(error.format_message())
     except (typer.Abort, KeyboardInterrupt):
-        code = _fail("interrupted", 130)
+        code = _fail("interrupted", INTERRUPTED_CODE)
+    except Ended as ended:
+        code = _fail(str(ended), ended.code)
     except BrokenPipeError:
         # What is still to be written has no reader: it goes nowhere.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = 1
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename is not None else ""
+        code = _fail(f"{place}{error.strerror or error}; expected a file or folder that can be used")
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _terminate(number: int, frame: FrameType | None) -> None:
+    """End by an exception, which takes half-written files away; a child process ends at once, as it would have."""
+    signal.signal(number, signal.SIG_DFL)
+    if os.getpid() == MAIN_PROCESS:
+        raise Ended("ended from outside", TERMINATED_CODE)
+    os.kill(os.getpid(), number)
+
+
 def _fail(message: str, code: int = BAD_INPUT) -> int:
+    from posekit.safe_io import bounded
+
     say(f"posekit: error: {bounded(' '.join(message.split()))}", err=True)
     return code
 
@@ -131,6 +151,8 @@ def _warn(
     line: str | None = None,
 ) -> None:
     """Print a warning to the user as one line, without the place in the code; others are for developers."""
+    from posekit.safe_io import bounded
+
     if not issubclass(category, UserWarning):
         return
     say(f"posekit: warning: {bounded(' '.join(str(message).split()))}", err=True)

@@ -17,7 +17,6 @@ from posekit.cli.noise_options import Uncertain
 from posekit.cli.options import (
     ContactMargin,
     about,
-    distinct,
     examples,
     option,
     options_given,
@@ -131,8 +130,6 @@ def recover(
     from posekit.views.given_views import given_views
     from posekit.views.opened import of_person
 
-    for read in (view, nearer, truth, who.calibrate, who.lengths):
-        distinct(output, write_urdf, read)
     if view.is_dir() and output.resolve().parent == view.resolve():
         raise InputError(
             f"-o {output}: is in the folder of key points, which would read it as a picture; choose another folder"

@@ -12,7 +12,6 @@ import typer
 
 from posekit.cli.options import about, examples, numbers, option, options_given, progress
 from posekit.cli.terminal import say
-from posekit.conversion.composed import DrawnChoice, write_whole_page
 from posekit.conversion.given import read_given
 from posekit.display.plural import plural
 from posekit.errors import InputError, ViewerError
@@ -178,6 +177,8 @@ def render(
     Right limbs are orange, left ones blue. Pictures are drawn by an installed Chromium or Chrome, found by
     POSEKIT_BROWSER or on PATH, without a window, a server or an open port; pages (.html) need none.
     """
+    from posekit.conversion.composed import DrawnChoice, write_whole_page
+
     if over is not None:
         from posekit.cli.render_over import render_over
         from posekit.viewer.overlay import Overlay

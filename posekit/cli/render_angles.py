@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from posekit.cli.options import about, distinct
+from posekit.cli.options import about
 from posekit.cli.terminal import say
 from posekit.cli.true_joints import true_joints
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
@@ -52,7 +52,6 @@ def render_angles(
         )
     if len(given) > 1 or len(seen) > 1:
         raise InputError(f"--angles: got {len(given)} files; expected one a plot")
-    distinct(output, *given, *seen, truth)
     check_target(output)
     count = len(chosen_angles(angles))
     with drawing():  # says what is missing before the work

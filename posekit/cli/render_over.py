@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from posekit.cli.options import about, distinct, progress
+from posekit.cli.options import about, progress
 from posekit.cli.terminal import say
 from posekit.conversion.chosen_postures import chosen_frames, frame_numbers
 from posekit.conversion.given import read_given
@@ -48,7 +48,6 @@ def render_over(
     from posekit.viewer.overlay import check_overlay, frame_pictures, write_overlay
 
     check_overlay(output, overlay)
-    distinct(output, over, *given, *seen)
     if over.is_dir() and output.resolve().is_relative_to(over.resolve()):
         raise InputError(
             f"-o {output}: is in the folder of the photographs, which it would join; choose another folder"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from posekit.cli.guarded_command import GuardedCommand
 from posekit.cli.options import Noise, OutputView, Seed, examples, numbers, option
 from posekit.cli.terminal import say
 from posekit.display.plural import plural
@@ -39,10 +40,11 @@ Dt = Annotated[float, typer.Option("--dt", min=0.0, help="Seconds from frame to 
 
 
 @app.command(
+    cls=GuardedCommand,
     epilog=examples(
         "posekit synth walker -o seq1.json --camera 400,0,0",
         "posekit synth walker -o walk.json --camera 300,0,300 --frames 20 --dt 0.05 --velocity 1.2",
-    )
+    ),
 )
 def walker(
     output: OutputView,
@@ -80,7 +82,9 @@ def walker(
     _write(output, scene, noise / 100, seed)
 
 
-@app.command(epilog=examples("posekit synth random -o random.json --frames 100 --noise 1 --seed 7"))
+@app.command(
+    cls=GuardedCommand, epilog=examples("posekit synth random -o random.json --frames 100 --noise 1 --seed 7")
+)
 def random(
     output: OutputView,
     frames: Frames = 1,
@@ -103,7 +107,8 @@ def random(
 
 
 @app.command(
-    epilog=examples("posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1")
+    cls=GuardedCommand,
+    epilog=examples("posekit synth mocap clips.npz -o view.json --clip walking_1 --frames 30 --dt 0.1"),
 )
 def mocap(
     file: Annotated[
@@ -152,6 +157,7 @@ def mocap(
 
 @app.command(
     "object",
+    cls=GuardedCommand,
     epilog=examples("posekit synth object panda -o panda.json --frames 3 --seed 1"),
 )
 def articulated(

@@ -2,9 +2,27 @@
 
 from __future__ import annotations
 
+from typing import Final
+
 import typer
 
-from posekit.safe_io import one_line
+INTERRUPTED_CODE: Final = 130
+TERMINATED_CODE: Final = 143
+"""What a shell says of a command that SIGINT or SIGTERM ended: 128 and the signal's number."""
+
+
+class Ended(BaseException):
+    """The command was asked to end: what is half written is taken away on the way out.
+
+    Attributes
+    ----------
+    code : int
+        The exit code of the process.
+    """
+
+    def __init__(self, says: str, code: int) -> None:
+        super().__init__(says)
+        self.code = code
 
 
 def say(text: str, *, err: bool = False) -> None:
@@ -17,4 +35,6 @@ def say(text: str, *, err: bool = False) -> None:
     err : bool
         Whether it goes to standard error.
     """
+    from posekit.safe_io import one_line  # what --help does not need
+
     typer.echo("\n".join(one_line(line) for line in text.split("\n")), err=err)

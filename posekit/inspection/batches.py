@@ -12,8 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from posekit.batch.intact import MANIFEST_FILE, check_shard, known_digests
 from posekit.batch.reading import FRAME_COLUMNS, shard_paths
-from posekit.batch.run_folder import ASKED_FILE, MANIFEST_FILE, MANIFEST_SCHEMA, RunFolder
+from posekit.batch.run_folder import ASKED_FILE, MANIFEST_SCHEMA, RunFolder
 from posekit.batch.shard import METADATA_KEY, SHARDS_FOLDER
 from posekit.display.plural import plural
 from posekit.errors import InputError
@@ -52,7 +53,9 @@ def run_lines(folder: Path) -> list[str]:
     manifest = _manifest(folder / MANIFEST_FILE)
     shards = shard_paths(folder) if (folder / SHARDS_FOLDER).is_dir() else []
     found = Tally()
+    known = known_digests(folder)
     for shard in shards:
+        check_shard(shard, known)
         found.add(shard)
     failed = manifest.get("failed", [])
     planned = manifest.get("shards")
@@ -95,6 +98,7 @@ def shard_lines(path: Path) -> list[str]:
     InputError
         Where it is damaged.
     """
+    check_shard(path, known_digests(path.parent.parent))
     with opened(path) as file:
         names = set(file.schema_arrow.names)
         said = _said(path, (file.metadata.metadata or {}).get(METADATA_KEY, b""))

@@ -7,7 +7,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -64,7 +64,8 @@ def replacing(path: str | Path, *, sync: bool = False) -> Iterator[BinaryIO]:
         ) from None
     finally:
         if beside is not None and not done:
-            beside.unlink(missing_ok=True)
+            with suppress(OSError):  # where nothing can be written, there is nothing to take away
+                beside.unlink()
 
 
 def _target(path: str | Path) -> Path:
@@ -81,7 +82,12 @@ def _target(path: str | Path) -> Path:
 
 def check_target(path: str | Path) -> None:
     """Refuse a name that cannot be written: a folder, or one in a folder that is not there."""
-    _target(path)
+    try:
+        _target(path)
+    except OSError as error:
+        raise refusal(
+            path, "", error.strerror or str(error), "the name of a file", "choose another"
+        ) from None
 
 
 def write_text(path: str | Path, pieces: Iterable[str]) -> None:

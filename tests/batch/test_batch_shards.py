@@ -151,10 +151,10 @@ def test_the_same_frames_give_the_same_bytes(tmp_path: Path, folder: Path) -> No
     run_shard(shard)
     assert shard.path.read_bytes() == first
     assert list((folder / PARTS_FOLDER).iterdir()) == []
-    said = finished(shard)
+    said = finished(shard, {})
     assert said is not None and said.frames == 5
     shard.path.write_bytes(first[:-9])
-    assert finished(shard) is None
+    assert finished(shard, {}) is None
 
 
 def test_a_frame_without_survivors_is_a_row_with_its_reason(tmp_path: Path, folder: Path) -> None:

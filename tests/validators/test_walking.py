@@ -248,7 +248,11 @@ class TestTheBodyPlane:
         frames = np.arange(3)
         # Ahead, sidelong, and not known: one arm is then before the body plane and one behind it.
         check = walking(FIGURE, (1,))[0].moving(heading)
-        assert check.judge_frames(points[:, check.points], frames).violated[:, 0].tolist() == [True, False, True]
+        assert check.judge_frames(points[:, check.points], frames).violated[:, 0].tolist() == [
+            True,
+            False,
+            True,
+        ]
         printed = walking(FIGURE, (1,), PRINTED)[0].moving(heading)
         assert printed.judge_frames(points[:, printed.points], frames).violated.all()
 

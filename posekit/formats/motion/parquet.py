@@ -154,7 +154,9 @@ def opened(path: str | Path, *, limit: int = MAX_BYTES, buffer_bytes: int = 0) -
     with open_file(path, limit=limit) as file:
         try:
             # Reading ahead takes threads, which call Python for the file's bytes: also while the process ends.
-            yield pq.ParquetFile(file, pre_buffer=False, buffer_size=buffer_bytes)
+            yield pq.ParquetFile(
+                file, pre_buffer=False, buffer_size=buffer_bytes, page_checksum_verification=True
+            )
         except (pa.ArrowException, OSError, MemoryError, UnicodeDecodeError) as error:
             reason = cut(one_line(str(error)) or type(error).__name__)
             raise refusal(

@@ -1,0 +1,85 @@
+"""A command whose outputs are none of its inputs, and whose files have names that a system takes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Final
+
+import typer
+import typer.core
+
+from posekit.cli.terminal import INTERRUPTED_CODE, Ended
+from posekit.errors import InputError
+
+OUTPUT_OPTIONS: Final = frozenset({"output", "write_urdf", "page", "timeline", "keep", "repair", "pictures"})
+"""Parameters of commands that name what is written."""
+
+
+class GuardedCommand(typer.core.TyperCommand):
+    """A command that looks at the names of all its files before it does anything."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command; an output that is also read, or written twice, is refused first."""
+        check_files(ctx.params)
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise Ended("interrupted", INTERRUPTED_CODE) from None
+
+
+def check_files(given: dict[str, Any]) -> None:
+    """Refuse names that no file can have, and outputs that are inputs or one another.
+
+    Parameters
+    ----------
+    given : dict
+        The parameters of a command, by name: paths, or text that may name a file, one or several.
+
+    Raises
+    ------
+    InputError
+        With the name and what it would be written over.
+    """
+    from posekit.safe_io import cut  # what --help does not need
+
+    read: set[str] = set()
+    for name, value in given.items():
+        for path in _paths(value):
+            real = _real(path)
+            if name not in OUTPUT_OPTIONS and real is not None and Path(real).is_file():
+                read.add(real)
+    for name in OUTPUT_OPTIONS & given.keys():
+        for path in _paths(given[name]):
+            real = _real(path)
+            if real in read:
+                raise InputError(
+                    f"{cut(path)}: would be written over another file of this command; choose another name"
+                )
+            if real is not None:
+                read.add(real)
+
+
+def _paths(value: Any) -> Iterator[str]:
+    """Yield what may name a file; of ``FILE:NAME`` the file too."""
+    for one in value if isinstance(value, list | tuple) else [value]:
+        if isinstance(one, Path):
+            yield str(one)
+        elif isinstance(one, str) and one:
+            yield one
+            if ":" in one:
+                yield one.rpartition(":")[0]
+
+
+def _real(path: str) -> str | None:
+    """Follow a name to its file, which need not exist; None where it is text that names none."""
+    try:
+        os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        pass
+    except ValueError:  # a NUL
+        return None
+    except OSError as error:
+        raise InputError(f"{path[:20]}…: {error.strerror}; expected a name that the system takes") from None
+    return os.path.realpath(path)

@@ -1,0 +1,118 @@
+"""What commands write: never over what they read, whole or not at all, and refused in one line where it cannot be."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+LONG = "x" * 300
+COMMANDS_WITH_LONG_NAMES = [
+    ("inspect", LONG),
+    ("recover", "view.json", "-o", f"{LONG}.json"),
+    ("recover", "view.json", "-o", "a.json", "--truth", LONG),
+    ("convert", "view.json", f"{LONG}.npz"),
+    ("render", "view.json", "-o", f"{LONG}.png"),
+    ("validate", "view.json", "--urdf", LONG),
+    ("batch", "view.json", "-o", LONG),
+    ("synth", "walker", "-o", f"{LONG}.json"),
+    ("samples", LONG),
+]
+OVER_THEIR_INPUT = [
+    ("recover", "view.json", "-o", "view.json"),
+    ("recover", "view.json", "-o", "a.json", "--write-urdf", "a.json"),
+    ("recover", "points.json", "--camera", "camera.toml", "-o", "camera.toml"),
+    ("recover", "points.json", "--camera", "camera.toml:first", "-o", "camera.toml"),
+    ("recover", "points.json", "--lengths", "lengths.toml", "-o", "lengths.toml"),
+    ("recover", "view.json", "--truth", "walk.npz", "-o", "./walk.npz"),
+    ("convert", "view.json", "link.json"),
+    ("validate", "view.json", "--page", "view.json"),
+    ("validate", "view.json", "--urdf", "robot.urdf", "-o", "robot.urdf"),
+    ("render", "view.json", "-o", "view.json"),
+    ("evaluate", "walk.npz", "-o", "walk.npz"),
+    ("batch", "view.json", "-o", "view.json"),
+]
+
+
+@pytest.mark.parametrize("arguments", COMMANDS_WITH_LONG_NAMES, ids=lambda arguments: arguments[0])
+def test_a_name_that_no_system_takes_is_one_line(
+    arguments: tuple[str, ...],
+    run: Callable[..., Any],
+    assert_refused: Callable[..., None],
+    files_here: Callable[[], list[str]],
+) -> None:
+    Path("view.json").write_text("{}")
+    assert_refused(run(*arguments), os.strerror(errno.ENAMETOOLONG))
+    assert files_here() == ["view.json"]
+
+
+@pytest.mark.parametrize("arguments", OVER_THEIR_INPUT, ids=lambda arguments: " ".join(arguments[-2:]))
+def test_nothing_is_written_over_what_is_read(
+    arguments: tuple[str, ...], run: Callable[..., Any], assert_refused: Callable[..., None]
+) -> None:
+    for name in ("view.json", "points.json", "camera.toml", "lengths.toml", "walk.npz", "robot.urdf"):
+        Path(name).write_text(name)
+    Path("link.json").symlink_to("view.json")
+    assert_refused(run(*arguments), "would be written over another file")
+    assert all(path.read_text() == path.resolve().name for path in Path().iterdir())
+
+
+@pytest.mark.parametrize("asked", ["recover", "validate", "convert"])
+def test_a_disk_that_takes_nothing_is_one_line(
+    asked: str,
+    run: Callable[..., Any],
+    walk: dict[str, Any],
+    assert_refused: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    Path("view.json").write_text(json.dumps(walk))
+    names = {"recover": ("-o", "out.json"), "validate": ("-o", "out.json"), "convert": ("out.npz",)}
+    original = Path.open
+
+    def refuse(self: Path, *arguments: Any, **more: Any) -> Any:
+        if self.suffix == ".part":
+            raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(self))
+        return original(self, *arguments, **more)
+
+    def refuse_removal(self: Path, missing_ok: bool = False) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(self))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(Path, "unlink", refuse_removal)
+    outcome = run(asked, "view.json", *names[asked])
+    assert outcome.code == 2
+    assert "Read-only file system" in outcome.err
+    assert outcome.err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("signal", "code", "says"), [("SIGTERM", 143, "ended from outside"), ("SIGINT", 130, "interrupted")]
+)
+def test_a_command_that_is_ended_leaves_nothing_half_written(
+    signal: str, code: int, says: str, tmp_path: Path
+) -> None:
+    # The signal comes when the file is written and has not its name yet.
+    program = f"""
+import os, pathlib, signal, sys
+from posekit.cli.main import main
+pathlib.Path.replace = lambda self, target: os.kill(os.getpid(), signal.{signal})
+sys.argv = ["posekit", "synth", "walker", "-o", "view.json", "--frames", "1"]
+main()
+"""
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (code, f"posekit: error: {says}\n")
+    assert not list(tmp_path.iterdir())
