@@ -1,7 +1,8 @@
-"""A command whose outputs are none of its inputs, and whose files have names that a system takes."""
+"""A command that looks at what it is given first: outputs are no inputs, names are a system's, numbers are finite."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +23,7 @@ class GuardedCommand(typer.core.TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an output that is also read, or written twice, is refused first."""
+        check_numbers(ctx.params)
         check_files(ctx.params)
         try:
             return super().invoke(ctx)
@@ -59,6 +61,19 @@ def check_files(given: dict[str, Any]) -> None:
                 )
             if real is not None:
                 read.add(real)
+
+
+def check_numbers(given: dict[str, Any]) -> None:
+    """Refuse numbers that are not finite, wherever an option takes one.
+
+    Raises
+    ------
+    InputError
+        With the option.
+    """
+    for name, value in given.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            raise InputError(f"--{name.replace('_', '-')}: {value}; expected a finite number; correct it")
 
 
 def _paths(value: Any) -> Iterator[str]:

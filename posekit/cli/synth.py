@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -22,7 +22,10 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
-Frames = Annotated[int, typer.Option("--frames", min=1, help="How many frames.")]
+MOST_FRAMES: Final = 10_000_000
+"""Frames that are made at once: above, memory ends."""
+
+Frames = Annotated[int, typer.Option("--frames", min=1, max=MOST_FRAMES, help="How many frames.")]
 Uncalibrated = Annotated[
     bool,
     typer.Option(

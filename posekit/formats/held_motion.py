@@ -13,12 +13,13 @@ from posekit.formats.format import Content
 from posekit.formats.held import HeldPostures
 from posekit.formats.motion import Motion, postures_of, read_motion
 from posekit.formats.motion.amass import AMASS_FORMAT, read_amass
-from posekit.formats.motion.body_size import FARTHEST_COORDINATE, BodyUnit, body_unit, stature_of
+from posekit.formats.motion.body_size import BodyUnit, body_unit, stature_of
 from posekit.formats.motion.detected import read_detected
 from posekit.formats.motion.ground_up import FoundUp, against_stated_up, find_up
 from posekit.formats.motion.motion_format import MotionFormat
 from posekit.formats.motion.people_in_motion import people_apart
 from posekit.formats.own import Postures
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.formats.recognising import Recognised
 from posekit.formats.registry import formats
 from posekit.formats.skeleton_maps import SkeletonMap

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from posekit.formats.motion.array_names import RATE_NAMES, holds_body_angles
 from posekit.formats.motion.body_model import BODY_JOINTS, BODY_PARENTS, BodyModel, read_body_model
-from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.formats.motion.motion import Motion
 from posekit.formats.motion.motion_format import MotionFormat
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.geometry.rotations import rotation_from_vector
 from posekit.safe_io import open_npz, refusal

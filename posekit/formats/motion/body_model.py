@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from posekit.errors import InputError
-from posekit.formats.motion.body_size import FARTHEST_COORDINATE
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.safe_io import open_npz, refusal
 from posekit.safe_io.npz_file import Archive

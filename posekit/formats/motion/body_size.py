@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.formats.motion.motion_format import METRES_IN_UNIT
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.safe_io import refusal
 from posekit.skeleton import JOINT, SIDES
@@ -25,10 +26,6 @@ USUAL_METRES: Final = (1.2, 2.2)
 """Statures of nearly all who are recorded: a body of 67 is one of inches, and no toddler in centimetres."""
 LEAST_METRES, MOST_METRES = 0.2, 5.0
 """Statures that are taken for metres: anything that is nearer to a body in metres than in another unit."""
-
-
-FARTHEST_COORDINATE: Final = 1e9
-"""Beyond it no point of a body is in any unit, and squares overflow."""
 
 
 class BodyUnit(NamedTuple):

@@ -14,6 +14,7 @@ from posekit.display.short_repr import short
 from posekit.display.stick_drawing import points_drawing, posture_drawing
 from posekit.errors import InputError
 from posekit.formats.distinct import check_distinct
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.safe_io import cut, nearest, refusal, shown
 from posekit.skeleton import JOINTS
@@ -97,7 +98,7 @@ class Motion(Pictured):
             raise refusal(self.source, "rate", shown(float(self.rate)), "a positive rate, finite times")
         check_distinct(self.source, "names", self.names)
         unknown = np.isnan(points)
-        bad = np.isinf(points) | (unknown ^ unknown.all(axis=-1, keepdims=True))
+        bad = (np.abs(points) > FARTHEST_COORDINATE) | (unknown ^ unknown.all(axis=-1, keepdims=True))
         if bad.any():
             frame, point, _ = (int(k) for k in np.argwhere(bad)[0])
             got = str(points[frame, point].tolist())

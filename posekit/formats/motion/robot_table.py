@@ -28,10 +28,10 @@ from posekit.formats.motion.array_names import (
     ROOT_TURNS_IN_ORDER,
     holds_robot,
 )
-from posekit.formats.motion.body_size import FARTHEST_COORDINATE
 from posekit.formats.motion.configuration_format import ConfigurationFormat
 from posekit.formats.motion.root_turn import QUATERNION_ORDERS, root_turn
 from posekit.formats.own.postures_q import ROOT_NAMES, NamedConfigurations
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.geometry import Array
 from posekit.safe_io import cut, open_npz, refusal
 

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from posekit.formats.motion.amass import SMPL_NAMES
-from posekit.formats.motion.body_size import FARTHEST_COORDINATE
+from posekit.formats.own.units import FARTHEST_COORDINATE
 from posekit.formats.skeleton_maps import SkeletonMap, load_skeleton_map
 from posekit.geometry import Array
 from posekit.safe_io import refusal

@@ -17,7 +17,7 @@ from posekit.formats.own.postures_schema import POSTURES_SCHEMA, PosturesFile
 from posekit.formats.own.result import RESULT_SCHEMAS, Result
 from posekit.formats.own.result_json import result_of
 from posekit.formats.own.result_npz import MAX_PADDED, result_in
-from posekit.formats.own.units import Unit, from_metres, to_metres
+from posekit.formats.own.units import FARTHEST_COORDINATE, Unit, from_metres, to_metres
 from posekit.safe_io.json_file import read_json
 from posekit.safe_io.npz_file import MAX_ARRAYS, Archive, not_finite, open_npz
 from posekit.safe_io.refusal import nearest, refusal, shown
@@ -136,9 +136,14 @@ def write_postures(path: str | Path, postures: Postures | Array, unit: Unit = "m
 
 
 def check_points(source: str | Path, name: str, values: NDArray[Any]) -> None:
-    """Refuse infinite coordinates, and points (..., 3) of which only a part is known."""
+    """Refuse coordinates that are infinite or too far, and points (..., 3) of which only a part is known."""
     if np.isinf(values).any():
         raise not_finite(source, name, values)
+    if (np.abs(values) > FARTHEST_COORDINATE).any():
+        far = float(values[np.abs(values) > FARTHEST_COORDINATE][0])
+        raise refusal(
+            source, name, f"{far:.3g} m", f"coordinates within {FARTHEST_COORDINATE:g} m", "check the unit"
+        )
     unknown = np.isnan(values)
     partly = unknown.any(axis=-1) & ~unknown.all(axis=-1)
     if partly.any():

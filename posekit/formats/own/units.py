@@ -17,6 +17,9 @@ UNIT_NAMES: Final = get_args(Unit)
 
 UNIT_METRES: Final[dict[str, float]] = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 """Metres in one unit."""
+FARTHEST_COORDINATE: Final = 1e9
+"""Metres, or pixels, beyond which nothing of a person or of a picture is."""
+
 PER_METRE: Final[dict[str, float]] = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 """Units in one metre. Whole numbers: dividing by them errs by half a unit in the last place, no more."""
 
@@ -75,6 +78,8 @@ def parse_length(text: str, *, name: str = "") -> float:
         )
     if match[2] not in PER_METRE:
         raise refusal(name, "", shown(text), "the unit cm, m or mm", "convert it to one of these")
+    if number > FARTHEST_COORDINATE:
+        raise refusal(name, "", shown(text), f"a length up to {FARTHEST_COORDINATE:g}", "check the number")
     if number < 0:
         raise refusal(name, "", shown(text), "a length of zero or more", "remove the sign")
     return float(Decimal(match[1]).scaleb(_EXPONENTS[match[2]]))

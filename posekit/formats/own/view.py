@@ -14,7 +14,7 @@ from posekit.display.plural import plural
 from posekit.display.short_repr import short
 from posekit.display.stick_drawing import image_drawing
 from posekit.formats.own.camera_model import CameraModel, ScaledOrthographicModel
-from posekit.formats.own.units import Unit
+from posekit.formats.own.units import FARTHEST_COORDINATE, Unit
 from posekit.formats.own.view_schema import HEAD_NAMES
 from posekit.safe_io.refusal import nearest, refusal, shown
 from posekit.settings.recover import MAX_LENGTH_DEVIATION
@@ -185,9 +185,9 @@ class View(Pictured):
 
 
 def _check_points(name: str, values: Array) -> None:
-    """Refuse infinite numbers, and points of which only a part is known."""
+    """Refuse numbers that are infinite or too far, and points of which only a part is known."""
     unknown = np.isnan(values)
-    bad = np.isinf(values)
+    bad = np.abs(values) > FARTHEST_COORDINATE
     if name == "confidence":
         bad |= values < 0
     elif values.ndim > 1:
