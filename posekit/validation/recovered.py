@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
@@ -11,9 +12,12 @@ from posekit.body import Figure, load_figure
 from posekit.formats.own import Result
 from posekit.recovery.judged import tolerances_of
 from posekit.safe_io.refusal import refusal
-from posekit.settings import EXACT_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
+from posekit.settings import EXACT_TOLERANCE, PHOTOGRAPH_TOLERANCE, RIGID_TOLERANCE, ValidateSettings
 from posekit.validators.ranges import NAMED_TABLES
 from posekit.validators.walking import THRESHOLDS_BY_WALKERS
+
+MOST_UNDER_NOISE: Final = 3.0
+"""Times what photographs are allowed that frames with noise may have been: what is stated is believed up to that."""
 
 SHORTEST_LIMB_METRES: Final = 0.2
 """Metres: by it what positions are off becomes what angles are off."""
@@ -22,7 +26,8 @@ SHORTEST_LIMB_METRES: Final = 0.2
 class RecoveredWith(NamedTuple):
     """Whose postures a result holds, and settings that judge them by what they were recovered with.
 
-    Of several kinds of frames, by what allowed most; and no more strictly than is usual.
+    Of several kinds of frames, by what allowed most; and no more strictly than is usual. No file vouches for itself:
+    what it states beyond what posekit allows is cut to that, with a warning.
     """
 
     figure: Figure
@@ -59,9 +64,23 @@ def _judged(settings: Mapping[str, Any], decimals: int | None) -> ValidateSettin
     for kind, said in tolerances_of(settings).items():
         if kind in kinds:
             within = "tolerance." if kind == "given" else f"{kind}."
-            rigid.append(_number(said, "rigid", RIGID_TOLERANCE, within=within))
-            angles.append(_number(said, "angle", EXACT_TOLERANCE.angle, within=within))
-            margins.append(_number(said, "contact", asked, within=within))
+            most = MOST_UNDER_NOISE if kind in ("noisy", "refined") else 1.0
+            metres, degrees = most * PHOTOGRAPH_TOLERANCE.rigid, most * PHOTOGRAPH_TOLERANCE.angle
+            stated = (
+                ("rigid", _number(said, "rigid", RIGID_TOLERANCE, within=within), metres, rigid),
+                ("angle", _number(said, "angle", EXACT_TOLERANCE.angle, within=within), degrees, angles),
+                ("contact", -_number(said, "contact", asked, within=within), metres, margins),
+            )
+            for name, value, bound, kept in stated:
+                if value > bound:
+                    warnings.warn(
+                        f"the result says that it was judged with {within}{name} of {value:.4g}, more than posekit "
+                        f"allows of itself: judged with {bound:.4g}; ask for more by an option if it is meant",
+                        UserWarning,
+                        stacklevel=2,
+                    )
+                kept.append((-1 if name == "contact" else 1) * min(value, bound))
+    margins[0] = max(margins[0], -PHOTOGRAPH_TOLERANCE.rigid)
     if decimals is not None:  # what was rounded may be off by that
         step = math.sqrt(3) * 10.0**-decimals
         rigid, margins = [max(rigid) + step], [min(margins) - step]

@@ -187,7 +187,9 @@ class View(Pictured):
 def _check_points(name: str, values: Array) -> None:
     """Refuse numbers that are infinite or too far, and points of which only a part is known."""
     unknown = np.isnan(values)
-    bad = np.abs(values) > FARTHEST_COORDINATE
+    bad = np.isinf(values)
+    if name in ("root", "truth"):  # metres; image points may have any unit
+        bad |= np.abs(values) > FARTHEST_COORDINATE
     if name == "confidence":
         bad |= values < 0
     elif values.ndim > 1:
