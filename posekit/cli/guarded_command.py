@@ -23,7 +23,7 @@ class GuardedCommand(typer.core.TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command; an output that is also read, or written twice, is refused first."""
-        check_numbers(ctx.params)
+        check_numbers({option.opts[0]: ctx.params.get(option.name) for option in self.params})
         check_files(ctx.params)
         try:
             return super().invoke(ctx)
@@ -73,7 +73,7 @@ def check_numbers(given: dict[str, Any]) -> None:
     """
     for name, value in given.items():
         if isinstance(value, float) and not math.isfinite(value):
-            raise InputError(f"--{name.replace('_', '-')}: {value}; expected a finite number; correct it")
+            raise InputError(f"{name}: {value}; expected a finite number; correct it")
 
 
 def _paths(value: Any) -> Iterator[str]:

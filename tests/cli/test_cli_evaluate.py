@@ -147,7 +147,7 @@ def test_frames_in_a_row_and_placed_necks(run) -> None:
         (("--heights", "9"), ("--heights",)),
         (("--heights", ","), ("--heights", "one or more")),
         (("--distance", "0m"), ("distance",)),
-        (("--f", "nan"), ("focal length",)),
+        (("--f", "nan"), ("--f: nan",)),
         (("--f", "90000"), ("leaves every picture",)),
         (("--size", "9"), ("--size", "1920x1080")),
         (("--size", "0x9"), ("--size: '0x9'", "1920x1080")),

@@ -38,8 +38,8 @@ def test_a_refusal_has_an_end() -> None:
 
 def test_names_of_recordings_are_text_in_reports_and_on_the_terminal(run: Callable[..., Any]) -> None:
     run("synth", "mocap", "--help")  # the folder of the test is made
-    motion = np.load(_walk(run))
-    content = dict(motion)
+    with np.load(_walk(run)) as motion:
+        content = dict(motion)
     content["clip_names"] = np.array([MARKUP + BELL_AND_LINK])
     content["clip_action"] = np.array([MARKUP + BELL_AND_LINK])
     np.savez("named.npz", **content)

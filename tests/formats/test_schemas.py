@@ -117,7 +117,7 @@ def write_batch(folder: Path) -> None:
                 )
                 for shard, of in (("", None), ("a.parquet", 0))
             ]
-            run.write_manifest(dict.fromkeys(TOTALS, 1), failures)
+            run.write_manifest(dict.fromkeys(TOTALS, 1), failures, {"a.parquet": "0" * 64})
 
 
 def write_all(folder, rng) -> dict[str, list]:

@@ -104,3 +104,7 @@ class ManifestFile(FileModel):
     survivors: Count
     empty: Count = Field(description="Frames without survivors.")
     failed: list[FailureFields]
+    digests: dict[str, Digest] = Field(
+        default_factory=dict,
+        description="SHA-256 of each shard's file, by its name; earlier versions have none.",
+    )
