@@ -252,7 +252,7 @@ def test_all_that_decides_a_batch_is_in_its_schema():
     settings = Recipe().document()
     assert list(settings) == list(BatchSettingsFields.model_fields)
     assert list(settings["source"]) == list(SourceFields.model_fields)
-    assert set(TOTALS) | {"schema_", "failed"} == set(ManifestFile.model_fields)
+    assert set(TOTALS) | {"schema_", "failed", "digests"} == set(ManifestFile.model_fields)
 
 
 def test_numbers_that_an_evaluation_cannot_have_are_refused(tmp_path):
