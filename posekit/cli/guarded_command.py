@@ -11,6 +11,7 @@ from typing import Any, Final
 import typer
 import typer.core
 
+from posekit.cli.options import distinct
 from posekit.cli.terminal import INTERRUPTED_CODE, Ended
 from posekit.errors import InputError
 
@@ -44,23 +45,15 @@ def check_files(given: dict[str, Any]) -> None:
     InputError
         With the name and what it would be written over.
     """
-    from posekit.safe_io import cut  # what --help does not need
-
-    read: set[str] = set()
+    read: set[Path] = set()
+    written: list[Path] = []
     for name, value in given.items():
         for path in _paths(value):
-            real = _real(path)
-            if name not in OUTPUT_OPTIONS and real is not None and Path(real).is_file():
-                read.add(real)
-    for name in OUTPUT_OPTIONS & given.keys():
-        for path in _paths(given[name]):
-            real = _real(path)
-            if real in read:
-                raise InputError(
-                    f"{cut(path)}: would be written over another file of this command; choose another name"
-                )
-            if real is not None:
-                read.add(real)
+            if name in OUTPUT_OPTIONS:
+                written.append(path)
+            elif path.is_file():
+                read.add(path.resolve())
+    distinct(*sorted(read), *written)
 
 
 def check_numbers(given: dict[str, Any]) -> None:
@@ -76,25 +69,30 @@ def check_numbers(given: dict[str, Any]) -> None:
             raise InputError(f"{name}: {value}; expected a finite number; correct it")
 
 
-def _paths(value: Any) -> Iterator[str]:
-    """Yield what may name a file; of ``FILE:NAME`` the file too."""
+def _paths(value: Any) -> Iterator[Path]:
+    """Yield what may name a file, of ``FILE:NAME`` the file too."""
     for one in value if isinstance(value, list | tuple) else [value]:
-        if isinstance(one, Path):
-            yield str(one)
-        elif isinstance(one, str) and one:
-            yield one
-            if ":" in one:
-                yield one.rpartition(":")[0]
+        if not isinstance(one, Path | str):
+            continue
+        listed = isinstance(one, str) and "," in one
+        for text in (str(one), one.rpartition(":")[0] if isinstance(one, str) else ""):
+            if text and _may_be_named(text, listed):
+                yield Path(text)
 
 
-def _real(path: str) -> str | None:
-    """Follow a name to its file, which need not exist; None where it is text that names none."""
+def _may_be_named(path: str, listed: bool) -> bool:
+    """Tell whether a file may have a name, which need not exist.
+
+    A name that no system takes is refused; what lists several things by commas is only then none.
+    """
     try:
         os.lstat(path)
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         pass
     except ValueError:  # a NUL
-        return None
+        return False
     except OSError as error:
+        if listed:
+            return False
         raise InputError(f"{path[:20]}…: {error.strerror}; expected a name that the system takes") from None
-    return os.path.realpath(path)
+    return True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -64,15 +65,16 @@ def about(file: Path) -> Iterator[None]:
 
 def distinct(*paths: Path | None) -> None:
     """Refuse to write over what is read, or two outputs over each other."""
-    places: set[Path] = set()
+    places: set[str] = set()
     for path in paths:
         if path is None:
             continue
-        if path.resolve() in places:
+        place = os.path.realpath(path)
+        if place in places:
             raise InputError(
                 f"{path}: would be written over another file of this command; choose another name"
             )
-        places.add(path.resolve())
+        places.add(place)
 
 
 def split(text: str) -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from typing import Any
 
 import pytest
 
+from posekit.skeleton import DOFS
+
 LONG = "x" * 300
 COMMANDS_WITH_LONG_NAMES = [
     ("inspect", LONG),
@@ -102,6 +104,7 @@ def test_a_command_that_is_ended_leaves_nothing_half_written(
     program = f"""
 import os, pathlib, signal, sys
 from posekit.cli.main import main
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background jobs ignore it
 pathlib.Path.replace = lambda self, target: os.kill(os.getpid(), signal.{signal})
 sys.argv = ["posekit", "synth", "walker", "-o", "view.json", "--frames", "1"]
 main()
@@ -116,3 +119,13 @@ main()
     )
     assert (ended.returncode, ended.stderr) == (code, f"posekit: error: {says}\n")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_long_list_is_no_name_of_a_file(run: Callable[..., Any]) -> None:
+    pytest.importorskip("matplotlib")
+    assert run("synth", "walker", "-o", "view.json", "--frames", 1).code == 0
+    assert run("recover", "view.json", "-o", "result.npz").code == 0
+    every = ",".join(DOFS)
+    assert len(every) > 255
+    outcome = run("render", "result.npz", "--angles", every, "-o", "angles.png")
+    assert (outcome.code, outcome.err) == (0, "")
