@@ -18,7 +18,7 @@ from posekit.cli.groups import with_groups
 from posekit.cli.judging_options import Judging, TolerancesAsRecover
 from posekit.cli.noise_options import UncertainAsRecover
 from posekit.cli.options import ContactMargin, examples, option, signed_length
-from posekit.cli.terminal import say
+from posekit.cli.terminal import INTERRUPTED_CODE, Ended, say
 from posekit.display.plural import plural
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ BATCH_EXAMPLES = examples(
     "posekit batch views.parquet -o results --jobs 16 --q --margins",
     "posekit batch archive/ -o results --cluster 10.0.0.1:6379",
 )
-EXIT_SOME_FAILED, EXIT_INTERRUPTED = 1, 130
+EXIT_SOME_FAILED = 1
 PROGRESS_EVERY_SECONDS = 10.0
 """Seconds between two lines of progress where there is no terminal."""
 
@@ -128,8 +128,7 @@ def batch(
                 progress=progress,
             )
     except KeyboardInterrupt:
-        say(f"posekit: error: interrupted; run it again to go on in {output}", err=True)
-        raise typer.Exit(EXIT_INTERRUPTED) from None
+        raise Ended(f"interrupted; run it again to go on in {output}", INTERRUPTED_CODE) from None
     _report(summary, output)
     if summary.failures:
         raise typer.Exit(EXIT_SOME_FAILED)

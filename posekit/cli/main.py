@@ -136,10 +136,14 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 def _fail(message: str, code: int = BAD_INPUT) -> int:
-    from posekit.safe_io import bounded
-
-    say(f"posekit: error: {bounded(' '.join(message.split()))}", err=True)
+    _say_line("error", message)
     return code
+
+
+def _say_line(kind: str, message: str) -> None:
+    from posekit.safe_io import bounded  # what --help does not need
+
+    say(f"posekit: {kind}: {bounded(' '.join(message.split()))}", err=True)
 
 
 def _warn(
@@ -151,8 +155,5 @@ def _warn(
     line: str | None = None,
 ) -> None:
     """Print a warning to the user as one line, without the place in the code; others are for developers."""
-    from posekit.safe_io import bounded
-
-    if not issubclass(category, UserWarning):
-        return
-    say(f"posekit: warning: {bounded(' '.join(str(message).split()))}", err=True)
+    if issubclass(category, UserWarning):
+        _say_line("warning", str(message))

@@ -224,6 +224,7 @@ def render(
         timeout=timeout,
     )
     moving = check_picture(output, shot)
+    over_time = moving and not turntable
     content, behind = read_given(file, behind_file, explain=rejected)
     if (
         output.suffix.lower() == ".html"
@@ -242,15 +243,15 @@ def render(
         if truth is not None:
             true = _truth_of(truth, content, behind, behind_file, rejected)
         asked = DrawnChoice(frame=frame, posture=posture, rejected=rejected, truth=true)
-        subject, frames = asked.of(content, behind, moving=moving and not turntable)
-    arranged = asked.layout(moving=moving and not turntable, through_view=through_view)
+        subject, frames = asked.of(content, behind, moving=over_time)
+    arranged = asked.layout(moving=over_time, through_view=through_view)
     style = Style(
         layout=layout.value if layout else arranged,
         background=background,
         camera=camera and truth is None,
         ground=ground,
     )
-    if fps is None and moving and not turntable:
+    if fps is None and over_time:
         shot = replace(shot, fps=real_time([one.time for one in frames]))
     with progress("drawing", turntable if moving and turntable else len(frames) if moving else 1) as done:
         count = write_picture(output, subject, frames, style=style, shot=shot, title=file.name, progress=done)
