@@ -149,7 +149,7 @@ class RunFolder:
 
     def remove_others(self, names: set[str]) -> int:
         """Remove results that are not among these, and say how many there were."""
-        others = [one for one in (self.path / SHARDS_FOLDER).iterdir() if one.name not in names]
+        others = self._others(names)
         for one in others:
             with writing(one):
                 one.unlink()
@@ -163,7 +163,7 @@ class RunFolder:
         InputError
             Where a shard has not one of these names.
         """
-        others = sorted(one.name for one in (self.path / SHARDS_FOLDER).iterdir() if one.name not in names)
+        others = self._others(names)
         if others:
             raise refusal(
                 self.path,
@@ -172,6 +172,9 @@ class RunFolder:
                 "a run's own results",
                 "choose another folder, or give --overwrite",
             )
+
+    def _others(self, names: set[str]) -> list[Path]:
+        return [one for one in (self.path / SHARDS_FOLDER).iterdir() if one.name not in names]
 
     def remove_staged(self) -> None:
         """Remove the tables of image points; what they held is done."""

@@ -97,6 +97,8 @@ class Run:
         self.missing: list[Shard] = []
         self.failures: list[Failure] = []
         self.done: list[Finished] = []
+        self.known = known_digests(folder.path)
+        self.found: dict[str, Finished] = {}
         self.skipped = 0
         self.peak = 0
         self.warned = 0
@@ -111,11 +113,11 @@ class Run:
         ]
         self._stage(jobs)
         # Tables are removed when a run is done. One that goes on needs those of inputs with shards that are missing.
-        again, known = [], known_digests(self.folder.path)
+        again = []
         for k, one in enumerate(self.staged):
             lacking = any(not Path(table.path).is_file() for table in one.tables)
             if lacking and any(
-                finished(shard, known) is None
+                self._there(shard) is None
                 for shard in shards_of(one, self.recipe, self.hash, self.folder.path)
             ):
                 again.append(k)
@@ -127,6 +129,15 @@ class Run:
         if not self.staged:
             more = f" (and {len(self.failures) - 1} more)" if len(self.failures) > 1 else ""
             raise InputError(f"{self.failures[0].error}{more}")
+
+    def _there(self, shard: Shard) -> Finished | None:
+        """Look at a shard's file; at one that is whole only once, since all of it is read."""
+        if shard.name not in self.found:
+            there = finished(shard, self.known)
+            if there is None:
+                return None
+            self.found[shard.name] = there
+        return self.found[shard.name]
 
     def _stage(self, jobs: Sequence[Staging]) -> None:
         for count, outcome in enumerate(self.pool.run(stage, jobs), 1):
@@ -152,9 +163,8 @@ class Run:
         """Cut the inputs into shards, and find those whose files are there."""
         for one in self.staged:
             self.shards.extend(shards_of(one, self.recipe, self.hash, self.folder.path))
-        known = known_digests(self.folder.path)
         for shard in self.shards:
-            there = finished(shard, known)
+            there = self._there(shard)
             if there is None:
                 self.missing.append(shard)
             else:
