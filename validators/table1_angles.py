@@ -75,8 +75,8 @@ def paper_axes(points: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LimbBall(Check):
-    """Shoulder or hip: flexion and abduction of the limb's upper segment (§3.2.A i)."""
+class Table1Limb(Check):
+    """What is judged of a limb: some of its joints from the torso on, by their names without the side."""
 
     ranges: Ranges
     tolerance: float
@@ -87,21 +87,26 @@ class LimbBall(Check):
     noise = Loosening.DIRECTIONS
     pulls = True
 
-    @cached_property
-    def places(self) -> tuple[Place, ...]:
-        """Flexion and abduction."""
-        joint = f"{self.side}_{self.limb[0]}"
-        return Place.of_angles(f"{joint}.flexion", f"{joint}.abduction")
-
     @property
     def points(self) -> tuple[int, ...]:
-        """The torso, then the joint and the one beyond."""
+        """The torso, then the limb's joints."""
         return TORSO_POINTS + tuple(JOINT[f"{self.side}_{joint}"] for joint in self.limb)
 
     @property
     def scaled(self) -> bool:
         """Whether its tolerance grows where the angles turn faster than the limb."""
         return self.ranges.kind == "rotation"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LimbBall(Table1Limb):
+    """Shoulder or hip: flexion and abduction of the limb's upper segment (§3.2.A i)."""
+
+    @cached_property
+    def places(self) -> tuple[Place, ...]:
+        """Flexion and abduction."""
+        joint = f"{self.side}_{self.limb[0]}"
+        return Place.of_angles(f"{joint}.flexion", f"{joint}.abduction")
 
     def judge(self, points: Array) -> Findings:
         """Judge both angles; see `posekit.tree.Check`."""
@@ -136,22 +141,13 @@ def _ball_angles(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class LimbHinge(Check):
+class LimbHinge(Table1Limb):
     """Elbow or knee: the flexion between the two segments (§3.2.A ii); the hip's range goes with it.
 
     At the knee the hip's flexion is judged again: its range is the wide one only where the knee is flexed (Table 1,
     note a). The bound moves from one to the other as the knee flexes by `Ranges.knee_flexed`; of printed angles it
     jumps there.
     """
-
-    ranges: Ranges
-    tolerance: float
-    side: str
-    limb: tuple[str, ...]
-    name: str = "joint_range"
-    unit: str = "deg"
-    noise = Loosening.DIRECTIONS
-    pulls = True
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
@@ -160,16 +156,6 @@ class LimbHinge(Check):
         return Place.of_angles(
             *((hinge,) if self.limb[1] == "elbow" else (hinge, f"{self.side}_hip.flexion"))
         )
-
-    @property
-    def points(self) -> tuple[int, ...]:
-        """The torso, then the limb's three joints."""
-        return TORSO_POINTS + tuple(JOINT[f"{self.side}_{joint}"] for joint in self.limb)
-
-    @property
-    def scaled(self) -> bool:
-        """Whether its tolerance grows where the angles turn faster than the limb."""
-        return self.ranges.kind == "rotation"
 
     def judge(self, points: Array) -> Findings:
         """Judge the hinge; see `posekit.tree.Check`."""
